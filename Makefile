@@ -1,0 +1,55 @@
+# `make` alone lists the targets. Everything is built inside this folder, in .venv and out.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+OUT := out
+# Temporary files of the tests stay in the checkout too.
+PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test test-all lint format benchmark clean
+
+help:  ## List the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+
+demo: $(STAMP)  ## Score, choose, verify and draw shaving in the wheelchair; results in out/demo
+	@mkdir -p $(OUT)
+	$(BIN)/python scripts/demo.py --out $(OUT)/demo
+
+test: lint  ## Format, lint, types, import rules, doctests and tests: what CI runs
+	@mkdir -p $(OUT)
+	$(PYTEST) -m "not slow"
+
+test-all: lint  ## The same with the slow tests
+	@mkdir -p $(OUT)
+	$(PYTEST)
+
+lint: $(STAMP)  ## Format, lint, types and import rules
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(STAMP)  ## Rewrite the code in house format and fix what can be fixed
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+benchmark: $(STAMP)  ## Print the measured numbers with machine, versions and spread
+	$(BIN)/python benchmarks/run.py
+
+clean:  ## Remove everything the other targets made
+	rm -rf $(VENV) $(OUT) build dist
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find tcs tests scripts benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+
+# Installed again only when pyproject.toml changes; the checkout itself is what gets imported.
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "tcs needs Python 3.11 or newer, but '$(PYTHON)' is not. Try: make PYTHON=python3.11 $(MAKECMDGOALS)" >&2; \
+	  exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[dev]'
+	@touch $@

@@ -1,0 +1,120 @@
+"""Where the free joint may stand at all, in closed form, and where it is worth a closer look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import jit
+from tcs.kernel.solver import ArmSolver
+
+MAX_ARCS = 6
+"""Two arcs mirror each other about the direction of the goal; limits cut each at most in two, and
+the full turn of a continuous joint once more."""
+
+IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
+
+
+@jit
+def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int, int]:
+    """Fill the arcs of joint 1 from which the elbow can span the way from shoulder to wrist.
+
+    |SW|^2 is a cosine of q1 about the direction of the goal, and a cosine of q4: the limits of
+    joint 4 bound the first cosine from both sides.
+
+    Args:
+        arm: The arm.
+        goal: From `wrist_goal`, shape (4, 3).
+        arcs: Filled with (first, last) [rad], shape (MAX_ARCS, 2); within the limits of joint 1.
+
+    Returns:
+        The number of arcs, and IN_REACH, OUT_OF_REACH (no angle of joint 1 at all would do) or
+        OUT_OF_LIMITS (joint 1 would have to pass its limits).
+    """
+    wx, wy, wz = goal[0, 0], goal[0, 1], goal[0, 2]
+    sx, sy, sz = arm.p[1, 0], arm.p[1, 1], arm.p[1, 2]
+    near = arm.reach[0] + arm.reach[1] * arm.elbow_cos[0]
+    far = arm.reach[0] + arm.reach[1] * arm.elbow_cos[1]
+    steady = wx * wx + wy * wy + wz * wz + sx * sx + sy * sy + sz * sz - 2.0 * wz * sz
+    cosine, sine = wx * sx + wy * sy, wy * sx - wx * sy
+    swing = 2.0 * np.hypot(cosine, sine)
+    centre = np.arctan2(sine, cosine)
+    inner, outer = 0.0, np.pi
+    # |SW|^2 = steady - swing cos(q1 - centre) must lie in [near, far].
+    if steady - swing > far or steady + swing < near:
+        return 0, OUT_OF_REACH
+    if steady - swing < near:
+        inner = np.arccos(min(max((steady - near) / swing, -1.0), 1.0))
+    if steady + swing > far:
+        outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0))
+    lower, upper = arm.lower[0], arm.upper[0]
+    if not np.isfinite(lower):
+        # A continuous joint: one full turn about the direction of the goal holds all there is.
+        if inner == 0.0:
+            arcs[0, 0], arcs[0, 1] = centre - outer, centre + outer
+            return 1, IN_REACH
+        arcs[0, 0], arcs[0, 1] = centre - outer, centre - inner
+        arcs[1, 0], arcs[1, 1] = centre + inner, centre + outer
+        return 2, IN_REACH
+    count = 0
+    for turn in range(-1, 2):
+        middle = centre + 2.0 * np.pi * turn
+        for side in range(2):
+            first, last = middle - outer, middle - inner
+            if side == 1:
+                first, last = middle + inner, middle + outer
+            first, last = max(first, lower), min(last, upper)
+            if first > last:
+                continue
+            if count and arcs[count - 1, 1] >= first:
+                arcs[count - 1, 1] = last
+            elif count < MAX_ARCS:
+                arcs[count, 0], arcs[count, 1] = first, last
+                count += 1
+    return count, IN_REACH if count else OUT_OF_LIMITS
+
+
+@jit
+def windows_of(
+    slack: FloatArray, count: int, step: float, windows: FloatArray, found: int
+) -> int:
+    """Append the stretches of a row of lanes in which feasible angles lie or may hide.
+
+    A stretch is a run of feasible lanes with its two neighbours, or the two neighbours of an
+    infeasible lane that comes closer to feasible than both: a window narrower than the spacing
+    shows as such a peak.
+
+    Args:
+        slack: Of neighbouring lanes, shape (>= count,).
+        count: How many lanes there are.
+        step: Their spacing [rad].
+        windows: Filled with (first, last) as lane indices, shape (room, 2).
+        found: How many windows are there already.
+
+    Returns:
+        How many windows are there now.
+    """
+    i = 0
+    while i < count and found < windows.shape[0]:
+        if slack[i] >= 0.0:
+            j = i
+            while j + 1 < count and slack[j + 1] >= 0.0:
+                j += 1
+            windows[found, 0], windows[found, 1] = max(i - 1, 0), min(j + 1, count - 1)
+            found += 1
+            i = j + 1
+            continue
+        left = slack[i - 1] if i > 0 else -np.inf
+        right = slack[i + 1] if i + 1 < count else -np.inf
+        peak = slack[i] >= left and slack[i] >= right
+        if peak and slack[i] > -PEAK_SLOPE * step and left < 0.0 and right < 0.0:
+            windows[found, 0], windows[found, 1] = max(i - 1, 0), min(i + 1, count - 1)
+            found += 1
+        i += 1
+    return found
+
+
+PEAK_SLOPE = 4.0
+"""How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
+difference of cosines of joint angles, which move at most a few radians per radian of joint 1
+away from singularities; steeper windows are narrower than what a dense scan resolves."""

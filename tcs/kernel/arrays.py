@@ -1,0 +1,107 @@
+"""The arrays a scene is lowered to: all the kernel ever sees.
+
+Frames (letters as in Drake): W environment, B robot base, A arm base (the link
+that carries joint 1 of the arm, at the torso level in force), L1..L7 the arm's
+links, T the tool, G a goal. Link frames are chosen so that joint i turns about
+the z axis of `Li` and `X_AL1..7` follow from `Chain` alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+SPHERE, CAPSULE, BOX = 0, 1, 2
+"""Shape kinds. `size` holds: sphere (radius, 0, 0); capsule along its own z
+(radius, half length between cap centres, 0); box (three half sizes)."""
+
+
+class Chain(NamedTuple):
+    """A serial arm of seven revolute joints, each about the z axis of its own link frame.
+
+    X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1] Rz(qi), X_AT = X_AL7 F[7].
+    """
+
+    R: FloatArray
+    """Rotations of F, shape (8, 3, 3)."""
+    p: FloatArray
+    """Translations of F [m], shape (8, 3)."""
+    lower: FloatArray
+    """Lower joint limits [rad], shape (7,); -inf where continuous."""
+    upper: FloatArray
+    """Upper joint limits [rad], shape (7,); +inf where continuous."""
+
+
+class Shapes(NamedTuple):
+    """Collision shapes, in one or several states of whatever carries them."""
+
+    kind: NDArray[np.int8]
+    """SPHERE, CAPSULE or BOX, shape (n,)."""
+    size: FloatArray
+    """Sizes [m], shape (n, 3)."""
+    pad: FloatArray
+    """How far the true surface may stand out of the shape [m], shape (n,)."""
+    body: NDArray[np.int16]
+    """Index of the body it belongs to, in the lowered scene's list of names, shape (n,)."""
+    frame: NDArray[np.int8]
+    """What carries it, shape (n,). Arm shapes: 1..7, the link. Body shapes: 0 what stays when
+    the torso moves, 1 what rides on it. Room shapes: 0."""
+    R: FloatArray
+    """Orientations, shape (states, n, 3, 3)."""
+    p: FloatArray
+    """Centres [m], shape (states, n, 3)."""
+
+
+class SceneArrays(NamedTuple):
+    """Everything needed to score any initial configuration of one scene against its goals.
+
+    Shapes i and j collide when they come closer than `max(margin, pad_i + pad_j)`.
+    """
+
+    chain: Chain
+    arm_base_R: FloatArray
+    """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
+    arm_base_p: FloatArray
+    """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
+    arm: Shapes
+    """Shapes the arm moves, one state: poses in link frames. Frame 7 is the gripper."""
+    body: Shapes
+    """Every other shape of the robot: poses in B, one state for each torso level."""
+    room: Shapes
+    """Furniture, person, obstacles: poses in W, one state for each environment state."""
+    arm_vs_arm: BoolArray
+    """Pairs that are checked, shape (n_arm, n_arm); symmetric, diagonal False."""
+    arm_vs_body: BoolArray
+    """Pairs that are checked, shape (n_arm, n_body)."""
+    arm_vs_room: BoolArray
+    """Pairs that are checked, shape (n_arm, n_room)."""
+    body_vs_room: BoolArray
+    """Pairs that are checked, shape (n_body, n_room)."""
+    margin: float
+    """Contacts closer than this count as collision [m]."""
+    goal_R: FloatArray
+    """Goal orientations in W, shape (environment states, goals, 3, 3)."""
+    goal_p: FloatArray
+    """Goal positions in W [m], shape (environment states, goals, 3)."""
+
+
+class GridArrays(NamedTuple):
+    """The discretised initial configurations, eta in the TCS paper.
+
+    Flat order is C order over (environment state, base x, base y, base yaw, torso level).
+    """
+
+    environment_states: int
+    base_x: FloatArray
+    """[m], shape (nx,)."""
+    base_y: FloatArray
+    """[m], shape (ny,)."""
+    base_yaw: FloatArray
+    """[rad], shape (nyaw,)."""
+    torso_levels: int

@@ -1,0 +1,78 @@
+"""Compile kernel functions once per machine, into a folder that cannot go stale.
+
+Numba's own cache looks only at the file a cached function stands in: after an edit in a file it
+imports from, it would serve machine code of the old text. So every function here is cached in a
+folder named by a hash of all kernel sources, the numba version and the processor.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import llvmlite.binding as llvm
+import numba
+
+from tcs.errors import OutputError
+from tcs.paths import cache_folder
+
+_log = logging.getLogger(__name__)
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def kernel_digest(folder: Path) -> str:
+    """Return a hash of everything that decides the machine code, as 16 hex digits.
+
+    Args:
+        folder: The folder whose `*.py` files are the kernel's sources.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    cpu = f"{llvm.get_host_cpu_name()}{llvm.get_host_cpu_features().flatten()}"
+    versions = f"{numba.__version__} {platform.python_version()} {cpu}"
+    digest.update(versions.encode())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def jit_folder() -> Path | None:
+    """Return the folder of today's machine code, or None when no folder can be written."""
+    try:
+        folder = cache_folder() / "jit" / kernel_digest(Path(__file__).parent)
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(13, "not writable", str(folder))
+    except (OSError, OutputError) as error:
+        _log.warning("The kernel compiles anew in every run: %s", error)
+        return None
+    return folder
+
+
+def is_compiled() -> bool:
+    """Return whether an earlier run has left machine code for the whole scoring kernel."""
+    folder = jit_folder()
+    return folder is not None and any(folder.rglob("sweep.score_slice*.nbc"))
+
+
+def jit(function: _Function) -> _Function:
+    """Compile `function` without the GIL, IEEE arithmetic, and keep its machine code on disk.
+
+    Division by zero gives inf or nan as in numpy. No `fastmath`: verdicts must not depend on how
+    a compiler reorders sums. Contraction to fused multiply-add is off for the same reason.
+    """
+    folder = jit_folder()
+    before = numba.config.CACHE_DIR
+    # Numba takes the cache folder from this global while it decorates, and only then.
+    numba.config.CACHE_DIR = str(folder) if folder else ""
+    try:
+        compiled = numba.njit(nogil=True, cache=folder is not None, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    return compiled  # type: ignore[no-any-return]

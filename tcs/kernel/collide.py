@@ -1,0 +1,272 @@
+"""Are two shapes closer than a gap? Exact, for spheres, capsules and boxes.
+
+Every shape is a core (point, segment, box) grown by a radius (0 for boxes), so each question is a
+distance between cores. Distances are exact, not bounds: Drake must give the same verdict.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray, Shapes
+from tcs.kernel.cache import jit
+
+PARALLEL = 1e-12
+"""Squared sine below which two edges count as parallel: their cross product is no axis then."""
+
+
+# Columns of packed shapes. A shape is one row of floats: its inner loops then touch one array.
+KIND, BALL, SIZE, CENTRE, TURN, COLUMNS = 0, 1, 2, 5, 8, 17
+"""Kind; radius of the ball about the centre that holds the shape [m]; three sizes as in `Shapes`
+[m]; centre [m]; rotation matrix row by row."""
+
+
+def pack(shapes: Shapes, order: IntArray | None = None) -> FloatArray:
+    """Return shapes as rows, shape (states, n, COLUMNS), in `order` if one is given."""
+    states, n = shapes.p.shape[:2]
+    kind, size = shapes.kind, shapes.size
+    length = np.linalg.norm(size, axis=1)
+    ball = np.where(kind == CAPSULE, size[:, 0] + size[:, 1], size[:, 0])
+    rows = np.empty((states, n, COLUMNS))
+    rows[..., KIND] = kind
+    rows[..., BALL] = np.where(kind == BOX, length, ball)
+    rows[..., SIZE : SIZE + 3] = size
+    rows[..., CENTRE : CENTRE + 3] = shapes.p
+    rows[..., TURN:] = shapes.R.reshape(states, n, 9)
+    return rows if order is None else np.ascontiguousarray(rows[:, order])
+
+
+@jit
+def move(R: FloatArray, p: FloatArray, local: FloatArray, i: int, out: FloatArray, k: int) -> None:
+    """Place row i of `local` at the pose (R, p), as row k of `out`."""
+    for c in range(CENTRE):
+        out[k, c] = local[i, c]
+    x, y, z = local[i, CENTRE], local[i, CENTRE + 1], local[i, CENTRE + 2]
+    for r in range(3):
+        a, b, c_ = R[r, 0], R[r, 1], R[r, 2]
+        out[k, CENTRE + r] = p[r] + a * x + b * y + c_ * z
+        for c in range(3):
+            out[k, TURN + 3 * r + c] = (
+                a * local[i, TURN + c] + b * local[i, TURN + 3 + c] + c_ * local[i, TURN + 6 + c]
+            )
+
+
+@jit
+def balls_meet(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
+    """Return whether the balls about two shapes are closer than `gap` [m]: ask before `closer`.
+
+    On its own because a function that calls another one counts references to its arrays, which
+    costs more than these few sums, and nearly every pair ends here.
+    """
+    x = b[j, CENTRE] - a[i, CENTRE]
+    y = b[j, CENTRE + 1] - a[i, CENTRE + 1]
+    z = b[j, CENTRE + 2] - a[i, CENTRE + 2]
+    apart = a[i, BALL] + b[j, BALL] + gap
+    return x * x + y * y + z * z < apart * apart
+
+
+@jit
+def closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
+    """Return whether shape i of a and shape j of b are closer than `gap` > 0 [m]."""
+    if a[i, KIND] > b[j, KIND]:
+        a, i, b, j = b, j, a, i
+    if a[i, KIND] == BOX:
+        return _boxes_closer(a, i, b, j, gap)
+    reach = a[i, SIZE] + gap
+    half_a = a[i, SIZE + 1] if a[i, KIND] == CAPSULE else 0.0
+    if b[j, KIND] == BOX:
+        return _segment_box(a, i, half_a, b, j) < reach * reach
+    reach += b[j, SIZE]
+    half_b = b[j, SIZE + 1] if b[j, KIND] == CAPSULE else 0.0
+    return _segments(a, i, half_a, b, j, half_b) < reach * reach
+
+
+@jit
+def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_b: float) -> float:
+    """Return the squared distance between two segments along the shapes' z axes [m^2]."""
+    ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
+    vx, vy, vz = b[j, TURN + 2], b[j, TURN + 5], b[j, TURN + 8]
+    x, y, z = b[j, CENTRE] - a[i, CENTRE], b[j, CENTRE + 1] - a[i, CENTRE + 1], b[j, CENTRE + 2] - a[i, CENTRE + 2]
+    c = ux * vx + uy * vy + uz * vz
+    along_a = ux * x + uy * y + uz * z
+    along_b = vx * x + vy * y + vz * z
+    sine = 1.0 - c * c
+    s = 0.0
+    if sine > PARALLEL:
+        s = min(max((along_a - c * along_b) / sine, -half_a), half_a)
+    t = s * c - along_b
+    if abs(t) > half_b:
+        t = half_b if t > 0.0 else -half_b
+        s = min(max(t * c + along_a, -half_a), half_a)
+    elif sine <= PARALLEL:
+        s = min(max(t * c + along_a, -half_a), half_a)
+        t = min(max(s * c - along_b, -half_b), half_b)
+    dx, dy, dz = x + t * vx - s * ux, y + t * vy - s * uy, z + t * vz - s * uz
+    return dx * dx + dy * dy + dz * dz
+
+
+@jit
+def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> float:
+    """Return the squared distance from a segment along shape i's z axis to box j [m^2]."""
+    x, y, z = a[i, CENTRE] - b[j, CENTRE], a[i, CENTRE + 1] - b[j, CENTRE + 1], a[i, CENTRE + 2] - b[j, CENTRE + 2]
+    ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
+    px = b[j, TURN] * x + b[j, TURN + 3] * y + b[j, TURN + 6] * z
+    py = b[j, TURN + 1] * x + b[j, TURN + 4] * y + b[j, TURN + 7] * z
+    pz = b[j, TURN + 2] * x + b[j, TURN + 5] * y + b[j, TURN + 8] * z
+    dx = half * (b[j, TURN] * ux + b[j, TURN + 3] * uy + b[j, TURN + 6] * uz)
+    dy = half * (b[j, TURN + 1] * ux + b[j, TURN + 4] * uy + b[j, TURN + 7] * uz)
+    dz = half * (b[j, TURN + 2] * ux + b[j, TURN + 5] * uy + b[j, TURN + 8] * uz)
+    return _line_box(
+        px - dx, py - dy, pz - dz, 2.0 * dx, 2.0 * dy, 2.0 * dz,
+        b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2],
+    )  # fmt: skip
+
+
+@jit
+def _beyond(x: float, h: float) -> float:
+    """Return how far x lies outside [-h, h], signed."""
+    return max(x - h, 0.0) + min(x + h, 0.0)
+
+
+@jit
+def _line_box(
+    px: float, py: float, pz: float,
+    dx: float, dy: float, dz: float,
+    hx: float, hy: float, hz: float,
+) -> float:  # fmt: skip
+    """Return the squared distance between p + t d, t in [0, 1], and the box of half sizes h.
+
+    Half the derivative of the squared distance, g(t) = d . beyond(p + t d), grows with t and is
+    linear between the values of t at which a coordinate passes a face: narrow down to the piece
+    that holds the root, then interpolate.
+    """
+    low, high = 0.0, 1.0
+    g_low = dx * _beyond(px, hx) + dy * _beyond(py, hy) + dz * _beyond(pz, hz)
+    t = 0.0
+    if g_low < 0.0:
+        qx, qy, qz = px + dx, py + dy, pz + dz
+        g_high = dx * _beyond(qx, hx) + dy * _beyond(qy, hy) + dz * _beyond(qz, hz)
+        t = 1.0
+        if g_high > 0.0:
+            for face in range(6):
+                p, d, h = px, dx, hx
+                if face % 3 == 1:
+                    p, d, h = py, dy, hy
+                elif face % 3 == 2:
+                    p, d, h = pz, dz, hz
+                if d == 0.0:
+                    continue
+                cut = ((h if face < 3 else -h) - p) / d
+                if low < cut < high:
+                    qx, qy, qz = px + cut * dx, py + cut * dy, pz + cut * dz
+                    g = dx * _beyond(qx, hx) + dy * _beyond(qy, hy) + dz * _beyond(qz, hz)
+                    if g <= 0.0:
+                        low, g_low = cut, g
+                    else:
+                        high, g_high = cut, g
+            t = low - g_low * (high - low) / (g_high - g_low)
+    ex = _beyond(px + t * dx, hx)
+    ey = _beyond(py + t * dy, hy)
+    ez = _beyond(pz + t * dz, hz)
+    return ex * ex + ey * ey + ez * ez
+
+
+@jit
+def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
+    """Return whether two boxes are closer than `gap`.
+
+    The 15 separating axes decide nearly every case: a projected distance above the gap keeps the
+    boxes apart, none above zero means overlap. In between, the least distance is attained on an
+    edge of one box, so the 24 edges are measured.
+    """
+    x, y, z = b[j, CENTRE] - a[i, CENTRE], b[j, CENTRE + 1] - a[i, CENTRE + 1], b[j, CENTRE + 2] - a[i, CENTRE + 2]
+    ax, ay, az = a[i, SIZE], a[i, SIZE + 1], a[i, SIZE + 2]
+    bx, by, bz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
+    tx = a[i, TURN] * x + a[i, TURN + 3] * y + a[i, TURN + 6] * z
+    m00 = a[i, TURN] * b[j, TURN] + a[i, TURN + 3] * b[j, TURN + 3] + a[i, TURN + 6] * b[j, TURN + 6]
+    m01 = a[i, TURN] * b[j, TURN + 1] + a[i, TURN + 3] * b[j, TURN + 4] + a[i, TURN + 6] * b[j, TURN + 7]
+    m02 = a[i, TURN] * b[j, TURN + 2] + a[i, TURN + 3] * b[j, TURN + 5] + a[i, TURN + 6] * b[j, TURN + 8]
+    most = abs(tx) - (ax + abs(m00) * bx + abs(m01) * by + abs(m02) * bz)
+    if most >= gap:
+        return False
+    ty = a[i, TURN + 1] * x + a[i, TURN + 4] * y + a[i, TURN + 7] * z
+    m10 = a[i, TURN + 1] * b[j, TURN] + a[i, TURN + 4] * b[j, TURN + 3] + a[i, TURN + 7] * b[j, TURN + 6]
+    m11 = a[i, TURN + 1] * b[j, TURN + 1] + a[i, TURN + 4] * b[j, TURN + 4] + a[i, TURN + 7] * b[j, TURN + 7]
+    m12 = a[i, TURN + 1] * b[j, TURN + 2] + a[i, TURN + 4] * b[j, TURN + 5] + a[i, TURN + 7] * b[j, TURN + 8]
+    most = max(most, abs(ty) - (ay + abs(m10) * bx + abs(m11) * by + abs(m12) * bz))
+    if most >= gap:
+        return False
+    tz = a[i, TURN + 2] * x + a[i, TURN + 5] * y + a[i, TURN + 8] * z
+    m20 = a[i, TURN + 2] * b[j, TURN] + a[i, TURN + 5] * b[j, TURN + 3] + a[i, TURN + 8] * b[j, TURN + 6]
+    m21 = a[i, TURN + 2] * b[j, TURN + 1] + a[i, TURN + 5] * b[j, TURN + 4] + a[i, TURN + 8] * b[j, TURN + 7]
+    m22 = a[i, TURN + 2] * b[j, TURN + 2] + a[i, TURN + 5] * b[j, TURN + 5] + a[i, TURN + 8] * b[j, TURN + 8]
+    most = max(most, abs(tz) - (az + abs(m20) * bx + abs(m21) * by + abs(m22) * bz))
+    s = tx * m00 + ty * m10 + tz * m20
+    most = max(most, abs(s) - (bx + abs(m00) * ax + abs(m10) * ay + abs(m20) * az))
+    s = tx * m01 + ty * m11 + tz * m21
+    most = max(most, abs(s) - (by + abs(m01) * ax + abs(m11) * ay + abs(m21) * az))
+    s = tx * m02 + ty * m12 + tz * m22
+    most = max(most, abs(s) - (bz + abs(m02) * ax + abs(m12) * ay + abs(m22) * az))
+    if most >= gap:
+        return False
+    most = max(most, _edge_gap(m00, ty, tz, m10, m20, ay, az, by, bz, m02, m01))
+    most = max(most, _edge_gap(m01, ty, tz, m11, m21, ay, az, bx, bz, m02, m00))
+    most = max(most, _edge_gap(m02, ty, tz, m12, m22, ay, az, bx, by, m01, m00))
+    most = max(most, _edge_gap(m10, tz, tx, m20, m00, az, ax, by, bz, m12, m11))
+    most = max(most, _edge_gap(m11, tz, tx, m21, m01, az, ax, bx, bz, m12, m10))
+    most = max(most, _edge_gap(m12, tz, tx, m22, m02, az, ax, bx, by, m11, m10))
+    most = max(most, _edge_gap(m20, tx, ty, m00, m10, ax, ay, by, bz, m22, m21))
+    most = max(most, _edge_gap(m21, tx, ty, m01, m11, ax, ay, bx, bz, m22, m20))
+    most = max(most, _edge_gap(m22, tx, ty, m02, m12, ax, ay, bx, by, m21, m20))
+    if most >= gap:
+        return False
+    if most <= 0.0:
+        return True
+    return min(_edges_box(a, i, b, j), _edges_box(b, j, a, i)) < gap * gap
+
+
+@jit
+def _edge_gap(
+    cosine: float, t1: float, t2: float, m1: float, m2: float,
+    a1: float, a2: float, b1: float, b2: float, k1: float, k2: float,
+) -> float:  # fmt: skip
+    """Return the projected distance of two boxes along the cross product of two of their edges.
+
+    The axis is a_i x b_j. (1, 2) are the cyclic successors of i: t, a and m hold the offset, the
+    half sizes and b_j along them. b1, b2 are the half sizes of the other two edges of b, and
+    k1, k2 the components along a_i of the edges of b that are crossed with them.
+    """
+    sine = 1.0 - cosine * cosine
+    if sine < PARALLEL:
+        return -np.inf
+    spread = a1 * abs(m2) + a2 * abs(m1) + b1 * abs(k1) + b2 * abs(k2)
+    return (abs(t2 * m1 - t1 * m2) - spread) / np.sqrt(sine)
+
+
+@jit
+def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
+    """Return the least squared distance from the 12 edges of box i to box j [m^2]."""
+    c = np.empty(3)
+    e = np.empty((3, 3))
+    for k in range(3):
+        c[k] = 0.0
+        for m in range(3):
+            c[k] += b[j, TURN + 3 * m + k] * (a[i, CENTRE + m] - b[j, CENTRE + m])
+        for m in range(3):
+            e[m, k] = 0.0
+            for n in range(3):
+                e[m, k] += b[j, TURN + 3 * n + k] * a[i, TURN + 3 * n + m] * a[i, SIZE + m]
+    least = np.inf
+    hx, hy, hz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
+    for m in range(3):
+        f, g = (m + 1) % 3, (m + 2) % 3
+        for sign_f in (-1.0, 1.0):
+            for sign_g in (-1.0, 1.0):
+                px = c[0] + sign_f * e[f, 0] + sign_g * e[g, 0] - e[m, 0]
+                py = c[1] + sign_f * e[f, 1] + sign_g * e[g, 1] - e[m, 1]
+                pz = c[2] + sign_f * e[f, 2] + sign_g * e[g, 2] - e[m, 2]
+                square = _line_box(
+                    px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz
+                )
+                least = min(least, square)
+    return least

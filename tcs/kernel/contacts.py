@@ -1,0 +1,226 @@
+"""Which pair of shapes touches first: base, gripper and arm, each in the frame that suits it.
+
+A contact is a code `robot_body * bodies + other`, where `other` counts the room's bodies first
+and then the robot's; NO_CONTACT where nothing touches.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.collide import balls_meet, closer, move
+from tcs.kernel.problem import Problem
+
+NO_CONTACT = -1
+ROOM, BODY, ARM = 0, 1, 2
+"""What the arm touched."""
+
+
+class Workspace(NamedTuple):
+    """Scratch of one worker, reused from pair to pair."""
+
+    arm: FloatArray
+    """Arm shapes in A at the posture in hand, packed."""
+    room_B: FloatArray
+    """Room shapes in B, packed."""
+    room_A: FloatArray
+    """Room shapes in A, packed; only those listed in `near` are up to date."""
+    near: IntArray
+    """Indices of the room shapes that the arm could touch from here, shape (n_room,)."""
+    near_count: IntArray
+    """How many there are, shape (1,)."""
+    link_R: FloatArray
+    """Orientations of L1..L7 in A, shape (8, 3, 3)."""
+    link_p: FloatArray
+    """Origins of L1..L7 in A [m], shape (8, 3)."""
+    last: IntArray
+    """The pair that blocked last (kind of partner, arm shape, partner), shape (3,)."""
+    R_BW: FloatArray
+    """Orientation of the environment W in the base B in hand, shape (3, 3)."""
+    p_BW: FloatArray
+    """Origin of W in B [m], shape (3,)."""
+    R_AG: FloatArray
+    """Orientation of the goal in hand in the arm base A, shape (3, 3)."""
+    p_AG: FloatArray
+    """Position of the goal in A [m], shape (3,)."""
+
+
+@jit
+def new_workspace(problem: Problem) -> Workspace:
+    """Return scratch memory for one worker."""
+    return Workspace(
+        np.empty_like(problem.links),
+        np.empty_like(problem.room[0]),
+        np.empty_like(problem.room[0]),
+        np.zeros(problem.room_body.size, np.int64),
+        np.zeros(1, np.int64),
+        np.empty((8, 3, 3)),
+        np.empty((8, 3)),
+        np.full(3, -1, np.int64),
+        np.eye(3),
+        np.zeros(3),
+        np.eye(3),
+        np.zeros(3),
+    )
+
+
+@jit
+def contact_code(problem: Problem, robot_body: int, other: int, partner: int) -> int:
+    """Return the code of a contact between a robot body and a ROOM body or another robot body."""
+    if partner != ROOM:
+        other += problem.room_bodies
+    return robot_body * (problem.room_bodies + problem.robot_bodies) + other
+
+
+@jit
+def base_contact(problem: Problem, work: Workspace, torso: int, rides: int) -> int:
+    """Return the first contact with the room of the body shapes that ride on the torso, or not.
+
+    The room must stand in `work.room_B`.
+    """
+    body, room, gaps = problem.body[torso], work.room_B, problem.gap_base
+    for i in range(len(body)):
+        if problem.body_rides[i] != rides:
+            continue
+        for j in range(len(room)):
+            gap = gaps[i, j]
+            if gap > 0.0 and balls_meet(body, i, room, j, gap) and closer(body, i, room, j, gap):
+                return contact_code(problem, problem.body_body[i], problem.room_body[j], ROOM)
+    return NO_CONTACT
+
+
+@jit
+def gripper_room_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
+    """Return the first contact of the gripper, tool at a goal, with the room; all in W."""
+    _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
+    arm, room, gaps = work.arm, problem.room[state], problem.gap_room
+    for i in range(problem.grippers):
+        for j in range(len(room)):
+            gap = gaps[i, j]
+            if gap > 0.0 and balls_meet(arm, i, room, j, gap) and closer(arm, i, room, j, gap):
+                return contact_code(problem, problem.link_body[i], problem.room_body[j], ROOM)
+    return NO_CONTACT
+
+
+@jit
+def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) -> int:
+    """Return the first contact of the gripper, tool at the goal in hand, with the robot's body.
+
+    It leaves the gripper's shapes placed in `work.arm`.
+    """
+    _place_gripper(problem, work, work.R_AG, work.p_AG)
+    arm, gaps = work.arm, problem.gap_body
+    for i in range(problem.grippers):
+        for j in range(len(body_A)):
+            gap = gaps[i, j]
+            if gap > 0.0 and balls_meet(arm, i, body_A, j, gap) and closer(arm, i, body_A, j, gap):
+                return contact_code(problem, problem.link_body[i], problem.body_body[j], BODY)
+    return NO_CONTACT
+
+
+@jit
+def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
+    """Place the shapes of the last link such that the tool stands at (R, p)."""
+    R7, p7 = work.link_R[7], work.link_p[7]
+    F, f = problem.chain_R[7], problem.chain_p[7]
+    for r in range(3):
+        for c in range(3):
+            R7[r, c] = R[r, 0] * F[c, 0] + R[r, 1] * F[c, 1] + R[r, 2] * F[c, 2]
+    for r in range(3):
+        p7[r] = p[r] - (R7[r, 0] * f[0] + R7[r, 1] * f[1] + R7[r, 2] * f[2])
+    for i in range(problem.grippers):
+        move(R7, p7, problem.links, i, work.arm, i)
+
+
+@jit
+def place_links(
+    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, link_R: FloatArray, link_p: FloatArray
+) -> None:
+    """Fill the poses of L1..L7 in A at joint angles q; row i of the outputs is Li.
+
+    Args:
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
+        q: Joint angles [rad], shape (7,).
+        link_R: Filled, shape (8, 3, 3); row 0 becomes the identity, A itself.
+        link_p: Filled [m], shape (8, 3).
+    """
+    for r in range(3):
+        link_p[0, r] = 0.0
+        for c in range(3):
+            link_R[0, r, c] = 1.0 if r == c else 0.0
+    for i in range(7):
+        F, f = chain_R[i], chain_p[i]
+        R, S = link_R[i], link_R[i + 1]
+        cosine, sine = np.cos(q[i]), np.sin(q[i])
+        for r in range(3):
+            x = R[r, 0] * F[0, 0] + R[r, 1] * F[1, 0] + R[r, 2] * F[2, 0]
+            y = R[r, 0] * F[0, 1] + R[r, 1] * F[1, 1] + R[r, 2] * F[2, 1]
+            S[r, 0], S[r, 1] = cosine * x + sine * y, -sine * x + cosine * y
+            S[r, 2] = R[r, 0] * F[0, 2] + R[r, 1] * F[1, 2] + R[r, 2] * F[2, 2]
+            link_p[i + 1, r] = link_p[i, r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
+
+
+@jit
+def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatArray) -> int:
+    """Return the first contact of the arm at joint angles q, gripper against the room excepted.
+
+    `gripper_body_contact` must have placed the gripper. The pair that blocked last is tried first.
+    """
+    arm, room = work.arm, work.room_A
+    gap_room, gap_body, gap_arm = problem.gap_room, problem.gap_body, problem.gap_arm
+    bodies = problem.link_body
+    place_links(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+    partner, i, j = work.last[0], work.last[1], work.last[2]
+    if partner >= 0:
+        _place_link(problem, work, i)
+        if partner == ROOM:
+            # The room's shapes move with the base: the pair may be out of date.
+            if _is_near(work, j) and closer(arm, i, room, j, gap_room[i, j]):
+                return contact_code(problem, bodies[i], problem.room_body[j], ROOM)
+        elif partner == BODY:
+            if closer(arm, i, body_A, j, gap_body[i, j]):
+                return contact_code(problem, bodies[i], problem.body_body[j], BODY)
+        else:
+            _place_link(problem, work, j)
+            if closer(arm, i, arm, j, gap_arm[i, j]):
+                return contact_code(problem, bodies[i], bodies[j], ARM)
+    for i in range(problem.grippers, len(arm)):
+        _place_link(problem, work, i)
+        for n in range(work.near_count[0]):
+            j = work.near[n]
+            gap = gap_room[i, j]
+            if gap > 0.0 and balls_meet(arm, i, room, j, gap) and closer(arm, i, room, j, gap):
+                work.last[0], work.last[1], work.last[2] = ROOM, i, j
+                return contact_code(problem, bodies[i], problem.room_body[j], ROOM)
+        for j in range(len(body_A)):
+            gap = gap_body[i, j]
+            if gap > 0.0 and balls_meet(arm, i, body_A, j, gap) and closer(arm, i, body_A, j, gap):
+                work.last[0], work.last[1], work.last[2] = BODY, i, j
+                return contact_code(problem, bodies[i], problem.body_body[j], BODY)
+        for j in range(i):
+            gap = gap_arm[i, j]
+            if gap > 0.0 and balls_meet(arm, i, arm, j, gap) and closer(arm, i, arm, j, gap):
+                work.last[0], work.last[1], work.last[2] = ARM, i, j
+                return contact_code(problem, bodies[i], bodies[j], ARM)
+    return NO_CONTACT
+
+
+@jit
+def _place_link(problem: Problem, work: Workspace, i: int) -> None:
+    """Place arm shape i in A from the link poses in the workspace."""
+    frame = problem.link_frame[i]
+    move(work.link_R[frame], work.link_p[frame], problem.links, i, work.arm, i)
+
+
+@jit
+def _is_near(work: Workspace, j: int) -> bool:
+    """Return whether room shape j is among those the arm could touch from here."""
+    for n in range(work.near_count[0]):
+        if work.near[n] == j:
+            return True
+    return False

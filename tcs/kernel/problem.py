@@ -1,0 +1,128 @@
+"""Scene arrays, arranged for speed: what the compiled sweep reads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray, SceneArrays, Shapes
+from tcs.kernel.collide import pack
+from tcs.kernel.solver import ArmSolver, arm_solver
+
+UNCHECKED = -1.0
+"""Gap of a pair of shapes that is never checked."""
+
+
+class Problem(NamedTuple):
+    """One scene, its goals and its grid."""
+
+    arm: ArmSolver
+    chain_R: FloatArray
+    """Rotations of the chain, shape (8, 3, 3)."""
+    chain_p: FloatArray
+    """Translations of the chain [m], shape (8, 3)."""
+    links: FloatArray
+    """The arm's shapes, packed, in link frames, nearest to the tool first, shape (n_arm, 17)."""
+    link_frame: IntArray
+    """Link that carries each, 7 .. 1, shape (n_arm,)."""
+    link_body: IntArray
+    """Robot body each belongs to, shape (n_arm,)."""
+    grippers: int
+    """How many of them, the first ones, ride on the last link."""
+    base_R: FloatArray
+    """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
+    base_p: FloatArray
+    """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
+    body: FloatArray
+    """Shapes of the rest of the robot in B, packed, shape (torso levels, n_body, 17)."""
+    body_A: FloatArray
+    """The same in A."""
+    body_rides: IntArray
+    """1 where a body shape rides on the torso, else 0, shape (n_body,)."""
+    body_body: IntArray
+    """Robot body each belongs to, shape (n_body,)."""
+    room: FloatArray
+    """Shapes of the room in W, packed, shape (environment states, n_room, 17)."""
+    room_body: IntArray
+    """Room body each belongs to, shape (n_room,)."""
+    room_bodies: int
+    """How many bodies the room has."""
+    robot_bodies: int
+    """How many the robot has."""
+    gap_room: FloatArray
+    """Distance [m] that arm and room shapes must keep, or UNCHECKED, shape (n_arm, n_room)."""
+    gap_body: FloatArray
+    """The same for arm and body shapes, shape (n_arm, n_body)."""
+    gap_arm: FloatArray
+    """The same for arm shapes among themselves, shape (n_arm, n_arm)."""
+    gap_base: FloatArray
+    """The same for body and room shapes, shape (n_body, n_room)."""
+    goal_R: FloatArray
+    """Goal orientations in W, shape (environment states, goals, 3, 3)."""
+    goal_p: FloatArray
+    """Goal positions in W [m], shape (environment states, goals, 3)."""
+    base_x: FloatArray
+    base_y: FloatArray
+    base_yaw: FloatArray
+    torso_levels: int
+    environment_states: int
+
+
+def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
+    """Return `scene` and `grid` arranged for the kernel.
+
+    Raises:
+        ArmClassError: If the closed form cannot solve the arm.
+    """
+    arm = arm_solver(scene.chain)
+    order = np.argsort(-scene.arm.frame.astype(np.int64), kind="stable")
+    R_AB = np.swapaxes(scene.arm_base_R, 1, 2)
+    from_arm_base = scene.body.p - scene.arm_base_p[:, None]
+    body_A = scene.body._replace(
+        R=R_AB[:, None] @ scene.body.R, p=np.einsum("tij,tnj->tni", R_AB, from_arm_base)
+    )
+    frame = scene.arm.frame[order].astype(np.int64)
+    pads = scene.arm.pad[order], scene.body.pad, scene.room.pad
+    margin = scene.margin
+    return Problem(
+        arm=arm,
+        chain_R=arm.R,
+        chain_p=arm.p,
+        links=pack(scene.arm, order)[0],
+        link_frame=frame,
+        link_body=scene.arm.body[order].astype(np.int64),
+        grippers=int(np.sum(frame == 7)),
+        base_R=np.ascontiguousarray(scene.arm_base_R),
+        base_p=np.ascontiguousarray(scene.arm_base_p),
+        body=pack(scene.body),
+        body_A=pack(body_A),
+        body_rides=scene.body.frame.astype(np.int64),
+        body_body=scene.body.body.astype(np.int64),
+        room=pack(scene.room),
+        room_body=scene.room.body.astype(np.int64),
+        room_bodies=_count(scene.room),
+        robot_bodies=max(_count(scene.arm), _count(scene.body)),
+        gap_room=_gaps(scene.arm_vs_room[order], pads[0], pads[2], margin),
+        gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], margin),
+        gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], margin),
+        gap_base=_gaps(scene.body_vs_room, pads[1], pads[2], margin),
+        goal_R=np.ascontiguousarray(scene.goal_R),
+        goal_p=np.ascontiguousarray(scene.goal_p),
+        base_x=np.ascontiguousarray(grid.base_x),
+        base_y=np.ascontiguousarray(grid.base_y),
+        base_yaw=np.ascontiguousarray(grid.base_yaw),
+        torso_levels=grid.torso_levels,
+        environment_states=grid.environment_states,
+    )
+
+
+def _count(shapes: Shapes) -> int:
+    """Return how many bodies the shapes belong to, counted by the highest index."""
+    return int(shapes.body.max(initial=-1)) + 1
+
+
+def _gaps(checked: BoolArray, pad_a: FloatArray, pad_b: FloatArray, margin: float) -> FloatArray:
+    """Return the distance each pair must keep [m], UNCHECKED where it is not looked at."""
+    required = np.maximum(margin, pad_a[:, None] + pad_b[None, :])
+    return np.ascontiguousarray(np.where(checked, required, UNCHECKED))

@@ -1,0 +1,252 @@
+"""The kernel's mathematics once more, in plain loops: written to be read, never to be tuned.
+
+Tests hold the compiled kernel against this twin, and this twin against Drake. Nothing else uses
+it. Where the kernel has a shortcut (packed rows, lanes, a determinant by minors, contacts in the
+order of likelihood) the twin takes the definition.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
+
+Pose = tuple[FloatArray, FloatArray]
+"""Rotation (3, 3) and position (3,) [m]."""
+
+
+def compose(X_AB: Pose, X_BC: Pose) -> Pose:
+    """Return X_AC."""
+    return X_AB[0] @ X_BC[0], X_AB[1] + X_AB[0] @ X_BC[1]
+
+
+def inverse(X_AB: Pose) -> Pose:
+    """Return X_BA."""
+    return X_AB[0].T, -X_AB[0].T @ X_AB[1]
+
+
+def turn(angle: float) -> FloatArray:
+    """Return the rotation by `angle` [rad] about z, shape (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def link_poses(chain: Chain, q: FloatArray) -> list[Pose]:
+    """Return X_AL1 .. X_AL7 and X_AT."""
+    X: Pose = (np.eye(3), np.zeros(3))
+    poses = []
+    for i in range(7):
+        X = compose(compose(X, (chain.R[i], chain.p[i])), (turn(q[i]), np.zeros(3)))
+        poses.append(X)
+    poses.append(compose(X, (chain.R[7], chain.p[7])))
+    return poses
+
+
+def jacobian(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the Jacobian of the tool in A, shape (6, 7), rows [angular; linear]."""
+    *links, tool = link_poses(chain, q)
+    columns = [np.concatenate([R[:, 2], np.cross(R[:, 2], tool[1] - p)]) for R, p in links]
+    return np.array(columns).T
+
+
+def isotropy(J: FloatArray) -> float:
+    """Return TCS eq. (2) with the sixth root: det(J J^T)^(1/6) / (trace(J J^T)/6)."""
+    G = J @ J.T
+    return max(float(np.linalg.det(G)), 0.0) ** (1 / 6) / (float(np.trace(G)) / 6)
+
+
+# --- inverse kinematics -----------------------------------------------------------------------
+
+
+def turns_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float, list[float]]:
+    """Return the turns t about z for which R Rz(t) v has the z component `height`.
+
+    Returns:
+        How far the height is from impossible (1 in the middle, negative when impossible), and
+        the two turns: first the one with the sign +1, then the one with -1.
+    """
+    P = R[2, 0] * v[0] + R[2, 1] * v[1]
+    Q = R[2, 1] * v[0] - R[2, 0] * v[1]
+    m = height - R[2, 2] * v[2]
+    left = P * P + Q * Q - m * m
+    h = math.sqrt(max(left, 0.0))
+    turns = [math.atan2(Q * m + P * g, P * m - Q * g) for g in (h, -h)]
+    return left / (P * P + Q * Q), turns
+
+
+@dataclass(frozen=True)
+class Solution:
+    """One branch of the closed form at one value of the free joint."""
+
+    q: FloatArray
+    """Joint angles [rad], turned into the limits where they can be, shape (7,)."""
+    slack: float
+    """>= 0 where the branch exists and every joint keeps its limits."""
+
+
+def solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, int, int], Solution]:
+    """Return the solutions at free joint q1 by branch: signs of elbow, aim and wrist."""
+    R_A7 = X_AG[0] @ chain.R[7].T
+    wrist = X_AG[1] - R_A7 @ chain.p[7]
+    X_AL1 = compose((chain.R[0], chain.p[0]), (turn(q1), np.zeros(3)))
+    v = inverse(X_AL1)[0] @ (wrist - X_AL1[1]) - chain.p[1]
+    elbow_left, cosine, phase = elbow(chain, float(v @ v))
+    v = chain.R[1].T @ v
+    found = {}
+    for elbow_sign in (1, -1):
+        q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
+        u = chain.p[3] + chain.R[3] @ turn(q4) @ chain.p[4]
+        aim_left, aims = turns_to_height(chain.R[2], u, v[2])
+        for aim_sign, q3 in zip((1, -1), aims, strict=True):
+            k = chain.R[2] @ turn(q3) @ u
+            q2 = math.atan2(v[1], v[0]) - math.atan2(k[1], k[0])
+            R = X_AL1[0]
+            for i, angle in ((1, q2), (2, q3), (3, q4)):
+                R = R @ chain.R[i] @ turn(angle)
+            M = (R @ chain.R[4]).T @ R_A7
+            f = chain.R[6][:, 2]
+            wrist_left, flexes = turns_to_height(chain.R[5], f, M[2, 2])
+            for wrist_sign, q6 in zip((1, -1), flexes, strict=True):
+                e = chain.R[5] @ turn(q6) @ f
+                q5 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
+                N = (turn(q5) @ chain.R[5] @ turn(q6) @ chain.R[6]).T @ M
+                q7 = math.atan2(N[1, 0], N[0, 0])
+                q = np.array([q1, q2, q3, q4, q5, q6, q7])
+                slack = min(elbow_left, aim_left, wrist_left)
+                for i in range(7):
+                    q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
+                    slack = min(slack, kept)
+                found[elbow_sign, aim_sign, wrist_sign] = Solution(q, slack)
+    return found
+
+
+def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
+    """Return, for |SW|^2 = square, 1 - cos(q4 - phase)^2, cos(q4 - phase), and the phase [rad]."""
+    least, most = (
+        [float(np.sum((chain.p[3] + chain.R[3] @ turn(a) @ chain.p[4]) ** 2)) for a in (0.0, t)]
+        for t in (math.pi / 2, math.pi)
+    )
+    # |SW|^2 = c + a cos(q4) + b sin(q4): three values of q4 give c, a and b.
+    c = (most[0] + most[1]) / 2
+    a, b = most[0] - c, least[1] - c
+    cosine = (square - c) / math.hypot(a, b)
+    return 1.0 - cosine * cosine, cosine, math.atan2(b, a)
+
+
+def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]:
+    """Return the angle turned into its limits if it can be, and cos(off middle) - cos(half)."""
+    if upper - lower >= 2 * math.pi or not math.isfinite(lower):
+        return math.remainder(angle, 2 * math.pi), 1.0
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    off = math.remainder(angle - middle, 2 * math.pi)
+    return middle + off, math.cos(off) - math.cos(half)
+
+
+# --- distances --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One shape at one pose."""
+
+    kind: int
+    size: FloatArray
+    R: FloatArray
+    p: FloatArray
+    pad: float
+    body: int
+
+    def moved(self, X: Pose) -> Placed:
+        """Return the shape at X times its pose."""
+        R, p = compose(X, (self.R, self.p))
+        return Placed(self.kind, self.size, R, p, self.pad, self.body)
+
+    @property
+    def radius(self) -> float:
+        """What the core is grown by [m]."""
+        return 0.0 if self.kind == BOX else float(self.size[0])
+
+    @property
+    def ball(self) -> float:
+        """Radius of a ball about the centre that holds the shape [m]."""
+        return float(np.linalg.norm(self.half)) + self.radius
+
+    @property
+    def half(self) -> FloatArray:
+        """Half sizes of the core along the shape's axes [m]: of a point, a segment or a box."""
+        if self.kind == BOX:
+            return np.asarray(self.size)
+        return np.array([0.0, 0.0, self.size[1] if self.kind == CAPSULE else 0.0])
+
+
+def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
+    """Return the shapes in one state, unpacked."""
+    return [
+        Placed(
+            int(shapes.kind[i]),
+            shapes.size[i],
+            shapes.R[state, i],
+            shapes.p[state, i],
+            float(shapes.pad[i]),
+            int(shapes.body[i]),
+        )
+        for i in range(len(shapes.kind))
+    ]
+
+
+def distance(a: Placed, b: Placed) -> float:
+    """Return the distance between two shapes [m], 0 when their cores meet, less the radii.
+
+    Cores are boxes with some half sizes 0. When no separating axis shows them apart they meet;
+    else the least distance is attained on an edge of one of them.
+    """
+    if not _apart(a, b):
+        return -(a.radius + b.radius)
+    least = min(_edges_to_box(a, b), _edges_to_box(b, a))
+    return least - a.radius - b.radius
+
+
+def _apart(a: Placed, b: Placed) -> bool:
+    """Return whether one of the 15 separating axes keeps the cores apart."""
+    axes = [a.R[:, i] for i in range(3)] + [b.R[:, i] for i in range(3)]
+    axes += [np.cross(a.R[:, i], b.R[:, j]) for i in range(3) for j in range(3)]
+    for axis in axes:
+        if np.linalg.norm(axis) < 1e-6:
+            continue
+        spread = np.abs(axis @ a.R) @ a.half + np.abs(axis @ b.R) @ b.half
+        if abs(axis @ (b.p - a.p)) > spread + 1e-15:
+            return True
+    return False
+
+
+def _edges_to_box(a: Placed, b: Placed) -> float:
+    """Return the least distance from the edges of core a to core b [m]."""
+    least = math.inf
+    for along in range(3):
+        for signs in product((-1.0, 1.0), repeat=2):
+            corner = np.insert(np.array(signs), along, -1.0) * a.half
+            start = b.R.T @ (a.R @ corner + a.p - b.p)
+            way = b.R.T @ (a.R[:, along] * 2 * a.half[along])
+            least = min(least, _segment_to_box(start, way, b.half))
+    return least
+
+
+def _segment_to_box(start: FloatArray, way: FloatArray, half: FloatArray) -> float:
+    """Return the least distance from start + t way, t in [0, 1], to the box [m].
+
+    The distance is convex in t: halve the bracket of its minimum by the sign of its slope.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        t = (low + high) / 2
+        beyond = (point := start + t * way) - np.clip(point, -half, half)
+        low, high = (t, high) if beyond @ way < 0 else (low, t)
+    return min(
+        float(np.linalg.norm((point := start + t * way) - np.clip(point, -half, half)))
+        for t in (0.0, (low + high) / 2, 1.0)
+    )
+

@@ -1,0 +1,284 @@
+"""The plain-loop twin of scoring: one configuration against one goal, from `reference`'s pieces.
+
+It looks at the same angles of the free joint as the kernel, so that verdicts can be compared one
+by one; how many of them the kernel needs is another question (see `dense`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.kernel.arcs import PEAK_SLOPE
+from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
+from tcs.kernel.pairs import (
+    ARM_BLOCKED,
+    BODY_BLOCKED,
+    FINE_STEP,
+    FIRST_LANES,
+    GRIPPER_BLOCKED,
+    JOINT_LIMITS,
+    LEAST_LANES,
+    REACHED,
+    REFINE_LANES,
+    REFINEMENTS,
+    TOO_FAR,
+)
+from tcs.kernel.reference import (
+    Placed,
+    Pose,
+    compose,
+    distance,
+    elbow,
+    inverse,
+    isotropy,
+    jacobian,
+    link_poses,
+    shapes_of,
+    solutions,
+    turn,
+)
+
+Branch = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `score` finds."""
+
+    reason: int
+    isotropy: float = 0.0
+    q: FloatArray | None = None
+    clearance: float = math.inf
+    """How far the nearest pair that decided is from deciding otherwise [m]; for tests."""
+
+
+@dataclass
+class Stand:
+    """A scene with the robot at one configuration, everything in the arm base A."""
+
+    scene: SceneArrays
+    room: list[Placed]
+    body: list[Placed]
+    X_AG: Pose
+    clearance: float = math.inf
+
+    def touches(self, a: Placed, b: Placed) -> bool:
+        """Return whether two shapes are closer than they may be, and note how clear that is."""
+        required = max(self.scene.margin, a.pad + b.pad)
+        # Balls that are well apart spare the exact distance; they cannot decide a verdict.
+        if float(np.linalg.norm(a.p - b.p)) - a.ball - b.ball > required + 0.01:
+            return False
+        excess = distance(a, b) - required
+        self.clearance = min(self.clearance, abs(excess))
+        return excess < 0.0
+
+    def arm_at(self, q: FloatArray) -> list[Placed]:
+        """Return the arm's shapes at joint angles q."""
+        poses = link_poses(self.scene.chain, q)
+        shapes = shapes_of(self.scene.arm, 0)
+        return [s.moved(poses[f - 1]) for s, f in zip(shapes, self.scene.arm.frame, strict=True)]
+
+    def gripper_touches(self, with_body: bool) -> bool:
+        """Return whether the gripper at the goal touches the room, or the robot's own body."""
+        X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
+        others = self.body if with_body else self.room
+        checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_room
+        shapes = shapes_of(self.scene.arm, 0)
+        return any(
+            self.touches(shapes[i].moved(X_A7), others[j])
+            for i in range(len(shapes))
+            if self.scene.arm.frame[i] == 7
+            for j in range(len(others))
+            if checked[i, j]
+        )
+
+    def arm_touches(self, q: FloatArray) -> bool:
+        """Return whether the arm at q touches the room, the body or itself.
+
+        The gripper against room and body is left out: it has been looked at.
+        """
+        arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
+        pairs = [
+            (arm[i], other)
+            for i in range(len(arm))
+            if frame[i] < 7
+            for others, checked in ((self.room, scene.arm_vs_room), (self.body, scene.arm_vs_body))
+            for j, other in enumerate(others)
+            if checked[i, j]
+        ]
+        pairs += [
+            (arm[i], arm[j])
+            for i in range(len(arm))
+            for j in range(i)
+            if scene.arm_vs_arm[i, j] and min(frame[i], frame[j]) < 7
+        ]
+        return any(self.touches(a, b) for a, b in pairs)
+
+
+def stand_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> tuple[Stand, bool]:
+    """Return the scene with the robot at configuration h, and whether base or body touch."""
+    shape = (
+        grid.environment_states,
+        len(grid.base_x),
+        len(grid.base_y),
+        len(grid.base_yaw),
+        grid.torso_levels,
+    )
+    state, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, shape))
+    X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    X_BA = scene.arm_base_R[torso], scene.arm_base_p[torso]
+    X_AW = inverse(compose(X_WB, X_BA))
+    X_AB = inverse(X_BA)
+    stand = Stand(
+        scene=scene,
+        room=[s.moved(X_AW) for s in shapes_of(scene.room, state)],
+        body=[s.moved(X_AB) for s in shapes_of(scene.body, torso)],
+        X_AG=compose(X_AW, (scene.goal_R[state, goal], scene.goal_p[state, goal])),
+    )
+    blocked = any(
+        stand.touches(stand.body[i], stand.room[j])
+        for i in range(len(stand.body))
+        for j in range(len(stand.room))
+        if scene.body_vs_room[i, j]
+    )
+    return stand, blocked
+
+
+def score(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> Verdict:
+    """Return what the kernel should say about configuration h and one goal."""
+    stand, blocked = stand_at(scene, grid, h, goal)
+
+    def verdict(reason: int, value: float = 0.0, q: FloatArray | None = None) -> Verdict:
+        return Verdict(reason, value, q, stand.clearance)
+
+    if blocked:
+        return verdict(BODY_BLOCKED)
+    if stand.gripper_touches(with_body=False):
+        return verdict(GRIPPER_BLOCKED)
+    chain = scene.chain
+    arcs, possible = elbow_arcs(chain, stand.X_AG)
+    if not arcs:
+        return verdict(JOINT_LIMITS if possible else TOO_FAR)
+    if stand.gripper_touches(with_body=True):
+        return verdict(GRIPPER_BLOCKED)
+    candidates = find_candidates(chain, stand.X_AG, arcs)
+    if not candidates:
+        return verdict(JOINT_LIMITS)
+    for candidate in sorted(candidates, key=lambda c: -c.value):
+        if not stand.arm_touches(candidate.q):
+            best = climb(stand, candidate)
+            return verdict(REACHED, best.value, best.q)
+    return verdict(ARM_BLOCKED)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A solution that keeps all limits."""
+
+    q: FloatArray
+    value: float
+    branch: Branch
+    step: float
+
+
+def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], bool]:
+    """Return the arcs of joint 1 from which the elbow spans the way, and whether any would."""
+    near, far = elbow_spans(chain)
+    wrist = inverse((chain.R[0], chain.p[0]))
+    w = compose(wrist, compose(X_AG, inverse((chain.R[7], chain.p[7]))))[1]
+    s = chain.p[1]
+    steady = float(w @ w + s @ s - 2 * w[2] * s[2])
+    swing = 2 * math.hypot(w[0], w[1]) * math.hypot(s[0], s[1])
+    if steady - swing > far or steady + swing < near:
+        return [], False
+    centre = math.atan2(w[1], w[0]) - math.atan2(s[1], s[0])
+    inner = math.acos(min((steady - near) / swing, 1.0)) if steady - swing < near else 0.0
+    outer = math.acos(max((steady - far) / swing, -1.0)) if steady + swing > far else math.pi
+    lower, upper = chain.lower[0], chain.upper[0]
+    arcs: list[tuple[float, float]] = []
+    for middle in (centre + 2 * math.pi * k for k in range(-2, 3)):
+        for first, last in ((middle - outer, middle - inner), (middle + inner, middle + outer)):
+            first, last = max(first, lower), min(last, upper)
+            if first <= last and arcs and arcs[-1][1] >= first - 1e-12:
+                arcs[-1] = (arcs[-1][0], last)
+            elif first <= last:
+                arcs.append((first, last))
+    return arcs, True
+
+
+def elbow_spans(chain: Chain) -> tuple[float, float]:
+    """Return the least and the greatest |SW|^2 within the limits of joint 4 [m^2]."""
+    _, _, phase = elbow(chain, 0.0)
+    turning = [phase + k * math.pi for k in range(-4, 5)]
+    angles = [a for a in turning if chain.lower[3] <= a <= chain.upper[3]]
+    angles += [a for a in (chain.lower[3], chain.upper[3]) if math.isfinite(a)]
+    spans = [float(np.sum((chain.p[3] + chain.R[3] @ turn(a) @ chain.p[4]) ** 2)) for a in angles]
+    return min(spans), max(spans)
+
+
+def find_candidates(
+    chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]
+) -> list[Candidate]:
+    """Return the feasible angles of the kernel's two looks: over the arcs, inside the windows."""
+    length = sum(last - first for first, last in arcs)
+    found = []
+    for first, last in arcs:
+        count = max(LEAST_LANES, int(FIRST_LANES * (last - first) / length) if length else 0)
+        angles = [first + i * (last - first) / (count - 1) for i in range(count)]
+        looks = [solutions(chain, X_AG, angle) for angle in angles]
+        for branch in looks[0]:
+            slack = [look[branch].slack for look in looks]
+            for i, j in windows_of(slack, (last - first) / (count - 1)):
+                found += look_closer(chain, X_AG, branch, angles[i], angles[j])
+    return found
+
+
+def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
+    """Return the stretches of lanes in which feasible angles lie or may hide."""
+    last = len(slack) - 1
+    inside = [i for i, left in enumerate(slack) if left >= 0]
+    windows = []
+    for i in inside:
+        if i - 1 not in inside:
+            j = next(k for k in range(i, last + 1) if k == last or slack[k + 1] < 0)
+            windows.append((max(i - 1, 0), min(j + 1, last)))
+    for i, left in enumerate(slack):
+        sides = [slack[k] for k in (i - 1, i + 1) if 0 <= k <= last]
+        if -PEAK_SLOPE * step < left < 0 and all(s < 0 and s <= left for s in sides):
+            windows.append((max(i - 1, 0), min(i + 1, last)))
+    return windows
+
+
+def look_closer(
+    chain: Chain, X_AG: Pose, branch: Branch, first: float, last: float
+) -> list[Candidate]:
+    """Return the feasible angles of one window on one branch."""
+    count = max(LEAST_LANES, int((last - first) / FINE_STEP) + 1)
+    step = (last - first) / (count - 1)
+    found = []
+    for i in range(count):
+        solution = solutions(chain, X_AG, first + i * step)[branch]
+        if solution.slack >= 0:
+            value = isotropy(jacobian(chain, solution.q))
+            found.append(Candidate(solution.q, value, branch, step))
+    return found
+
+
+def climb(stand: Stand, best: Candidate) -> Candidate:
+    """Return the best solution near a collision-free one, as the kernel refines it."""
+    chain, step = stand.scene.chain, best.step
+    for _ in range(REFINEMENTS):
+        fine = 2 * step / (REFINE_LANES - 1)
+        near = []
+        for i in range(REFINE_LANES):
+            solution = solutions(chain, stand.X_AG, best.q[0] - step + i * fine)[best.branch]
+            if solution.slack >= 0:
+                value = isotropy(jacobian(chain, solution.q))
+                near.append(Candidate(solution.q, value, best.branch, fine))
+        better = [c for c in sorted(near, key=lambda c: -c.value) if c.value > best.value]
+        best = next((c for c in better if not stand.arm_touches(c.q)), best)
+        step = fine
+    return best

@@ -1,0 +1,133 @@
+"""Pairs of configurations: how many are kept between two base cells, and how good they get.
+
+Every sum runs over the goals in order, as in `tcs.tables.equations`, so that a pair has the
+same score here and online, to the last bit. Rounding is monotone: a score computed from
+greater isotropies is never smaller, so bounds computed by the same sum need no slack.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.cache import jit
+
+
+class SetArrays(NamedTuple):
+    """The candidates, grouped by base cell; those of cell c are rows start[c] to start[c + 1]."""
+
+    number: IntArray
+    """Number of each candidate in the order that breaks ties, shape (C,)."""
+    start: IntArray
+    """First row of each cell, shape (N + 1,)."""
+    xy: FloatArray
+    """Places of the cells [m], shape (N, 2)."""
+    isotropy: FloatArray
+    """Isotropy at each goal, 0 where not reached, shape (C, G)."""
+    reached: BoolArray
+    """Whether each goal is reached, shape (C, G)."""
+    peak: FloatArray
+    """Greatest isotropy in each cell at each goal, shape (N, G)."""
+    weights: FloatArray
+    """Weights of the goals, shape (G,)."""
+    least_distance: float
+    """Pairs of cells closer than this are left out [m]."""
+    threshold: float
+    """Pairs are kept when their P_M is greater than this."""
+
+
+class CellPairs(NamedTuple):
+    """What is kept between each cell of a slice (rows) and every cell (columns)."""
+
+    kept: IntArray
+    """How many pairs are kept, shape (rows, N); 0 where the second cell comes before the first."""
+    reachability: FloatArray
+    """Their greatest P_R, shape (rows, N)."""
+    manipulability: FloatArray
+    """Their greatest P_M, shape (rows, N)."""
+    total: FloatArray
+    """Their greatest P_R + P_M, shape (rows, N)."""
+
+
+class BestPairs(NamedTuple):
+    """The pair with the greatest P_R + P_M in each cell of a slice."""
+
+    total: FloatArray
+    """P_R + P_M, -1 where no pair is kept, shape (rows,)."""
+    members: IntArray
+    """Candidate numbers a < b, shape (rows, 2)."""
+
+
+@jit
+def pair_reachability(reached: BoolArray, i: int, j: int, weights: FloatArray) -> float:
+    """Return P_R of the rows i and j together, TCS eq. (1)."""
+    total = 0.0
+    for g in range(weights.size):
+        if reached[i, g] or reached[j, g]:
+            total += weights[g]
+    return total
+
+
+@jit
+def pair_manipulability(a: FloatArray, i: int, b: FloatArray, j: int, weights: FloatArray) -> float:
+    """Return P_M of row i of `a` and row j of `b` together, TCS eq. (4)."""
+    total = 0.0
+    for g in range(weights.size):
+        total += weights[g] * max(a[i, g], b[j, g])
+    return total
+
+
+@jit
+def bound_cell_pair(
+    arrays: SetArrays, first: int, second: int, row: int, out: CellPairs, best: BestPairs
+) -> None:
+    """Go through the pairs between two cells, and write what is kept to `row` of `out`."""
+    isotropy, peak, weights = arrays.isotropy, arrays.peak, arrays.weights
+    # No pair can beat the cells' peaks, at every goal, taken together.
+    if not pair_manipulability(peak, first, peak, second, weights) > arrays.threshold:
+        return
+    for i in range(arrays.start[first], arrays.start[first + 1]):
+        if not pair_manipulability(isotropy, i, peak, second, weights) > arrays.threshold:
+            continue
+        begin = i + 1 if first == second else arrays.start[second]
+        for j in range(begin, arrays.start[second + 1]):
+            manipulability = pair_manipulability(isotropy, i, isotropy, j, weights)
+            if not manipulability > arrays.threshold:
+                continue
+            reachability = pair_reachability(arrays.reached, i, j, weights)
+            total = reachability + manipulability
+            out.kept[row, second] += 1
+            out.reachability[row, second] = max(out.reachability[row, second], reachability)
+            out.manipulability[row, second] = max(out.manipulability[row, second], manipulability)
+            out.total[row, second] = max(out.total[row, second], total)
+            if total >= best.total[row]:
+                a = min(arrays.number[i], arrays.number[j])
+                b = max(arrays.number[i], arrays.number[j])
+                earlier = a < best.members[row, 0] or (
+                    a == best.members[row, 0] and b < best.members[row, 1]
+                )
+                if total > best.total[row] or earlier:
+                    best.total[row] = total
+                    best.members[row, 0] = a
+                    best.members[row, 1] = b
+
+
+@jit
+def bound_cells(arrays: SetArrays, begin: int, end: int, out: CellPairs, best: BestPairs) -> None:
+    """Go through the pairs between cells begin..end-1 and every cell not before them.
+
+    Args:
+        arrays: The candidates.
+        begin: First cell of the slice.
+        end: Cell after the last.
+        out: Filled with zeros, `end - begin` rows.
+        best: Filled with -1, `end - begin` rows.
+    """
+    for first in range(begin, end):
+        for second in range(first, arrays.start.size - 1):
+            dx = arrays.xy[second, 0] - arrays.xy[first, 0]
+            dy = arrays.xy[second, 1] - arrays.xy[first, 1]
+            if np.sqrt(dx * dx + dy * dy) >= arrays.least_distance:
+                bound_cell_pair(arrays, first, second, first - begin, out, best)

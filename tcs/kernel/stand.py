@@ -1,0 +1,109 @@
+"""The robot standing at one initial configuration: who is where, in which frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.collide import BALL, CENTRE, TURN, move
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import Workspace
+from tcs.kernel.problem import Problem
+
+
+@jit
+def stand(problem: Problem, work: Workspace, place: int) -> int:
+    """Put the base at a place of the grid and move the room into its frame.
+
+    Args:
+        problem: The scene and its grid.
+        work: `R_BW`, `p_BW` and `room_B` get filled.
+        place: Flat index over (environment state, base x, base y, base yaw).
+
+    Returns:
+        The environment state.
+    """
+    yaws, ys, xs = problem.base_yaw.size, problem.base_y.size, problem.base_x.size
+    yaw = problem.base_yaw[place % yaws]
+    y = problem.base_y[(place // yaws) % ys]
+    x = problem.base_x[(place // (yaws * ys)) % xs]
+    state = place // (yaws * ys * xs)
+    c, s = np.cos(yaw), np.sin(yaw)
+    R, p = work.R_BW, work.p_BW
+    R[0, 0], R[0, 1], R[1, 0], R[1, 1] = c, s, -s, c
+    p[0], p[1] = -(c * x + s * y), s * x - c * y
+    room = problem.room[state]
+    for j in range(len(room)):
+        move(R, p, room, j, work.room_B, j)
+    return state
+
+
+@jit
+def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, g: int) -> None:
+    """Fill the pose of a goal in the arm base A, `work.R_AG` and `work.p_AG`."""
+    A, a = problem.base_R[torso], problem.base_p[torso]
+    R_WG, p_WG = problem.goal_R[state, g], problem.goal_p[state, g]
+    R_BW, p_BW, R_AG, p_AG = work.R_BW, work.p_BW, work.R_AG, work.p_AG
+    for r in range(3):
+        p_AG[r] = 0.0
+        for c in range(3):
+            R_AG[r, c] = 0.0
+    for m in range(3):
+        for c in range(3):
+            total = 0.0
+            for n in range(3):
+                total += R_BW[m, n] * R_WG[n, c]
+            for r in range(3):
+                R_AG[r, c] += A[m, r] * total
+        along = p_BW[m] - a[m]
+        for n in range(3):
+            along += R_BW[m, n] * p_WG[n]
+        for r in range(3):
+            p_AG[r] += A[m, r] * along
+
+
+@jit
+def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
+    """Move the room from B to A and list the shapes that the arm could touch at all."""
+    A, a = problem.base_R[torso], problem.base_p[torso]
+    room_B, room_A = work.room_B, work.room_A
+    far = arm_radius(problem)
+    count = 0
+    for j in range(len(room_B)):
+        square = 0.0
+        for r in range(3):
+            along = 0.0
+            for m in range(3):
+                along += A[m, r] * (room_B[j, CENTRE + m] - a[m])
+            room_A[j, CENTRE + r] = along
+            square += along * along
+        reach = far + room_B[j, BALL]
+        if square > reach * reach:
+            continue
+        work.near[count] = j
+        count += 1
+        for c in range(CENTRE):
+            room_A[j, c] = room_B[j, c]
+        for r in range(3):
+            for c in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += A[m, r] * room_B[j, TURN + 3 * m + c]
+                room_A[j, TURN + 3 * r + c] = total
+    work.near_count[0] = count
+
+
+@jit
+def arm_radius(problem: Problem) -> float:
+    """Return a distance from the origin of A beyond which nothing touches the arm [m]."""
+    reach = np.zeros(8)
+    for i in range(7):
+        reach[i + 1] = reach[i] + np.sqrt(np.sum(problem.chain_p[i] * problem.chain_p[i]))
+    radius = 0.0
+    for i in range(len(problem.links)):
+        centre = problem.links[i, CENTRE : CENTRE + 3]
+        out = np.sqrt(np.sum(centre * centre)) + problem.links[i, BALL]
+        radius = max(radius, reach[problem.link_frame[i]] + out)
+    gap = 0.0
+    for required in problem.gap_room.flat:
+        gap = max(gap, required)
+    return radius + gap

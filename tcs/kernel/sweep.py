@@ -1,0 +1,131 @@
+"""Every initial configuration of a slice of the grid against every goal."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
+from tcs.kernel.arrays import IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    base_contact,
+    gripper_body_contact,
+    gripper_room_contact,
+    new_workspace,
+)
+from tcs.kernel.lanes import wrist_goal
+from tcs.kernel.measure import isotropy_at, rounded_inward
+from tcs.kernel.pairs import (
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED,
+    JOINT_LIMITS,
+    REACHED,
+    TOO_FAR,
+    Search,
+    new_search,
+    score_pair,
+)
+from tcs.kernel.problem import Problem
+from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
+
+
+class Scores(NamedTuple):
+    """Output of a slice; row 0 is configuration `start` of the slice."""
+
+    reason: NDArray[np.uint8]
+    """Shape (n, goals)."""
+    contact: NDArray[np.int32]
+    """Contact code or NO_CONTACT, shape (n, goals)."""
+    isotropy: NDArray[np.float32]
+    """0 where not reached, shape (n, goals)."""
+    joints: NDArray[np.float32]
+    """Winning joints [rad], 0 where not reached, shape (n, goals, 7)."""
+
+
+@jit
+def gripper_contacts(problem: Problem) -> IntArray:
+    """Return the gripper's contact with the room at every goal, shape (states, goals).
+
+    It does not depend on where the robot stands.
+    """
+    work = new_workspace(problem)
+    states, goals = problem.goal_p.shape[0], problem.goal_p.shape[1]
+    codes = np.empty((states, goals), np.int64)
+    for s in range(states):
+        for g in range(goals):
+            codes[s, g] = gripper_room_contact(problem, work, s, g)
+    return codes
+
+
+@jit
+def score_slice(
+    problem: Problem, grippers: IntArray, start: int, stop: int, scores: Scores
+) -> None:
+    """Score the configurations start <= h < stop in the flat order of the grid.
+
+    Args:
+        problem: The scene, its goals and its grid.
+        grippers: From `gripper_contacts`.
+        start: First configuration.
+        stop: One after the last.
+        scores: Filled; every array holds stop - start rows.
+    """
+    work = new_workspace(problem)
+    search = new_search()
+    rounded = np.empty(7)
+    place, base_code, state = -1, NO_CONTACT, 0
+    for h in range(start, stop):
+        row, torso = h - start, h % problem.torso_levels
+        if h // problem.torso_levels != place:
+            place = h // problem.torso_levels
+            state = stand(problem, work, place)
+            base_code = base_contact(problem, work, 0, 0)
+        code = base_code
+        if code == NO_CONTACT:
+            code = base_contact(problem, work, torso, 1)
+        if code != NO_CONTACT:
+            scores.reason[row] = BODY_BLOCKED
+            scores.contact[row] = code
+            continue
+        body_A = problem.body_A[torso]
+        room_placed = False
+        for g in range(problem.goal_p.shape[1]):
+            scores.contact[row, g] = NO_CONTACT
+            if grippers[state, g] != NO_CONTACT:
+                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.contact[row, g] = grippers[state, g]
+                continue
+            goal_in_arm_base(problem, work, state, torso, g)
+            wrist_goal(problem.arm, work.R_AG, work.p_AG, search.goal)
+            arcs, reach = elbow_arcs(problem.arm, search.goal, search.arcs)
+            if reach != IN_REACH:
+                scores.reason[row, g] = TOO_FAR if reach == OUT_OF_REACH else JOINT_LIMITS
+                continue
+            code = gripper_body_contact(problem, work, body_A)
+            if code != NO_CONTACT:
+                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.contact[row, g] = code
+                continue
+            if not room_placed:
+                room_in_arm_base(problem, work, torso)
+                room_placed = True
+            reason, code = score_pair(problem, work, body_A, search, arcs)
+            scores.reason[row, g] = reason
+            scores.contact[row, g] = code
+            if reason == REACHED:
+                _keep(problem, search, rounded, scores, row, g)
+
+
+@jit
+def _keep(
+    problem: Problem, search: Search, rounded: NDArray[np.float64], scores: Scores, row: int, g: int
+) -> None:
+    """Write the winner. Its isotropy is that of the rounded joints, as anyone can recompute."""
+    rounded_inward(search.best, problem.arm.lower, problem.arm.upper, rounded)
+    for i in range(7):
+        scores.joints[row, g, i] = rounded[i]
+    scores.isotropy[row, g] = isotropy_at(problem.arm, rounded)

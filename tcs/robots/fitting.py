@@ -1,0 +1,213 @@
+"""Fit boxes and capsules to triangles so that each triangle lies wholly inside one of them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tcs.robots.boxes import (
+    best_candidate,
+    corner_points,
+    enclose,
+    hull_volume,
+    tightest_orientation,
+)
+from tcs.robots.primitives import Primitive, union_volume
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_BEAM = 6
+"""Divisions that are pursued side by side."""
+_SPLITS = 8
+"""Splits of one cluster that are pursued."""
+_ENOUGH = 0.04
+"""A further shape must save this share of the hull's volume, or it is not worth its cost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """When a fit is good enough.
+
+    Attributes:
+        excess: Volume of the union over the hull's volume at which no shape is added.
+        max_shapes: Most shapes on one body.
+    """
+
+    excess: float
+    max_shapes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Primitives around one body, and how much they exceed it.
+
+    Attributes:
+        primitives: They enclose every triangle.
+        hull: Volume of the convex hull of the triangles [m^3].
+        union: Volume of the primitives together [m^3].
+    """
+
+    primitives: tuple[Primitive, ...]
+    hull: float
+    union: float
+
+    @property
+    def excess(self) -> float:
+        """Union over hull."""
+        return self.union / self.hull
+
+
+def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
+    """Return few primitives that enclose every triangle closely.
+
+    Triangles are divided by planes, the division that leaves the least volume first, with a few
+    rivals pursued beside it; each part gets its smallest box or capsule. The first number of shapes
+    that meets the target is taken.
+
+    Args:
+        body: Name of the body.
+        triangles: Corners in its frame [m], shape (n, 3, 3).
+        target: When to stop.
+    """
+    hull = hull_volume(triangles)
+    search = _Search(triangles)
+    best: Fit | None = None
+    beam = [(search.volume(search.everything), (search.everything,))]
+    for count in range(1, target.max_shapes + 1):
+        if count > 1:
+            beam = search.divide(beam)
+        fits = [_finish(body, triangles, parts, search, hull) for _, parts in beam]
+        found = min(fits, key=lambda fit: fit.union)
+        if best is None or found.excess < best.excess - _ENOUGH * (count - len(best.primitives)):
+            best = found
+        if best.excess <= target.excess:
+            break
+    assert best is not None
+    return best
+
+
+Parts = tuple[IntArray, ...]
+Beam = list[tuple[float, Parts]]
+
+
+class _Search:
+    """Divisions of triangles into parts, judged by the summed volume of boxes in set frames."""
+
+    def __init__(self, triangles: FloatArray) -> None:
+        self.everything = np.arange(len(triangles))
+        self.orientations = _orientations(corner_points(triangles))
+        # Along each axis of each frame every triangle spans an interval; a box around several
+        # triangles is the span of their intervals.
+        seen = np.einsum("nci,kij->kncj", triangles, self.orientations)
+        self._low, self._high = seen.min(axis=2), seen.max(axis=2)
+        self._splits: dict[bytes, list[tuple[float, IntArray, IntArray]]] = {}
+
+    def volume(self, part: IntArray) -> float:
+        """Return the volume of the smallest box around a part in the set frames [m^3]."""
+        size = self._high[:, part].max(axis=1) - self._low[:, part].min(axis=1)
+        return float(size.prod(axis=1).min())
+
+    def divide(self, beam: Beam) -> Beam:
+        """Return the best divisions with one part more."""
+        found: dict[tuple[bytes, ...], tuple[float, Parts]] = {}
+        for total, parts in beam:
+            for i, part in enumerate(parts):
+                rest = total - self.volume(part)
+                for volume, first, second in self._splits_of(part):
+                    divided = (*parts[:i], first, second, *parts[i + 1 :])
+                    key = tuple(sorted(p.tobytes() for p in divided))
+                    found[key] = (rest + volume, divided)
+        # Keys break ties, so the result does not hang on the order of finding.
+        ranked = sorted(found.items(), key=lambda item: (item[1][0], item[0]))
+        return [division for _, division in ranked[:_BEAM]] or beam
+
+    def _splits_of(self, part: IntArray) -> list[tuple[float, IntArray, IntArray]]:
+        key = part.tobytes()
+        if key not in self._splits:
+            self._splits[key] = self._find_splits(part)
+        return self._splits[key]
+
+    def _find_splits(self, part: IntArray) -> list[tuple[float, IntArray, IntArray]]:
+        """Return the best splits of a part by planes across the axes of the set frames."""
+        if len(part) < 2:
+            return []
+        low, high = self._low[:, part], self._high[:, part]
+        found: list[tuple[float, IntArray, IntArray]] = []
+        for frame, axis in itertools.product(range(len(self.orientations)), range(3)):
+            starts, ends = low[frame, :, axis], high[frame, :, axis]
+            # A triangle that the plane cuts goes to the far side, the near side, or by its middle.
+            for position in (ends, starts, starts + ends):
+                order = np.argsort(position, kind="stable")
+                near = _running_volumes(low[:, order], high[:, order])
+                far = _running_volumes(low[:, order[::-1]], high[:, order[::-1]])[::-1]
+                total = near[:-1] + far[1:]
+                i = int(np.argmin(total))
+                first, second = np.sort(part[order[: i + 1]]), np.sort(part[order[i + 1 :]])
+                found.append((float(total[i]), first, second))
+        found.sort(key=lambda split: (split[0], split[1].tobytes()))
+        distinct = {split[1].tobytes(): split for split in reversed(found)}
+        return sorted(distinct.values(), key=lambda s: (s[0], s[1].tobytes()))[:_SPLITS]
+
+
+def _running_volumes(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the smallest box volume around the first 1, 2, ... triangles, shape (n,)."""
+    size = np.maximum.accumulate(high, axis=1) - np.minimum.accumulate(low, axis=1)
+    return np.asarray(size.prod(axis=2).min(axis=0))
+
+
+def _orientations(points: FloatArray) -> FloatArray:
+    """Return the frames that are searched: the body's own, its tightest box's, and turned ones."""
+    turned = [
+        Rotation.from_euler(axis, angle, degrees=True).as_matrix()
+        for axis in "xyz"
+        for angle in (15, 30, 45, 60, 75)
+    ]
+    return np.stack([np.eye(3), tightest_orientation(points), *turned])
+
+
+def _finish(body: str, triangles: FloatArray, parts: Parts, search: _Search, hull: float) -> Fit:
+    """Return the tightest primitives for a division, each freed of what others enclose."""
+    shapes = [_tightest(body, triangles[part], search) for part in parts]
+    best: Fit | None = None
+    # Who is freed first matters; with many shapes the rotations of the order must do.
+    orders: list[tuple[int, ...]] = [
+        tuple(np.roll(range(len(shapes)), shift)) for shift in range(len(shapes))
+    ]
+    if len(shapes) <= 3:
+        orders = list(itertools.permutations(range(len(shapes))))
+    for order in orders:
+        freed = _freed(body, triangles, shapes, order, search)
+        union = union_volume(freed)
+        if best is None or union < best.union:
+            best = Fit(primitives=freed, hull=hull, union=union)
+    assert best is not None
+    return best
+
+
+def _freed(
+    body: str,
+    triangles: FloatArray,
+    shapes: list[Primitive],
+    order: tuple[int, ...],
+    search: _Search,
+) -> tuple[Primitive, ...]:
+    """Return the shapes after each in turn was fitted anew to what only it encloses."""
+    current: list[Primitive | None] = list(shapes)
+    for i in order:
+        others = [shape for j, shape in enumerate(current) if j != i and shape is not None]
+        alone = np.ones(len(triangles), dtype=np.bool_)
+        for other in others:
+            alone &= ~other.contains_triangles(triangles)
+        current[i] = _tightest(body, triangles[alone], search) if alone.any() else None
+    return tuple(shape for shape in current if shape is not None)
+
+
+def _tightest(body: str, triangles: FloatArray, search: _Search) -> Primitive:
+    points = corner_points(triangles)
+    candidate = best_candidate(points, search.orientations)
+    return enclose(body, points, candidate.kind, candidate.R)

@@ -1,0 +1,95 @@
+"""Meshes of a URDF: read as triangles, or converted once to OBJ, the format that Drake reads."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from tcs.errors import OutputError, RobotError
+from tcs.paths import cache_folder
+
+FloatArray = NDArray[np.float64]
+
+_VERSION = b"1"
+"""Part of the cache key: raise it when the conversion changes."""
+
+
+def as_obj(mesh: Path) -> Path:
+    """Return an OBJ file of a mesh: itself, or its conversion in the user's cache.
+
+    The file is named by the content it was made from, so an edited mesh never meets a stale
+    conversion, and equal meshes share one.
+
+    Args:
+        mesh: A file in any format that trimesh reads: STL, Collada, OBJ, ...
+
+    Raises:
+        RobotError: If the mesh cannot be read.
+        OutputError: If the cache cannot be written.
+    """
+    if mesh.suffix.lower() == ".obj":
+        return mesh
+    folder = cache_folder() / "meshes"
+    key = hashlib.sha256(_VERSION + mesh.suffix.lower().encode() + _content(mesh)).hexdigest()
+    target = folder / f"{mesh.stem}_{key[:16]}.obj"
+    if not target.is_file():
+        loaded = _load(mesh)
+        text = trimesh.exchange.obj.export_obj(loaded, include_texture=False, include_color=False)
+        _write_atomically(target, text)
+    return target
+
+
+@cache
+def mesh_triangles(mesh: Path) -> FloatArray:
+    """Return the corners of every triangle of a mesh [its own unit], shape (n, 3, 3).
+
+    Triangles without area are kept: they are part of what must be enclosed.
+
+    Raises:
+        RobotError: If the mesh cannot be read.
+    """
+    loaded = _load(mesh)
+    triangles = np.asarray(loaded.vertices, dtype=np.float64)[loaded.faces]
+    triangles.setflags(write=False)
+    return triangles
+
+
+def _content(mesh: Path) -> bytes:
+    try:
+        return mesh.read_bytes()
+    except OSError as error:
+        raise RobotError(f"mesh '{mesh}' cannot be read: {error.strerror}.") from error
+
+
+def _load(mesh: Path) -> trimesh.Trimesh:
+    _content(mesh)
+    try:
+        loaded = trimesh.load(mesh, force="mesh", process=False)
+    except Exception as error:  # whatever its many readers raise on a broken file
+        raise RobotError(f"mesh '{mesh}' cannot be used: {error}.") from error
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        raise RobotError(f"mesh '{mesh}' holds no triangle.")
+    return loaded
+
+
+def _write_atomically(target: Path, text: str) -> None:
+    """Write under a temporary name, then rename: two processes may convert the same mesh."""
+    temporary: str | None = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=".part")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise OutputError(f"mesh cache '{target.parent}': {error.strerror}.") from error
+    finally:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)

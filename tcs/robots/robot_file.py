@@ -1,0 +1,306 @@
+"""Robot files: what `tcs` has to know about a robot beyond its URDF, as data."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.paths import data_folder
+from tcs.robots.packages import resolve_uri
+from tcs.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
+from tcs.robots.urdf import Urdf, read_urdf
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+PositiveNumber = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Vector = tuple[Number, Number, Number]
+Name = Annotated[str, Field(min_length=1)]
+Positions = Mapping[Name, Number]
+
+_FILES = ("urdf", "primitives")
+"""Fields that name a file, relative to the robot file."""
+
+
+class _Data(BaseModel):
+    """A frozen mapping of the file that refuses keys it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _Placed(_Data):
+    """Something fixed to a link of the robot."""
+
+    name: Name
+    parent: Name
+    xyz: Vector = (0.0, 0.0, 0.0)
+    """Origin in the parent [m]."""
+    rpy_deg: Vector = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw about the parent's fixed axes [deg]."""
+
+    @property
+    def rpy(self) -> Vector:
+        """Roll, pitch, yaw about the parent's fixed axes [rad]."""
+        roll, pitch, yaw = (math.radians(angle) for angle in self.rpy_deg)
+        return roll, pitch, yaw
+
+
+class ExtraFrame(_Placed):
+    """A frame that the URDF lacks, e.g. the tip of a tool."""
+
+
+class BodyPrimitive(_Data):
+    """One collision shape of an extra body."""
+
+    kind: Literal["sphere", "capsule", "box"]
+    size: tuple[PositiveNumber, ...]
+    """Sphere: radius. Capsule: radius, length between cap centres. Box: full sizes [m]."""
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy_deg: Vector = (0.0, 0.0, 0.0)
+
+
+class ExtraBody(_Placed):
+    """A body that the URDF lacks, e.g. a tool in the hand."""
+
+    primitives: tuple[BodyPrimitive, ...]
+
+
+class DisabledGroup(_Data):
+    """Pairs of bodies whose contact is never checked, and why."""
+
+    reason: Annotated[str, Field(min_length=10)]
+    pairs: tuple[tuple[Name, Name], ...]
+
+
+class RobotFile(_Data):
+    """A robot as its file says it; `load_robot` has checked it against the URDF."""
+
+    name: Name
+    title: str
+    urdf: str
+    """`package://...`, or a path."""
+    root_body: Name
+    """B: the URDF's root link, which the planar base joint carries."""
+    arm_base: Name
+    """A: the link that carries joint 1 of the scored arm."""
+    arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
+    """The scored arm's seven joints, from A outward."""
+    tool_frame: Name
+    """T: what has to come to a goal; a link of the URDF, or an extra frame or body."""
+    torso_joint: Name | None = None
+    limits: Literal["soft", "hard"] = "soft"
+    """Which limits of the URDF hold: `safety_controller` or `limit`."""
+    postures: Mapping[Name, Positions] = {}
+    """Joints other than arm and torso by posture name [rad or m]; a joint not named is at 0, or at
+    the nearest position its limits allow."""
+    posture: Name | None = None
+    """The posture in force; None leaves every joint at 0."""
+    grippers: Mapping[Name, Positions] = {}
+    """Gripper joints by opening [rad or m]."""
+    gripper: Name | None = None
+    """The opening in force."""
+    frames: tuple[ExtraFrame, ...] = ()
+    bodies: tuple[ExtraBody, ...] = ()
+    standing_bodies: tuple[Name, ...] = ()
+    """Bodies that may touch the floor."""
+    primitives: str
+    """CSV file of the collision shapes."""
+    disabled_groups: tuple[DisabledGroup, ...] = ()
+    source: str
+
+    @model_validator(mode="after")
+    def _choices_exist(self) -> Self:
+        for field, choice, choices in (
+            ("posture", self.posture, self.postures),
+            ("gripper", self.gripper, self.grippers),
+        ):
+            if choice is not None and choice not in choices:
+                raise UnknownNameError(field, choice, choices, where=f"robot '{self.name}'")
+        return self
+
+    def __hash__(self) -> int:
+        """Hash the content; pydantic's own hash stumbles over the mappings."""
+        return hash(self.model_dump_json())
+
+    @property
+    def disabled_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Every pair of bodies whose contact is never checked."""
+        return tuple(pair for group in self.disabled_groups for pair in group.pairs)
+
+    def urdf_path(self) -> Path:
+        """Return where the URDF lies on this machine.
+
+        Raises:
+            RobotError: If it is not there.
+        """
+        return resolve_uri(self.urdf, Path())
+
+    def model(self) -> Urdf:
+        """Return what the URDF says.
+
+        Raises:
+            RobotError: If it cannot be used.
+        """
+        return read_urdf(self.urdf_path())
+
+    def joint_limits(self) -> dict[str, tuple[float, float]]:
+        """Return the limits in force of every movable joint [rad or m], infinite where it turns on.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints.values()
+        return {j.name: j.soft if self.limits == "soft" else j.hard for j in joints if j.is_movable}
+
+    def joint_positions(self) -> dict[str, float]:
+        """Return where every movable joint but the scored arm and the torso stands [rad or m].
+
+        Joints named by the posture and the gripper opening in force are where these say; joints
+        that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints
+        given: dict[str, float] = {}
+        if self.posture is not None:
+            given |= self.postures[self.posture]
+        if self.gripper is not None:
+            given |= self.grippers[self.gripper]
+        limits = self.joint_limits()
+
+        def position(name: str) -> float:
+            mimic = joints[name].mimic
+            if name in given:
+                return given[name]
+            if mimic is not None:
+                return mimic.multiplier * position(mimic.leader) + mimic.offset
+            lower, upper = limits[name]
+            return min(max(0.0, lower), upper)
+
+        scored = {*self.arm_joints, self.torso_joint}
+        return {name: position(name) for name in limits if name not in scored}
+
+    def load_primitives(self) -> tuple[Primitive, ...]:
+        """Return every collision shape: those of the CSV file, then those of the extra bodies.
+
+        Raises:
+            RobotError: If the file cannot be used.
+        """
+        extra = tuple(
+            Primitive(
+                body=body.name,
+                kind=shape.kind,
+                size=shape.size,
+                xyz=shape.xyz,
+                quaternion=quaternion_of_rpy([math.radians(angle) for angle in shape.rpy_deg]),
+            )
+            for body in self.bodies
+            for shape in body.primitives
+        )
+        return read_primitives(Path(self.primitives)) + extra
+
+    def with_choices(
+        self,
+        *,
+        posture: str | None = None,
+        gripper: str | None = None,
+        limits: Literal["soft", "hard"] | None = None,
+    ) -> RobotFile:
+        """Return the same robot with another posture, gripper opening or kind of limits in force.
+
+        Args:
+            posture: Name of a posture of the file; None keeps the one in force.
+            gripper: Name of a gripper opening of the file; None keeps the one in force.
+            limits: "soft" or "hard"; None keeps those in force.
+
+        Raises:
+            UnknownNameError: If the file has no posture or opening of that name.
+        """
+        chosen = {"posture": posture, "gripper": gripper, "limits": limits}
+        given = {key: value for key, value in chosen.items() if value is not None}
+        return RobotFile.model_validate(self.model_dump() | given)
+
+
+def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:
+    """Return the limits in force of every movable joint; see `RobotFile.joint_limits`."""
+    return robot.joint_limits()
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the robots that ship with `tcs`, sorted."""
+    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
+
+
+def load_robot(name_or_path: str | Path) -> RobotFile:
+    """Return a robot, checked against its URDF, the files it names as absolute paths.
+
+    Args:
+        name_or_path: One of `robot_names()`, or the path of a file: anything that ends in `.yaml`
+            or holds a path separator.
+
+    Raises:
+        UnknownNameError: If there is no robot of that name, or the file names something unknown.
+        RobotError: If the file, or a model it names, cannot be used.
+    """
+    from tcs.robots.checks import check_robot
+
+    path = _path_of(str(name_or_path))
+    content = _read_yaml(path)
+    for key in _FILES:
+        value = content.get(key)
+        if isinstance(value, str) and not value.startswith("package://"):
+            content[key] = str((path.parent / Path(value).expanduser()).resolve())
+    try:
+        robot = RobotFile.model_validate(content)
+    except ValidationError as error:
+        raise _complaint(error, path) from None
+    check_robot(robot, where=f"robot file '{path}'")
+    return robot
+
+
+def _folder() -> Path:
+    return data_folder() / "models" / "robots"
+
+
+def _path_of(name_or_path: str) -> Path:
+    separators = [separator for separator in (os.sep, os.altsep) if separator]
+    if name_or_path.endswith(".yaml") or any(s in name_or_path for s in separators):
+        return Path(name_or_path).expanduser().resolve()
+    if name_or_path not in robot_names():
+        raise UnknownNameError("robot", name_or_path, robot_names())
+    return _folder() / f"{name_or_path}.yaml"
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    where = f"robot file '{path}'"
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RobotError(f"{where} cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{where} is no text file in UTF-8.") from error
+    except (yaml.YAMLError, ValueError) as error:
+        text = re.sub(r"\s+", " ", str(error))
+        raise RobotError(f"{where} is no sound YAML: {text}.") from error
+    if not isinstance(content, dict):
+        raise RobotError(f"{where} must hold keys and values: {', '.join(RobotFile.model_fields)}.")
+    return content
+
+
+def _complaint(error: ValidationError, path: Path) -> RobotError | UnknownNameError:
+    """Return the first thing that is wrong with a robot file, as one line."""
+    first = error.errors()[0]
+    where = f"robot file '{path}'"
+    *parents, last = (str(part) for part in first["loc"] or ("file",))
+    if first["type"] == "extra_forbidden" and not parents:
+        return UnknownNameError("key", last, RobotFile.model_fields, where=where)
+    field = ".".join((*parents, last))
+    given = "" if first["type"] == "missing" else f" (given: {str(first['input'])[:60]!r})"
+    return RobotError(f"{where}, {field}: {first['msg']}{given}.")

@@ -1,0 +1,30 @@
+"""Scenes: a robot in an environment, as a live Drake plant or as arrays for the kernel."""
+
+from __future__ import annotations
+
+from tcs.scene.environment import (
+    EnvironmentFile,
+    JointError,
+    ModelEntry,
+    Obstacle,
+    environment_names,
+    load_environment,
+)
+from tcs.scene.lowering import LoweredScene, goal_poses, lower
+from tcs.scene.scene import Contact, Scene
+from tcs.scene.spec import SceneSpec
+
+__all__ = [
+    "Contact",
+    "EnvironmentFile",
+    "JointError",
+    "LoweredScene",
+    "ModelEntry",
+    "Obstacle",
+    "Scene",
+    "SceneSpec",
+    "environment_names",
+    "goal_poses",
+    "load_environment",
+    "lower",
+]

@@ -1,0 +1,103 @@
+"""The frames that the kernel's arm chain uses, chosen from where the joint axes lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+
+AXES_MEET = 1e-6
+"""Axes closer than this meet [m]: far above rounding in a URDF's figures (1e-9), far below what
+could move a tool visibly."""
+
+_PARALLEL = 1e-9
+"""Squared sine of the angle below which two axes count as parallel: there, the point where they
+meet is lost in rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A joint axis and the frame of the link it moves, all joints at zero.
+
+    Attributes:
+        R_AJ: Orientation of the joint frame J in the arm base A, shape (3, 3).
+        p_AJ: Origin of J in A, a point on the axis [m], shape (3,).
+        direction_J: Unit vector of the axis in J, shape (3,).
+    """
+
+    R_AJ: FloatArray
+    p_AJ: FloatArray
+    direction_J: FloatArray
+
+    @property
+    def direction_A(self) -> FloatArray:
+        """Unit vector of the axis in A, shape (3,)."""
+        return self.R_AJ @ self.direction_J
+
+
+def link_frames(axes: tuple[Axis, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return the poses of link frames L1..L7 in the arm base A, all joints at zero.
+
+    Each L turns about its own z. Its origin is that of the joint frame, except where sliding it
+    along the joint axis makes the closed form of the arm visible: L2 and L3 lie where axes 2 and
+    3 meet, L5, L6 and L7 where axes 5, 6 and 7 meet in one point.
+
+    Args:
+        axes: The seven joint axes, in the arm's order.
+
+    Returns:
+        Rotations (7, 3, 3) and origins (7, 3) [m].
+    """
+    R_AL = np.stack([axis.R_AJ @ _rotation_to_z(axis.direction_J) for axis in axes])
+    p_AL = np.stack([axis.p_AJ for axis in axes])
+    shoulder = meeting_points(axes[1], axes[2])
+    if shoulder is not None:
+        p_AL[1], p_AL[2] = shoulder
+    # Axes 5 and 7 may be parallel at zero, so each is met with axis 6, where the point is sharp.
+    wrist, hand = meeting_points(axes[4], axes[5]), meeting_points(axes[6], axes[5])
+    if wrist is not None and hand is not None and np.linalg.norm(wrist[1] - hand[1]) < AXES_MEET:
+        p_AL[4], p_AL[5], p_AL[6] = wrist[0], wrist[1], hand[0]
+    return R_AL, p_AL
+
+
+def meeting_points(first: Axis, second: Axis) -> tuple[FloatArray, FloatArray] | None:
+    """Return where two axes meet, expressed in A [m], or None if they pass each other.
+
+    Axes given in rounded figures miss each other by a hair, so there is one point on each: every
+    link origin stays on its own axis, and the chain stays exact.
+
+    >>> z = Axis(np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    >>> x = Axis(np.eye(3), np.array([5.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]))
+    >>> [point.tolist() for point in meeting_points(z, x)]
+    [[0.0, 0.0, 2.0], [0.0, 0.0, 2.0]]
+    """
+    a, b = first.direction_A, second.direction_A
+    offset = second.p_AJ - first.p_AJ
+    cosine = float(a @ b)
+    sine_squared = 1.0 - cosine * cosine
+    if sine_squared < _PARALLEL:
+        return None
+    along_first = float(a @ offset - cosine * (b @ offset)) / sine_squared
+    along_second = float(cosine * (a @ offset) - b @ offset) / sine_squared
+    on_first = first.p_AJ + along_first * a
+    on_second = second.p_AJ + along_second * b
+    if np.linalg.norm(on_first - on_second) >= AXES_MEET:
+        return None
+    return on_first, on_second
+
+
+def _rotation_to_z(direction: FloatArray) -> FloatArray:
+    """Return the rotation whose z column is `direction`, cyclic where the axis is x or y.
+
+    The columns of a URDF axis along x, y or z stay exact zeros and ones, so no rounding creeps
+    into the chain.
+    """
+    largest = int(np.argmax(np.abs(direction)))
+    z = direction / np.linalg.norm(direction)
+    helper = np.zeros(3)
+    helper[(largest + 1) % 3] = 1.0
+    x = helper - (helper @ z) * z
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])

@@ -1,0 +1,21 @@
+"""Scoring: the offline job, its sets, and the re-check of what it stored."""
+
+from __future__ import annotations
+
+from tcs.scoring.job import Job, load_job, score, summary
+from tcs.scoring.sets import build_sets
+from tcs.scoring.sweep import Sweep, sweep, warm_up
+from tcs.scoring.verify import Verification, verify
+
+__all__ = [
+    "Job",
+    "Sweep",
+    "Verification",
+    "build_sets",
+    "load_job",
+    "score",
+    "summary",
+    "sweep",
+    "verify",
+    "warm_up",
+]

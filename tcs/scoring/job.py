@@ -1,0 +1,208 @@
+"""The offline job: one task in one environment with one robot, scored and made ready to choose."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from tcs.errors import TaskError
+from tcs.robots import RobotFile, load_robot
+from tcs.scene import (
+    EnvironmentFile,
+    LoweredScene,
+    Scene,
+    SceneSpec,
+    environment_names,
+    load_environment,
+    lower,
+)
+from tcs.scoring.sets import build_sets
+from tcs.scoring.sweep import sweep
+from tcs.space import Grid
+from tcs.store import ScoreFile
+from tcs.tasks import Task, load_task
+
+MEASURE = "isotropy"
+"""Name of the dexterity measure: kinematic isotropy, TCS eq. (2)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Job:
+    """What is scored: everything loaded and checked, nothing built yet."""
+
+    task: Task
+    spec: SceneSpec
+    grid: Grid
+
+    def scene(self) -> Scene:
+        """Return a new live scene in which this task's allowed contacts are allowed."""
+        return Scene(self.spec, allowed_contacts=self.task.allowed_contacts)
+
+    def lowered(self, scene: Scene) -> LoweredScene:
+        """Return the scene as arrays."""
+        return lower(scene, self.task, self.grid)
+
+
+def load_job(
+    task: str | Path | Task,
+    environment: str | Path | EnvironmentFile,
+    robot: str | Path | RobotFile,
+) -> Job:
+    """Return what is named, loaded and checked against each other.
+
+    Raises:
+        UnknownNameError: If a task, environment or robot of that name does not exist.
+        DataFileError: If a file cannot be used, or the task is not for that environment.
+        GridError: If the grid is empty or enormous.
+    """
+    task = task if isinstance(task, Task) else load_task(task)
+    if not isinstance(environment, EnvironmentFile):
+        environment = load_environment(environment)
+    robot = robot if isinstance(robot, RobotFile) else load_robot(robot)
+    # An environment of the user's own may take any task whose body frames it has.
+    ours = environment.name in environment_names()
+    if ours and environment.name not in task.environments:
+        raise TaskError(
+            f"Task '{task.name}' has no goals in environment '{environment.name}'. "
+            f"It is for: {', '.join(task.environments)}."
+        )
+    grid = Grid.from_spec(environment.grid, where=f"environment '{environment.name}'")
+    changes = task.grid_changes(environment.name)
+    if changes:
+        grid = grid.overridden(changes, where=f"task '{task.name}'")
+    return Job(task, SceneSpec(robot, environment), grid)
+
+
+def score(
+    task: str | Path | Task,
+    environment: str | Path | EnvironmentFile = "wheelchair",
+    robot: str | Path | RobotFile = "pr2",
+    *,
+    jobs: int = 2,
+    min_distance: float = 0.40,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> ScoreFile:
+    """Score a task on the whole grid of an environment and build the sets to choose from.
+
+    Args:
+        task: Name of a task, path of a task file, or a task.
+        environment: Name, path or environment.
+        robot: Name, path or robot.
+        jobs: Number of threads; the result does not depend on it.
+        min_distance: Least base x-y distance between the members of a pair [m].
+        on_progress: Called with configurations scored and in all.
+        on_compile: Called before the kernel compiles, when it has to.
+
+    Returns:
+        Scores and sets, ready for `tcs.save` and `tcs.select`.
+
+    Raises:
+        UnknownNameError: If a task, environment, robot or frame of that name does not exist.
+        DataFileError: If a file cannot be used.
+        GridError: If the grid is empty or enormous.
+        ArmClassError: If the closed form cannot solve the arm.
+    """
+    begun = time.perf_counter()
+    job = load_job(task, environment, robot)
+    lowered = job.lowered(job.scene())
+    swept = sweep(
+        lowered, job.task.weights, jobs=jobs, on_progress=on_progress, on_compile=on_compile
+    )
+    sets_begun = time.perf_counter()
+    sets = build_sets(swept.scores, job.grid, min_distance=min_distance, jobs=jobs)
+    done = time.perf_counter()
+    return ScoreFile(
+        metadata={
+            "program_version": version("tcs"),
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "task": _reference(task, job.task.name),
+            "environment": _reference(environment, job.spec.environment.name),
+            "robot": _reference(robot, job.spec.robot.name),
+            "scene_digest": lowered.digest(),
+            "measure": MEASURE,
+            "hashes": {"scene": lowered.digest()},
+            "timings": {
+                "compile_seconds": swept.compile_seconds,
+                "scoring_seconds": swept.scoring_seconds,
+                "sets_seconds": done - sets_begun,
+                "total_seconds": done - begun,
+            },
+        },
+        task=_task_as_dict(job.task),
+        robot=job.spec.robot.model_dump(mode="json"),
+        environment=job.spec.environment.model_dump(mode="json"),
+        grid=job.grid.to_dict(),
+        scores=swept.scores,
+        sets=sets,
+    )
+
+
+def _reference(given: object, name: str) -> str:
+    """Return how to find a data file again: its name, or its absolute path."""
+    if isinstance(given, Path) or (isinstance(given, str) and given != name):
+        return str(Path(given).absolute())
+    return name
+
+
+def _task_as_dict(task: Task) -> dict[str, Any]:
+    """Return a task as plain containers."""
+    return {
+        "name": task.name,
+        "title": task.title,
+        "source": task.source,
+        "tool": task.tool,
+        "environments": list(task.environments),
+        "allowed_contacts": [list(pair) for pair in task.allowed_contacts],
+        "goals": [
+            {
+                "body_frame": goal.body_frame,
+                "position": goal.position.tolist(),
+                "quaternion_wxyz": goal.quaternion.tolist(),
+                "weight": goal.weight,
+            }
+            for goal in task.goals
+        ],
+    }
+
+
+def summary(file: ScoreFile) -> dict[str, Any]:
+    """Return the figures of a score file that a person wants to see first.
+
+    The keys are those of `tcs score --json`, except the name of the file.
+    """
+    scores, sets, timings = file.scores, file.sets, file.metadata["timings"]
+    return {
+        "configurations": scores.configurations,
+        "goals": scores.goals,
+        "pairs": scores.configurations * scores.goals,
+        "reached_pairs": int(scores.reached.sum()),
+        "scoring_seconds": timings["scoring_seconds"],
+        "compile_seconds": timings["compile_seconds"],
+        "sets_seconds": timings["sets_seconds"],
+        "total_seconds": timings["total_seconds"],
+        "candidates": len(sets.candidates),
+        "sets": sets.sets,
+        "best": _set_summary(file, sets.best),
+        "best_single": _set_summary(file, sets.best_single),
+        "reasons": scores.reason_counts(),
+    }
+
+
+def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | None:
+    """Return scores and members of a set; None when no goal is reached anywhere."""
+    if not members:
+        return None
+    grid = Grid.from_dict(file.grid)
+    reachability, manipulability = file.sets.scores_of(members)
+    return {
+        "reachability": reachability,
+        "manipulability": manipulability,
+        "members": [grid.configuration(h).to_json() for h in members],
+    }
+

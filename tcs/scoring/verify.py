@@ -1,0 +1,294 @@
+"""Re-check stored answers with Drake, and look for answers that the search has missed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from tcs.errors import TcsError
+from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.problem import build_problem
+from tcs.kernel.reference import isotropy
+from tcs.scene import Scene, goal_poses
+from tcs.scoring.job import Job, load_job
+from tcs.store import ScoreFile, check_scene
+from tcs.tables import Reason
+
+POSITION_BAR = 1e-6
+"""Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
+the tool by up to 1.2e-7 rad x 1 m for each of the seven joints, 4e-7 m in practice."""
+ROTATION_BAR = 2e-6
+"""Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
+8.4e-7, and reading an angle off a rotation matrix near the identity loses as much again."""
+ISOTROPY_BAR = 1e-6
+"""Greatest difference of a stored isotropy from that of Drake's Jacobian; float32 keeps 6e-8."""
+CLEARANCE_ROUNDING = 2e-6
+"""How much closer than required a pair may be [m] when Drake measures it: rounding of the joints
+moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is good to 1e-6 m."""
+UNREACHED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
+"""Strata of the dense scan: base and gripper are free and the goal is within reach."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What re-checking a score file found."""
+
+    checked: int
+    """Reached pairs re-checked with Drake."""
+    false_reached: int
+    """Of these, how many miss the goal, pass a limit or touch something."""
+    max_position_error: float
+    """Greatest distance of the tool from its goal [m]."""
+    max_rotation_error: float
+    """Greatest rotation of the tool from its goal [rad]."""
+    max_isotropy_error: float
+    """Greatest difference of the isotropy from that of Drake's Jacobian."""
+    limit_violations: int
+    """Joints beyond their limits."""
+    dense_checked: int
+    """Unreached pairs scanned densely."""
+    missed: int
+    """Of these, how many have a solution that Drake confirms."""
+    unconfirmed_hits: int
+    """Solutions of the dense scan that Drake refuses."""
+    recall: float
+    """Estimated share of reachable pairs that are stored as reached."""
+    recall_ci95: tuple[float, float]
+    """Its interval: exact binomial limits in each stratum, added up."""
+    shortfall_checked: int
+    """Reached pairs scanned densely."""
+    mean_shortfall: float
+    """How much more isotropy the dense scan finds there, on average."""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether no answer was found false."""
+        return (
+            self.false_reached == 0
+            and self.limit_violations == 0
+            and self.unconfirmed_hits == 0
+            and self.max_position_error <= POSITION_BAR
+            and self.max_rotation_error <= ROTATION_BAR
+            and self.max_isotropy_error <= ISOTROPY_BAR
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the findings as plain containers."""
+        return {**asdict(self), "recall_ci95": list(self.recall_ci95)}
+
+
+def verify(
+    file: ScoreFile,
+    *,
+    pairs: int = 500,
+    dense: int = 200,
+    seed: int = 0,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Verification:
+    """Check answers of a score file against Drake and against a dense scan.
+
+    Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
+    every checked contact, isotropy. Random unreached pairs, stratified over those whose base and
+    gripper are free and whose goal is within reach, are scanned with 11,520 values of the free
+    joint, and so are random reached pairs, for the isotropy the search left behind. Drake has to
+    confirm every solution the scan finds where none is stored.
+
+    Args:
+        file: A score file.
+        pairs: How many reached pairs to re-check.
+        dense: How many unreached and how many reached pairs to scan densely.
+        seed: Seed of the random choice.
+        on_progress: Called with pairs done and in all.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+        TcsError: If a number is negative.
+    """
+    if pairs < 0 or dense < 0:
+        raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
+    names = (file.metadata[key] for key in ("task", "environment", "robot"))
+    job = load_job(*names)
+    scene = job.scene()
+    lowered = job.lowered(scene)
+    check_scene(file, lowered.digest())
+    judge = _Judge(job, scene)
+    rng = np.random.default_rng(seed)
+    scores = file.scores
+    problem = build_problem(lowered.arrays, lowered.grid)
+
+    reached = _sample(rng, scores.reason == Reason.REACHED, pairs)
+    strata = _shares(scores.reason, dense)
+    unreached = [_sample(rng, scores.reason == reason, n) for reason, n in strata.items()]
+    again = _sample(rng, scores.reason == Reason.REACHED, dense)
+    total = len(reached) + sum(len(part) for part in unreached) + len(again)
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if on_progress is not None:
+            on_progress(done, total)
+
+    findings = []
+    for h, g in reached:
+        q = scores.joints_of(h, g)
+        findings.append(judge.check(h, g, np.asarray(q, dtype=np.float64), scores.isotropy[h, g]))
+        step()
+    missed, unconfirmed = [], 0
+    for part in unreached:
+        hits = 0
+        for h, g in part:
+            q = np.empty(7)
+            value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
+            if value >= 0.0:
+                confirmed = judge.check(h, g, q, value).is_true
+                hits += confirmed
+                unconfirmed += not confirmed
+            step()
+        missed.append(hits)
+    shortfall = []
+    for h, g in again:
+        value = dense_scan(problem, h, g, DENSE_SAMPLES, np.empty(7))
+        shortfall.append(max(0.0, value - float(scores.isotropy[h, g])))
+        step()
+    sizes = [int(np.count_nonzero(scores.reason == reason)) for reason in strata]
+    scanned = [len(part) for part in unreached]
+    recall, interval = estimated_recall(int(scores.reached.sum()), sizes, scanned, missed)
+    return Verification(
+        checked=len(findings),
+        false_reached=sum(not finding.is_true for finding in findings),
+        max_position_error=max((finding.position_error for finding in findings), default=0.0),
+        max_rotation_error=max((finding.rotation_error for finding in findings), default=0.0),
+        max_isotropy_error=max((finding.isotropy_error for finding in findings), default=0.0),
+        limit_violations=sum(finding.limit_violations for finding in findings),
+        dense_checked=sum(scanned),
+        missed=sum(missed),
+        unconfirmed_hits=unconfirmed,
+        recall=recall,
+        recall_ci95=interval,
+        shortfall_checked=len(shortfall),
+        mean_shortfall=float(np.mean(shortfall)) if shortfall else 0.0,
+    )
+
+
+def estimated_recall(
+    reached: int, sizes: list[int], scanned: list[int], missed: list[int]
+) -> tuple[float, tuple[float, float]]:
+    """Return the estimated recall and its 95 % interval.
+
+    Args:
+        reached: R, how many pairs are stored as reached.
+        sizes: U of each stratum, how many unreached pairs there are.
+        scanned: How many of them were scanned.
+        missed: How many of these turned out to be reachable.
+
+    Returns:
+        R / (R + sum of U x missed / scanned), and the same at the Clopper-Pearson limits of each
+        stratum, which together are on the safe side.
+
+    >>> estimated_recall(990, [1000], [100], [1])[0]
+    0.99
+    """
+    tail = (1.0 - CONFIDENCE) / 2.0
+    expected = lowest = highest = 0.0
+    for size, n, k in zip(sizes, scanned, missed, strict=True):
+        if n == 0:
+            # Nothing looked at: nothing known, unless there is nothing.
+            highest += size
+            continue
+        expected += size * k / n
+        if k > 0:
+            lowest += size * float(beta.ppf(tail, k, n - k + 1))
+        highest += size * (float(beta.ppf(1.0 - tail, k + 1, n - k)) if k < n else 1.0)
+    if reached == 0:
+        return (1.0, (0.0, 1.0)) if expected == 0.0 else (0.0, (0.0, 0.0))
+    return reached / (reached + expected), (
+        reached / (reached + highest),
+        reached / (reached + lowest),
+    )
+
+
+def _shares(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
+    """Return how many pairs of each stratum to scan: in proportion, none of them left out."""
+    sizes = {r: int(np.count_nonzero(reason == r)) for r in UNREACHED}
+    total = sum(sizes.values())
+    if total == 0 or dense == 0:
+        return dict.fromkeys(UNREACHED, 0)
+    first, second = UNREACHED
+    least = min(dense // 2, sizes[first], max(1, dense // 10)) if sizes[first] else 0
+    share = min(max(round(dense * sizes[first] / total), least), dense)
+    rest = min(dense - share, sizes[second])
+    if sizes[second]:
+        rest = max(rest, min(max(1, dense // 10), sizes[second]))
+    return {first: min(dense - rest, sizes[first]), second: rest}
+
+
+def _sample(
+    rng: np.random.Generator, chosen: NDArray[np.bool_], count: int
+) -> list[tuple[int, int]]:
+    """Return up to `count` different random (h, g) at which `chosen` is true."""
+    flat = np.flatnonzero(chosen)
+    picked = rng.choice(flat, size=min(count, len(flat)), replace=False)
+    goals = chosen.shape[1]
+    return [(int(i // goals), int(i % goals)) for i in picked]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What Drake says of one solution."""
+
+    position_error: float
+    rotation_error: float
+    isotropy_error: float
+    limit_violations: int
+    contacts: int
+
+    @property
+    def is_true(self) -> bool:
+        """Whether the solution is at its goal, within its limits and free of contact."""
+        return (
+            self.position_error <= POSITION_BAR
+            and self.rotation_error <= ROTATION_BAR
+            and self.limit_violations == 0
+            and self.contacts == 0
+        )
+
+
+class _Judge:
+    """Drake's verdict on solutions of one job."""
+
+    def __init__(self, job: Job, scene: Scene) -> None:
+        self._job, self._scene = job, scene
+        self._lower, self._upper = scene.arm_limits
+        self._axes = [axis.name for axis in job.grid.environment_axes]
+
+    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
+        """Return what Drake finds at configuration h, goal g and joint angles q."""
+        scene = self._scene
+        at = self._job.grid.values(np.array([h]))
+        scene.place_base(*(float(at[name][0]) for name in ("base_x", "base_y", "base_yaw")))
+        scene.set_torso(float(at["torso"][0]))
+        for name in self._axes:
+            scene.set_joint(name, float(at[name][0]))
+        scene.set_arm(q)
+        X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
+        X_TG = X_WT.inverse() @ X_WG
+        rotation = X_TG.rotation().ToAngleAxis().angle()
+        contacts = [
+            distance
+            for first, second, distance in scene.violations()
+            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
+        ]
+        return Finding(
+            position_error=float(np.linalg.norm(X_TG.translation())),
+            rotation_error=float(rotation),
+            isotropy_error=abs(isotropy(scene.tool_jacobian()) - float(value)),
+            limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
+            contacts=len(contacts),
+        )

@@ -1,0 +1,144 @@
+"""Choose the set to use now: the online part of TCS."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tcs.errors import SelectionError
+from tcs.select.search import PairIndex, best_pair
+from tcs.select.travel import Legs, TravelWeights, legs_from, shortest_tour
+from tcs.select.utility import UtilityWeights, utility
+from tcs.space import Grid
+from tcs.store import ScoreFile
+from tcs.tables import InitialConfiguration, SetTable
+
+MOST_MEMBERS = 2
+"""Greatest number of members of the sets that are stored."""
+
+_DEFAULT_WEIGHTS = UtilityWeights()
+_DEFAULT_TRAVEL = TravelWeights()
+
+
+@dataclass(frozen=True)
+class SelectionTables:
+    """What can be chosen from: the sets, and the grid their members are of.
+
+    Keeps what the search derives from the sets, so that later choices from the same tables
+    are faster than the first.
+    """
+
+    sets: SetTable
+    """The kept sets."""
+    grid: Grid
+    """The grid of initial configurations."""
+
+    @classmethod
+    def of(cls, file: ScoreFile) -> SelectionTables:
+        """Return the tables of a loaded score file."""
+        return cls(file.sets, Grid.from_dict(file.grid))
+
+    @cached_property
+    def index(self) -> PairIndex:
+        """The sets, prepared for the search."""
+        return PairIndex(self.sets)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The set with the greatest utility, and what it was chosen for."""
+
+    members: tuple[InitialConfiguration, ...]
+    """The members, in the order of their configuration indices."""
+    indices: tuple[int, ...]
+    """Flat configuration indices of the members, ascending."""
+    order: tuple[int, ...]
+    """Order in which to visit `members`: the shortest tour."""
+    reachability: float
+    """P_R of the set, TCS eq. (1)."""
+    manipulability: float
+    """P_M of the set, TCS eq. (4)."""
+    cost: float
+    """D of the set from the current state."""
+    utility: float
+    """alpha P_R + beta P_M - gamma D, TCS eq. (5)."""
+    seconds: float
+    """How long choosing took [s]."""
+
+
+def select(
+    source: ScoreFile | SelectionTables,
+    here: InitialConfiguration,
+    *,
+    weights: UtilityWeights = _DEFAULT_WEIGHTS,
+    travel: TravelWeights = _DEFAULT_TRAVEL,
+    max_members: int = MOST_MEMBERS,
+) -> Choice:
+    """Return the stored set with the greatest utility from where the robot is.
+
+    The result equals a search through all stored sets. Of sets with the same utility the first
+    wins: singles by configuration index, then pairs in lexicographic order.
+
+    Args:
+        source: A loaded score file; or its tables, which is faster when choosing repeatedly.
+        here: The current state of robot and environment, h_0, in the environment frame.
+        weights: alpha, beta, gamma.
+        travel: What each kind of motion costs.
+        max_members: 1 to choose a single configuration, 2 to allow a pair.
+
+    Raises:
+        SelectionError: If no goal is reached from anywhere, the current state is not finite or
+            lacks an axis that costs something, or `max_members` is not stored.
+        UnknownNameError: If an environment axis has no such name.
+
+    Source:
+        TCS eq. (5). The paper leaves D open; ours is the shortest tour through the members.
+    """
+    start = time.perf_counter()
+    if not 1 <= max_members <= MOST_MEMBERS:
+        raise SelectionError(
+            f"At most {max_members} members asked for; sets of 1 to {MOST_MEMBERS} are stored."
+        )
+    tables = SelectionTables.of(source) if isinstance(source, ScoreFile) else source
+    sets = tables.sets
+    if not len(sets.candidates):
+        raise SelectionError(
+            "Nothing to choose from: no goal is reached from any initial configuration. Look at "
+            "the reasons in the score table, then change the task, the grid or the environment."
+        )
+    legs = legs_from(here, tables.grid, sets.candidates, tables.index.xy, travel)
+    singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)
+    single = int(np.argmax(singles))
+    rows: tuple[int, ...] = (single,)
+    if max_members > 1 and len(sets.pair_cells):
+        pair = best_pair(tables.index, legs, weights, float(singles[single]))
+        rows = (pair.a, pair.b) if pair is not None else rows
+    return _choice(tables, legs, weights, rows, start)
+
+
+def _choice(
+    tables: SelectionTables,
+    legs: Legs,
+    weights: UtilityWeights,
+    rows: tuple[int, ...],
+    start: float,
+) -> Choice:
+    """Return the choice of the candidates with these numbers, begun at time `start`."""
+    member = np.array(rows)
+    between = legs.between(member[:, None], member[None, :])
+    cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
+    indices = tuple(int(h) for h in tables.sets.candidates[member])
+    reachability, manipulability = tables.sets.scores_of(indices)
+    return Choice(
+        members=tuple(tables.grid.configuration(h) for h in indices),
+        indices=indices,
+        order=order,
+        reachability=reachability,
+        manipulability=manipulability,
+        cost=cost,
+        utility=utility(reachability, manipulability, cost, weights),
+        seconds=time.perf_counter() - start,
+    )

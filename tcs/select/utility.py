@@ -1,0 +1,62 @@
+"""How good a set is now: its two scores against the way there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.select.checks import check_weight
+
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UtilityWeights:
+    """Weights of the terms of the utility, TCS eq. (5); each a number from 0 to 1e9.
+
+    The travel weight is per metre. It is 0.05 by default: one metre more is worth five percent
+    of the task. At 1 a metre would cancel a task that is reached in full.
+    """
+
+    reachability: float = 1.0
+    """alpha, the weight of TC-reachability P_R."""
+    manipulability: float = 1.0
+    """beta, the weight of TC-manipulability P_M."""
+    travel: float = 0.05
+    """gamma, the weight of the travel cost D."""
+
+    def __post_init__(self) -> None:
+        """Refuse weights that are negative or not finite.
+
+        Raises:
+            SelectionError: If a weight is no number from 0 to 1e9.
+        """
+        check_weight("alpha (reachability)", self.reachability)
+        check_weight("beta (manipulability)", self.manipulability)
+        check_weight("gamma (travel)", self.travel)
+
+
+def utility(
+    reachability: Number, manipulability: Number, cost: Number, weights: UtilityWeights
+) -> Number:
+    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5).
+
+    The order of the operations is part of the contract: the search bounds the
+    utility by the same operations on greater scores and smaller costs, and
+    rounding keeps that order.
+
+    Args:
+        reachability: P_R of the sets.
+        manipulability: P_M of the sets.
+        cost: D of the sets.
+        weights: alpha, beta, gamma.
+
+    >>> utility(1.0, 0.5, 2.0, UtilityWeights())
+    1.4
+    """
+    return (
+        float(weights.reachability) * reachability + float(weights.manipulability) * manipulability
+    ) - float(weights.travel) * cost

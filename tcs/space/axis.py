@@ -1,0 +1,160 @@
+"""One degree of freedom and the values it may take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import GridError, UnknownNameError
+
+UNITS = ("m", "deg")
+"""Units in which an axis may be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Equally spaced values of one degree of freedom, told apart by integer index.
+
+    A value is known by its index and never by its float: 3 * 0.1 is not 0.3, so looking a
+    configuration up by its coordinates would miss.
+    """
+
+    name: str
+    """The degree of freedom, e.g. "base_x"."""
+    unit: str
+    """Unit of `start` and `step`: "m" or "deg"."""
+    start: float
+    """First value [unit]."""
+    step: float
+    """Distance between neighbours [unit]; positive, or 0 for a single value."""
+    count: int
+    """How many values there are."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no axis.
+
+        Raises:
+            GridError: If the unit is unknown, a number is not finite, the step is not positive,
+                or there is no value at all.
+        """
+        where = f"axis '{self.name}'"
+        if self.unit not in UNITS:
+            raise GridError(f"{where}: unit is {self.unit!r}, but must be one of {_listed(UNITS)}.")
+        for key in ("start", "step"):
+            number = getattr(self, key)
+            if not _is_number(number) or not math.isfinite(number):
+                raise GridError(f"{where}: {key} is {number!r}, but must be a finite number.")
+        if not isinstance(self.count, int) or isinstance(self.count, bool):
+            raise GridError(f"{where}: count is {self.count!r}, but must be a whole number.")
+        if self.count < 1:
+            raise GridError(
+                f"{where}: count is {self.count}, so the grid would be empty. It must be 1 or more."
+            )
+        if self.step < 0 or (self.step == 0 and self.count > 1):
+            raise GridError(
+                f"{where}: step is {self.step:g} {self.unit}, but must be positive "
+                "(0 only where count is 1)."
+            )
+        object.__setattr__(self, "start", float(self.start))
+        object.__setattr__(self, "step", float(self.step))
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Every value, start + i * step [m or rad], shape (count,).
+
+        >>> Axis("base_yaw", "deg", 0.0, 90.0, 3).values.round(4).tolist()
+        [0.0, 1.5708, 3.1416]
+        """
+        # Degrees turn into radians last: the multiples of a step stay exact that way.
+        written: NDArray[np.float64] = (
+            self.start + np.arange(self.count, dtype=np.float64) * self.step
+        )
+        return np.deg2rad(written) if self.unit == "deg" else written
+
+    @property
+    def held_unit(self) -> str:
+        """Unit of `values`: "m" or "rad"."""
+        return "rad" if self.unit == "deg" else "m"
+
+    def overridden(self, changes: Mapping[str, object], *, where: str = "") -> Self:
+        """Return this axis with some of unit, start, step and count replaced.
+
+        Args:
+            changes: New values by key.
+            where: Where the changes stand, for the message.
+
+        Raises:
+            UnknownNameError: If a key is none of an axis.
+            GridError: If the result is no axis, or has another unit than this one.
+        """
+        changed = self.from_dict(
+            {**self.to_dict(), **_only_keys(changes, _SPEC_KEYS, self.name, where)}, where=where
+        )
+        if changed.unit != self.unit:
+            raise GridError(
+                f"{_prefix(where)}axis '{self.name}': unit is '{changed.unit}', "
+                f"but this axis is written in '{self.unit}'."
+            )
+        return changed
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the axis as plain numbers and strings."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, object], *, where: str = "") -> Self:
+        """Return the axis that `to_dict` wrote, or a file spells out.
+
+        Args:
+            plain: Name, unit, start, step and count.
+            where: Where it stands, for the message.
+
+        Raises:
+            UnknownNameError: If a key is none of an axis.
+            GridError: If a key is missing, or the values are no axis.
+        """
+        name = plain.get("name")
+        if not isinstance(name, str) or not name:
+            raise GridError(f"{_prefix(where)}an axis is named {name!r}; it needs a name.")
+        known = _only_keys(plain, _KEYS, name, where)
+        missing = [key for key in _KEYS if key not in known]
+        if missing:
+            raise GridError(
+                f"{_prefix(where)}axis '{name}' needs {_listed(missing)}. "
+                f"An axis has {_listed(_SPEC_KEYS)}."
+            )
+        try:
+            return cls(**known)  # type: ignore[arg-type]  # __post_init__ checks each value
+        except GridError as error:
+            raise GridError(f"{_prefix(where)}{error}") from None
+
+
+_KEYS = tuple(field.name for field in fields(Axis))
+_SPEC_KEYS = _KEYS[1:]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.floating) and not isinstance(value, bool)
+
+
+def _only_keys(
+    plain: Mapping[str, object], known: tuple[str, ...], name: str, where: str
+) -> dict[str, object]:
+    """Return `plain` as a dict, refusing keys that are not known."""
+    for key in plain:
+        if key not in known:
+            raise UnknownNameError("key", str(key), known, where=f"{_prefix(where)}axis '{name}'")
+    return dict(plain)
+
+
+def _prefix(where: str) -> str:
+    return f"{where}: " if where else ""
+
+
+def _listed(names: tuple[str, ...] | list[str]) -> str:
+    return ", ".join(names)

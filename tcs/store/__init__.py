@@ -1,0 +1,17 @@
+"""Score files: joblib files of plain containers and arrays, read through an allow-list."""
+
+from __future__ import annotations
+
+from tcs.store.files import load_scores, save_scores
+from tcs.store.packing import FORMAT, FORMAT_VERSION
+from tcs.store.score_file import REQUIRED_METADATA, ScoreFile, check_scene
+
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "REQUIRED_METADATA",
+    "ScoreFile",
+    "check_scene",
+    "load_scores",
+    "save_scores",
+]

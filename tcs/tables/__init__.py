@@ -1,0 +1,17 @@
+"""Plain data that the other rooms pass around: configurations, scores, sets (numpy only)."""
+
+from __future__ import annotations
+
+from tcs.tables.configuration import InitialConfiguration
+from tcs.tables.equations import tc_manipulability, tc_reachability
+from tcs.tables.scores import Reason, ScoreTable
+from tcs.tables.sets import SetTable
+
+__all__ = [
+    "InitialConfiguration",
+    "Reason",
+    "ScoreTable",
+    "SetTable",
+    "tc_manipulability",
+    "tc_reachability",
+]

@@ -1,0 +1,55 @@
+"""TC-reachability and TC-manipulability, equations (1) and (4) of the TCS paper.
+
+Sums run over the goals one by one, in order and in double precision, wherever
+these scores are computed: here, in the compiled kernel and online. A matrix
+product would be shorter, but BLAS adds in an order of its own, and a set could
+then beat the best single configuration on one machine and tie with it on another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def tc_reachability(
+    reached: NDArray[np.bool_], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return P_R, the weighted share of goals that can be reached: TCS eq. (1).
+
+    Args:
+        reached: Whether a goal is reached, shape (..., goals).
+        weights: Weights of the goals, sum 1, shape (goals,).
+
+    Returns:
+        P_R in [0, 1], shape (...).
+
+    >>> float(tc_reachability(np.array([True, False, True]), np.array([0.5, 0.25, 0.25])))
+    0.75
+    """
+    total = np.zeros(reached.shape[:-1])
+    for g, weight in enumerate(weights):
+        total += float(weight) * reached[..., g]
+    return total
+
+
+def tc_manipulability(
+    isotropy: NDArray[np.float32] | NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return P_M, the weighted kinematic isotropy over the goals: TCS eq. (4).
+
+    Args:
+        isotropy: Best isotropy at each goal, 0 where it is not reached, shape (..., goals).
+        weights: Weights of the goals, sum 1, shape (goals,).
+
+    Returns:
+        P_M in [0, 1], shape (...).
+
+    >>> float(tc_manipulability(np.array([0.5, 0.0]), np.array([0.5, 0.5])))
+    0.25
+    """
+    total = np.zeros(isotropy.shape[:-1])
+    for g, weight in enumerate(weights):
+        # Widen first: a float32 array times a Python float stays float32.
+        total += float(weight) * isotropy[..., g].astype(np.float64)
+    return total

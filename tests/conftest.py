@@ -1,0 +1,66 @@
+"""Scenes that several tests share: building one takes a second, so it happens once a session."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.robots import load_robot
+from tcs.scene import Scene, SceneSpec, load_environment, lower
+from tcs.space import Grid
+from tcs.tasks import load_task
+
+
+@pytest.fixture(scope="session")
+def wheelchair():
+    """The wheelchair environment file."""
+    return load_environment("wheelchair")
+
+
+@pytest.fixture(scope="session")
+def pr2():
+    """The PR2 robot file."""
+    return load_robot("pr2")
+
+
+@pytest.fixture(scope="session")
+def spec(pr2, wheelchair):
+    """PR2 and wheelchair."""
+    return SceneSpec(pr2, wheelchair)
+
+
+@pytest.fixture(scope="session")
+def _one_scene(spec):
+    return Scene(spec)
+
+
+@pytest.fixture
+def scene(_one_scene):
+    """A scene of PR2 and wheelchair, in its first state before and after each test."""
+    before = _one_scene.positions()
+    yield _one_scene
+    _one_scene.restore(before)
+
+
+@pytest.fixture(scope="session")
+def full_grid(wheelchair):
+    """The paper's grid of the wheelchair environment."""
+    return Grid.from_spec(wheelchair.grid)
+
+
+@pytest.fixture(scope="session")
+def shaving():
+    """The shaving task."""
+    return load_task("shaving")
+
+
+@pytest.fixture(scope="session")
+def lowered(spec, shaving, full_grid):
+    """Shaving in the wheelchair, as arrays."""
+    return lower(Scene(spec), shaving, full_grid)
+
+
+@pytest.fixture
+def rng():
+    """Random numbers, the same in every run."""
+    return np.random.default_rng(0)

@@ -1,0 +1,175 @@
+"""Environment files: what they say, and what a bad one gets."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tcs.errors import EnvironmentFileError, GridError, UnknownNameError
+from tcs.paths import data_folder
+from tcs.scene import Scene, SceneSpec, load_environment
+from tcs.space import Grid
+
+MINIMAL = {
+    "name": "room",
+    "title": "A room",
+    "origin": "in the corner",
+    "source": "made up",
+    "grid": {
+        "base_x": {"unit": "m", "start": 0.0, "step": 0.1, "count": 2},
+        "base_y": {"unit": "m", "start": 0.0, "step": 0.1, "count": 2},
+        "base_yaw": {"unit": "deg", "start": 0.0, "step": 90.0, "count": 4},
+        "torso": {"unit": "m", "start": 0.0, "step": 0.1, "count": 2},
+    },
+}
+
+
+def written(tmp_path: Path, **changes: object) -> Path:
+    path = tmp_path / "room.yaml"
+    path.write_text(yaml.safe_dump({**MINIMAL, **changes}), encoding="utf-8")
+    return path
+
+
+def test_wheelchair_has_the_grid_and_the_errors_of_the_paper():
+    environment = load_environment("wheelchair")
+    grid = Grid.from_spec(environment.grid)
+    assert grid.shape == (61, 61, 8, 3)
+    assert grid.size == 89304
+    assert grid.axis("base_x").values[[0, -1]].tolist() == [-1.5, 1.5]
+    # TCS Table II.
+    deviations = {name: e.standard_deviation for name, e in environment.errors.items()}
+    assert deviations == {
+        "wheelchair_x": 0.0125,
+        "wheelchair_y": 0.0125,
+        "wheelchair_yaw": np.radians(2.5),
+        "person_x": 0.05,
+        "person_y": 0.05,
+        "person_yaw": np.radians(5.0),
+        "head_tilt": np.radians(5.0),
+    }
+
+
+def test_an_environment_is_a_value():
+    environment = load_environment("wheelchair")
+    again = pickle.loads(pickle.dumps(environment))
+    assert again == environment
+    assert hash(again) == hash(environment)
+    assert hash(environment.model_copy(update={"contact_margin": 0.002})) != hash(environment)
+    with pytest.raises(ValueError, match="frozen"):
+        environment.name = "other"
+
+
+def test_files_are_found_beside_the_environment_first_then_in_the_data_folder(tmp_path):
+    (tmp_path / "shelf.sdf").write_text("<sdf version='1.9'/>")
+    models = [
+        {"name": "wheelchair", "file": "wheelchair.sdf"},
+        {"name": "shelf", "file": "shelf.sdf"},
+    ]
+    environment = load_environment(written(tmp_path, models=models))
+    shipped = data_folder() / "models" / "beds_wheelchairs" / "wheelchair.sdf"
+    assert Path(environment.models[0].file) == shipped.resolve()
+    assert Path(environment.models[1].file) == (tmp_path / "shelf.sdf").resolve()
+
+
+def test_unknown_name_gets_the_nearest():
+    with pytest.raises(UnknownNameError, match="Did you mean 'wheelchair'"):
+        load_environment("wheelchir")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"flor": True}, r"field 'flor': unknown key\. Known: name, .*floor"),
+        ({"models": [{"name": "a", "fil": "b"}]}, r"field 'models\.0\.file'.*required"),
+        (
+            {"obstacles": [{"name": "a", "box": [1, 1, 1], "size": 1}]},
+            r"obstacles\.0\.size.*Known: name, xyz",
+        ),
+        ({"obstacles": [{"name": "a"}]}, r"obstacles\.0'.*either 'box"),
+        (
+            {"obstacles": [{"name": "a", "box": [1, 1, 1], "file": "x.sdf"}]},
+            r"obstacles\.0'.*either 'box",
+        ),
+        ({"obstacles": [{"name": "a", "box": [1, 0, 1]}]}, r"obstacles\.0\.box\.1.*greater than 0"),
+        (
+            {"obstacles": [{"name": "a", "box": [1, 1, 1]}] * 2},
+            r"name 'a' is used twice",
+        ),
+        ({"obstacles": [{"name": "floor", "box": [1, 1, 1]}]}, r"'floor' is used twice or reserv"),
+        ({"models": [{"name": "a", "file": "nowhere.sdf"}]}, r"models\.0\.file.*nowhere\.sdf"),
+        ({"padding": {"a::b": -0.1}}, r"padding\.a::b.*greater than or equal to 0"),
+        ({"contact_margin": float("nan")}, r"contact_margin"),
+        ({"errors": {"j": {"distribution": "normal"}}}, r"errors\.j'.*either 'std'"),
+        ({"errors": {"j": {"distribution": "flat", "std": 1}}}, r"errors\.j\.distribution.*normal"),
+    ],
+    ids=lambda value: str(value)[:40] if isinstance(value, dict) else "",
+)
+def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path, changes, said):
+    path = written(tmp_path, **changes)
+    with pytest.raises(EnvironmentFileError, match=said) as caught:
+        load_environment(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bad_grid_names_the_file(tmp_path):
+    grid = {**MINIMAL["grid"], "torso": {"unit": "m", "start": 0.0, "step": 0.1, "count": 0}}
+    with pytest.raises(GridError, match=r"room\.yaml', field 'grid'.*torso.*empty"):
+        load_environment(written(tmp_path, grid=grid))
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "a: [", "\x00"], ids=["list", "torn", "binary"])
+def test_what_is_no_mapping_is_refused(tmp_path, text):
+    path = tmp_path / "room.yaml"
+    path.write_text(text)
+    with pytest.raises(EnvironmentFileError, match=r"room\.yaml"):
+        load_environment(path)
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(EnvironmentFileError, match="cannot be read"):
+        load_environment(tmp_path / "none.yaml")
+
+
+def test_a_file_says_only_what_differs_from_the_one_it_is_based_on(tmp_path):
+    room = tmp_path / "room.yaml"
+    room.write_text("{name: room, title: t, based_on: wheelchair, contact_margin: 0.004}")
+    corner = tmp_path / "corner.yaml"
+    corner.write_text("{name: corner, based_on: room.yaml, obstacles: [{name: a, box: [1, 1, 1]}]}")
+    environment, base = load_environment(corner), load_environment("wheelchair")
+    assert (environment.name, environment.title) == ("corner", "t")
+    assert environment.contact_margin == 0.004
+    assert [obstacle.name for obstacle in environment.obstacles] == ["a"]
+    changed = {"name", "title", "contact_margin", "obstacles"}
+    assert environment.model_dump(exclude=changed) == base.model_dump(exclude=changed)
+
+
+def test_a_base_that_is_none_is_refused(tmp_path):
+    path = tmp_path / "room.yaml"
+    path.write_text("{name: room, based_on: wheelchir}")
+    with pytest.raises(UnknownNameError, match=r"room\.yaml', field 'based_on'.*'wheelchair'"):
+        load_environment(path)
+    path.write_text("{name: room, based_on: other.yaml}")
+    (tmp_path / "other.yaml").write_text("{name: other, based_on: ./room.yaml}")
+    with pytest.raises(EnvironmentFileError, match=r"other\.yaml', field 'based_on'.*in turn"):
+        load_environment(path)
+
+
+def test_the_example_of_the_documentation_works(tmp_path, pr2):
+    text = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+    blocks = dict(re.findall(r"```(yaml|xml)\n(.*?)```", text, flags=re.DOTALL))
+    (tmp_path / "dining_room.yaml").write_text(blocks["yaml"], encoding="utf-8")
+    (tmp_path / "lamp.sdf").write_text(blocks["xml"], encoding="utf-8")
+    scene = Scene(SceneSpec(pr2, load_environment(tmp_path / "dining_room.yaml")))
+    names = [part.name for part in scene.built.parts]
+    assert {"table", "lamp::pole", "lamp::shade", "person::head_center"} <= set(names)
+    lamp = scene.built.parts[names.index("lamp::shade")]
+    p_WG = scene.query_object().GetPoseInWorld(lamp.geometry).translation()
+    np.testing.assert_allclose(p_WG, [0.2, 0.9, 1.45], atol=1e-12)
+    scene.place_base(1.3, 0.9, 0.0)
+    assert any(b == "table" for _, b, _ in scene.violations())

@@ -1,0 +1,309 @@
+import dataclasses
+import errno
+import os
+import resource
+import zlib
+
+import joblib
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError, StoreError, StoreFormatError
+from tcs.store import FORMAT_VERSION, ScoreFile, files, load_scores, save_scores
+from tcs.store.packing import pack
+from tcs.tables import ScoreTable, SetTable
+from tests.store.example import score_file
+from tests.tables.small import small_grid
+
+
+@pytest.fixture(scope="module")
+def file():
+    return score_file()
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "shaving.tcs"
+
+
+def assert_same(one, two):
+    for field in dataclasses.fields(one):
+        a, b = getattr(one, field.name), getattr(two, field.name)
+        if isinstance(a, ScoreTable | SetTable):
+            assert_same(a, b)
+        elif isinstance(a, np.ndarray):
+            assert a.dtype == b.dtype
+            np.testing.assert_array_equal(a, b)
+        else:
+            assert a == b
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
+def test_load_of_save_is_the_same(path, share):
+    file = score_file(share=share)
+    save_scores(path, file)
+    loaded = load_scores(path)
+    assert isinstance(loaded, ScoreFile)
+    assert_same(file, loaded)
+    # No member of it can be changed by accident.
+    with pytest.raises(ValueError, match="read-only"):
+        loaded.scores.isotropy[0, 0] = 1.0
+
+
+def test_joblib_reads_it_too(path, file):
+    save_scores(path, file)
+    content = joblib.load(path)
+    assert content["format"] == "tcs scores"
+    assert content["metadata"] == file.metadata
+
+
+def test_an_uncompressed_file_is_read_too(path, file):
+    joblib.dump(pack(file), path)
+    assert_same(file, load_scores(path))
+
+
+def test_names_may_be_text_or_paths(path, file):
+    save_scores(str(path), file)
+    assert_same(load_scores(str(path)), load_scores(path))
+
+
+def test_nothing_but_the_file_is_left(path, file):
+    save_scores(path, file)
+    save_scores(path, file)
+    assert [found.name for found in path.parent.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("place", "raised"),
+    [
+        ("joblib.dump", KeyboardInterrupt()),
+        ("os.fsync", KeyboardInterrupt()),
+        ("os.fsync", OSError(errno.ENOSPC, "No space left on device")),
+        ("pathlib.Path.replace", PermissionError(errno.EACCES, "Permission denied")),
+        ("pathlib.Path.replace", KeyboardInterrupt()),
+    ],
+    ids=lambda value: getattr(value, "strerror", None) or str(value) or "Ctrl-C",
+)
+def test_a_failure_leaves_the_old_file_and_no_half_one(path, file, monkeypatch, place, raised):
+    path.write_bytes(b"the old file")
+
+    def fail(*arguments, **options):
+        # Half a file is there by now.
+        if place == "joblib.dump":
+            arguments[1].write(b"half")
+        raise raised
+
+    with monkeypatch.context() as patch:
+        patch.setattr(place, fail)
+        expected = OutputError if isinstance(raised, OSError) else KeyboardInterrupt
+        with pytest.raises(expected) as caught:
+            save_scores(path, file)
+    if expected is OutputError:
+        assert raised.strerror in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert path.read_bytes() == b"the old file"
+    assert [found.name for found in path.parent.iterdir()] == [path.name]
+
+
+def test_a_full_disk_is_told(path, file):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot be written: File too large"):
+            save_scores(path, file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(path.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("folder", ["missing", "a file"])
+def test_an_impossible_folder_is_told(tmp_path, file, folder):
+    (tmp_path / "a file").write_text("x")
+    with pytest.raises(OutputError, match="existing, writable folder"):
+        save_scores(tmp_path / folder / "shaving.tcs", file)
+
+
+def test_a_folder_is_no_target(tmp_path, file):
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_scores(tmp_path, file)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_an_unwritable_folder_is_told(tmp_path, file):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="Permission denied"):
+        save_scores(tmp_path / "shaving.tcs", file)
+
+
+def test_a_missing_file_is_told(path):
+    with pytest.raises(StoreError, match="cannot be read: No such file"):
+        load_scores(path)
+
+
+def test_a_folder_or_pipe_is_no_file(tmp_path):
+    with pytest.raises(StoreError, match="no regular file"):
+        load_scores(tmp_path)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(StoreError, match="no regular file"):
+        load_scores(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_told(path, file, share):
+    save_scores(path, file)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(StoreFormatError, match=r"truncated|empty|damaged"):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
+def test_a_truncated_uncompressed_file_is_told(path, file, share):
+    joblib.dump(pack(file), path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+def test_a_flipped_bit_is_told(path, file):
+    save_scores(path, file)
+    whole = bytearray(path.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    path.write_bytes(whole)
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+def test_flipped_bytes_never_crash(tmp_path, file):
+    """Whatever a byte turns into, the answer is a sound file or one of our errors."""
+    joblib.dump(pack(file), tmp_path / "whole")
+    whole = (tmp_path / "whole").read_bytes()
+    rng = np.random.default_rng(0)
+    told = []
+    for _ in range(400):
+        broken = bytearray(whole)
+        for position in rng.integers(0, len(whole), 3):
+            broken[position] = rng.integers(0, 256)
+        (tmp_path / "broken").write_bytes(broken)
+        try:
+            load_scores(tmp_path / "broken")
+        except StoreError as error:
+            told.append(str(error))
+    assert len(told) > 100
+    assert not any("\n" in message for message in told)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"Dear reader,\n", b"\x1f\x8b\x08\x00 gzip", b"PK\x03\x04", b"\x80", b"\x80\x04.", bytes(100)],
+    ids=["text", "gzip", "zip", "one byte", "empty pickle", "zeros"],
+)
+def test_a_foreign_file_is_told(path, content):
+    path.write_bytes(content)
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("content", [[1, 2], {"a": np.zeros(3)}, None, {"format": "other"}, "x"])
+@pytest.mark.parametrize("compress", [0, 3])
+def test_another_joblib_file_is_told(path, content, compress):
+    joblib.dump(content, path, compress=compress)
+    with pytest.raises(StoreFormatError, match="tcs"):
+        load_scores(path)
+
+
+def test_a_longer_file_is_told(path, file):
+    save_scores(path, file)
+    path.write_bytes(path.read_bytes() + b"more")
+    with pytest.raises(StoreFormatError, match="goes on after its end"):
+        load_scores(path)
+
+
+def test_a_file_from_the_future_is_told(path, file):
+    joblib.dump(pack(file) | {"format_version": FORMAT_VERSION + 1}, path)
+    with pytest.raises(StoreFormatError, match="reads up to 1: update tcs"):
+        load_scores(path)
+
+
+def changed(file, section, name, change):
+    content = pack(file)
+    content[section] = dict(content[section])
+    content[section][name] = change(content[section][name])
+    return content
+
+
+FORGED = {
+    "weights as float32": ("scores", "weights", lambda a: a.astype(np.float32)),
+    "weights not normalised": ("scores", "weights", lambda a: a * 2.0),
+    "reason with a row too few": ("scores", "reason", lambda a: a[1:]),
+    "reason beyond the last": ("scores", "reason", lambda a: a + np.uint8(6)),
+    "reason flat": ("scores", "reason", lambda a: a.ravel()),
+    "reason missing": ("scores", "reason", lambda a: None),
+    "isotropy too short": ("scores", "isotropy", lambda a: a[:-1]),
+    "isotropy not finite": ("scores", "isotropy", lambda a: a * np.float32(np.inf)),
+    "isotropy as objects' kind": ("scores", "isotropy", lambda a: a.astype(np.float64)),
+    "joints of another arm": ("scores", "arm_joints", lambda a: a[:, :-1]),
+    "joints missing": ("scores", "arm_joints", lambda a: a[:, :-7]),
+    "names missing": ("scores", "pair_names", lambda names: names[:1]),
+    "names no pairs": ("scores", "pair_names", lambda names: [["arm"]] * 3),
+    "names no list": ("scores", "pair_names", lambda names: "arm"),
+    "cell beyond the last": ("sets", "cell", lambda a: a + np.uint8(200)),
+    "cell too short": ("sets", "cell", lambda a: a[1:]),
+    "cells elsewhere": ("sets", "cell_xy", lambda a: a + 1.0),
+    "cells nowhere": ("sets", "cell_xy", lambda a: a[:0]),
+    "pairs of cells beyond": ("sets", "pair_step", lambda a: a + a.dtype.type(7)),
+    "pairs that wrap round": (
+        "sets",
+        "pair_step",
+        lambda a: np.full(a.shape, 2**63, dtype=np.uint64),
+    ),
+    "pairs out of order": ("sets", "pair_step", lambda a: a * a.dtype.type(0)),
+    "count of pairs": ("sets", "pair_count", lambda a: a + a.dtype.type(100)),
+    "bound not a number": ("sets", "pair_sum", lambda a: a * np.float32(np.nan)),
+    "bound too short": ("sets", "pair_sum", lambda a: a[1:]),
+    "code beyond the values": ("sets", "reachability_values", lambda a: a[:1]),
+    "rule unknown": ("sets", "rule", lambda rule: "mine"),
+    "rule missing": ("sets", "rule", lambda rule: None),
+    "distance missing": ("sets", "min_distance", lambda distance: None),
+    "best no candidate": ("sets", "best", lambda best: [2**30]),
+    "best no number": ("sets", "best", lambda best: ["x"]),
+    "best huge": ("sets", "best_single", lambda best: [2**70]),
+    "no axes": ("grid", "axes", lambda axes: []),
+    "enormous grid": ("grid", "axes", lambda axes: [a | {"count": 10**6} for a in axes]),
+    "another grid": (
+        "grid",
+        "axes",
+        lambda axes: small_grid(nx=4, ny=6, bed=2).to_dict()["axes"],
+    ),
+    "no digest": ("metadata", "scene_digest", lambda digest: None),
+    "array among the metadata": ("metadata", "created", lambda created: np.zeros(3)),
+}
+
+
+@pytest.mark.parametrize(("section", "name", "change"), FORGED.values(), ids=FORGED.keys())
+def test_a_forged_file_is_told_in_one_line(path, file, section, name, change):
+    joblib.dump(changed(file, section, name, change), path, compress=3)
+    with pytest.raises(StoreFormatError) as caught:
+        load_scores(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "tcs score" in message
+    assert "while reading" not in message  # found by a check, not by stumbling
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("section", ["metadata", "task", "grid", "scores", "sets"])
+def test_a_missing_section_is_told(path, file, section):
+    content = pack(file)
+    del content[section]
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match=f"has no {section}"):
+        load_scores(path)
+
+
+def test_compression_is_one_that_is_read(path, file):
+    save_scores(path, file)
+    assert files.COMPRESSION[0] == "zlib"
+    assert zlib.decompress(path.read_bytes()).startswith(b"\x80")

@@ -1,0 +1,58 @@
+import inspect
+import re
+
+import pytest
+
+import tcs.errors
+from tcs.errors import TcsError, UnknownNameError
+
+CLASSES = [
+    value
+    for name, value in inspect.getmembers(tcs.errors, inspect.isclass)
+    if value.__module__ == "tcs.errors" and not name.startswith("_")
+]
+
+
+def drawn_parents() -> dict[str, str | None]:
+    """Each class in the tree of the module docstring, with the class it hangs from."""
+    parents: dict[str, str | None] = {}
+    above: list[tuple[int, str]] = []
+    for line in (tcs.errors.__doc__ or "").splitlines():
+        match = re.match(r"^([ │├└─]*)([A-Z]\w*Error)\b", line)
+        if not match:
+            continue
+        depth, name = len(match[1]), match[2]
+        while above and above[-1][0] >= depth:
+            above.pop()
+        parents[name] = above[-1][1] if above else None
+        above.append((depth, name))
+    return parents
+
+
+def test_tree_in_the_docstring_is_the_real_one():
+    real = {
+        error.__name__: None if error is TcsError else error.__base__.__name__ for error in CLASSES
+    }
+    assert drawn_parents() == real
+
+
+@pytest.mark.parametrize("error", CLASSES, ids=lambda error: error.__name__)
+def test_one_root_catches_every_error(error):
+    assert issubclass(error, TcsError)
+
+
+def test_unknown_name_says_what_was_asked_what_there_is_and_what_was_meant():
+    error = UnknownNameError("frame", "haed", ["torso", "head"], where="goal 3 of task 'shaving'")
+    assert str(error) == (
+        "goal 3 of task 'shaving': unknown frame 'haed'. Known: head, torso. Did you mean 'head'?"
+    )
+    assert (error.kind, error.name, error.known) == ("frame", "haed", ("head", "torso"))
+
+
+def test_unknown_name_guesses_nothing_far_off():
+    message = str(UnknownNameError("frame", "xyz", ["head"]))
+    assert message == "unknown frame 'xyz'. Known: head."
+
+
+def test_unknown_name_where_nothing_is_known():
+    assert str(UnknownNameError("task", "shaving", [])) == "unknown task 'shaving'. Known: none."

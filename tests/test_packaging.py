@@ -1,0 +1,102 @@
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+DATA_PARTS = ("models", "tasks")
+
+# Distributions whose module is called otherwise, and one that is found by its files alone.
+MODULE_OF = {"drake": "pydrake", "pyyaml": "yaml"}
+WITHOUT_MODULE = {"example-robot-data"}
+
+
+def dependencies() -> set[str]:
+    return {re.split(r"[^\w-]", line)[0] for line in PROJECT["dependencies"]}
+
+
+def imported_modules() -> set[str]:
+    """Top-level names of everything the package imports, lazily or not."""
+    found = set()
+    for path in (CHECKOUT / "tcs").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split(".")[0])
+    return found
+
+
+def test_what_is_imported_is_what_is_depended_on():
+    foreign = imported_modules() - set(sys.stdlib_module_names) - {"tcs"}
+    modules = {MODULE_OF.get(name, name) for name in dependencies() - WITHOUT_MODULE}
+    # These come with pydantic and numba, in the versions those need.
+    assert foreign - {"llvmlite", "pydantic_core"} == modules
+
+
+def test_readme_gives_a_reason_for_each_dependency():
+    readme = (CHECKOUT / "README.md").read_text(encoding="utf-8").lower()
+    assert [name for name in sorted(dependencies()) if name not in readme] == []
+
+
+def data_files() -> set[str]:
+    return {
+        str(path.relative_to(CHECKOUT))
+        for part in DATA_PARTS
+        for path in (CHECKOUT / part).rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    run(
+        "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", folder, CHECKOUT
+    )
+    (built,) = folder.glob("tcs-*.whl")
+    return built
+
+
+def run(*arguments: str | Path, cwd: Path | None = None, path: Path | None = None) -> str:
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=cwd,
+        env=None if path is None else {"PYTHONPATH": str(path), "HOME": str(path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_wheel_carries_every_data_file_and_module(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert data_files()
+    assert {f"tcs/_data/{name}" for name in data_files()} <= names
+    modules = {str(path.relative_to(CHECKOUT)) for path in (CHECKOUT / "tcs").rglob("*.py")}
+    assert modules | {"tcs/py.typed"} <= names
+
+
+def test_wheel_carries_nothing_else(wheel):
+    allowed = re.compile(r"tcs/|tcs-[^/]*\.dist-info/")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert [name for name in names if not allowed.match(name) or "__pycache__" in name] == []
+
+
+def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
+    site = tmp_path / "site"
+    run("-m", "pip", "install", "--quiet", "--no-deps", "--target", site, wheel)
+    code = (
+        "from tcs.paths import data_folder; from tcs.tasks import load_task, task_names\n"
+        "print(data_folder()); print(*task_names()); print(len(load_task('shaving').goals))"
+    )
+    lines = run("-c", code, cwd=tmp_path, path=site).splitlines()
+    assert lines == [str(site / "tcs" / "_data"), "brushing feeding shaving", "8"]

@@ -1,0 +1,85 @@
+import runpy
+from pathlib import Path
+
+import pytest
+
+import tcs.paths
+from tcs.errors import DataFileError, OutputError
+from tcs.paths import cache_folder, data_folder
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def make_data(folder: Path) -> Path:
+    for part in ("models", "tasks"):
+        (folder / part).mkdir(parents=True)
+    return folder
+
+
+def test_data_of_a_checkout_is_the_checkout():
+    assert data_folder() == CHECKOUT
+
+
+def test_data_of_an_installed_package_is_inside_it(tmp_path, monkeypatch):
+    package = tmp_path / "site-packages" / "tcs"
+    own = make_data(package / "_data")
+    # Some other package's folders of the same names lie beside it.
+    make_data(tmp_path / "site-packages")
+    monkeypatch.setattr(tcs.paths, "_PACKAGE", package)
+    assert data_folder() == own
+
+
+@pytest.mark.parametrize("present", [[], ["models"], ["tasks"]], ids=str)
+def test_missing_data_is_said_in_one_line(tmp_path, monkeypatch, present):
+    for part in present:
+        (tmp_path / part).mkdir()
+    monkeypatch.setattr(tcs.paths, "_PACKAGE", tmp_path / "tcs")
+    with pytest.raises(DataFileError) as caught:
+        data_folder()
+    message = str(caught.value)
+    assert str(tmp_path / "tcs" / "_data") in message
+    assert "\n" not in message
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    for name in ("TCS_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return tmp_path
+
+
+def test_cache_is_in_the_home_folder_by_default(home):
+    assert cache_folder() == home / ".cache" / "tcs"
+    assert cache_folder().is_dir()
+
+
+def test_cache_follows_xdg(home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "xdg"))
+    assert cache_folder() == home / "xdg" / "tcs"
+
+
+def test_relative_xdg_folder_is_ignored_as_its_specification_says(home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "xdg")
+    assert cache_folder() == home / ".cache" / "tcs"
+
+
+def test_own_variable_comes_first(home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "xdg"))
+    monkeypatch.setenv("TCS_CACHE_DIR", "~/mine")
+    assert cache_folder() == home / "mine"
+    assert not (home / "xdg").exists()
+
+
+def test_cache_that_cannot_be_made_is_said_in_one_line(home, monkeypatch):
+    blocked = home / "file"
+    blocked.write_text("")
+    monkeypatch.setenv("TCS_CACHE_DIR", str(blocked / "cache"))
+    with pytest.raises(OutputError, match=r"cache folder .* cannot be made.*TCS_CACHE_DIR"):
+        cache_folder()
+
+
+def test_importing_touches_no_folder(home, monkeypatch):
+    monkeypatch.setenv("TCS_CACHE_DIR", str(home / "untouched"))
+    runpy.run_path(str(tcs.paths.__file__))
+    assert not (home / "untouched").exists()
