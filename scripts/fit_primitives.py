@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 from tcs.errors import TcsError
-from tcs.robots import fit_robot, load_robot, write_primitives
+from tcs.robots import load_robot, write_primitives
+from tcs.robots.fit_robot import fit_robot
 
 
 def main() -> int:

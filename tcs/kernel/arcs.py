@@ -48,8 +48,8 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
     if steady + swing > far:
         outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0))
     lower, upper = arm.lower[0], arm.upper[0]
-    if not np.isfinite(lower):
-        # A continuous joint: one full turn about the direction of the goal holds all there is.
+    if not upper - lower < 2.0 * np.pi:
+        # One full turn about the direction of the goal holds all there is.
         if inner == 0.0:
             arcs[0, 0], arcs[0, 1] = centre - outer, centre + outer
             return 1, IN_REACH
@@ -75,9 +75,7 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
 
 
 @jit
-def windows_of(
-    slack: FloatArray, count: int, step: float, windows: FloatArray, found: int
-) -> int:
+def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, found: int) -> int:
     """Append the stretches of a row of lanes in which feasible angles lie or may hide.
 
     A stretch is a run of feasible lanes with its two neighbours, or the two neighbours of an

@@ -14,7 +14,7 @@ import platform
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite.binding as llvm
 import numba
@@ -68,11 +68,12 @@ def jit(function: _Function) -> _Function:
     a compiler reorders sums. Contraction to fused multiply-add is off for the same reason.
     """
     folder = jit_folder()
-    before = numba.config.CACHE_DIR
+    settings = vars(numba.config)
+    before = settings["CACHE_DIR"]
     # Numba takes the cache folder from this global while it decorates, and only then.
-    numba.config.CACHE_DIR = str(folder) if folder else ""
+    settings["CACHE_DIR"] = str(folder) if folder else ""
     try:
-        compiled = numba.njit(nogil=True, cache=folder is not None, error_model="numpy")(function)
+        decorate = numba.njit(nogil=True, cache=folder is not None, error_model="numpy")
+        return cast(_Function, decorate(function))
     finally:
-        numba.config.CACHE_DIR = before
-    return compiled  # type: ignore[no-any-return]
+        settings["CACHE_DIR"] = before

@@ -86,7 +86,11 @@ def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_
     """Return the squared distance between two segments along the shapes' z axes [m^2]."""
     ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
     vx, vy, vz = b[j, TURN + 2], b[j, TURN + 5], b[j, TURN + 8]
-    x, y, z = b[j, CENTRE] - a[i, CENTRE], b[j, CENTRE + 1] - a[i, CENTRE + 1], b[j, CENTRE + 2] - a[i, CENTRE + 2]
+    x, y, z = (
+        b[j, CENTRE] - a[i, CENTRE],
+        b[j, CENTRE + 1] - a[i, CENTRE + 1],
+        b[j, CENTRE + 2] - a[i, CENTRE + 2],
+    )
     c = ux * vx + uy * vy + uz * vz
     along_a = ux * x + uy * y + uz * z
     along_b = vx * x + vy * y + vz * z
@@ -108,7 +112,11 @@ def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_
 @jit
 def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> float:
     """Return the squared distance from a segment along shape i's z axis to box j [m^2]."""
-    x, y, z = a[i, CENTRE] - b[j, CENTRE], a[i, CENTRE + 1] - b[j, CENTRE + 1], a[i, CENTRE + 2] - b[j, CENTRE + 2]
+    x, y, z = (
+        a[i, CENTRE] - b[j, CENTRE],
+        a[i, CENTRE + 1] - b[j, CENTRE + 1],
+        a[i, CENTRE + 2] - b[j, CENTRE + 2],
+    )
     ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
     px = b[j, TURN] * x + b[j, TURN + 3] * y + b[j, TURN + 6] * z
     py = b[j, TURN + 1] * x + b[j, TURN + 4] * y + b[j, TURN + 7] * z
@@ -179,27 +187,65 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
     boxes apart, none above zero means overlap. In between, the least distance is attained on an
     edge of one box, so the 24 edges are measured.
     """
-    x, y, z = b[j, CENTRE] - a[i, CENTRE], b[j, CENTRE + 1] - a[i, CENTRE + 1], b[j, CENTRE + 2] - a[i, CENTRE + 2]
+    x, y, z = (
+        b[j, CENTRE] - a[i, CENTRE],
+        b[j, CENTRE + 1] - a[i, CENTRE + 1],
+        b[j, CENTRE + 2] - a[i, CENTRE + 2],
+    )
     ax, ay, az = a[i, SIZE], a[i, SIZE + 1], a[i, SIZE + 2]
     bx, by, bz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
     tx = a[i, TURN] * x + a[i, TURN + 3] * y + a[i, TURN + 6] * z
-    m00 = a[i, TURN] * b[j, TURN] + a[i, TURN + 3] * b[j, TURN + 3] + a[i, TURN + 6] * b[j, TURN + 6]
-    m01 = a[i, TURN] * b[j, TURN + 1] + a[i, TURN + 3] * b[j, TURN + 4] + a[i, TURN + 6] * b[j, TURN + 7]
-    m02 = a[i, TURN] * b[j, TURN + 2] + a[i, TURN + 3] * b[j, TURN + 5] + a[i, TURN + 6] * b[j, TURN + 8]
+    m00 = (
+        a[i, TURN] * b[j, TURN] + a[i, TURN + 3] * b[j, TURN + 3] + a[i, TURN + 6] * b[j, TURN + 6]
+    )
+    m01 = (
+        a[i, TURN] * b[j, TURN + 1]
+        + a[i, TURN + 3] * b[j, TURN + 4]
+        + a[i, TURN + 6] * b[j, TURN + 7]
+    )
+    m02 = (
+        a[i, TURN] * b[j, TURN + 2]
+        + a[i, TURN + 3] * b[j, TURN + 5]
+        + a[i, TURN + 6] * b[j, TURN + 8]
+    )
     most = abs(tx) - (ax + abs(m00) * bx + abs(m01) * by + abs(m02) * bz)
     if most >= gap:
         return False
     ty = a[i, TURN + 1] * x + a[i, TURN + 4] * y + a[i, TURN + 7] * z
-    m10 = a[i, TURN + 1] * b[j, TURN] + a[i, TURN + 4] * b[j, TURN + 3] + a[i, TURN + 7] * b[j, TURN + 6]
-    m11 = a[i, TURN + 1] * b[j, TURN + 1] + a[i, TURN + 4] * b[j, TURN + 4] + a[i, TURN + 7] * b[j, TURN + 7]
-    m12 = a[i, TURN + 1] * b[j, TURN + 2] + a[i, TURN + 4] * b[j, TURN + 5] + a[i, TURN + 7] * b[j, TURN + 8]
+    m10 = (
+        a[i, TURN + 1] * b[j, TURN]
+        + a[i, TURN + 4] * b[j, TURN + 3]
+        + a[i, TURN + 7] * b[j, TURN + 6]
+    )
+    m11 = (
+        a[i, TURN + 1] * b[j, TURN + 1]
+        + a[i, TURN + 4] * b[j, TURN + 4]
+        + a[i, TURN + 7] * b[j, TURN + 7]
+    )
+    m12 = (
+        a[i, TURN + 1] * b[j, TURN + 2]
+        + a[i, TURN + 4] * b[j, TURN + 5]
+        + a[i, TURN + 7] * b[j, TURN + 8]
+    )
     most = max(most, abs(ty) - (ay + abs(m10) * bx + abs(m11) * by + abs(m12) * bz))
     if most >= gap:
         return False
     tz = a[i, TURN + 2] * x + a[i, TURN + 5] * y + a[i, TURN + 8] * z
-    m20 = a[i, TURN + 2] * b[j, TURN] + a[i, TURN + 5] * b[j, TURN + 3] + a[i, TURN + 8] * b[j, TURN + 6]
-    m21 = a[i, TURN + 2] * b[j, TURN + 1] + a[i, TURN + 5] * b[j, TURN + 4] + a[i, TURN + 8] * b[j, TURN + 7]
-    m22 = a[i, TURN + 2] * b[j, TURN + 2] + a[i, TURN + 5] * b[j, TURN + 5] + a[i, TURN + 8] * b[j, TURN + 8]
+    m20 = (
+        a[i, TURN + 2] * b[j, TURN]
+        + a[i, TURN + 5] * b[j, TURN + 3]
+        + a[i, TURN + 8] * b[j, TURN + 6]
+    )
+    m21 = (
+        a[i, TURN + 2] * b[j, TURN + 1]
+        + a[i, TURN + 5] * b[j, TURN + 4]
+        + a[i, TURN + 8] * b[j, TURN + 7]
+    )
+    m22 = (
+        a[i, TURN + 2] * b[j, TURN + 2]
+        + a[i, TURN + 5] * b[j, TURN + 5]
+        + a[i, TURN + 8] * b[j, TURN + 8]
+    )
     most = max(most, abs(tz) - (az + abs(m20) * bx + abs(m21) * by + abs(m22) * bz))
     s = tx * m00 + ty * m10 + tz * m20
     most = max(most, abs(s) - (bx + abs(m00) * ax + abs(m10) * ay + abs(m20) * az))
@@ -209,15 +255,15 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
     most = max(most, abs(s) - (bz + abs(m02) * ax + abs(m12) * ay + abs(m22) * az))
     if most >= gap:
         return False
-    most = max(most, _edge_gap(m00, ty, tz, m10, m20, ay, az, by, bz, m02, m01))
-    most = max(most, _edge_gap(m01, ty, tz, m11, m21, ay, az, bx, bz, m02, m00))
-    most = max(most, _edge_gap(m02, ty, tz, m12, m22, ay, az, bx, by, m01, m00))
-    most = max(most, _edge_gap(m10, tz, tx, m20, m00, az, ax, by, bz, m12, m11))
-    most = max(most, _edge_gap(m11, tz, tx, m21, m01, az, ax, bx, bz, m12, m10))
-    most = max(most, _edge_gap(m12, tz, tx, m22, m02, az, ax, bx, by, m11, m10))
-    most = max(most, _edge_gap(m20, tx, ty, m00, m10, ax, ay, by, bz, m22, m21))
-    most = max(most, _edge_gap(m21, tx, ty, m01, m11, ax, ay, bx, bz, m22, m20))
-    most = max(most, _edge_gap(m22, tx, ty, m02, m12, ax, ay, bx, by, m21, m20))
+    most = max(most, _edge_gap(ty, tz, m10, m20, ay, az, by, bz, m02, m01))
+    most = max(most, _edge_gap(ty, tz, m11, m21, ay, az, bx, bz, m02, m00))
+    most = max(most, _edge_gap(ty, tz, m12, m22, ay, az, bx, by, m01, m00))
+    most = max(most, _edge_gap(tz, tx, m20, m00, az, ax, by, bz, m12, m11))
+    most = max(most, _edge_gap(tz, tx, m21, m01, az, ax, bx, bz, m12, m10))
+    most = max(most, _edge_gap(tz, tx, m22, m02, az, ax, bx, by, m11, m10))
+    most = max(most, _edge_gap(tx, ty, m00, m10, ax, ay, by, bz, m22, m21))
+    most = max(most, _edge_gap(tx, ty, m01, m11, ax, ay, bx, bz, m22, m20))
+    most = max(most, _edge_gap(tx, ty, m02, m12, ax, ay, bx, by, m21, m20))
     if most >= gap:
         return False
     if most <= 0.0:
@@ -227,7 +273,7 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
 
 @jit
 def _edge_gap(
-    cosine: float, t1: float, t2: float, m1: float, m2: float,
+    t1: float, t2: float, m1: float, m2: float,
     a1: float, a2: float, b1: float, b2: float, k1: float, k2: float,
 ) -> float:  # fmt: skip
     """Return the projected distance of two boxes along the cross product of two of their edges.
@@ -236,7 +282,7 @@ def _edge_gap(
     half sizes and b_j along them. b1, b2 are the half sizes of the other two edges of b, and
     k1, k2 the components along a_i of the edges of b that are crossed with them.
     """
-    sine = 1.0 - cosine * cosine
+    sine = m1 * m1 + m2 * m2
     if sine < PARALLEL:
         return -np.inf
     spread = a1 * abs(m2) + a2 * abs(m1) + b1 * abs(k1) + b2 * abs(k2)
@@ -265,8 +311,6 @@ def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
                 px = c[0] + sign_f * e[f, 0] + sign_g * e[g, 0] - e[m, 0]
                 py = c[1] + sign_f * e[f, 1] + sign_g * e[g, 1] - e[m, 1]
                 pz = c[2] + sign_f * e[f, 2] + sign_g * e[g, 2] - e[m, 2]
-                square = _line_box(
-                    px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz
-                )
+                square = _line_box(px, py, pz, 2 * e[m, 0], 2 * e[m, 1], 2 * e[m, 2], hx, hy, hz)
                 least = min(least, square)
     return least

@@ -12,12 +12,15 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
-from tcs.kernel.collide import balls_meet, closer, move
+from tcs.kernel.collide import BALL, CENTRE, balls_meet, closer, move
 from tcs.kernel.problem import Problem
 
 NO_CONTACT = -1
 ROOM, BODY, ARM = 0, 1, 2
 """What the arm touched."""
+AT_GOAL = 1e-7
+"""How far off [m, and as entries of a rotation] a solution may be. The closed form is good to 1e-12
+except within 1e-7 rad of a singularity."""
 
 
 class Workspace(NamedTuple):
@@ -83,12 +86,19 @@ def base_contact(problem: Problem, work: Workspace, torso: int, rides: int) -> i
     The room must stand in `work.room_B`.
     """
     body, room, gaps = problem.body[torso], work.room_B, problem.gap_base
-    for i in range(len(body)):
-        if problem.body_rides[i] != rides:
+    carried, ball = problem.body_rides, problem.body_balls[torso, rides]
+    for j in range(len(room)):
+        x = room[j, CENTRE] - ball[0]
+        y = room[j, CENTRE + 1] - ball[1]
+        z = room[j, CENTRE + 2] - ball[2]
+        apart = room[j, BALL] + ball[3] + problem.widest_gap
+        if apart <= 0.0 or x * x + y * y + z * z > apart * apart:
             continue
-        for j in range(len(room)):
+        for i in range(len(body)):
             gap = gaps[i, j]
-            if gap > 0.0 and balls_meet(body, i, room, j, gap) and closer(body, i, room, j, gap):
+            if carried[i] != rides or gap <= 0.0:
+                continue
+            if balls_meet(body, i, room, j, gap) and closer(body, i, room, j, gap):
                 return contact_code(problem, problem.body_body[i], problem.room_body[j], ROOM)
     return NO_CONTACT
 
@@ -173,22 +183,10 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     """
     arm, room = work.arm, work.room_A
     gap_room, gap_body, gap_arm = problem.gap_room, problem.gap_body, problem.gap_arm
-    bodies = problem.link_body
     place_links(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
     partner, i, j = work.last[0], work.last[1], work.last[2]
-    if partner >= 0:
-        _place_link(problem, work, i)
-        if partner == ROOM:
-            # The room's shapes move with the base: the pair may be out of date.
-            if _is_near(work, j) and closer(arm, i, room, j, gap_room[i, j]):
-                return contact_code(problem, bodies[i], problem.room_body[j], ROOM)
-        elif partner == BODY:
-            if closer(arm, i, body_A, j, gap_body[i, j]):
-                return contact_code(problem, bodies[i], problem.body_body[j], BODY)
-        else:
-            _place_link(problem, work, j)
-            if closer(arm, i, arm, j, gap_arm[i, j]):
-                return contact_code(problem, bodies[i], bodies[j], ARM)
+    if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
+        return pair_code(problem, partner, i, j)
     for i in range(problem.grippers, len(arm)):
         _place_link(problem, work, i)
         for n in range(work.near_count[0]):
@@ -196,18 +194,63 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
             gap = gap_room[i, j]
             if gap > 0.0 and balls_meet(arm, i, room, j, gap) and closer(arm, i, room, j, gap):
                 work.last[0], work.last[1], work.last[2] = ROOM, i, j
-                return contact_code(problem, bodies[i], problem.room_body[j], ROOM)
+                return pair_code(problem, ROOM, i, j)
         for j in range(len(body_A)):
             gap = gap_body[i, j]
             if gap > 0.0 and balls_meet(arm, i, body_A, j, gap) and closer(arm, i, body_A, j, gap):
                 work.last[0], work.last[1], work.last[2] = BODY, i, j
-                return contact_code(problem, bodies[i], problem.body_body[j], BODY)
+                return pair_code(problem, BODY, i, j)
         for j in range(i):
             gap = gap_arm[i, j]
             if gap > 0.0 and balls_meet(arm, i, arm, j, gap) and closer(arm, i, arm, j, gap):
                 work.last[0], work.last[1], work.last[2] = ARM, i, j
-                return contact_code(problem, bodies[i], bodies[j], ARM)
+                return pair_code(problem, ARM, i, j)
     return NO_CONTACT
+
+
+@jit
+def at_goal(problem: Problem, work: Workspace) -> bool:
+    """Return whether the links, as placed last, hold the tool at the goal in hand.
+
+    A safeguard: nothing leaves the kernel as reached that forward kinematics does not confirm.
+    """
+    R, p, F, f = work.link_R[7], work.link_p[7], problem.chain_R[7], problem.chain_p[7]
+    worst = 0.0
+    for r in range(3):
+        along = p[r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2] - work.p_AG[r]
+        worst = max(worst, abs(along))
+        for c in range(3):
+            turned = R[r, 0] * F[0, c] + R[r, 1] * F[1, c] + R[r, 2] * F[2, c]
+            worst = max(worst, abs(turned - work.R_AG[r, c]))
+    return worst < AT_GOAL
+
+
+@jit
+def pair_touches(
+    problem: Problem, work: Workspace, body_A: FloatArray, partner: int, i: int, j: int
+) -> bool:
+    """Return whether arm shape i touches shape j of a partner, the links being placed."""
+    arm = work.arm
+    _place_link(problem, work, i)
+    if partner == ROOM:
+        # The room's shapes move with the base: this one may be out of date.
+        return _is_near(work, j) and closer(arm, i, work.room_A, j, problem.gap_room[i, j])
+    if partner == BODY:
+        return closer(arm, i, body_A, j, problem.gap_body[i, j])
+    _place_link(problem, work, j)
+    return closer(arm, i, arm, j, problem.gap_arm[i, j])
+
+
+@jit
+def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
+    """Return the contact code of arm shape i and shape j of a partner."""
+    if partner == ROOM:
+        other = problem.room_body[j]
+    elif partner == BODY:
+        other = problem.body_body[j]
+    else:
+        other = problem.link_body[j]
+    return contact_code(problem, problem.link_body[i], other, partner)
 
 
 @jit

@@ -6,7 +6,13 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import jit
-from tcs.kernel.contacts import NO_CONTACT, arm_contact, gripper_body_contact, new_workspace
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    arm_contact,
+    at_goal,
+    gripper_body_contact,
+    new_workspace,
+)
 from tcs.kernel.lanes import lane_joints, solve_lanes, wrist_goal
 from tcs.kernel.measure import isotropy_at
 from tcs.kernel.pairs import MAX_LANES, fill_lanes, new_search
@@ -66,7 +72,8 @@ def dense_scan(
                     found += 1
     for i in np.argsort(-measures[:found], kind="mergesort"):
         lane_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
-        if arm_contact(problem, work, body_A, search.q) == NO_CONTACT:
+        contact = arm_contact(problem, work, body_A, search.q)
+        if contact == NO_CONTACT and at_goal(problem, work):
             joints[:] = search.q
             return isotropy_at(arm, joints)
     return -1.0

@@ -13,7 +13,10 @@ from tcs.kernel.cache import jit
 from tcs.kernel.solver import ArmSolver
 
 TINY = 1e-300
-"""Keeps 0/0 at a singularity finite; such lanes are infeasible or have no isotropy anyway."""
+"""Keeps 0/0 at a singularity finite; such lanes are infeasible."""
+SINGULAR = 1e-14
+"""Squared sine of the angle to an axis below which a direction lies along it. An angle of 1e-7 rad
+still determines the joint to 1e-9 rad."""
 
 
 @jit
@@ -149,7 +152,8 @@ def solve_lanes(
         rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
         kx = b00 * rx + b01 * ry + b02 * uz
         ky = b10 * rx + b11 * ry + b12 * uz
-        D = kx * kx + ky * ky + TINY
+        D2 = kx * kx + ky * ky
+        D = D2 + TINY
         c2, s2 = (kx * v2x + ky * v2y) / D, (kx * v2y - ky * v2x) / D
         # Axis 7, its x axis and the tool offset, into L3.
         gx, gy, gz = c1 * zx + s1 * zy, -s1 * zx + c1 * zy, zz
@@ -194,7 +198,8 @@ def solve_lanes(
         rx, ry = c6 * f02 - s6 * f12, s6 * f02 + c6 * f12
         kx = e00 * rx + e01 * ry + e02 * f22
         ky = e10 * rx + e11 * ry + e12 * f22
-        D = kx * kx + ky * ky + TINY
+        D5 = kx * kx + ky * ky
+        D = D5 + TINY
         c5, s5 = (kx * m7x + ky * m7y) / D, (kx * m7y - ky * m7x) / D
         px, py = c5 * k7x + s5 * k7y, -s5 * k7x + c5 * k7y
         gx = e00 * px + e10 * py + e20 * k7z
@@ -204,6 +209,8 @@ def solve_lanes(
         c7 = f00 * px + f10 * py + f20 * gz
         s7 = f01 * px + f11 * py + f21 * gz
         left = min(elbow_left, min(aim_left / N, wrist_left / N6))
+        # Where the aim or the wrist lies along an axis, joint 2 or 5 is undetermined: no solution.
+        left = min(left, min(D2 - SINGULAR * square, D5 - SINGULAR))
         left = min(left, c1 * mc1 + s1 * ms1 - h1)
         left = min(left, c2 * mc2 + s2 * ms2 - h2)
         left = min(left, c3 * mc3 + s3 * ms3 - h3)
@@ -357,9 +364,7 @@ def within(angle: float, lower: float, upper: float) -> float:
 
 
 @jit
-def _turn_to_height(
-    R: FloatArray, x: float, y: float, z: float, height: float, sign: int
-) -> float:
+def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, sign: int) -> float:
     """Return the turn about z after which R (x, y, z) has the z component `height`."""
     P = R[2, 0] * x + R[2, 1] * y
     Q = R[2, 1] * x - R[2, 0] * y

@@ -9,7 +9,14 @@ import numpy as np
 from tcs.kernel.arcs import MAX_ARCS, windows_of
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
-from tcs.kernel.contacts import NO_CONTACT, Workspace, arm_contact
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    at_goal,
+    pair_touches,
+    place_links,
+)
 from tcs.kernel.lanes import lane_joints, solve_lanes
 from tcs.kernel.problem import Problem
 from tcs.kernel.solver import ArmSolver
@@ -30,6 +37,10 @@ MAX_CANDIDATES = 4096
 REFINEMENTS = 3
 """Rounds in which the neighbourhood of the best solution is divided by REFINE_LANES / 2."""
 REFINE_LANES = 8
+SQUEEZES = 8
+"""Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
+SQUEEZE_PARTS = 16.0
+"""How finely the neighbourhood of an angle found by halving is refined."""
 
 
 class Search(NamedTuple):
@@ -38,6 +49,8 @@ class Search(NamedTuple):
     goal: FloatArray
     arcs: FloatArray
     windows: FloatArray
+    ends: FloatArray
+    """Outer and inner side of the ends of feasible stretches [rad], shape (MAX_WINDOWS, 2)."""
     angle: FloatArray
     cosine: FloatArray
     sine: FloatArray
@@ -63,6 +76,7 @@ def new_search() -> Search:
     return Search(
         np.empty((4, 3)),
         np.empty((MAX_ARCS, 2)),
+        np.empty((MAX_WINDOWS, 2)),
         np.empty((MAX_WINDOWS, 2)),
         np.empty(MAX_LANES),
         np.empty(MAX_LANES),
@@ -140,14 +154,49 @@ def _look_closer(
         arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
         search.slack, search.measure,
     )  # fmt: skip
+    before = search.slack[0] >= 0.0
+    ends = 0
     for i in range(count):
-        if search.slack[i] >= 0.0 and found < MAX_CANDIDATES:
-            search.found_angle[found] = search.angle[i]
-            search.found_step[found] = step
-            search.found_measure[found] = search.measure[i]
-            search.found_branch[found] = b
-            found += 1
+        inside = search.slack[i] >= 0.0
+        if inside:
+            found = _add(search, b, i, step, found)
+        if inside != before and ends < MAX_WINDOWS:
+            # The outer and the inner side of an end of a feasible stretch.
+            search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
+            search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
+            ends += 1
+        before = inside
+    for e in range(ends):
+        found = _look_at_end(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
     return found
+
+
+@jit
+def _look_at_end(
+    arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
+) -> int:
+    """Append feasible angles close to a joint limit: the best measure is often right there."""
+    step = fill_lanes(search, outer, inner, LEAST_LANES)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, LEAST_LANES - 1,
+        search.slack, search.measure,
+    )  # fmt: skip
+    for i in range(1, LEAST_LANES - 1):
+        if search.slack[i] >= 0.0:
+            found = _add(search, b, i, abs(step), found)
+    return found
+
+
+@jit
+def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
+    """Append lane i as a candidate on branch b; return how many there are now."""
+    if found == MAX_CANDIDATES:
+        return found
+    search.found_angle[found] = search.angle[i]
+    search.found_step[found] = step
+    search.found_measure[found] = search.measure[i]
+    search.found_branch[found] = b
+    return found + 1
 
 
 @jit
@@ -182,11 +231,98 @@ def best_free(
         branch = problem.arm.branches[search.found_branch[top]]
         lane_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
-        if contact == NO_CONTACT:
+        if contact == NO_CONTACT and at_goal(problem, work):
             return top, first_contact
         if rank == 0:
             first_contact = contact
     return -1, first_contact
+
+
+@jit
+def squeeze(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
+) -> int:
+    """Look for a free angle between neighbouring candidates that all touch something.
+
+    A free stretch narrower than the spacing lies where one contact has ended and another not
+    begun. So the candidates are walked in order; where the pair in contact changes, halving finds
+    whether there is room between the two.
+
+    Returns:
+        Index of the candidate that now holds a free angle, or -1.
+    """
+    arm = problem.arm
+    work.last[0] = -1
+    partner, i, j = -1, -1, -1
+    for n in range(found):
+        b = search.found_branch[n]
+        lane_joints(arm, search.goal, arm.branches[b], search.found_angle[n], search.q)
+        arm_contact(problem, work, body_A, search.q)
+        changed = work.last[0] != partner or work.last[1] != i or work.last[2] != j
+        if n and changed and b == search.found_branch[n - 1]:
+            width = search.found_angle[n] - search.found_angle[n - 1]
+            if abs(width) < 1.5 * search.found_step[n]:
+                first = search.found_angle[n - 1]
+                angle = _between(problem, work, body_A, search, b, first, width, partner, i, j)
+                if np.isfinite(angle):
+                    search.found_angle[n] = angle
+                    search.found_measure[n] = search.measure[0]
+                    search.found_step[n] = abs(width) / SQUEEZE_PARTS
+                    return n
+        partner, i, j = work.last[0], work.last[1], work.last[2]
+    return -1
+
+
+@jit
+def _between(
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    search: Search,
+    b: int,
+    first: float,
+    width: float,
+    partner: int,
+    i: int,
+    j: int,
+) -> float:
+    """Return a free angle in first .. first + width, or nan.
+
+    At `first` the pair (partner, i, j) touches, at the other end the pair in `work.last`.
+    """
+    arm = problem.arm
+    other, k, m = work.last[0], work.last[1], work.last[2]
+    answer = np.nan
+    low, high = 0.0, 1.0
+    for _ in range(SQUEEZES):
+        middle = 0.5 * (low + high)
+        angle = first + middle * width
+        lane_joints(arm, search.goal, arm.branches[b], angle, search.q)
+        place_links(arm.R, arm.p, search.q, work.link_R, work.link_p)
+        if pair_touches(problem, work, body_A, partner, i, j):
+            low = middle
+        elif pair_touches(problem, work, body_A, other, k, m):
+            high = middle
+        else:
+            if _is_feasible(arm, search, b, angle) and (
+                arm_contact(problem, work, body_A, search.q) == NO_CONTACT
+                and at_goal(problem, work)
+            ):
+                answer = angle
+            break
+    work.last[0], work.last[1], work.last[2] = other, k, m
+    return answer
+
+
+@jit
+def _is_feasible(arm: ArmSolver, search: Search, b: int, angle: float) -> bool:
+    """Return whether branch b exists at this angle and keeps all limits; fills measure[0]."""
+    search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, 1,
+        search.slack, search.measure,
+    )  # fmt: skip
+    return search.slack[0] >= 0.0
 
 
 @jit
@@ -217,7 +353,8 @@ def refine(
             if search.measure[i] <= value:
                 break
             lane_joints(arm, search.goal, branch, search.angle[i], search.q)
-            if arm_contact(problem, work, body_A, search.q) == NO_CONTACT:
+            contact = arm_contact(problem, work, body_A, search.q)
+            if contact == NO_CONTACT and at_goal(problem, work):
                 centre, value = search.angle[i], search.measure[i]
                 search.best[:] = search.q
                 break
@@ -245,6 +382,8 @@ def score_pair(
     if found == 0:
         return JOINT_LIMITS, NO_CONTACT
     winner, contact = best_free(problem, work, body_A, search, found)
+    if winner < 0:
+        winner = squeeze(problem, work, body_A, search, found)
     if winner < 0:
         return ARM_BLOCKED, contact
     refine(problem, work, body_A, search, winner)

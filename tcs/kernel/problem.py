@@ -5,13 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray, SceneArrays, Shapes
-from tcs.kernel.collide import pack
+from tcs.kernel.collide import BALL, CENTRE, pack
 from tcs.kernel.solver import ArmSolver, arm_solver
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is never checked."""
+TOUCH = 1e-9
+"""Least gap of a pair that is checked [m], far below what any distance is computed to."""
 
 
 class Problem(NamedTuple):
@@ -38,6 +41,9 @@ class Problem(NamedTuple):
     """Shapes of the rest of the robot in B, packed, shape (torso levels, n_body, 17)."""
     body_A: FloatArray
     """The same in A."""
+    body_balls: FloatArray
+    """Centre and radius of a ball about all body shapes that stay (0) and that ride on the torso
+    (1), in B [m], shape (torso levels, 2, 4)."""
     body_rides: IntArray
     """1 where a body shape rides on the torso, else 0, shape (n_body,)."""
     body_body: IntArray
@@ -58,6 +64,8 @@ class Problem(NamedTuple):
     """The same for arm shapes among themselves, shape (n_arm, n_arm)."""
     gap_base: FloatArray
     """The same for body and room shapes, shape (n_body, n_room)."""
+    widest_gap: float
+    """The greatest of all these distances [m]."""
     goal_R: FloatArray
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray
@@ -93,10 +101,11 @@ def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
         link_frame=frame,
         link_body=scene.arm.body[order].astype(np.int64),
         grippers=int(np.sum(frame == 7)),
-        base_R=np.ascontiguousarray(scene.arm_base_R),
-        base_p=np.ascontiguousarray(scene.arm_base_p),
+        base_R=_own(scene.arm_base_R),
+        base_p=_own(scene.arm_base_p),
         body=pack(scene.body),
         body_A=pack(body_A),
+        body_balls=_balls(pack(scene.body), scene.body.frame),
         body_rides=scene.body.frame.astype(np.int64),
         body_body=scene.body.body.astype(np.int64),
         room=pack(scene.room),
@@ -107,14 +116,31 @@ def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
         gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], margin),
         gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], margin),
         gap_base=_gaps(scene.body_vs_room, pads[1], pads[2], margin),
-        goal_R=np.ascontiguousarray(scene.goal_R),
-        goal_p=np.ascontiguousarray(scene.goal_p),
-        base_x=np.ascontiguousarray(grid.base_x),
-        base_y=np.ascontiguousarray(grid.base_y),
-        base_yaw=np.ascontiguousarray(grid.base_yaw),
+        widest_gap=max(margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads)),
+        goal_R=_own(scene.goal_R),
+        goal_p=_own(scene.goal_p),
+        base_x=_own(grid.base_x),
+        base_y=_own(grid.base_y),
+        base_yaw=_own(grid.base_yaw),
         torso_levels=grid.torso_levels,
         environment_states=grid.environment_states,
     )
+
+
+def _balls(bodies: FloatArray, rides: NDArray[np.int8]) -> FloatArray:
+    """Return a ball about each of the two groups of shapes; radius -inf for an empty one."""
+    balls = np.full((len(bodies), 2, 4), -np.inf)
+    balls[..., :3] = 0.0
+    for group in (0, 1):
+        rows = bodies[:, rides == group]
+        if not rows.shape[1]:
+            continue
+        centres, radii = rows[..., CENTRE : CENTRE + 3], rows[..., BALL, None]
+        low, high = (centres - radii).min(axis=1), (centres + radii).max(axis=1)
+        middle = (low + high) / 2
+        out = np.linalg.norm(centres - middle[:, None], axis=2) + rows[..., BALL]
+        balls[:, group, :3], balls[:, group, 3] = middle, out.max(axis=1)
+    return balls
 
 
 def _count(shapes: Shapes) -> int:
@@ -122,7 +148,14 @@ def _count(shapes: Shapes) -> int:
     return int(shapes.body.max(initial=-1)) + 1
 
 
+def _own(array: FloatArray) -> FloatArray:
+    """Return a writable copy: to numba, read-only arrays are another type to compile for."""
+    return np.array(array, dtype=np.float64, order="C")
+
+
 def _gaps(checked: BoolArray, pad_a: FloatArray, pad_b: FloatArray, margin: float) -> FloatArray:
     """Return the distance each pair must keep [m], UNCHECKED where it is not looked at."""
     required = np.maximum(margin, pad_a[:, None] + pad_b[None, :])
+    # The loops take a gap of 0 for "not looked at"; a touch must count in any case.
+    required = np.maximum(required, TOUCH)
     return np.ascontiguousarray(np.where(checked, required, UNCHECKED))

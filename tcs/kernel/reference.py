@@ -139,10 +139,12 @@ def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
 
 def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]:
     """Return the angle turned into its limits if it can be, and cos(off middle) - cos(half)."""
-    if upper - lower >= 2 * math.pi or not math.isfinite(lower):
+    if not math.isfinite(lower):
         return math.remainder(angle, 2 * math.pi), 1.0
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     off = math.remainder(angle - middle, 2 * math.pi)
+    if half >= math.pi:
+        return middle + off, 1.0
     return middle + off, math.cos(off) - math.cos(half)
 
 
@@ -249,4 +251,3 @@ def _segment_to_box(start: FloatArray, way: FloatArray, half: FloatArray) -> flo
         float(np.linalg.norm((point := start + t * way) - np.clip(point, -half, half)))
         for t in (0.0, (low + high) / 2, 1.0)
     )
-

@@ -1,7 +1,9 @@
 """The plain-loop twin of scoring: one configuration against one goal, from `reference`'s pieces.
 
 It looks at the same angles of the free joint as the kernel, so that verdicts can be compared one
-by one; how many of them the kernel needs is another question (see `dense`).
+by one; how many of them the kernel needs is another question (see `dense`). One thing it leaves
+out: where every angle touches something, the kernel halves its way between two contacts
+(`pairs.squeeze`) and may find room that the twin calls ARM_BLOCKED. There `confirms` judges.
 """
 
 from __future__ import annotations
@@ -219,9 +221,7 @@ def elbow_spans(chain: Chain) -> tuple[float, float]:
     return min(spans), max(spans)
 
 
-def find_candidates(
-    chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]
-) -> list[Candidate]:
+def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -> list[Candidate]:
     """Return the feasible angles of the kernel's two looks: over the arcs, inside the windows."""
     length = sum(last - first for first, last in arcs)
     found = []
@@ -258,13 +258,40 @@ def look_closer(
     """Return the feasible angles of one window on one branch."""
     count = max(LEAST_LANES, int((last - first) / FINE_STEP) + 1)
     step = (last - first) / (count - 1)
+    angles = [first + i * step for i in range(count)]
+    inside = [solutions(chain, X_AG, angle)[branch].slack >= 0 for angle in angles]
+    found = candidates_at(chain, X_AG, branch, angles, step)
+    for i in range(1, count):
+        if inside[i] != inside[i - 1]:
+            outer, inner = (i - 1, i) if inside[i] else (i, i - 1)
+            fine = (angles[inner] - angles[outer]) / (LEAST_LANES - 1)
+            near = [angles[outer] + k * fine for k in range(1, LEAST_LANES - 1)]
+            found += candidates_at(chain, X_AG, branch, near, abs(fine))
+    return found
+
+
+def candidates_at(
+    chain: Chain, X_AG: Pose, branch: Branch, angles: list[float], step: float
+) -> list[Candidate]:
+    """Return the feasible ones of some angles on one branch."""
     found = []
-    for i in range(count):
-        solution = solutions(chain, X_AG, first + i * step)[branch]
+    for angle in angles:
+        solution = solutions(chain, X_AG, angle)[branch]
         if solution.slack >= 0:
             value = isotropy(jacobian(chain, solution.q))
             found.append(Candidate(solution.q, value, branch, step))
     return found
+
+
+def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
+    """Return whether the arm at joint angles q reaches the goal from h and touches nothing."""
+    stand, blocked = stand_at(scene, grid, h, goal)
+    R, p = link_poses(scene.chain, q)[-1]
+    # Joints are float32: seven roundings of 1.2e-7 rad at up to 1 m from the tool.
+    at_goal = np.allclose(R, stand.X_AG[0], atol=2e-6) and np.allclose(p, stand.X_AG[1], atol=2e-6)
+    within = bool(np.all((q >= scene.chain.lower) & (q <= scene.chain.upper)))
+    gripper = stand.gripper_touches(with_body=False) or stand.gripper_touches(with_body=True)
+    return at_goal and within and not (blocked or gripper or stand.arm_touches(q))
 
 
 def climb(stand: Stand, best: Candidate) -> Candidate:

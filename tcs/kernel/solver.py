@@ -48,7 +48,7 @@ class ArmSolver(NamedTuple):
     middle_sin: FloatArray
     """sin(middle of the limits), 0 where there are none, shape (7,)."""
     lower: FloatArray
-    """Joint limits [rad], shape (7,), infinite where there are none."""
+    """Joint limits [rad], shape (7,), infinite where the joint is continuous."""
     upper: FloatArray
     branches: IntArray
     """Signs of sin(q4 - phase), of the aim and of the wrist that can occur within the limits,
@@ -91,8 +91,8 @@ def arm_solver(chain: Chain) -> ArmSolver:
         wrist_signs = _signs_within(lower[5] - wrist_phase, upper[5] - wrist_phase, True)
     branches = [(e, a, w_) for e in elbow_signs for a in (1, -1) for w_ in wrist_signs]
     return ArmSolver(
-        R=np.ascontiguousarray(chain.R),
-        p=np.ascontiguousarray(chain.p),
+        R=np.array(chain.R, order="C"),
+        p=np.array(chain.p, order="C"),
         u0=u0,
         uc=uc,
         us=us,
@@ -101,8 +101,8 @@ def arm_solver(chain: Chain) -> ArmSolver:
         limit_cos=np.where(limited, np.cos(half), -1.0),
         middle_cos=np.where(limited, np.cos(middle), 0.0),
         middle_sin=np.where(limited, np.sin(middle), 0.0),
-        lower=np.where(limited, lower, -np.inf),
-        upper=np.where(limited, upper, np.inf),
+        lower=np.array(lower, dtype=np.float64),
+        upper=np.array(upper, dtype=np.float64),
         branches=np.array(branches, dtype=np.int64),
     )
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.collide import BALL, CENTRE, TURN, move
 from tcs.kernel.cache import jit
+from tcs.kernel.collide import BALL, CENTRE, TURN, move
 from tcs.kernel.contacts import Workspace
 from tcs.kernel.problem import Problem
 
@@ -103,7 +103,4 @@ def arm_radius(problem: Problem) -> float:
         centre = problem.links[i, CENTRE : CENTRE + 3]
         out = np.sqrt(np.sum(centre * centre)) + problem.links[i, BALL]
         radius = max(radius, reach[problem.link_frame[i]] + out)
-    gap = 0.0
-    for required in problem.gap_room.flat:
-        gap = max(gap, required)
-    return radius + gap
+    return radius + problem.widest_gap

@@ -92,6 +92,8 @@ def score_slice(
             scores.contact[row] = code
             continue
         body_A = problem.body_A[torso]
+        # What blocks here must not depend on what was scored before.
+        work.last[0] = -1
         room_placed = False
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tcs.robots.fit_robot import BodyFit, fit_robot
 from tcs.robots.kinematic import kinematic_urdf, robot_urdf
 from tcs.robots.meshes import as_obj
 from tcs.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
@@ -10,12 +9,10 @@ from tcs.robots.robot_file import RobotFile, joint_limits, load_robot, robot_nam
 from tcs.robots.urdf import Urdf, read_urdf
 
 __all__ = [
-    "BodyFit",
     "Primitive",
     "RobotFile",
     "Urdf",
     "as_obj",
-    "fit_robot",
     "joint_limits",
     "kinematic_urdf",
     "load_robot",

@@ -7,13 +7,16 @@ import os
 import tempfile
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from tcs.errors import OutputError, RobotError
 from tcs.paths import cache_folder
+
+if TYPE_CHECKING:
+    import trimesh
 
 FloatArray = NDArray[np.float64]
 
@@ -40,9 +43,7 @@ def as_obj(mesh: Path) -> Path:
     key = hashlib.sha256(_VERSION + mesh.suffix.lower().encode() + _content(mesh)).hexdigest()
     target = folder / f"{mesh.stem}_{key[:16]}.obj"
     if not target.is_file():
-        loaded = _load(mesh)
-        text = trimesh.exchange.obj.export_obj(loaded, include_texture=False, include_color=False)
-        _write_atomically(target, text)
+        _write_atomically(target, _obj_text(mesh))
     return target
 
 
@@ -68,7 +69,17 @@ def _content(mesh: Path) -> bytes:
         raise RobotError(f"mesh '{mesh}' cannot be read: {error.strerror}.") from error
 
 
+def _obj_text(mesh: Path) -> str:
+    from trimesh.exchange.obj import export_obj
+
+    text = export_obj(_load(mesh), include_texture=False, include_color=False)
+    return str(text)
+
+
 def _load(mesh: Path) -> trimesh.Trimesh:
+    # Imported where it is needed: it costs half a second that scoring does not have to spend.
+    import trimesh
+
     _content(mesh)
     try:
         loaded = trimesh.load(mesh, force="mesh", process=False)

@@ -167,12 +167,26 @@ class RobotFile(_Data):
         Raises:
             RobotError: If the URDF cannot be used.
         """
-        joints = self.model().joints
         given: dict[str, float] = {}
         if self.posture is not None:
             given |= self.postures[self.posture]
         if self.gripper is not None:
             given |= self.grippers[self.gripper]
+        scored = {*self.arm_joints, self.torso_joint}
+        return {n: q for n, q in self.with_mimics(given).items() if n not in scored}
+
+    def with_mimics(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return the position of every movable joint, from those of some [rad or m].
+
+        Joints that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+
+        Args:
+            given: Joints whose position is known.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints
         limits = self.joint_limits()
 
         def position(name: str) -> float:
@@ -184,8 +198,7 @@ class RobotFile(_Data):
             lower, upper = limits[name]
             return min(max(0.0, lower), upper)
 
-        scored = {*self.arm_joints, self.torso_joint}
-        return {name: position(name) for name in limits if name not in scored}
+        return {name: position(name) for name in limits}
 
     def load_primitives(self) -> tuple[Primitive, ...]:
         """Return every collision shape: those of the CSV file, then those of the extra bodies.

@@ -205,4 +205,3 @@ def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | 
         "manipulability": manipulability,
         "members": [grid.configuration(h).to_json() for h in members],
     }
-

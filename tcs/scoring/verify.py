@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -12,12 +13,12 @@ from scipy.stats import beta
 
 from tcs.errors import TcsError
 from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
-from tcs.kernel.problem import build_problem
+from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.reference import isotropy
 from tcs.scene import Scene, goal_poses
 from tcs.scoring.job import Job, load_job
 from tcs.store import ScoreFile, check_scene
-from tcs.tables import Reason
+from tcs.tables import Reason, ScoreTable
 
 POSITION_BAR = 1e-6
 """Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
@@ -112,54 +113,29 @@ def verify(
     """
     if pairs < 0 or dense < 0:
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
-    names = (file.metadata[key] for key in ("task", "environment", "robot"))
-    job = load_job(*names)
+    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
     scene = job.scene()
     lowered = job.lowered(scene)
     check_scene(file, lowered.digest())
-    judge = _Judge(job, scene)
     rng = np.random.default_rng(seed)
-    scores = file.scores
-    problem = build_problem(lowered.arrays, lowered.grid)
-
-    reached = _sample(rng, scores.reason == Reason.REACHED, pairs)
-    strata = _shares(scores.reason, dense)
-    unreached = [_sample(rng, scores.reason == reason, n) for reason, n in strata.items()]
-    again = _sample(rng, scores.reason == Reason.REACHED, dense)
-    total = len(reached) + sum(len(part) for part in unreached) + len(again)
-    done = 0
+    reason = file.scores.reason
+    reached = _sample(rng, reason == Reason.REACHED, pairs)
+    unreached = [_sample(rng, reason == r, n) for r, n in _shares(reason, dense).items()]
+    again = _sample(rng, reason == Reason.REACHED, dense)
+    total = len(reached) + sum(map(len, unreached)) + len(again)
+    count = itertools.count(1)
 
     def step() -> None:
-        nonlocal done
-        done += 1
         if on_progress is not None:
-            on_progress(done, total)
+            on_progress(next(count), total)
 
-    findings = []
-    for h, g in reached:
-        q = scores.joints_of(h, g)
-        findings.append(judge.check(h, g, np.asarray(q, dtype=np.float64), scores.isotropy[h, g]))
-        step()
-    missed, unconfirmed = [], 0
-    for part in unreached:
-        hits = 0
-        for h, g in part:
-            q = np.empty(7)
-            value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
-            if value >= 0.0:
-                confirmed = judge.check(h, g, q, value).is_true
-                hits += confirmed
-                unconfirmed += not confirmed
-            step()
-        missed.append(hits)
-    shortfall = []
-    for h, g in again:
-        value = dense_scan(problem, h, g, DENSE_SAMPLES, np.empty(7))
-        shortfall.append(max(0.0, value - float(scores.isotropy[h, g])))
-        step()
-    sizes = [int(np.count_nonzero(scores.reason == reason)) for reason in strata]
-    scanned = [len(part) for part in unreached]
-    recall, interval = estimated_recall(int(scores.reached.sum()), sizes, scanned, missed)
+    check = _Check(file.scores, build_problem(lowered.arrays, lowered.grid), _Judge(job, scene))
+    findings = check.stored(reached, step)
+    hits = [check.hits(part, step) for part in unreached]
+    shortfall = check.shortfall(again, step)
+    scanned, missed = [len(part) for part in unreached], [sum(part) for part in hits]
+    sizes = [int(np.count_nonzero(reason == r)) for r in UNREACHED]
+    recall, interval = estimated_recall(int(file.scores.reached.sum()), sizes, scanned, missed)
     return Verification(
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
@@ -169,12 +145,53 @@ def verify(
         limit_violations=sum(finding.limit_violations for finding in findings),
         dense_checked=sum(scanned),
         missed=sum(missed),
-        unconfirmed_hits=unconfirmed,
+        unconfirmed_hits=sum(not confirmed for part in hits for confirmed in part),
         recall=recall,
         recall_ci95=interval,
         shortfall_checked=len(shortfall),
         mean_shortfall=float(np.mean(shortfall)) if shortfall else 0.0,
     )
+
+
+Pairs = list[tuple[int, int]]
+"""Configurations and goals, (h, g)."""
+
+
+@dataclass(frozen=True)
+class _Check:
+    """The three kinds of checks on the scores of a file."""
+
+    scores: ScoreTable
+    problem: Problem
+    judge: _Judge
+
+    def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
+        """Return what Drake says of the stored solutions of reached pairs."""
+        findings = []
+        for h, g in pairs:
+            q = np.asarray(self.scores.joints_of(h, g), dtype=np.float64)
+            findings.append(self.judge.check(h, g, q, float(self.scores.isotropy[h, g])))
+            step()
+        return findings
+
+    def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool]:
+        """Return, for each solution a dense scan finds at unreached pairs, Drake's verdict."""
+        found, q = [], np.empty(7)
+        for h, g in pairs:
+            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
+            if value >= 0.0:
+                found.append(self.judge.check(h, g, q, value).is_true)
+            step()
+        return found
+
+    def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
+        """Return how much better the dense scan's isotropy is at reached pairs."""
+        short, q = [], np.empty(7)
+        for h, g in pairs:
+            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
+            short.append(max(0.0, value - float(self.scores.isotropy[h, g])))
+            step()
+        return short
 
 
 def estimated_recall(
@@ -229,9 +246,7 @@ def _shares(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
     return {first: min(dense - rest, sizes[first]), second: rest}
 
 
-def _sample(
-    rng: np.random.Generator, chosen: NDArray[np.bool_], count: int
-) -> list[tuple[int, int]]:
+def _sample(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int) -> Pairs:
     """Return up to `count` different random (h, g) at which `chosen` is true."""
     flat = np.flatnonzero(chosen)
     picked = rng.choice(flat, size=min(count, len(flat)), replace=False)

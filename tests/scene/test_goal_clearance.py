@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -109,3 +110,18 @@ def test_a_goal_that_is_free_in_the_meshes_is_free_here(gripper, task):
                 optimistic.append((i, name, clearance, required, mesh[kind]))
     assert blocked == []
     assert optimistic == []
+
+
+def test_the_table_in_the_documentation_is_todays(gripper):
+    finger, lowered, floating = gripper
+    text = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+    number = r"(-?[\d.]+)"
+    row = rf"\| (\w+) (\d) \| {number} \| {number} \| {number} \| {number} \|"
+    found = re.findall(row, text)
+    assert len(found) == 23
+    for task, goal, *written in found:
+        arrays, i = lowered[task].arrays, int(goal)
+        least = floating.clearances(arrays.goal_R[0, i], arrays.goal_p[0, i])
+        here = float(written[1 if finger == "open" else 3])
+        # The table has a tenth of a millimetre.
+        assert 1e3 * least["person"][1] == pytest.approx(here, abs=0.1), (task, goal)

@@ -138,6 +138,7 @@ def test_the_parts_of_the_robot_are_told_apart(scene):
 
 def test_standing_in_the_chair_is_a_violation_and_standing_clear_is_none(scene):
     scene.set_arm(REACHING)
+    scene.set_torso(0.15)
     scene.place_base(0.4, 0.0, 0.0)
     blocked = scene.violations()
     assert any(a == "base_link" and b.startswith("wheelchair::") for a, b, _ in blocked)
@@ -228,7 +229,7 @@ def test_a_box_of_the_users_own_blocks_the_arm(spec, scene):
     scene.set_arm(REACHING)
     assert scene.violations() == ()
     where = scene.tool_pose().translation()
-    box = Obstacle(name="table", box=(0.04, 0.5, 0.02), xyz=tuple(where), rpy_deg=(0, 0, 90))
+    box = Obstacle(name="table", box=(0.2, 0.5, 0.2), xyz=tuple(where), rpy_deg=(0, 0, 90))
     other = obstacle_scene(spec, box)
     other.restore(scene.positions())
     assert any(b == "table" for _, b, _ in other.violations())
@@ -247,16 +248,16 @@ def test_a_model_of_the_users_own_stands_where_the_environment_file_says(
     spec, tmp_path, static, joint
 ):
     path = tmp_path / "shelf.sdf"
-    path.write_text(SHELF.format(static=static, z=0.7, shape=BOARD, joint=joint))
+    path.write_text(SHELF.format(static=static, z=0.2, shape=BOARD, joint=joint))
     turned = Obstacle(name="left shelf", file=str(path), xyz=(1, 2, 0.1), rpy_deg=(0, 0, 90))
     plain = Obstacle(name="shelf", file=str(path), xyz=(0, -3, 0))
     scene = obstacle_scene(spec, turned, plain)
     poses = shape_poses(scene)
     for name, where in {
-        "left shelf::top": [1, 2, 0.8],
-        "left shelf::post": [0.8, 2, 0.8],
-        "shelf::top": [0, -3, 0.7],
-        "shelf::post": [0, -2.8, 0.7],
+        "left shelf::top": [1, 2, 0.3],
+        "left shelf::post": [0.8, 2, 0.3],
+        "shelf::top": [0, -3, 0.2],
+        "shelf::post": [0, -2.8, 0.2],
     }.items():
         np.testing.assert_allclose(poses[name].translation(), where, atol=1e-12)
     scene.place_base(0.0, -3.0, 0.0)

@@ -1,0 +1,177 @@
+"""Measure what the README promises, on this machine, and print it as one table.
+
+Usage: python benchmarks/run.py [--task shaving] [--repeats 5] [--pairs 2000] [--dense 1000]
+
+Times of one run compare with each other; machines are shared and noisy, so medians and the
+range are printed. Nothing here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from tcs.kernel import reference_pairs
+from tcs.kernel.problem import build_problem
+from tcs.scoring import build_sets, load_job, score, sweep, verify, warm_up
+from tcs.select import SelectionTables, select
+from tcs.store import load_scores, save_scores
+from tcs.tables import InitialConfiguration, Reason
+
+PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
+REFERENCE_PAIRS = 12
+PLACES = 1000
+
+
+def main() -> int:
+    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    options = parse()
+    row("machine", f"{platform.machine()}, {processor()}")
+    row("python", platform.python_version())
+    row("versions", ", ".join(f"{name} {version(name)}" for name in PACKAGES))
+    row("task", f"{options.task} in the wheelchair, PR2, seed {options.seed}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scores.tcs"
+        lowered_times(options)
+        file = score(options.task)
+        save_scores(path, file)
+        store_times(path, options.repeats)
+        select_times(path, options.seed)
+        process_times(options.task, Path(folder) / "again.tcs", options.repeats)
+        sound = verification(path, options)
+    return 0 if sound else 1
+
+
+def parse() -> argparse.Namespace:
+    """Return the command line's options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--task", default="shaving")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--pairs", type=int, default=2000)
+    parser.add_argument("--dense", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args()
+
+
+def row(name: str, text: str) -> None:
+    """Print one line of the table."""
+    print(f"{name:<34} {text}", flush=True)
+
+
+def spread(seconds: list[float], unit: str = "s", scale: float = 1.0) -> str:
+    """Return median and range."""
+    values = [scale * s for s in seconds]
+    middle, low, high = statistics.median(values), min(values), max(values)
+    return f"{middle:.3f} {unit} (median of {len(values)}, {low:.3f} .. {high:.3f})"
+
+
+def processor() -> str:
+    """Return the processor's name and how many cores there are."""
+    names = [
+        line.split(":", 1)[1].strip()
+        for line in Path("/proc/cpuinfo").read_text().splitlines()
+        if line.startswith("model name")
+    ]
+    return f"{names[0]} x {len(names)}" if names else platform.processor()
+
+
+def lowered_times(options: argparse.Namespace) -> None:
+    """Measure scoring and set building, and the kernel against its plain-loop twin."""
+    begun = time.perf_counter()
+    job = load_job(options.task, "wheelchair", "pr2")
+    lowered = job.lowered(job.scene())
+    row("scene built and lowered", f"{time.perf_counter() - begun:.3f} s")
+    row("kernel compiled or loaded", f"{warm_up(build_problem(lowered.arrays, lowered.grid)):.3f} s")
+    times: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(options.repeats):
+        for jobs, taken in times.items():
+            swept = sweep(lowered, job.task.weights, jobs=jobs)
+            taken.append(swept.scoring_seconds)
+    scores = swept.scores
+    row("configurations x goals", f"{scores.configurations} x {scores.goals}")
+    row("reasons", ", ".join(f"{name} {n}" for name, n in scores.reason_counts().items()))
+    for jobs, taken in times.items():
+        row(f"scoring_seconds, jobs {jobs}", spread(taken))
+    ratios = [one / two for one, two in zip(times[1], times[2], strict=True)]
+    row("thread scaling 1 -> 2", spread(ratios, "x"))
+    building = []
+    for _ in range(options.repeats):
+        begun = time.perf_counter()
+        sets = build_sets(scores, job.grid)
+        building.append(time.perf_counter() - begun)
+    row("sets_seconds, jobs 2", f"{spread(building)}, {sets.sets} sets")
+    rng = np.random.default_rng(options.seed)
+    kept = np.argwhere(scores.reason == Reason.REACHED)
+    picked = kept[rng.choice(len(kept), REFERENCE_PAIRS, replace=False)]
+    begun = time.perf_counter()
+    for h, g in picked:
+        reference_pairs.score(lowered.arrays, lowered.grid, int(h), int(g))
+    each = (time.perf_counter() - begun) / len(picked)
+    fast = statistics.median(times[1]) / max(1, np.count_nonzero(scores.reached))
+    row("plain-loop twin, per reached pair", f"{each:.3f} s; whole sweep / reached {fast:.2e} s")
+
+
+def store_times(path: Path, repeats: int) -> None:
+    """Measure the store file."""
+    taken = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        load_scores(path)
+        taken.append(time.perf_counter() - begun)
+    row("store file", f"{path.stat().st_size / 1e6:.2f} MB, loaded in {spread(taken)}")
+
+
+def select_times(path: Path, seed: int) -> None:
+    """Measure selection from random places of the robot."""
+    tables = SelectionTables.of(load_scores(path))
+    rng = np.random.default_rng(seed)
+    taken = []
+    for _ in range(PLACES):
+        x, y, yaw = rng.uniform((-3.0, -3.0, -np.pi), (3.0, 3.0, np.pi))
+        here = InitialConfiguration(base_x=x, base_y=y, base_yaw=yaw, torso=0.0)
+        taken.append(select(tables, here).seconds)
+    p50, p99 = np.quantile(taken, (0.5, 0.99))
+    row(
+        f"select from {PLACES} places",
+        f"p50 {1e3 * p50:.2f} ms, p99 {1e3 * p99:.2f} ms, max {1e3 * max(taken):.2f} ms",
+    )
+
+
+def process_times(task: str, path: Path, repeats: int) -> None:
+    """Measure `tcs score` as a whole process, machine code at hand."""
+    command = [sys.executable, "-m", "tcs", "score", task, "--environment", "wheelchair"]
+    taken = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        subprocess.run([*command, "--out", str(path), "--json"], check=True, capture_output=True)
+        taken.append(time.perf_counter() - begun)
+    row("tcs score, whole process", spread(taken))
+    # Linux counts in KiB.
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+    row("peak memory of that process", f"{peak / 1e9:.2f} GB")
+
+
+def verification(path: Path, options: argparse.Namespace) -> bool:
+    """Re-check answers with Drake and the dense scan; return whether all are true."""
+    begun = time.perf_counter()
+    found = verify(
+        load_scores(path), pairs=options.pairs, dense=options.dense, seed=options.seed
+    )
+    for name, value in found.to_json().items():
+        row(f"verify: {name}", f"{value}")
+    row("verify took", f"{time.perf_counter() - begun:.1f} s")
+    return found.is_sound
+
+
+if __name__ == "__main__":
+    sys.exit(main())

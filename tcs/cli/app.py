@@ -1,0 +1,255 @@
+"""The commands: what they are called with, and which function each of them calls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tcs.cli import talk
+
+app = typer.Typer(
+    cls=talk.Commands,
+    help="Where should an assistive robot stand? Score a task once, then choose in milliseconds.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+_File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+_Place = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(
+        "--here",
+        metavar="X Y YAW_DEG",
+        help="Where the robot is now, in the environment frame (m, m, deg).",
+    ),
+]
+_Torso = Annotated[float, typer.Option(help="How high the torso is now, in metres.")]
+_Members = Annotated[
+    int, typer.Option(min=1, max=2, help="At most so many places to stand at: 1 or 2.")
+]
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="tcs")
+
+
+@app.callback(invoke_without_command=True)
+def _top(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        import tcs
+
+        typer.echo(tcs.__version__)
+        raise typer.Exit
+
+
+@app.command("list")
+def list_known(as_json: _Json = False) -> None:
+    """List the tasks, environments and robots there are."""
+    from tcs.cli.catalogue import catalogue
+
+    known = catalogue()
+    if as_json:
+        talk.print_json(known)
+        return
+    from tcs.cli.reports import report_catalogue
+
+    report_catalogue(known)
+
+
+@app.command()
+def score(
+    task: Annotated[str, typer.Argument(metavar="TASK", help="Name or YAML file of a task.")],
+    environment: Annotated[
+        str, typer.Option(help="Name or YAML file of an environment.")
+    ] = "wheelchair",
+    robot: Annotated[str, typer.Option(help="Name or YAML file of a robot.")] = "pr2",
+    jobs: Annotated[int, typer.Option(min=1, help="Number of threads.")] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="File to write.", show_default="<task>-<environment>-<robot>.tcs"),
+    ] = None,
+    as_json: _Json = False,
+) -> None:
+    """Score every initial configuration of a grid and build the sets to choose from."""
+    from tcs.cli.places import check_writable
+
+    names = (Path(name).stem for name in (task, environment, robot))
+    path = out if out is not None else Path("-".join(names) + ".tcs")
+    check_writable(path)
+
+    import tcs
+
+    with talk.progress_bar("configurations") as on_progress:
+        file = tcs.score(
+            task,
+            environment,
+            robot,
+            jobs=jobs,
+            on_progress=on_progress,
+            on_compile=lambda: talk.say(
+                "compiling for this machine, about 30 s; later runs do without."
+            ),
+        )
+        tcs.save(path, file)
+    result = {**tcs.summary(file), "file": str(path)}
+    if as_json:
+        talk.print_json(result)
+        return
+    from tcs.cli.reports import report_scores
+
+    report_scores(result)
+
+
+@app.command()
+def select(
+    file: _File,
+    here: Annotated[
+        tuple[float, float, float],
+        typer.Option(
+            "--here",
+            metavar="X Y YAW_DEG",
+            help="Where the robot is now, in the environment frame (m, m, deg).",
+        ),
+    ],
+    torso: _Torso = 0.0,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=VALUE",
+            help="How an axis of the environment is set now, in metres; AXIS_deg=VALUE for angles.",
+        ),
+    ] = None,
+    alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
+    beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
+    gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
+    metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
+    turn_weight: Annotated[float, typer.Option(help="Cost of a radian of turning.")] = 0.0,
+    torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso lift.")] = 0.0,
+    axis_weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=COST",
+            help="Cost of a metre or radian along an axis of the environment.",
+        ),
+    ] = None,
+    max_members: _Members = 2,
+    as_json: _Json = False,
+) -> None:
+    """Choose where to stand now: the set with the greatest utility from here."""
+    import tcs
+    from tcs.cli.places import axis_values, place
+
+    choice = tcs.select(
+        tcs.load(file),
+        place(here, torso, at or []),
+        weights=tcs.UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma),
+        travel=tcs.TravelWeights(
+            metre=metre_weight,
+            turn=turn_weight,
+            torso=torso_weight,
+            environment=axis_values(axis_weight or [], "--axis-weight"),
+        ),
+        max_members=max_members,
+    )
+    from tcs.cli.reports import choice_as_json, report_choice
+
+    result = choice_as_json(choice)
+    if as_json:
+        talk.print_json(result)
+    else:
+        report_choice(result)
+
+
+@app.command()
+def verify(
+    file: _File,
+    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check.")] = 500,
+    dense: Annotated[
+        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
+    ] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random choice.")] = 0,
+    as_json: _Json = False,
+) -> None:
+    """Re-check answers with Drake, and look for answers that were missed."""
+    import tcs
+
+    loaded = tcs.load(file)
+    with talk.progress_bar("pairs") as on_progress:
+        found = tcs.verify(loaded, pairs=pairs, dense=dense, seed=seed, on_progress=on_progress)
+    if as_json:
+        talk.print_json(found.to_json())
+    else:
+        from tcs.cli.reports import report_verification
+
+        report_verification(found.to_json(), sound=found.is_sound)
+    if not found.is_sound:
+        talk.say(f"some answers in '{file}' are false; do not use them.")
+        raise typer.Exit(1)
+
+
+@app.command("map")
+def draw_map(
+    file: _File,
+    out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
+    here: _Place = None,
+    torso: _Torso = 0.0,
+    max_members: _Members = 2,
+    as_json: _Json = False,
+) -> None:
+    """Draw the best score per base place, from above, and where the chosen members stand.
+
+    With --here the set chosen from there, else the one with the best scores.
+    """
+    _draw(file, out, here, torso, max_members, as_json, "map_figure")
+
+
+@app.command("picture")
+def draw_picture(
+    file: _File,
+    out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
+    here: _Place = None,
+    torso: _Torso = 0.0,
+    max_members: _Members = 2,
+    as_json: _Json = False,
+) -> None:
+    """Draw the robot where it is to stand, its arm at a goal, from its collision shapes.
+
+    With --here the set chosen from there, else the one with the best scores.
+    """
+    _draw(file, out, here, torso, max_members, as_json, "scene_figure")
+
+
+def _draw(
+    file: Path,
+    out: Path,
+    here: tuple[float, float, float] | None,
+    torso: float,
+    max_members: int,
+    as_json: bool,
+    kind: str,
+) -> None:
+    """Write one of the two pictures, of the set chosen from here or of the best one."""
+    import tcs
+    from tcs.cli.places import check_writable, place
+    from tcs.draw import check_format, save_figure
+
+    check_format(out)
+    check_writable(out)
+    loaded = tcs.load(file)
+
+    from tcs.cli import pictures
+
+    shown = pictures.Shown.of(loaded, place(here, torso, []) if here else None, max_members)
+    save_figure(out, getattr(pictures, kind)(loaded, shown))
+    members = [member.to_json() for member in shown.members]
+    if as_json:
+        talk.print_json({"file": str(out), "members": members})
+    else:
+        typer.echo(f"wrote {out}")

@@ -1,0 +1,66 @@
+"""What ships with `tcs`: names and titles of tasks, environments and robots.
+
+Reads headings only. Checking a file against the models it names takes seconds, and happens when
+it is used.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tcs.errors import DataFileError
+from tcs.paths import data_folder
+
+
+def catalogue() -> dict[str, list[dict[str, Any]]]:
+    """Return the tasks, environments and robots there are, each sorted by name.
+
+    Raises:
+        DataFileError: If a file that ships with `tcs` is damaged.
+    """
+    folder = data_folder()
+    return {
+        "tasks": [
+            {
+                "name": path.stem,
+                "title": content["title"],
+                "goals": len(content["goals"]),
+                "environments": content["environments"],
+            }
+            for path, content in _files(
+                folder / "tasks", "*/*.yaml", "title", "goals", "environments"
+            )
+        ],
+        "environments": [
+            {
+                "name": path.stem,
+                "title": content["title"],
+                "origin": " ".join(content["origin"].split()),
+            }
+            for path, content in _files(
+                folder / "models" / "beds_wheelchairs", "*.yaml", "title", "origin"
+            )
+        ],
+        "robots": [
+            {"name": path.stem, "title": content["title"]}
+            for path, content in _files(folder / "models" / "robots", "*.yaml", "title")
+        ],
+    }
+
+
+def _files(folder: Path, pattern: str, *keys: str) -> list[tuple[Path, dict[str, Any]]]:
+    """Return the YAML files that match, and what they hold; each must have the keys."""
+    found = []
+    for path in sorted(folder.glob(pattern), key=lambda path: path.stem):
+        try:
+            content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            reason = " ".join(str(error).split())
+            raise DataFileError(f"'{path}' cannot be read: {reason}. Install tcs again.") from error
+        if not isinstance(content, dict) or not all(key in content for key in keys):
+            raise DataFileError(f"'{path}' lacks one of: {', '.join(keys)}. Install tcs again.")
+        found.append((path, content))
+    return found

@@ -1,0 +1,192 @@
+"""Pictures of a score file: what to draw is read off its scene, and handed to `tcs.draw`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tcs.draw import (
+    Kind,
+    PlaceMap,
+    Solid,
+    Stand,
+    View,
+    draw_map,
+    draw_scene,
+    primitive_corners,
+)
+from tcs.draw.solids import FloatArray, outline
+from tcs.kernel.arrays import BOX
+from tcs.scene import Scene, goal_poses
+from tcs.scene.contacts import Group, Part, shape_of
+from tcs.scene.environment import FLOOR
+from tcs.scoring import Job, load_job
+from tcs.select import select
+from tcs.space import Grid
+from tcs.store import ScoreFile, check_scene
+from tcs.tables import InitialConfiguration
+
+_STICK = (0.03, 0.004, 0.004)
+"""Half sizes of the stick that shows where a goal's tool comes from [m]."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The set that is drawn."""
+
+    here: InitialConfiguration | None
+    """Where the robot is now, if that matters."""
+    members: tuple[InitialConfiguration, ...]
+    """Its members in the order of the tour; none when no goal is reached from anywhere."""
+    indices: tuple[int, ...]
+    """Their flat configuration indices."""
+    subtitle: str
+    """Its scores, for a person."""
+
+    @classmethod
+    def of(cls, file: ScoreFile, here: InitialConfiguration | None, max_members: int = 2) -> Shown:
+        """Return the set to choose from here, or the best one when `here` is None."""
+        if here is not None:
+            choice = select(file, here, max_members=max_members)
+            members = tuple(choice.members[i] for i in choice.order)
+            indices = tuple(choice.indices[i] for i in choice.order)
+            what = (
+                f"chosen from x {here.base_x:.2f} m, y {here.base_y:.2f} m, "
+                f"travel cost {choice.cost:.2f}"
+            )
+        else:
+            indices = file.sets.best if max_members > 1 else file.sets.best_single
+            grid = Grid.from_dict(file.grid)
+            members = tuple(grid.configuration(h) for h in indices)
+            what = "best set"
+        if not members:
+            return cls(None, (), (), "no goal is reached from anywhere")
+        reachability, manipulability = file.sets.scores_of(tuple(sorted(indices)))
+        said = f"reaches {reachability:.0%} of the goals, manipulability {manipulability:.3f}"
+        return cls(here, members, indices, f"{what}: {said}")
+
+
+def map_figure(file: ScoreFile, shown: Shown) -> Figure:
+    """Return the map of a score file.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job, scene = _stage(file)
+    base = _base_outline(scene)
+    _set_room(scene, job.grid, shown.members)
+    return draw_map(
+        PlaceMap.of(file.scores, job.grid),
+        _room(scene, job),
+        [Stand(member, base) for member in shown.members],
+        here=Stand(shown.here, base) if shown.here is not None else None,
+        title=_title(job),
+        subtitle=shown.subtitle,
+    )
+
+
+def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
+    """Return a picture of the robot at each member, its arm at the goal it serves best there.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job, scene = _stage(file)
+    views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
+    return draw_scene(views, title=f"{_title(job)}\n{shown.subtitle}")
+
+
+def _stage(file: ScoreFile) -> tuple[Job, Scene]:
+    """Return what a file was scored from, and its scene; refuse other models than those."""
+    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
+    scene = job.scene()
+    check_scene(file, job.lowered(scene).digest())
+    return job, scene
+
+
+def _title(job: Job) -> str:
+    return f"{job.task.title} · {job.spec.environment.title} · {job.spec.robot.title}"
+
+
+def _set_room(scene: Scene, grid: Grid, members: tuple[InitialConfiguration, ...]) -> None:
+    """Set the room as the first member wants it."""
+    for name, value in members[0].environment if members else ():
+        scene.set_joint(name, value)
+
+
+def _view(file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int) -> View:
+    """Return the view of one member."""
+    member, h = shown.members[number], shown.indices[number]
+    isotropy = file.scores.isotropy[list(shown.indices)]
+    serves = np.flatnonzero((isotropy.argmax(axis=0) == number) & (isotropy[number] > 0.0))
+    _set_room(scene, job.grid, (member,))
+    scene.place_base(member.base_x, member.base_y, member.base_yaw)
+    scene.set_torso(member.torso)
+    current = int(serves[np.argmax(isotropy[number, serves])]) if serves.size else None
+    joints = file.scores.joints_of(h, current) if current is not None else None
+    if joints is not None:
+        scene.set_arm(joints)
+    solids = [*_robot(scene), *_room(scene, job), *_goals(scene, job, current)]
+    goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
+    base = np.array([member.base_x, member.base_y, 0.0])
+    # Across the line from robot to person, from both sides: neither stands before the other.
+    along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
+    listed = ", ".join(str(g) for g in serves) or "none"
+    return View(
+        solids=solids,
+        look_at=np.array([*(0.5 * (goals.mean(axis=0) + base))[:2], 0.75]),
+        distance=4.6,
+        azimuths=tuple(along + math.radians(turn) for turn in (70.0, -70.0)),
+        caption=f"stop {number + 1}, best for goals {listed}; arm at goal {current}",
+    )
+
+
+def _robot(scene: Scene) -> list[Solid]:
+    kinds = {Group.ARM: Kind.ARM, Group.BODY: Kind.ROBOT}
+    return [
+        _solid(scene, part, kinds[part.group]) for part in scene.built.parts if part.group in kinds
+    ]
+
+
+def _room(scene: Scene, job: Job) -> list[Solid]:
+    """Return furniture, person and obstacles; whatever carries a body frame is the person."""
+    frames = job.spec.environment.body_frames.values()
+    people = {link.split("::", maxsplit=1)[0] for link in frames}
+    plant = scene.built.plant
+    solids = []
+    for part in scene.built.parts:
+        if part.group is Group.ROOM and part.name != FLOOR:
+            instance = plant.get_body(part.body).model_instance()
+            is_person = plant.GetModelInstanceName(instance) in people
+            solids.append(_solid(scene, part, Kind.PERSON if is_person else Kind.FURNITURE))
+    return solids
+
+
+def _goals(scene: Scene, job: Job, current: int | None) -> list[Solid]:
+    """Return a stick for each goal, pointing where the tool points."""
+    solids = []
+    for g, X_WG in enumerate(goal_poses(scene, job.task)):
+        kind = Kind.CURRENT_GOAL if g == current else Kind.GOAL
+        corners = primitive_corners(BOX, _STICK) - [_STICK[0], 0.0, 0.0]
+        R, p = X_WG.rotation().matrix(), X_WG.translation()
+        solids.append(Solid.placed(kind, corners, R, p))
+    return solids
+
+
+def _solid(scene: Scene, part: Part, kind: Kind) -> Solid:
+    corners = primitive_corners(*shape_of(scene.built.scene_graph.model_inspector(), part))
+    X_WP = scene.query_object().GetPoseInWorld(part.geometry)
+    return Solid.placed(kind, corners, X_WP.rotation().matrix(), X_WP.translation())
+
+
+def _base_outline(scene: Scene) -> FloatArray:
+    """Return the outline of what stands on the floor, in the base's frame [m], shape (n, 2)."""
+    scene.place_base(0.0, 0.0, 0.0)
+    plant, standing = scene.built.plant, scene.spec.robot.standing_bodies
+    body = [part for part in scene.built.parts if part.group is Group.BODY]
+    base = [part for part in body if plant.get_body(part.body).name() in standing] or body
+    corners = [_solid(scene, part, Kind.ROBOT).corners[:, :2] for part in base]
+    return outline(np.concatenate(corners))

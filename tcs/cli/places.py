@@ -1,0 +1,86 @@
+"""Values that commands take: a place, values of axes, a file to write."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Sequence
+from pathlib import Path
+
+from tcs.errors import OutputError, SelectionError
+from tcs.tables import InitialConfiguration
+
+
+def place(
+    here: tuple[float, float, float], torso: float, at: Sequence[str]
+) -> InitialConfiguration:
+    """Return the current state.
+
+    Args:
+        here: x [m], y [m] and heading [deg] in the environment frame.
+        torso: Torso lift [m].
+        at: Settings of the environment's axes as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
+
+    Raises:
+        SelectionError: If a setting is none.
+
+    >>> place((1.0, 2.0, 180.0), 0.1, ["head_rest_deg=90"]).environment
+    (('head_rest', 1.5707963267948966),)
+    """
+    x, y, yaw_deg = here
+    names, values, units = [], [], []
+    for name, value in axis_values(at, "--at"):
+        turns = name.endswith("_deg")
+        names.append(name.removesuffix("_deg"))
+        values.append(math.radians(value) if turns else value)
+        units.append("rad" if turns else "m")
+    return InitialConfiguration(
+        base_x=x,
+        base_y=y,
+        base_yaw=math.radians(yaw_deg),
+        torso=torso,
+        environment=tuple(zip(names, values, strict=True)),
+        environment_units=tuple(units),
+    )
+
+
+def axis_values(given: Sequence[str], option: str) -> tuple[tuple[str, float], ...]:
+    """Return names and numbers given as "NAME=NUMBER".
+
+    Args:
+        given: What stood on the command line.
+        option: Name of the option, for the message.
+
+    Raises:
+        SelectionError: If one is not of that form.
+    """
+    pairs = []
+    for text in given:
+        name, _, number = text.partition("=")
+        try:
+            pairs.append((name, float(number)))
+        except ValueError:
+            raise SelectionError(
+                f"{option} is '{text}'; must be NAME=NUMBER, e.g. bed_height=0.2."
+            ) from None
+    return tuple(pairs)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a file that could not be written, before the work that is to fill it.
+
+    Raises:
+        OutputError: If it is a folder, or its folder is missing or takes no files.
+    """
+    if path.is_dir():
+        raise OutputError(f"'{path}' is a folder. Name a file in it.")
+    # Permissions do not tell of read-only disks, nor of quotas: only trying does.
+    trial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.trial")
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "
+            "writable folder."
+        ) from error

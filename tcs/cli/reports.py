@@ -1,0 +1,138 @@
+"""Results for a person: compact tables with units, rounded to what matters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from tcs.cli.talk import paper
+from tcs.select import Choice
+
+_REASONS = {
+    "reached": "reached",
+    "too_far": "too far for the arm",
+    "joint_limits": "joint limits",
+    "body_blocked": "robot's body would touch something",
+    "gripper_blocked": "gripper would touch something at the goal",
+    "arm_blocked": "every arm posture would touch something",
+}
+_UNITS = {"base_x": "m", "base_y": "m", "torso": "m"}
+
+
+def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+    """Print the tasks, environments and robots there are."""
+    out = paper()
+    tasks = _table("task", "what", ">goals", "environments")
+    for task in known["tasks"]:
+        places = ", ".join(task["environments"])
+        tasks.add_row(task["name"], task["title"], str(task["goals"]), places)
+    environments = _table("environment", "what", "origin and axes")
+    for room in known["environments"]:
+        environments.add_row(room["name"], room["title"], room["origin"])
+    robots = _table("robot", "what")
+    for robot in known["robots"]:
+        robots.add_row(robot["name"], robot["title"])
+    for table in (tasks, environments, robots):
+        out.print(table)
+
+
+def report_scores(result: Mapping[str, Any]) -> None:
+    """Print what scoring found."""
+    out = paper()
+    out.print(
+        f"{result['configurations']:,} configurations x {result['goals']} goals scored in "
+        f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} reach at least one goal, "
+        f"{result['sets']:,} sets kept."
+    )
+    reasons = _table("configuration and goal", ">pairs", ">share")
+    for name, count in result["reasons"].items():
+        reasons.add_row(_REASONS[name], f"{count:,}", f"{count / result['pairs']:.1%}")
+    out.print(reasons)
+    for key, what in (("best_single", "best place to stand"), ("best", "best set")):
+        best = result[key]
+        if best is None:
+            out.print(f"{what}: none, no goal is reached from anywhere.")
+            continue
+        out.print(
+            f"{what}: {best['reachability']:.1%} of the goals, "
+            f"manipulability {best['manipulability']:.3f}"
+        )
+        out.print(_members(best["members"]))
+    out.print(f"wrote {result['file']}")
+
+
+def choice_as_json(choice: Choice) -> dict[str, Any]:
+    """Return a choice as plain containers, its members in the order of the tour."""
+    return {
+        "members": [choice.members[i].to_json() for i in choice.order],
+        "reachability": choice.reachability,
+        "manipulability": choice.manipulability,
+        "cost": choice.cost,
+        "utility": choice.utility,
+        "seconds": choice.seconds,
+    }
+
+
+def report_choice(result: Mapping[str, Any]) -> None:
+    """Print a choice."""
+    out = paper()
+    out.print(_members(result["members"]))
+    out.print(
+        f"{result['reachability']:.1%} of the goals, manipulability "
+        f"{result['manipulability']:.3f}, travel cost {result['cost']:.2f}, utility "
+        f"{result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
+    )
+
+
+def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
+    """Print what re-checking found."""
+    low, high = found["recall_ci95"]
+    rows = (
+        ("reached pairs re-checked with Drake", f"{found['checked']:,}"),
+        ("  of them false", f"{found['false_reached']:,}"),
+        ("  joints beyond their limits", f"{found['limit_violations']:,}"),
+        ("  tool off its goal, at most", f"{found['max_position_error']:.1e} m"),
+        ("  tool turned off its goal, at most", f"{found['max_rotation_error']:.1e} rad"),
+        ("  isotropy off, at most", f"{found['max_isotropy_error']:.1e}"),
+        ("unreached pairs scanned densely", f"{found['dense_checked']:,}"),
+        ("  of them reachable after all", f"{found['missed']:,}"),
+        ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
+        ("recall", f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"),
+        ("mean isotropy left behind", f"{found['mean_shortfall']:.1e}"),
+        ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
+    )
+    table = _table("check", ">found")
+    for name, value in rows:
+        table.add_row(name, value)
+    paper().print(table)
+
+
+def _members(members: Sequence[Mapping[str, float]]) -> Table:
+    """Return the members of a set as a table, numbered."""
+    table = _table("stop", *(f">{_heading(name)}" for name in members[0]))
+    for number, member in enumerate(members, start=1):
+        cells = (
+            f"{v % 360.0:.0f}" if n == "base_yaw_deg" else f"{v:.2f}" for n, v in member.items()
+        )
+        table.add_row(str(number), *cells)
+    return table
+
+
+def _heading(name: str) -> str:
+    """Return a column's heading with its unit."""
+    if name == "base_yaw_deg":
+        return "heading [deg]"
+    unit = "deg" if name.endswith("_deg") else _UNITS.get(name, "m")
+    return f"{name.removesuffix('_deg').replace('_', ' ')} [{unit}]"
+
+
+def _table(*headings: str) -> Table:
+    """Return an empty table; a heading that starts with ">" is set flush right."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    for heading in headings:
+        right = heading.startswith(">")
+        table.add_column(heading.removeprefix(">"), justify="right" if right else "left")
+    return table

@@ -1,0 +1,117 @@
+"""How commands talk: results to stdout, everything else to stderr, a bar only on a terminal."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+import typer
+from rich.console import Console
+from typer.core import TyperGroup
+
+from tcs.errors import TcsError
+
+_PIPE_WIDTH = 110
+"""Columns where nobody says how wide the paper is: no row of ours is wider."""
+
+
+_interrupted = threading.Event()
+"""Set by Ctrl-C: compiled libraries may swallow the exception, or turn it into another."""
+
+
+class Commands(TyperGroup):
+    """Commands that end in one line and an exit code when something goes wrong.
+
+    0 done, 1 our error, 2 misuse (told by typer), 130 interrupted. Whatever else is raised is a
+    mistake of ours, and keeps its traceback.
+    """
+
+    def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]  # typer's own class
+        """Run the command that was asked for."""
+        with _remembering_interrupts():
+            try:
+                return super().invoke(ctx)
+            except TcsError as error:
+                say(str(error))
+                raise typer.Exit(1) from None
+            except typer.Exit:
+                raise
+            except (Exception, KeyboardInterrupt) as error:
+                if not isinstance(error, KeyboardInterrupt) and not _interrupted.is_set():
+                    raise
+                say("interrupted; no half-written file is left.")
+                raise typer.Exit(130) from None
+
+
+@contextmanager
+def _remembering_interrupts() -> Iterator[None]:
+    """Remember Ctrl-C besides raising `KeyboardInterrupt`."""
+
+    def remember(_number: int, _frame: FrameType | None) -> None:
+        _interrupted.set()
+        raise KeyboardInterrupt
+
+    _interrupted.clear()
+    in_charge = threading.current_thread() is threading.main_thread()
+    # Somebody who has set another handler, or ignores the signal, wants it so.
+    if not in_charge or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def say(text: str) -> None:
+    """Tell the user something that is not the result."""
+    typer.echo(f"tcs: {text}", err=True)
+
+
+def print_json(result: dict[str, Any]) -> None:
+    """Print a result as one JSON object."""
+    typer.echo(json.dumps(result, indent=2, ensure_ascii=False))
+
+
+def paper() -> Console:
+    """Return where results for a person go."""
+    width = None if sys.stdout.isatty() else _PIPE_WIDTH
+    return Console(width=width, highlight=False, markup=False)
+
+
+@contextmanager
+def progress_bar(text: str) -> Iterator[Callable[[int, int], None]]:
+    """Give a function that moves a bar on stderr, and no bar where that is no terminal.
+
+    Args:
+        text: What is being done.
+
+    Raises:
+        KeyboardInterrupt: From the function, after a Ctrl-C that got lost on the way.
+    """
+    if not sys.stderr.isatty():
+        yield _heed_interrupt
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("", total=None)
+
+        def advance(done: int, total: int) -> None:
+            _heed_interrupt(done, total)
+            progress.update(bar, completed=done, total=total)
+
+        yield advance
+
+
+def _heed_interrupt(_done: int, _total: int) -> None:
+    if _interrupted.is_set():
+        raise KeyboardInterrupt

@@ -1,0 +1,191 @@
+"""A picture in space: robot, furniture, person and goals from their collision shapes.
+
+matplotlib's own 3-D axes sort whole faces, and shapes that enclose a robot's links
+pass through one another; so depth is compared pixel by pixel here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from tcs.draw.solids import FloatArray, Kind, Solid
+
+IntArray = NDArray[np.int64]
+
+_SIZE = (1500, 1300)
+"""Width and height of a view in pixels, before two by two are made one."""
+_FOCAL = 3.5
+"""Focal length over half the picture's height: from some 5 m away, a person and a robot fill it."""
+_ELEVATION = np.radians(24.0)
+_FLOOR = np.array([0.95, 0.95, 0.94])
+_LINE = np.array([0.86, 0.86, 0.86])
+_SKY = np.array([1.0, 1.0, 1.0])
+_LIGHTS = ((np.array([0.35, 0.8, 0.5]), 0.50), (np.array([-0.8, 0.1, 0.6]), 0.25))
+"""Directions towards the lights (right, up, towards the camera), and their strengths."""
+_AMBIENT = 0.42
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One panel of the picture."""
+
+    solids: Sequence[Solid]
+    """What there is."""
+    look_at: FloatArray
+    """The point in the middle [m], shape (3,)."""
+    distance: float
+    """How far away the camera is [m]."""
+    azimuths: tuple[float, ...]
+    """Directions from which to look [rad]; the one that shows most of the goals is taken."""
+    caption: str
+
+
+class _Camera(NamedTuple):
+    """Where the camera is, and which way it looks: rows right, up, backward."""
+
+    p: FloatArray
+    R: FloatArray
+
+
+class _Raster(NamedTuple):
+    """What every pixel sees."""
+
+    depth: FloatArray
+    """Reciprocal of the distance along the view [1/m], 0 where nothing is."""
+    triangle: IntArray
+    """Number of the triangle, -1 where none."""
+
+
+def draw_scene(views: Sequence[View], *, title: str) -> Figure:
+    """Return a picture with one panel for each view.
+
+    Args:
+        views: What to show, left to right.
+        title: First line, for a person.
+    """
+    figure = Figure(figsize=(6.6 * len(views), 6.6), layout="constrained")
+    panels = figure.subplots(1, len(views), squeeze=False)[0]
+    for axes, view in zip(panels, views, strict=True):
+        axes.imshow(_rendered(view), interpolation="antialiased")
+        axes.set_axis_off()
+        axes.set_title(view.caption, fontsize=11)
+    figure.suptitle(title, fontsize=13)
+    shown = {solid.kind for view in views for solid in view.solids}
+    handles = [
+        Patch(facecolor=kind.colour, edgecolor="#555555", lw=0.5, label=kind.label)
+        for kind in Kind
+        if kind in shown
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
+    return figure
+
+
+def _rendered(view: View) -> FloatArray:
+    """Return the picture from the direction that shows most of the goals, shape (h, w, 3)."""
+    triangles = np.concatenate([solid.triangles for solid in view.solids])
+    owner = np.repeat(np.arange(len(view.solids)), [len(solid.triangles) for solid in view.solids])
+    goals = (Kind.GOAL, Kind.CURRENT_GOAL)
+    of_goal = np.array([solid.kind in goals for solid in view.solids])[owner]
+    best, most = None, -1
+    for azimuth in view.azimuths:
+        camera = _camera(view, azimuth)
+        raster = _rasterised(triangles, camera)
+        seen = int(of_goal[raster.triangle[raster.triangle >= 0]].sum())
+        if seen > most:
+            best, most = (camera, raster), seen
+    if best is None:
+        return np.broadcast_to(_SKY, (_SIZE[1] // 2, _SIZE[0] // 2, 3))
+    image = _shaded(view, triangles, owner, *best)
+    # Two by two pixels become one: smooth edges.
+    return np.asarray(image.reshape(_SIZE[1] // 2, 2, _SIZE[0] // 2, 2, 3).mean(axis=(1, 3)))
+
+
+def _camera(view: View, azimuth: float) -> _Camera:
+    flat = np.cos(_ELEVATION)
+    backward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(_ELEVATION)])
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    up = np.cross(backward, right)
+    return _Camera(view.look_at + view.distance * backward, np.stack([right, up, backward]))
+
+
+def _rasterised(triangles: FloatArray, camera: _Camera) -> _Raster:
+    """Return the nearest triangle in each pixel.
+
+    The reciprocal of the distance is linear across the picture of a plane, so three
+    corners give it everywhere in the triangle.
+    """
+    width, height = _SIZE
+    depth = np.zeros((height, width))
+    nearest = np.full((height, width), -1, dtype=np.int64)
+    seen = (triangles - camera.p) @ camera.R.T
+    away = -seen[..., 2]
+    pixels = _FOCAL * (height / 2.0) * seen[..., :2] / away[..., None]
+    xy = pixels * [1.0, -1.0] + [width / 2.0, height / 2.0]
+    edge1, edge2 = xy[:, 1] - xy[:, 0], xy[:, 2] - xy[:, 0]
+    area = edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]
+    low = np.maximum(np.floor(xy.min(axis=1)).astype(int), 0)
+    high = np.minimum(np.ceil(xy.max(axis=1)).astype(int) + 1, [width, height])
+    # Counter-clockwise from outside is clockwise where y points down: the rest shows its back.
+    front = (area < 0.0) & (away.min(axis=1) > 0.05) & np.all(low < high, axis=1)
+    for i in np.flatnonzero(front):
+        (x0, y0), (x1, y1) = low[i], high[i]
+        px = np.arange(x0, x1)[None, :] + 0.5 - xy[i, 0, 0]
+        py = np.arange(y0, y1)[:, None] + 0.5 - xy[i, 0, 1]
+        b = (px * edge2[i, 1] - py * edge2[i, 0]) / area[i]
+        c = (py * edge1[i, 0] - px * edge1[i, 1]) / area[i]
+        near = 1.0 / away[i]
+        here = near[0] + b * (near[1] - near[0]) + c * (near[2] - near[0])
+        window = (slice(y0, y1), slice(x0, x1))
+        wins = (b >= 0.0) & (c >= 0.0) & (b + c <= 1.0) & (here > depth[window])
+        depth[window][wins] = here[wins]
+        nearest[window][wins] = i
+    return _Raster(depth, nearest)
+
+
+def _shaded(
+    view: View, triangles: FloatArray, owner: IntArray, camera: _Camera, raster: _Raster
+) -> FloatArray:
+    """Return the colours of all pixels, shape (height, width, 3)."""
+    image = _floor(camera)
+    hit = raster.triangle >= 0
+    number = raster.triangle[hit]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    towards = normals @ camera.R.T
+    light = np.full(len(triangles), _AMBIENT)
+    for direction, strength in _LIGHTS:
+        light += strength * np.maximum(towards @ (direction / np.linalg.norm(direction)), 0.0)
+    base = np.array([to_rgb(solid.kind.colour) for solid in view.solids])
+    image[hit] = np.clip(base[owner[number]] * light[number][:, None], 0.0, 1.0)
+    solid = np.where(hit, owner[np.maximum(raster.triangle, 0)], -1)
+    edge = np.zeros(hit.shape, dtype=np.bool_)
+    edge[:, 1:] |= solid[:, 1:] != solid[:, :-1]
+    edge[1:] |= solid[1:] != solid[:-1]
+    image[edge] *= 0.45
+    return image
+
+
+def _floor(camera: _Camera) -> FloatArray:
+    """Return the empty floor with a line every half metre, shape (height, width, 3)."""
+    width, height = _SIZE
+    x = (np.arange(width) + 0.5 - width / 2.0) / (_FOCAL * height / 2.0)
+    y = -(np.arange(height) + 0.5 - height / 2.0) / (_FOCAL * height / 2.0)
+    rays = np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1) @ camera.R
+    down = -rays[..., 2]
+    reach = camera.p[2] / np.maximum(down, 1e-6)
+    spots = camera.p[:2] + reach[..., None] * rays[..., :2]
+    # A line is as wide as a pixel is on the floor there, but never less than 8 mm.
+    half = np.maximum(0.004, 1.2 * reach / (_FOCAL * height / 2.0))
+    off = np.abs(np.mod(spots + 0.25, 0.5) - 0.25).min(axis=-1)
+    image = np.where((off < half)[..., None], _LINE, _FLOOR)
+    fade = np.clip((reach - 5.0) / 3.0, 0.0, 1.0)[..., None]
+    return np.asarray(np.where(down[..., None] > 0.0, image * (1 - fade) + _SKY * fade, _SKY))

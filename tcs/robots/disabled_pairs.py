@@ -1,0 +1,214 @@
+"""Which pairs of a robot's bodies need no collision check, and the evidence for each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from tcs.robots.geometry import body_triangles, welded_top
+from tcs.robots.robot_file import DisabledGroup, RobotFile
+from tcs.robots.self_collision import BodyPair, SelfCollision, sample_positions
+from tcs.robots.urdf import Joint, Urdf
+
+FloatArray = NDArray[np.float64]
+
+SPACING = 0.005
+"""Distance between the points that stand for a surface [m]."""
+CLEAR = 0.008
+"""Surfaces whose points never come closer than this [m] do not meet: they are at least half of it
+apart even where both surfaces lie between their points."""
+_MOST_JOINTS = 3
+"""Up to so many joints between two bodies, the closest approach is searched for."""
+_DRAWS = 300
+_DESCENTS = 6
+_AT_LIMIT = 0.3
+"""Share of draws that put a joint at one of its limits, where bodies come closest."""
+
+
+def propose_disabled_pairs(
+    robot: RobotFile, *, postures: int = 2000, seed: int = 0
+) -> tuple[DisabledGroup, ...]:
+    """Return the pairs of bodies that need no check, in groups with their reason.
+
+    Only pairs with a body that the scored arm moves are looked at; others are never checked. A pair
+    whose primitives touch in none of the postures is left enabled, for its check costs little and
+    may yet catch something. Of the others a pair is proposed when
+
+    - one joint connects the two: they touch where it turns, and its limits keep them apart;
+    - no more than three joints lie between them, and the original surfaces never come close: what
+      touches then is the room that primitives take beyond them;
+    - its primitives touch in every posture, so that its check would forbid all of them.
+
+    Args:
+        robot: The robot; its present disabled pairs do not matter.
+        postures: Postures drawn uniformly within the limits in force.
+        seed: Seed of the draws.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    model = robot.model()
+    sampled = sample_positions(robot, postures, seed)
+    judge = SelfCollision(robot)
+    counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
+    first = model.joints[robot.arm_joints[0]].child
+    moved = {body for body in model.links if model.chain(first, body) is not None}
+    surfaces = Surfaces(robot)
+    neighbours: list[BodyPair] = []
+    apart: list[tuple[float, BodyPair]] = []
+    always: list[BodyPair] = []
+    for pair, count in sorted(counts.items()):
+        if not moved & set(pair) or not set(pair) <= model.links.keys():
+            continue
+        joints = joints_between(model, *pair)
+        if len(joints) == 1:
+            neighbours.append(pair)
+            continue
+        if len(free_joints(model, joints)) <= _MOST_JOINTS:
+            closest = surfaces.closest_approach(pair, seed)
+            if closest >= CLEAR:
+                apart.append((closest, pair))
+                continue
+        if count == postures:
+            always.append(pair)
+    least = min((closest for closest, _ in apart), default=0.0)
+    groups = (
+        ("neighbours: one joint connects them, and its limits keep them apart", neighbours),
+        (
+            "cannot meet: within the joint limits their surfaces stay at least "
+            f"{np.floor(least * 1e3):.0f} mm apart; only the room that primitives take touches",
+            [pair for _, pair in apart],
+        ),
+        (
+            f"overlap in each of {postures} postures: parts of one joint assembly, so a check "
+            "would forbid every posture",
+            always,
+        ),
+    )
+    return tuple(DisabledGroup(reason=why, pairs=tuple(pairs)) for why, pairs in groups if pairs)
+
+
+class Surfaces:
+    """The bodies' original surfaces as points, and how close two of them can come."""
+
+    def __init__(self, robot: RobotFile) -> None:
+        """Read the surfaces; points are spread when a body is first asked for."""
+        self._robot = robot
+        self._model = robot.model()
+        self._triangles = body_triangles(self._model)
+        self._points: dict[str, FloatArray] = {}
+
+    def closest_approach(self, pair: BodyPair, seed: int) -> float:
+        """Return how close two bodies' surfaces come within the limits in force [m].
+
+        The joints between them are drawn at random, often at their limits; from the closest draws
+        a search descends further.
+
+        Args:
+            pair: Names of the bodies.
+            seed: Seed of draws and points.
+        """
+        joints = joints_between(self._model, *pair)
+        names = free_joints(self._model, joints)
+        limits = self._robot.joint_limits()
+        lower = np.array([max(limits[name][0], -np.pi) for name in names])
+        upper = np.array([min(limits[name][1], np.pi) for name in names])
+        tree = cKDTree(self._of(pair[0], seed))
+        points = self._of(pair[1], seed)
+
+        def distance(q: FloatArray) -> float:
+            positions = self._robot.with_mimics(dict(zip(names, map(float, q), strict=True)))
+            R_AB, p_AB = _relative_pose(self._model, pair, positions)
+            return float(tree.query(points @ R_AB.T + p_AB)[0].min())
+
+        rng = np.random.default_rng(seed)
+        draws = rng.uniform(lower, upper, size=(_DRAWS, len(names)))
+        ends = np.where(rng.random(draws.shape) < 0.5, lower, upper)
+        draws = np.where(rng.random(draws.shape) < _AT_LIMIT, ends, draws)
+        found = sorted(((distance(q), tuple(q)) for q in draws), key=lambda item: item[0])
+        closest = found[0][0]
+        if closest < CLEAR:
+            return closest
+        for _, start in found[:_DESCENTS]:
+            descent = minimize(
+                distance,
+                np.array(start),
+                method="Nelder-Mead",
+                bounds=list(zip(lower, upper, strict=True)),
+                options={"maxfev": 60, "xatol": 1e-3, "fatol": 1e-4},
+            )
+            closest = min(closest, float(descent.fun))
+        return closest
+
+    def _of(self, body: str, seed: int) -> FloatArray:
+        """Return points on a body's surface in its frame [m], shape (n, 3): corners included."""
+        if body not in self._points:
+            triangles = self._triangles[body]
+            edges = triangles[:, 1:] - triangles[:, :1]
+            areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
+            rng = np.random.default_rng(seed)
+            count = int(areas.sum() / SPACING**2) + 1
+            chosen = rng.choice(len(triangles), count, p=areas / areas.sum())
+            uv = rng.random((count, 2))
+            # The half of the square beyond its diagonal folds back onto the triangle.
+            uv = np.where(uv.sum(axis=1, keepdims=True) > 1, 1 - uv, uv)
+            inner = triangles[chosen, 0] + np.einsum("ni,nij->nj", uv, edges[chosen])
+            self._points[body] = np.concatenate([inner, triangles.reshape(-1, 3)])
+        return self._points[body]
+
+
+def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:
+    """Return the movable joints on the way from one body to another."""
+    up, down = (_movable_above(model, body) for body in (first, second))
+    shared = {joint.name for joint in up} & {joint.name for joint in down}
+    return tuple(joint for joint in (*up, *down) if joint.name not in shared)
+
+
+def free_joints(model: Urdf, joints: Iterable[Joint]) -> tuple[str, ...]:
+    """Return the joints that decide where some joints stand: themselves, or whom they mimic."""
+    names = []
+    for joint in joints:
+        while joint.mimic is not None:
+            joint = model.joints[joint.mimic.leader]
+        names.append(joint.name)
+    return tuple(dict.fromkeys(names))
+
+
+def _movable_above(model: Urdf, body: str) -> list[Joint]:
+    joints = []
+    while (top := welded_top(model, body)[0]) in model.parent_joints:
+        joints.append(model.parent_joints[top])
+        body = joints[-1].parent
+    return joints
+
+
+def _relative_pose(
+    model: Urdf, pair: BodyPair, positions: dict[str, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return R_AB and p_AoBo_A of the second body B of a pair in the first, A."""
+    (R_A, p_A), (R_B, p_B) = (_pose_in_root(model, body, positions) for body in pair)
+    return R_A.T @ R_B, R_A.T @ (p_B - p_A)
+
+
+def _pose_in_root(
+    model: Urdf, body: str, positions: dict[str, float]
+) -> tuple[FloatArray, FloatArray]:
+    chain = model.chain(model.root, body)
+    assert chain is not None
+    R, p = np.eye(3), np.zeros(3)
+    for joint in chain:
+        p = p + R @ np.array(joint.xyz)
+        R = R @ Rotation.from_euler("xyz", joint.rpy).as_matrix()
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        q = positions.get(joint.name, 0.0)
+        if joint.type == "prismatic":
+            p = p + R @ axis * q
+        elif joint.is_movable:
+            R = R @ Rotation.from_rotvec(axis * q).as_matrix()
+    return R, p

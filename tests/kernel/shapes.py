@@ -1,0 +1,99 @@
+"""Random shapes and chains that several kernel tests share."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, Chain, Shapes
+from tcs.kernel.reference import Placed
+
+
+def rotation(rng):
+    """Return a uniformly random rotation matrix."""
+    w, x, y, z = (q := rng.normal(size=4)) / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def about(axis, angle):
+    """Return the rotation by `angle` about `axis` (Rodrigues)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K)
+
+
+def right_angles(rng):
+    """Return one of the 24 rotations that map axes onto axes."""
+    columns = np.eye(3)[:, rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)
+    return columns if np.linalg.det(columns) > 0 else -columns
+
+
+def placed(kind, size, R=None, p=(0.0, 0.0, 0.0), pad=0.0, body=0):
+    """Return one shape at one pose."""
+    R = np.eye(3) if R is None else R
+    return Placed(kind, np.asarray(size, float), np.asarray(R), np.asarray(p, float), pad, body)
+
+
+def random_size(rng, kind):
+    """Return sizes between a thin plate or a needle and a big block."""
+    if kind == SPHERE:
+        return np.array([10 ** rng.uniform(-2.3, -0.5), 0.0, 0.0])
+    if kind == CAPSULE:
+        return np.array([10 ** rng.uniform(-2.3, -0.7), 10 ** rng.uniform(-2.3, 0.3), 0.0])
+    return 10 ** rng.uniform(-3.0, 0.3, 3)
+
+
+def as_shapes(items, frame=0):
+    """Return placed shapes as `Shapes` in one state."""
+    n = len(items)
+    return Shapes(
+        kind=np.array([item.kind for item in items], np.int8),
+        size=np.array([item.size for item in items], float).reshape(n, 3),
+        pad=np.array([item.pad for item in items], float),
+        body=np.array([item.body for item in items], np.int16),
+        frame=np.full(n, frame, np.int8),
+        R=np.array([item.R for item in items], float).reshape(1, n, 3, 3),
+        p=np.array([item.p for item in items], float).reshape(1, n, 3),
+    )
+
+
+def random_arm(rng, *, limited=True):
+    """Return a random arm of the closed-form class: any twists, any other offsets."""
+    R = np.array([rotation(rng) for _ in range(8)])
+    p = rng.uniform(-0.3, 0.3, (8, 3))
+    p[[2, 5, 6]] = 0.0
+    lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
+    for i in range(7):
+        if limited and rng.random() < 0.75:
+            middle, half = rng.uniform(-2, 2), rng.uniform(0.4, 3.0)
+            lower[i], upper[i] = middle - half, middle + half
+    return Chain(R, p, lower, upper)
+
+
+def random_joints(rng, chain):
+    """Return joint angles within the limits."""
+    free = rng.uniform(-np.pi, np.pi, 7)
+    share = rng.random(7)
+    limited = np.isfinite(chain.lower)
+    lower, upper = np.where(limited, chain.lower, 0.0), np.where(limited, chain.upper, 0.0)
+    return np.where(limited, lower + share * (upper - lower), free)
+
+
+def around(angle):
+    """Return angles modulo a full turn, in [-pi, pi]."""
+    return np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
+
+
+KINDS = {"sphere": SPHERE, "capsule": CAPSULE, "box": BOX}
+
+
+def turned_by(R):
+    """Return the small rotation vector of R."""
+    return np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2

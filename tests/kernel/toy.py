@@ -1,0 +1,161 @@
+"""Small random scenes around one arm: everything the kernel distinguishes, in few shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
+from tcs.kernel.problem import build_problem
+from tcs.kernel.reference import compose, inverse, link_poses, turn
+from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
+
+QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
+
+
+def along(vector):
+    """Return a rotation whose z axis points along `vector`."""
+    z = vector / np.linalg.norm(vector)
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def arm_shapes(chain):
+    """Return a ball at the shoulder, capsules along the links, and a palm with a finger."""
+    upper, fore, tool = chain.p[3], chain.p[4], chain.p[7]
+    parts = [
+        (2, placed(SPHERE, [0.05, 0, 0], body=2)),
+        (3, placed(CAPSULE, [0.04, np.linalg.norm(upper) / 4, 0], along(upper), upper / 2, body=3)),
+        (4, placed(CAPSULE, [0.035, np.linalg.norm(fore) / 4, 0], along(fore), fore / 2, body=4)),
+        (4, placed(BOX, [0.05, 0.04, 0.03], np.eye(3), fore / 3, body=4)),
+        (7, placed(BOX, [0.04, 0.03, 0.04], along(tool), tool * 0.5, body=5)),
+        (7, placed(CAPSULE, [0.01, 0.02, 0], along(tool), tool * 0.9, body=6)),
+    ]
+    shapes = as_shapes([shape for _, shape in parts])
+    return shapes._replace(frame=np.array([frame for frame, _ in parts], np.int8))
+
+
+def body_shapes():
+    """Return a base that stays, and a trunk and a head that ride on a torso of two levels."""
+    parts = [
+        (0, placed(BOX, [0.25, 0.25, 0.15], p=[0, 0, 0.2], body=0)),
+        (1, placed(BOX, [0.1, 0.12, 0.3], p=[-0.25, 0, 0.7], body=1)),
+        (1, placed(SPHERE, [0.1, 0, 0], p=[-0.2, 0, 1.2], body=7)),
+    ]
+    shapes = as_shapes([shape for _, shape in parts])
+    frame = np.array([frame for frame, _ in parts], np.int8)
+    raised = shapes.p + np.where(frame == 1, 0.3, 0.0)[:, None] * [0, 0, 1.0]
+    return shapes._replace(
+        frame=frame, R=np.repeat(shapes.R, 2, axis=0), p=np.concatenate([shapes.p, raised])
+    )
+
+
+def room_shapes(rng, number, states):
+    """Return boxes, capsules and balls, some padded, elsewhere in every state; and a floor."""
+    parts = [placed(BOX, [3.0, 3.0, 0.05], p=[0, 0, -0.05])]
+    for i in range(number):
+        kind = (BOX, CAPSULE, SPHERE)[i % 3]
+        size = rng.uniform(0.03, 0.25, 3) if kind == BOX else rng.uniform(0.03, 0.12, 3)
+        p = rng.uniform([-1, -1, 0.1], [1, 1, 1.5])
+        parts.append(placed(kind, size, rotation(rng), p, pad=0.02 * (i % 2), body=1 + i // 2))
+    shapes = as_shapes(parts)
+    moved = [shapes.p[0] + (s > 0) * rng.normal(scale=0.1, size=shapes.p[0].shape) for s in range(states)]
+    return shapes._replace(R=np.repeat(shapes.R, states, axis=0), p=np.array(moved))
+
+
+def toy_grid(*, states=2):
+    """Return 3 x 3 places, four headings, two torso levels."""
+    return GridArrays(
+        environment_states=states,
+        base_x=np.array([-0.4, 0.0, 0.45]),
+        base_y=np.array([-0.35, 0.05, 0.5]),
+        base_yaw=QUARTERS,
+        torso_levels=2,
+    )
+
+
+def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
+    """Return a random scene, its goals placed such that some place of `toy_grid` may reach them."""
+    rng = np.random.default_rng(seed)
+    arm, body, room = arm_shapes(chain), body_shapes(), room_shapes(rng, obstacles, states)
+    arm_base_p = np.array([[0.0, 0.1, 0.7], [0.0, 0.1, 1.0]])
+    arm_base_R = np.stack([turn(0.2), turn(0.2)])
+    grid = toy_grid(states=states)
+    targets = []
+    for _ in range(goals):
+        X_WB = turn(rng.choice(QUARTERS)), np.array([*rng.choice(grid.base_x, 2), 0.0])
+        X_BA = arm_base_R[0], arm_base_p[rng.integers(2)]
+        X_AT = link_poses(chain, random_joints(rng, chain))[-1]
+        targets.append(compose(X_WB, compose(X_BA, X_AT)))
+    apart = np.abs(arm.frame[:, None].astype(int) - arm.frame[None]) > 1
+    floor = np.zeros(len(room.kind), bool)
+    floor[0] = True
+    return SceneArrays(
+        chain=chain,
+        arm_base_R=arm_base_R,
+        arm_base_p=arm_base_p,
+        arm=arm,
+        body=body,
+        room=room,
+        arm_vs_arm=apart,
+        # The upper arm starts inside the trunk.
+        arm_vs_body=np.repeat(arm.frame[:, None] > 3, len(body.kind), axis=1),
+        arm_vs_room=np.ones((len(arm.kind), len(room.kind)), bool),
+        body_vs_room=np.repeat(~floor[None], len(body.kind), axis=0),
+        margin=0.001,
+        goal_R=np.repeat(np.array([R for R, _ in targets])[None], states, axis=0),
+        goal_p=np.array([[p + 0.05 * s for _, p in targets] for s in range(states)]),
+    )
+
+
+def with_obstacle(scene, shape):
+    """Return the scene with one more shape in the room, checked against everything."""
+    states = len(scene.room.p)
+    extra = as_shapes([shape])
+
+    def more(mask):
+        return np.concatenate([mask, np.ones((len(mask), 1), bool)], axis=1)
+
+    room = Shapes(
+        *(np.concatenate(both) for both in zip(scene.room[:5], extra[:5], strict=True)),
+        R=np.concatenate([scene.room.R, np.repeat(extra.R, states, axis=0)], axis=1),
+        p=np.concatenate([scene.room.p, np.repeat(extra.p, states, axis=0)], axis=1),
+    )
+    return scene._replace(
+        room=room, arm_vs_room=more(scene.arm_vs_room), body_vs_room=more(scene.body_vs_room)
+    )
+
+
+def size_of(grid):
+    """Return how many configurations there are."""
+    places = len(grid.base_x) * len(grid.base_y) * len(grid.base_yaw)
+    return grid.environment_states * places * grid.torso_levels
+
+
+def scores_of(scene, grid, cuts=None):
+    """Return the kernel's scores of the whole grid, in one slice or cut at `cuts`."""
+    problem = build_problem(scene, grid)
+    size, goals = size_of(grid), scene.goal_p.shape[1]
+    scores = Scores(
+        # Values that no score has: whatever is left unfilled shows.
+        reason=np.full((size, goals), 99, np.uint8),
+        contact=np.full((size, goals), -9, np.int32),
+        isotropy=np.zeros((size, goals), np.float32),
+        joints=np.zeros((size, goals, 7), np.float32),
+    )
+    grippers = gripper_contacts(problem)
+    cuts = [0, *(cuts or []), size]
+    for start, stop in zip(cuts[:-1], cuts[1:], strict=True):
+        part = Scores(*(array[start:stop] for array in scores))
+        score_slice(problem, grippers, start, stop, part)
+    return scores
+
+
+def goal_in_base(scene, grid, h, goal):
+    """Return X_AG at configuration h."""
+    shape = (grid.environment_states, len(grid.base_x), len(grid.base_y), len(grid.base_yaw), grid.torso_levels)
+    s, x, y, yaw, torso = np.unravel_index(h, shape)
+    X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    X_WA = compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))
+    return compose(inverse(X_WA), (scene.goal_R[s, goal], scene.goal_p[s, goal]))
