@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 import time
 from pathlib import Path
 
 import tcs
 from tcs.cli.pictures import Shown, map_figure, scene_figure
+from tcs.cli.places import place
 from tcs.cli.reports import choice_as_json, report_choice, report_scores, report_verification
 from tcs.cli.talk import progress_bar
 from tcs.draw import save_figure
@@ -63,7 +63,9 @@ def run(folder: Path) -> int:
             ROBOT,
             jobs=2,
             on_progress=on_progress,
-            on_compile=lambda: print("Compiling for this machine, about 30 s, once.", flush=True),
+            on_compile=lambda: print(
+                "Compiling for this machine, up to a minute, once.", flush=True
+            ),
         )
     tcs.save(path, scored)
     summary = {**tcs.summary(scored), "file": str(path)}
@@ -71,12 +73,10 @@ def run(folder: Path) -> int:
 
     file = tcs.load(path)
     choices = []
-    for number, (x, y, yaw_deg) in enumerate(PLACES, start=1):
+    for number, here in enumerate(PLACES, start=1):
+        x, y, yaw_deg = here
         step(f"3.{number}  Choose for a robot at x {x} m, y {y} m, heading {yaw_deg:g} deg")
-        here = tcs.InitialConfiguration(
-            base_x=x, base_y=y, base_yaw=math.radians(yaw_deg), torso=0.0
-        )
-        choices.append(choice_as_json(tcs.select(file, here)))
+        choices.append(choice_as_json(tcs.select(file, place(here))))
         report_choice(choices[-1])
 
     step("4  Re-check random answers with Drake, and look for missed ones")
@@ -85,9 +85,7 @@ def run(folder: Path) -> int:
     report_verification(found.to_json(), sound=found.is_sound)
 
     step("5  Draw")
-    x, y, yaw_deg = PLACES[0]
-    here = tcs.InitialConfiguration(base_x=x, base_y=y, base_yaw=math.radians(yaw_deg), torso=0.0)
-    shown = Shown.of(file, here)
+    shown = Shown.of(file, place(PLACES[0]))
     save_figure(folder / "map.png", map_figure(file, shown))
     save_figure(folder / "scene.png", scene_figure(file, shown))
     results = {"scores": summary, "choices": choices, "verification": found.to_json()}

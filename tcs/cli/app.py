@@ -94,7 +94,7 @@ def score(
             jobs=jobs,
             on_progress=on_progress,
             on_compile=lambda: talk.say(
-                "compiling for this machine, about 30 s; later runs do without."
+                "compiling for this machine, up to a minute; later runs do without."
             ),
         )
         tcs.save(path, file)
@@ -148,13 +148,13 @@ def select(
 
     choice = tcs.select(
         tcs.load(file),
-        place(here, torso, at or []),
+        place(here, torso, at or ()),
         weights=tcs.UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma),
         travel=tcs.TravelWeights(
             metre=metre_weight,
             turn=turn_weight,
             torso=torso_weight,
-            environment=axis_values(axis_weight or [], "--axis-weight"),
+            environment=axis_values(axis_weight or (), "--axis-weight"),
         ),
         max_members=max_members,
     )
@@ -226,6 +226,32 @@ def draw_picture(
     _draw(file, out, here, torso, max_members, as_json, "scene_figure")
 
 
+@app.command()
+def export(
+    file: _File,
+    out: Annotated[Path, typer.Option(help="CSV file to write.")],
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also configurations that reach no goal.")
+    ] = False,
+    as_json: _Json = False,
+) -> None:
+    """Write scores as a table: a row for each configuration that reaches a goal."""
+    import tcs
+    from tcs.cli.places import check_writable
+
+    check_writable(out)
+    loaded = tcs.load(file)
+
+    from tcs.cli.export import score_frame, write_csv
+
+    frame = score_frame(loaded, everything=everything)
+    write_csv(out, frame)
+    if as_json:
+        talk.print_json({"file": str(out), "rows": len(frame), "columns": list(frame.columns)})
+    else:
+        typer.echo(f"wrote {out}: {len(frame):,} rows")
+
+
 def _draw(
     file: Path,
     out: Path,
@@ -246,7 +272,7 @@ def _draw(
 
     from tcs.cli import pictures
 
-    shown = pictures.Shown.of(loaded, place(here, torso, []) if here else None, max_members)
+    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members)
     save_figure(out, getattr(pictures, kind)(loaded, shown))
     members = [member.to_json() for member in shown.members]
     if as_json:

@@ -19,6 +19,7 @@ from tcs.draw import (
     primitive_corners,
 )
 from tcs.draw.solids import FloatArray, outline
+from tcs.errors import SelectionError
 from tcs.kernel.arrays import BOX
 from tcs.scene import Scene, goal_poses
 from tcs.scene.contacts import Group, Part, shape_of
@@ -93,7 +94,13 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
+        SelectionError: If there is no member to stand the robot at.
     """
+    if not shown.members:
+        raise SelectionError(
+            "Nothing to draw: no goal is reached from any initial configuration. `tcs map` shows "
+            "where the robot can stand at all."
+        )
     job, scene = _stage(file)
     views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
     return draw_scene(views, title=f"{_title(job)}\n{shown.subtitle}")

@@ -12,7 +12,7 @@ from tcs.tables import InitialConfiguration
 
 
 def place(
-    here: tuple[float, float, float], torso: float, at: Sequence[str]
+    here: tuple[float, float, float], torso: float = 0.0, at: Sequence[str] = ()
 ) -> InitialConfiguration:
     """Return the current state.
 

@@ -23,6 +23,8 @@ SPACING = 0.005
 CLEAR = 0.008
 """Surfaces whose points never come closer than this [m] do not meet: they are at least half of it
 apart even where both surfaces lie between their points."""
+_FAR = 0.05
+"""Distances beyond this [m] are not told apart."""
 _MOST_JOINTS = 3
 """Up to so many joints between two bodies, the closest approach is searched for."""
 _DRAWS = 300
@@ -105,7 +107,7 @@ class Surfaces:
         self._points: dict[str, FloatArray] = {}
 
     def closest_approach(self, pair: BodyPair, seed: int) -> float:
-        """Return how close two bodies' surfaces come within the limits in force [m].
+        """Return how close two bodies' surfaces come [m], at most 0.05, within the limits in force.
 
         The joints between them are drawn at random, often at their limits; from the closest draws
         a search descends further.
@@ -125,7 +127,10 @@ class Surfaces:
         def distance(q: FloatArray) -> float:
             positions = self._robot.with_mimics(dict(zip(names, map(float, q), strict=True)))
             R_AB, p_AB = _relative_pose(self._model, pair, positions)
-            return float(tree.query(points @ R_AB.T + p_AB)[0].min())
+            seen = points @ R_AB.T + p_AB
+            # Far points take the tree longest, and nobody asks how far they are.
+            near, _ = tree.query(seen, distance_upper_bound=_FAR)
+            return min(float(near.min()), _FAR)
 
         rng = np.random.default_rng(seed)
         draws = rng.uniform(lower, upper, size=(_DRAWS, len(names)))
@@ -135,7 +140,9 @@ class Surfaces:
         closest = found[0][0]
         if closest < CLEAR:
             return closest
-        for _, start in found[:_DESCENTS]:
+        for start_distance, start in found[:_DESCENTS]:
+            if start_distance >= _FAR:
+                break
             descent = minimize(
                 distance,
                 np.array(start),

@@ -86,6 +86,20 @@ def random_joints(rng, chain):
     return np.where(limited, lower + share * (upper - lower), free)
 
 
+def straight_arm(limits, offset):
+    """Return an arm of right angles, like many on the market: straight up at zero.
+
+    Args:
+        limits: Greatest angles to either side [rad], shape (7,).
+        offset: Of the shoulder from axis 1 [m].
+    """
+    X = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+    R = np.array([np.eye(3), X, X.T, X.T, X, X, X.T, np.eye(3)])
+    p = np.zeros((8, 3))
+    p[0, 2], p[1, 0], p[3, 2], p[4, 1], p[7, 2] = 0.34, offset, 0.42, -0.4, 0.126
+    return Chain(R, p, -limits, limits)
+
+
 def around(angle):
     """Return angles modulo a full turn, in [-pi, pi]."""
     return np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi

@@ -1,0 +1,67 @@
+"""Scores as one wide table, for spreadsheets and data analysis."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tcs.errors import OutputError
+from tcs.space import Grid
+from tcs.store import ScoreFile
+from tcs.tables import Reason
+
+
+def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
+    """Return one row for each initial configuration, by its flat index.
+
+    Args:
+        file: A score file.
+        everything: Also the configurations that reach no goal.
+
+    Returns:
+        Columns: the axes of the grid (angles as `..._deg`), `reachability` (P_R),
+        `manipulability` (P_M), and for each goal g `reason_g` and `isotropy_g`.
+    """
+    grid, scores = Grid.from_dict(file.grid), file.scores
+    rows = np.arange(grid.size) if everything else file.sets.candidates
+    values = grid.values(rows)
+    columns: dict[str, object] = {
+        (f"{axis.name}_deg" if axis.unit == "deg" else axis.name): (
+            np.degrees(values[axis.name]) if axis.unit == "deg" else values[axis.name]
+        )
+        for axis in grid.axes
+    }
+    columns["reachability"] = scores.reachability()[rows]
+    columns["manipulability"] = scores.manipulability()[rows]
+    names = [reason.name.lower() for reason in Reason]
+    for g in range(scores.goals):
+        columns[f"reason_{g}"] = pd.Categorical.from_codes(scores.reason[rows, g], pd.Index(names))
+        columns[f"isotropy_{g}"] = scores.isotropy[rows, g]
+    return pd.DataFrame(columns, index=pd.Index(rows, name="configuration"))
+
+
+def write_csv(path: Path, frame: pd.DataFrame) -> None:
+    """Write a table as CSV, wholly or not at all; nine digits, which keep float32 exactly.
+
+    Raises:
+        OutputError: If it cannot be written there.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    try:
+        frame.to_csv(beside, float_format="%.9g")
+        beside.replace(path)
+    except BaseException as error:
+        # Where no file could be made, there is none to remove; the first error is the one to tell.
+        with contextlib.suppress(OSError):
+            beside.unlink()
+        if isinstance(error, OSError):
+            raise OutputError(
+                f"Table '{path}' cannot be written: {error.strerror or error}. Name a file in an "
+                "existing, writable folder."
+            ) from error
+        raise

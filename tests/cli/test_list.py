@@ -1,0 +1,65 @@
+from tcs.robots import load_robot, robot_names
+from tcs.scene import environment_names, load_environment
+from tcs.tasks import load_task, task_names
+
+
+def test_list_knows_what_ships(tcs_command):
+    ran = tcs_command("list", "--json")
+    assert ran.code == 0
+    known = ran.json
+    assert tuple(task["name"] for task in known["tasks"]) == task_names()
+    assert tuple(room["name"] for room in known["environments"]) == environment_names()
+    assert tuple(robot["name"] for robot in known["robots"]) == robot_names()
+
+
+def test_headings_are_those_of_the_checked_files(tcs_command):
+    known = tcs_command("list", "--json").json
+    for entry in known["tasks"]:
+        task = load_task(entry["name"])
+        assert (task.name, task.title, len(task.goals), list(task.environments)) == (
+            entry["name"],
+            entry["title"],
+            entry["goals"],
+            entry["environments"],
+        )
+    for entry in known["environments"]:
+        room = load_environment(entry["name"])
+        assert (room.title, " ".join(room.origin.split())) == (entry["title"], entry["origin"])
+    for entry in known["robots"]:
+        assert load_robot(entry["name"]).title == entry["title"]
+
+
+def test_list_for_a_person(tcs_command):
+    ran = tcs_command("list")
+    assert ran.code == 0
+    assert ran.err == ""
+    for word in ("shaving", "wheelchair", "pr2", "x points where the person faces", "goals"):
+        assert word in ran.out
+
+
+def test_list_loads_nothing_heavy(process):
+    heavy = ("pydrake", "numba", "matplotlib", "trimesh", "scipy")
+    before = (
+        "import atexit; atexit.register(lambda: print("
+        f"[m for m in {heavy} if m in sys.modules], file=sys.stderr))"
+    )
+    ran = process("list", "--json", before=before)
+    assert ran.code == 0
+    assert ran.err.strip() == "[]"
+
+
+def test_damaged_data_is_one_line(tcs_command, tmp_path, monkeypatch):
+    for part in ("tasks/adl", "models/robots", "models/beds_wheelchairs"):
+        (tmp_path / part).mkdir(parents=True)
+    (tmp_path / "models/robots/r2.yaml").write_text("name: r2\n")
+    monkeypatch.setattr("tcs.cli.catalogue.data_folder", lambda: tmp_path)
+    ran = tcs_command("list")
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "r2.yaml' lacks one of: title. Install tcs again." in ran.err
+
+
+def test_version(tcs_command):
+    ran = tcs_command("--version")
+    assert ran.code == 0
+    assert ran.out.strip()[0].isdigit()

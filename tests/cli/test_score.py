@@ -1,0 +1,397 @@
+import dataclasses
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+
+import tcs
+from tcs.paths import data_folder
+from tests.store.example import METADATA, score_file
+
+TIMINGS = dict.fromkeys(
+    ("compile_seconds", "scoring_seconds", "sets_seconds", "total_seconds"), 0.5
+)
+
+# Two strips beside the wheelchair, where the PR2 has goals of shaving in reach.
+CORNER = """
+based_on: wheelchair
+name: corner
+title: A few places beside the wheelchair
+grid:
+  base_x: {unit: m, start: 0.95, step: 0.1, count: 3}
+  base_y: {unit: m, start: -0.7, step: 0.7, count: 3}
+  base_yaw: {unit: deg, start: 90, step: 90, count: 2}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
+"""
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory) -> Path:
+    """An environment file of the user's own, with 36 configurations."""
+    path = tmp_path_factory.mktemp("corner") / "corner.yaml"
+    path.write_text(CORNER)
+    return path
+
+
+@pytest.fixture(scope="module")
+def corner_file(corner) -> Path:
+    """Shaving, scored there."""
+    path = corner.parent / "corner.tcs"
+    tcs.save(path, tcs.score("shaving", corner))
+    return path
+
+
+def example(**changes):
+    """A score file as `tcs.score` might return it."""
+    return score_file(metadata={**METADATA, "timings": TIMINGS}, **changes)
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    """Calls of `tcs.score`, which returns an example at once."""
+    calls = []
+
+    def score(*arguments, **options):
+        calls.append((arguments, options))
+        return example()
+
+    monkeypatch.setattr(tcs, "score", score)
+    return calls
+
+
+def test_score_on_a_real_scene(tcs_command, corner, tmp_path):
+    path = tmp_path / "out.tcs"
+    ran = tcs_command("score", "shaving", "--environment", corner, "--out", path, "--json")
+    assert ran.code == 0
+    result = ran.json
+    assert set(result) >= {
+        *("configurations", "goals", "pairs", "reached_pairs", "scoring_seconds"),
+        *("compile_seconds", "candidates", "sets", "best", "best_single", "reasons", "file"),
+    }
+    assert (result["configurations"], result["goals"], result["pairs"]) == (36, 8, 288)
+    assert result["file"] == str(path)
+    file = tcs.load(path)
+    assert result["reached_pairs"] == int(file.scores.reached.sum()) > 0
+    assert sum(result["reasons"].values()) == 288
+    assert set(result["best"]["members"][0]) == {"base_x", "base_y", "base_yaw_deg", "torso"}
+    singles = file.scores.reachability() + file.scores.manipulability()
+    best = result["best_single"]
+    assert best["reachability"] + best["manipulability"] == singles.max()
+    assert len(best["members"]) == 1
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_number_of_jobs_changes_nothing(tcs_command, corner, corner_file, tmp_path):
+    path = tmp_path / "one.tcs"
+    ran = tcs_command("score", "shaving", "--environment", corner, "--jobs", 1, "--out", path)
+    assert ran.code == 0
+    one, two = tcs.load(path), tcs.load(corner_file)
+    np.testing.assert_array_equal(one.scores.isotropy, two.scores.isotropy)
+    np.testing.assert_array_equal(one.scores.arm_joints, two.scores.arm_joints)
+
+
+def test_verify_finds_a_sound_file_sound(tcs_command, corner_file):
+    ran = tcs_command("verify", corner_file, "--pairs", 20, "--dense", 6, "--seed", 3, "--json")
+    assert ran.code == 0, ran.err
+    found = ran.json
+    assert set(found) >= {
+        *("checked", "false_reached", "max_position_error", "max_rotation_error"),
+        *("max_isotropy_error", "limit_violations", "dense_checked", "missed", "recall"),
+        *("recall_ci95", "mean_shortfall"),
+    }
+    assert found["checked"] == min(20, int(tcs.load(corner_file).scores.reached.sum()))
+    assert found["false_reached"] == found["limit_violations"] == 0
+
+
+def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
+    file = tcs.load(corner_file)
+    joints = file.scores.arm_joints.copy()
+    joints[:, 0] += np.float32(0.01)
+    forged = dataclasses.replace(file, scores=dataclasses.replace(file.scores, arm_joints=joints))
+    path = tmp_path / "forged.tcs"
+    tcs.save(path, forged)
+    ran = tcs_command("verify", path, "--pairs", 5, "--dense", 0, "--json")
+    assert ran.code == 1
+    assert ran.json["false_reached"] == ran.json["checked"] > 0
+    assert "some answers" in ran.err
+    ran = tcs_command("verify", path, "--pairs", 5, "--dense", 0)
+    assert ran.code == 1
+    assert "SOME ANSWERS ARE FALSE" in ran.out
+
+
+@pytest.mark.parametrize("verb", ["verify", "map", "picture"])
+def test_other_models_are_refused(tcs_command, corner_file, tmp_path, verb):
+    file = tcs.load(corner_file)
+    path = tmp_path / "older.tcs"
+    other = {**file.metadata, "scene_digest": "0" * 64}
+    tcs.save(path, dataclasses.replace(file, metadata=other))
+    ran = tcs_command(verb, path, *(() if verb == "verify" else ("--out", tmp_path / "p.png")))
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "from other models" in ran.err
+    assert list(tmp_path.iterdir()) == [path]
+    assert tcs_command("select", path, "--here", 1, -1, 0).code == 0
+
+
+@pytest.mark.parametrize("verb", ["map", "picture"])
+def test_pictures_are_written(tcs_command, corner_file, tmp_path, verb):
+    path = tmp_path / "p.png"
+    for here in ((), ("--here", 1.6, -1.4, 90)):
+        ran = tcs_command(verb, corner_file, "--out", path, *here, "--json")
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.json["file"] == str(path)
+        assert path.read_bytes().startswith(b"\x89PNG")
+    chosen = tcs_command("select", corner_file, "--here", 1.6, -1.4, 90, "--json").json
+    assert ran.json["members"] == chosen["members"]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("verb", ["map", "picture"])
+def test_pictures_have_a_known_format_and_a_place(tcs_command, small_file, tmp_path, verb):
+    ran = tcs_command(verb, small_file, "--out", tmp_path / "p.gif")
+    assert ran.code == 1
+    assert "must end in one of .png, .pdf, .svg" in ran.err
+    ran = tcs_command(verb, small_file, "--out", tmp_path / "none" / "p.png")
+    assert ran.code == 1
+    assert "p.png' cannot be written: No such file or directory." in ran.err
+    assert tcs_command(verb, small_file).code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        pytest.param(("shavin",), "unknown task 'shavin'.*Did you mean 'shaving'", id="task"),
+        pytest.param(
+            ("shaving", "--environment", "wheelchiar"), "Did you mean 'wheelchair'", id="room"
+        ),
+        pytest.param(("shaving", "--robot", "pr3"), "unknown robot 'pr3'", id="robot"),
+        pytest.param(("none.yaml",), "task file 'none.yaml' cannot be read", id="no file"),
+    ],
+)
+def test_unknown_names(tcs_command, tmp_path, words, said):
+    path = tmp_path / "out.tcs"
+    ran = tcs_command("score", *words, "--out", path)
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert re.search(said, ran.err)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        pytest.param(("count: 3}", "count: 0}"), "corner.yaml", id="empty grid"),
+        pytest.param(
+            ("step: 0.1, count: 3", "step: 0.1, count: 30000000"), "360,000,000", id="huge"
+        ),
+    ],
+)
+def test_impossible_grids(tcs_command, tmp_path, change, said):
+    room = tmp_path / "corner.yaml"
+    room.write_text(CORNER.replace(*change))
+    ran = tcs_command("score", "shaving", "--environment", room, "--out", tmp_path / "o.tcs")
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert said in ran.err
+
+
+def test_unknown_frame_names_the_nearest(tcs_command, tmp_path):
+    task = tmp_path / "mine.yaml"
+    text = (data_folder() / "tasks/adl/shaving.yaml").read_text()
+    task.write_text(text.replace("body_frame: head", "body_frame: haed", 1))
+    ran = tcs_command("score", task, "--out", tmp_path / "o.tcs")
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "Did you mean 'head'?" in ran.err
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        pytest.param("none/out.tcs", id="no such folder"),
+        pytest.param("file/out.tcs", id="a file for a folder"),
+        pytest.param("folder", id="a folder"),
+        pytest.param("/proc/out.tcs", id="no files allowed"),
+    ],
+)
+def test_place_that_cannot_be_written_is_refused_before_the_work(
+    tcs_command, tmp_path, stand_in, place
+):
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    ran = tcs_command("score", "shaving", "--out", tmp_path / place)
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert stand_in == []
+
+
+def test_file_is_named_after_its_content(tcs_command, tmp_path, stand_in, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = tcs_command("score", "my/shave.yaml", "--environment", "hall.yaml", "--json")
+    assert ran.code == 0
+    assert ran.json["file"] == "shave-hall-pr2.tcs"
+    assert [path.name for path in tmp_path.iterdir()] == ["shave-hall-pr2.tcs"]
+    ((arguments, options),) = stand_in
+    assert arguments == ("my/shave.yaml", "hall.yaml", "pr2")
+    assert options["jobs"] == 2
+
+
+def test_score_for_a_person(tcs_command, tmp_path, stand_in):
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
+    assert ran.code == 0
+    for word in ("configurations", "best set", "best place to stand", "base x [m]", "o.tcs"):
+        assert word in ran.out
+
+
+def test_nothing_reached_is_an_answer(tcs_command, tmp_path, monkeypatch):
+    monkeypatch.setattr(tcs, "score", lambda *_, **__: example(share=0.0))
+    path = tmp_path / "o.tcs"
+    ran = tcs_command("score", "shaving", "--out", path)
+    assert ran.code == 0
+    assert "no goal is reached from anywhere" in ran.out
+    assert tcs_command("score", "shaving", "--out", path, "--json").json["best"] is None
+
+
+@pytest.mark.parametrize("jobs", ["0", "-1", "two"])
+def test_impossible_jobs_are_misuse(tcs_command, stand_in, jobs):
+    assert tcs_command("score", "shaving", "--jobs", jobs).code == 2
+    assert stand_in == []
+
+
+def test_first_run_says_that_it_compiles(tcs_command, tmp_path, monkeypatch):
+    def score(*_arguments, on_compile, on_progress, **_options):
+        on_compile()
+        on_progress(1, 2)
+        return example()
+
+    monkeypatch.setattr(tcs, "score", score)
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs", "--json")
+    # One line, no bar: stderr is no terminal here.
+    assert ran.err == "tcs: compiling for this machine, up to a minute; later runs do without.\n"
+    assert json.loads(ran.out)["goals"] == 5
+
+
+SLOW_SCORE = """
+import time, tcs
+def score(*arguments, on_progress, **options):
+    for done in range(200):
+        on_progress(done, 200)
+        time.sleep(0.05)
+tcs.score = score
+"""
+
+
+def run_on_terminal(code: str, *words: str) -> str:
+    """What a command draws on a terminal of its own."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=theirs, stdin=theirs
+    ) as running:
+        os.close(theirs)
+        seen = b""
+        while True:
+            try:
+                part = os.read(ours, 4096)
+            except OSError:
+                break
+            seen += part
+            if b"/200" in seen and running.poll() is None:
+                running.send_signal(signal.SIGINT)
+            if not part:
+                break
+    os.close(ours)
+    return seen.decode()
+
+
+def test_bar_on_a_terminal(tmp_path):
+    code = f"import sys\n{SLOW_SCORE}\nfrom tcs.cli import main\nmain()"
+    seen = run_on_terminal(code, "score", "shaving", "--out", str(tmp_path / "o.tcs"))
+    assert "configurations" in seen
+    assert "/200" in seen
+    assert "interrupted; no half-written file is left." in seen
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_while_scoring(tmp_path):
+    code = f"import sys\n{SLOW_SCORE.replace('time.sleep', 'print(0, flush=True); time.sleep')}\n"
+    code += "from tcs.cli import main\nmain()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, "score", "shaving", "--out", str(tmp_path / "o.tcs")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        assert running.stdout.readline() == "0\n"
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate()
+    assert running.returncode == 130
+    assert said == "tcs: interrupted; no half-written file is left.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_that_compiled_code_swallows_still_counts(tcs_command, tmp_path, monkeypatch):
+    def score(*_arguments, on_progress, **_options):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        on_progress(1, 2)
+        raise AssertionError("must not get here")
+
+    monkeypatch.setattr(tcs, "score", score)
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
+    assert ran.code == 130
+    assert "interrupted" in ran.err
+
+
+def test_interrupt_while_writing_keeps_the_old_file(tcs_command, small_file, stand_in, monkeypatch):
+    before = small_file.read_bytes()
+
+    def dump(_content, stream, **_options):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(joblib, "dump", dump)
+    ran = tcs_command("score", "shaving", "--out", small_file)
+    assert ran.code == 130
+    assert small_file.read_bytes() == before
+    assert list(small_file.parent.iterdir()) == [small_file]
+
+
+def test_mistakes_of_ours_are_not_swallowed(tcs_command, tmp_path, monkeypatch):
+    def score(*_arguments, **_options):
+        raise ZeroDivisionError("a mistake")
+
+    monkeypatch.setattr(tcs, "score", score)
+    with pytest.raises(ZeroDivisionError):
+        tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
+
+
+def test_commands_work_off_the_main_thread(tcs_command, small_file):
+    codes = []
+    thread = threading.Thread(
+        target=lambda: codes.append(tcs_command("select", small_file, "--here", 0, 0, 0).code)
+    )
+    thread.start()
+    thread.join()
+    assert codes == [0]
+
+
+def test_script_is_the_command(tmp_path):
+    script = Path(__file__).resolve().parents[2] / "scripts" / "score_task.py"
+    done = subprocess.run(
+        [sys.executable, script, "shavin", "--out", tmp_path / "o.tcs"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(script.parents[1])},
+    )
+    assert done.returncode == 1
+    assert "Did you mean 'shaving'?" in done.stderr

@@ -1,0 +1,177 @@
+import math
+import os
+import pickle
+
+import joblib
+import pytest
+
+import tcs
+from tests.store.example import score_file
+
+HERE = ("--here", "0.5", "-1", "90")
+
+
+def state(**changes):
+    values = {"base_x": 0.5, "base_y": -1.0, "base_yaw": math.pi / 2, "torso": 0.0} | changes
+    return tcs.InitialConfiguration(**values)
+
+
+def test_select_prints_the_choice(tcs_command, small_file):
+    ran = tcs_command("select", small_file, *HERE, "--json")
+    assert (ran.code, ran.err) == (0, "")
+    result = ran.json
+    assert set(result) == {
+        "members", "reachability", "manipulability", "cost", "utility", "seconds",
+    }  # fmt: skip
+    choice = tcs.select(tcs.load(small_file), state())
+    # The order of the tour, which is not that of the indices.
+    assert result["members"] == [choice.members[i].to_json() for i in choice.order]
+    assert result["utility"] == choice.utility
+    assert result["cost"] == choice.cost
+
+
+def test_members_come_in_the_order_of_the_tour(tcs_command, small_file):
+    turned = 0
+    for x in (-3.0, 3.0):
+        words = ("select", small_file, "--here", x, 0, 0, "--gamma", 0.01, "--json")
+        members = tcs_command(*words).json["members"]
+        assert len(members) == 2
+        way = [abs(x - member["base_x"]) for member in members]
+        turned += members[0]["base_x"] > members[1]["base_x"]
+        assert way[0] <= way[1]
+    assert turned == 1
+
+
+def test_weights_reach_the_selection(tcs_command, small_file):
+    words = (
+        *("--alpha", 2, "--beta", 0.5, "--gamma", 0.3, "--metre-weight", 0.7),
+        *("--turn-weight", 0.2, "--torso-weight", 0.4, "--torso", 0.1, "--max-members", 1),
+        *("--at", "bed_height=0.1", "--axis-weight", "bed_height=3"),
+    )
+    result = tcs_command("select", small_file, *HERE, *words, "--json").json
+    here = state(torso=0.1, environment=(("bed_height", 0.1),), environment_units=("m",))
+    choice = tcs.select(
+        tcs.load(small_file),
+        here,
+        weights=tcs.UtilityWeights(reachability=2, manipulability=0.5, travel=0.3),
+        travel=tcs.TravelWeights(metre=0.7, turn=0.2, torso=0.4, environment=(("bed_height", 3),)),
+        max_members=1,
+    )
+    assert len(result["members"]) == 1
+    assert (result["utility"], result["cost"]) == (choice.utility, choice.cost)
+    assert result["members"][0] == choice.members[0].to_json()
+
+
+def test_select_for_a_person(tcs_command, small_file):
+    ran = tcs_command("select", small_file, *HERE)
+    for word in ("base x [m]", "heading [deg]", "bed height [m]", "of the goals", "utility"):
+        assert word in ran.out
+
+
+def test_select_loads_neither_simulator_nor_compiler(process, small_file):
+    heavy = ("pydrake", "numba", "matplotlib")
+    before = (
+        "import atexit; atexit.register(lambda: print("
+        f"[m for m in {heavy} if m in sys.modules], file=sys.stderr))"
+    )
+    ran = process("select", small_file, *HERE, "--json", before=before)
+    assert ran.code == 0
+    assert ran.err.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param((), id="no place"),
+        pytest.param(("--here", "1", "2"), id="half a place"),
+        pytest.param(("--here", "1", "2", "north"), id="no number"),
+        pytest.param((*HERE, "--max-members", "3"), id="three members"),
+        pytest.param((*HERE, "--delta", "1"), id="unknown option"),
+    ],
+)
+def test_misuse_exits_with_2(tcs_command, small_file, words):
+    ran = tcs_command("select", small_file, *words)
+    assert ran.code == 2
+    assert ran.out == ""
+    assert ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        pytest.param((*HERE, "--gamma", "-1"), "Weight gamma (travel) is -1.0", id="negative"),
+        pytest.param((*HERE, "--alpha", "nan"), "Weight alpha (reachability) is nan", id="nan"),
+        pytest.param(("--here", "inf", "0", "0"), "base_x is inf", id="far away"),
+        pytest.param((*HERE, "--at", "bed=high"), "--at is 'bed=high'; must be", id="no number"),
+        pytest.param((*HERE, "--at", "bed_hight=1"), "Did you mean 'bed_height'?", id="no axis"),
+        pytest.param(
+            (*HERE, "--axis-weight", "bed_height=1"), "Current state lacks bed_height", id="unset"
+        ),
+        pytest.param(
+            (*HERE, "--at", "bed_height_deg=1"), "'bed_height' is given in 'rad'", id="unit"
+        ),
+    ],
+)
+def test_impossible_values_are_one_line(tcs_command, small_file, words, said):
+    ran = tcs_command("select", small_file, *words)
+    assert ran.code == 1
+    assert ran.out == ""
+    assert ran.err.startswith("tcs: ")
+    assert ran.err.count("\n") == 1
+    assert said in ran.err
+
+
+class Call:
+    """What a pickle may ask for: here, to make a folder."""
+
+    def __init__(self, folder):
+        self.folder = str(folder)
+
+    def __reduce__(self):
+        return os.mkdir, (self.folder,)
+
+
+def test_malicious_file_is_refused_and_nothing_is_called(tcs_command, tmp_path):
+    path, folder = tmp_path / "evil.tcs", tmp_path / "made"
+    joblib.dump({"format": "tcs scores", "task": Call(folder)}, path)
+    ran = tcs_command("select", path, *HERE)
+    assert (ran.code, ran.out) == (1, "")
+    assert ran.err.count("\n") == 1
+    assert "outside the allow-list" in ran.err
+    assert not folder.exists()
+    pickle.loads(pickle.dumps(Call(folder)))
+    assert folder.exists()
+
+
+def test_truncated_file(tcs_command, small_file):
+    content = small_file.read_bytes()
+    small_file.write_bytes(content[: len(content) // 2])
+    ran = tcs_command("select", small_file, *HERE)
+    assert ran.code == 1
+    assert "is truncated. Make it again with `tcs score`." in ran.err
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG"])
+def test_foreign_file(tcs_command, tmp_path, content):
+    path = tmp_path / "foreign.tcs"
+    path.write_bytes(content)
+    ran = tcs_command("select", path, *HERE)
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "Make it again with `tcs score`." in ran.err
+
+
+@pytest.mark.parametrize("verb", ["select", "verify", "map", "picture"])
+def test_missing_file(tcs_command, tmp_path, verb):
+    more = {"select": HERE, "verify": ()}.get(verb, ("--out", tmp_path / "p.png"))
+    ran = tcs_command(verb, tmp_path / "none.tcs", *more)
+    assert ran.code == 1
+    assert "none.tcs' cannot be read: No such file or directory." in ran.err
+
+
+def test_nothing_to_choose_from(tcs_command, tmp_path):
+    path = tmp_path / "none.tcs"
+    tcs.save(path, score_file(share=0.0))
+    ran = tcs_command("select", path, *HERE)
+    assert ran.code == 1
+    assert "Nothing to choose from" in ran.err

@@ -1,0 +1,165 @@
+"""The machine code on disk must be that of the sources, whatever is edited."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import numba
+import pytest
+
+from tcs.errors import OutputError
+from tcs.kernel import cache
+from tcs.kernel.cache import jit, jit_folder, kernel_digest
+
+ROOT = Path(__file__).parents[2]
+KERNEL = ROOT / "tcs" / "kernel"
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the kernel's sources."""
+    return Path(shutil.copytree(KERNEL, tmp_path / "kernel", ignore=shutil.ignore_patterns("__*")))
+
+
+def test_a_copy_has_the_same_digest(copy):
+    assert kernel_digest(copy) == kernel_digest(copy)
+    assert len(kernel_digest(copy)) == 16
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in KERNEL.glob("*.py")))
+def test_one_byte_in_any_source_changes_the_digest(copy, name):
+    before = kernel_digest(copy)
+    source = copy / name
+    text = source.read_bytes()
+    middle = len(text) // 2
+    changed = bytes([text[middle] ^ 1]) if text else b"#"
+    source.write_bytes(text[:middle] + changed + text[middle + 1 :])
+    assert kernel_digest(copy) != before
+
+
+def test_files_added_renamed_and_removed_change_the_digest(copy):
+    digests = {kernel_digest(copy)}
+    (copy / "extra.py").write_text("")
+    digests.add(kernel_digest(copy))
+    (copy / "extra.py").rename(copy / "other.py")
+    digests.add(kernel_digest(copy))
+    (copy / "other.py").unlink()
+    (copy / "lanes.py").unlink()
+    digests.add(kernel_digest(copy))
+    assert len(digests) == 4
+
+
+def test_text_that_moves_from_one_file_to_the_next_changes_the_digest(tmp_path):
+    (tmp_path / "a.py").write_text("x = 1\n")
+    (tmp_path / "b.py").write_text("")
+    before = kernel_digest(tmp_path)
+    (tmp_path / "a.py").write_text("")
+    (tmp_path / "b.py").write_text("x = 1\n")
+    assert kernel_digest(tmp_path) != before
+
+
+def test_versions_and_processor_change_the_digest(copy, monkeypatch):
+    digests = {kernel_digest(copy)}
+    monkeypatch.setattr(numba, "__version__", "0.0.1")
+    digests.add(kernel_digest(copy))
+    monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: "another")
+    digests.add(kernel_digest(copy))
+    monkeypatch.setattr(cache.platform, "python_version", lambda: "3.99")
+    digests.add(kernel_digest(copy))
+    assert len(digests) == 4
+
+
+@pytest.fixture
+def fresh():
+    """Let `jit_folder` forget what it found before and after."""
+    jit_folder.cache_clear()
+    yield
+    jit_folder.cache_clear()
+
+
+def refuse():
+    raise OutputError("cannot write there.")
+
+
+def test_without_a_folder_functions_compile_all_the_same(fresh, monkeypatch, caplog):
+    monkeypatch.setattr(cache, "cache_folder", refuse)
+    with caplog.at_level(logging.WARNING, logger="tcs.kernel.cache"):
+        twice = jit(lambda x: 2 * x)
+    assert twice(21) == 42
+    assert "compiles anew in every run" in caplog.text
+    assert "cannot write there" in caplog.text
+    assert not cache.is_compiled()
+
+
+def test_a_file_in_the_way_of_the_folder_is_no_error(fresh, monkeypatch, tmp_path, caplog):
+    # Permissions do not stop the superuser; a file where a folder should be stops everyone.
+    (tmp_path / "jit").write_text("")
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    with caplog.at_level(logging.WARNING, logger="tcs.kernel.cache"):
+        assert jit_folder() is None
+    assert "compiles anew in every run" in caplog.text
+
+
+def test_decorating_leaves_numbas_settings_alone():
+    before = numba.config.CACHE_DIR
+    jit(lambda x: x)
+    assert before == numba.config.CACHE_DIR
+
+
+SCRIPT = """
+import numpy as np
+from tcs.kernel.cache import jit_folder
+from tcs.kernel.measure import isotropy_at
+from tcs.kernel.solver import ArmSolver
+
+v = np.zeros(7)
+R, p = np.tile(np.eye(3)[[1, 2, 0]], (8, 1, 1)), np.full((8, 3), 0.2)
+n = np.zeros(3)
+arm = ArmSolver(R, p, n, n, n, n, n, v, v, v, v, v, np.zeros((1, 3), np.int64))
+print(isotropy_at(arm, np.linspace(0.1, 0.9, 7)), isotropy_at.stats.cache_hits.__len__(), jit_folder())
+"""
+
+
+def test_an_edit_in_an_imported_file_is_not_answered_with_old_machine_code(tmp_path):
+    # `measure.isotropy_at` calls `contacts.place_links`: numba's own cache looks at measure.py
+    # alone and would go on with the old placement.
+    shutil.copytree(ROOT / "tcs", tmp_path / "tcs", ignore=shutil.ignore_patterns("__pycache__"))
+    source = tmp_path / "tcs" / "kernel" / "contacts.py"
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            check=True,
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(tmp_path),
+                "TCS_CACHE_DIR": str(tmp_path / "cache"),
+            },
+            timeout=120,
+        )
+        value, hits, folder = done.stdout.split()
+        return float(value), int(hits), folder
+
+    first, first_hits, first_folder = run()
+    again, again_hits, again_folder = run()
+    assert (first_hits, again_hits) == (0, 1)
+    assert (again, again_folder) == (first, first_folder)
+    text = source.read_text()
+    line = "cosine, sine = np.cos(q[i]), np.sin(q[i])"
+    assert line in text
+    source.write_text(text.replace(line, line.replace("q[i]", "(2.0 * q[i])")))
+    edited, edited_hits, edited_folder = run()
+    assert edited != first
+    assert edited_hits == 0
+    assert edited_folder != first_folder
+    source.write_text(text)
+    assert run()[0] == first

@@ -1,0 +1,99 @@
+"""The dense scan, and the search held against it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel import reference_pairs
+from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
+from tcs.kernel.problem import build_problem
+from tcs.kernel.reference import isotropy, jacobian
+from tests.kernel.shapes import random_arm
+from tests.kernel.toy import scores_of, toy_grid, toy_scene
+
+SEEDS = range(10)
+
+
+def scene_of(seed, lowered):
+    chain = lowered.arrays.chain
+    if seed % 2:
+        chain = random_arm(np.random.default_rng(seed))
+    return toy_scene(chain, seed, obstacles=3 + seed), toy_grid()
+
+
+def sample(rng, chosen, number):
+    found = np.argwhere(chosen)
+    return found[rng.choice(len(found), min(number, len(found)), replace=False)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
+    scene, grid = scene_of(seed, lowered)
+    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    shortfalls = []
+    for h, g in sample(rng, scores.reason == REACHED, 12):
+        q = np.full(7, np.nan)
+        value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
+        # Free stretches narrower than the scan's 1/32 degree are the search's own.
+        assert value >= 0.0
+        # 1/32 degree is 5e-4 rad, and the isotropy of these arms changes by up to 2 per radian.
+        assert value >= scores.isotropy[h, g] - 2e-3
+        shortfalls.append(value - scores.isotropy[h, g])
+    # Refinement makes up for what the finer scan finds, up to another peak here and there.
+    assert np.median(shortfalls) < 5e-4
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_the_scan_finds_is_true(lowered, seed, rng):
+    scene, grid = scene_of(seed, lowered)
+    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    for h, g in sample(rng, scores.reason == REACHED, 5):
+        q = np.full(7, np.nan)
+        value = dense_scan(problem, h, g, 2000, q)
+        if value >= 0.0:
+            # The twin's chain of rotations rounds otherwise, to 1e-15.
+            eased = scene._replace(margin=scene.margin - 1e-9)
+            assert reference_pairs.confirms(eased, grid, int(h), int(g), q)
+            exact = isotropy(jacobian(scene.chain, q))
+            assert value == pytest.approx(exact, abs=1e-9 if exact > 0.1 else 3e-3)
+
+
+def test_the_search_misses_little_that_the_scan_finds(lowered, rng):
+    # A floor only: with some hundred pairs, 98 % lies well below the .998 that is measured on the
+    # real scene (benchmarks/), and far above what one forgotten branch or arc would leave.
+    reached = missed = scanned = candidates = 0
+    for seed in SEEDS:
+        scene, grid = scene_of(seed, lowered)
+        scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+        reached += np.sum(scores.reason == REACHED)
+        blocked = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED))
+        candidates += np.sum(blocked)
+        for h, g in sample(rng, blocked, 40):
+            missed += dense_scan(problem, h, g, DENSE_SAMPLES, np.empty(7)) >= 0.0
+            scanned += 1
+    assert scanned > 200
+    assert reached / (reached + candidates * missed / scanned) > 0.98
+
+
+def test_nothing_is_found_too_far_away(lowered):
+    scene, grid = scene_of(0, lowered)
+    problem = build_problem(scene._replace(goal_p=scene.goal_p + 10.0), grid)
+    assert dense_scan(problem, 0, 0, 500, np.empty(7)) == -1.0
+
+
+@pytest.mark.parametrize("samples", [2, 511, 512, 513, 514, 1025])
+def test_every_number_of_samples_is_walked_to_its_end(lowered, samples):
+    # Lanes come in blocks of 512; a goal reached only at the last angle shows a lost block.
+    chain = lowered.arrays.chain
+    scene, grid = toy_scene(chain, 4, obstacles=0, goals=5), toy_grid()
+    scores = scores_of(scene, grid)
+    h, g = np.argwhere(scores.reason == REACHED)[0]
+    angle = float(scores.joints[h, g, 0])
+    lower, upper = chain.lower.copy(), chain.upper.copy()
+    lower[0], upper[0] = angle - 0.5, angle
+    problem = build_problem(scene._replace(chain=chain._replace(lower=lower, upper=upper)), grid)
+    q = np.full(7, np.nan)
+    assert dense_scan(problem, h, g, samples, q) >= 0.0
+    assert q[0] <= angle

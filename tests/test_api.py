@@ -1,0 +1,101 @@
+import doctest
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+import tcs
+from tests.store.example import score_file
+
+PROMISED = [
+    "Choice",
+    "InitialConfiguration",
+    "ScoreFile",
+    "TcsError",
+    "TravelWeights",
+    "UtilityWeights",
+    "Verification",
+    "__version__",
+    "load",
+    "save",
+    "score",
+    "select",
+    "summary",
+    "verify",
+]
+
+
+def fresh(code: str) -> str:
+    """What a new interpreter prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_promise():
+    assert sorted(tcs.__all__) == sorted(PROMISED)
+    assert set(PROMISED) <= set(dir(tcs))
+
+
+@pytest.mark.parametrize("name", PROMISED)
+def test_promised_name_is_there(name):
+    assert getattr(tcs, name)
+
+
+def test_unknown_name():
+    with pytest.raises(AttributeError, match="no attribute 'scor'"):
+        _ = tcs.scor
+
+
+@pytest.mark.parametrize(
+    ("name", "room", "there"),
+    [("load", "tcs.store", "load_scores"), ("score", "tcs.scoring", "score")],
+)
+def test_names_are_those_of_the_rooms(name, room, there):
+    assert getattr(tcs, name) is getattr(importlib.import_module(room), there)
+
+
+def test_import_loads_nothing_heavy():
+    heavy = "('numpy', 'joblib', 'pydrake', 'numba', 'matplotlib', 'pydantic', 'yaml', 'typer')"
+    code = f"import sys, tcs; print([m for m in {heavy} if m in sys.modules])"
+    assert fresh(code) == "[]"
+
+
+def test_choosing_loads_neither_simulator_nor_compiler(tmp_path):
+    path = tmp_path / "small.tcs"
+    tcs.save(path, score_file())
+    code = (
+        "import sys, tcs\n"
+        f"file = tcs.load({str(path)!r})\n"
+        "here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)\n"
+        "choice = tcs.select(file, here, weights=tcs.UtilityWeights(travel=0.2))\n"
+        "assert len(choice.members) in (1, 2)\n"
+        "print([m for m in ('pydrake', 'numba', 'matplotlib') if m in sys.modules])"
+    )
+    assert fresh(code) == "[]"
+
+
+@pytest.mark.parametrize(
+    "first",
+    ["import tcs.select", "from tcs.select import UtilityWeights", "import tcs.select.choice", ""],
+)
+def test_select_is_a_function_whatever_was_imported_before(first):
+    code = f"{first}\nimport tcs\nimport tcs.select.travel as t\nprint(callable(tcs.select), t)"
+    assert fresh(code).startswith("True <module 'tcs.select.travel'")
+
+
+def test_select_called_on_the_package_is_select_of_the_room():
+    from tcs.select import select
+
+    file = score_file()
+    here = tcs.InitialConfiguration(base_x=0.1, base_y=0.2, base_yaw=0.0, torso=0.0)
+    assert (
+        tcs.select(file, here, max_members=1).indices == select(file, here, max_members=1).indices
+    )
+
+
+def test_docstring_runs():
+    assert doctest.testmod(tcs).failed == 0
