@@ -52,7 +52,7 @@ def run(folder: Path) -> int:
     scene = job.scene()
     print(f"{job.spec.robot.title}; {job.spec.environment.title}; task '{job.task.title}'.")
     print(f"Origin of the environment frame: {job.spec.environment.origin}")
-    print(f"{len(scene.built.parts)} collision shapes, {job.grid.size:,} places and postures.")
+    print(f"{len(scene.built.parts)} collision shapes, {job.grid.size:,} initial configurations.")
 
     step("2  Score every initial configuration, build the sets, save")
     path = folder / f"{TASK}-{ENVIRONMENT}-{ROBOT}.tcs"

@@ -1,8 +1,9 @@
-"""Fit the collision primitives of a robot anew and write them to the file its YAML names.
+"""Fit the collision primitives of a robot anew, or find the pairs of bodies that need no check.
 
-    python scripts/fit_primitives.py pr2
+    python scripts/fit_primitives.py pr2            rewrites the primitives file its YAML names
+    python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the YAML's last entry
 
-The same meshes give the same file. Prints how much each body's primitives exceed its hull.
+The same meshes give the same files. Both take a few minutes; pairs depend on the primitives.
 """
 
 from __future__ import annotations
@@ -10,23 +11,40 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import yaml
+
 from tcs.errors import TcsError
-from tcs.robots import load_robot, write_primitives
+from tcs.paths import data_folder
+from tcs.robots import RobotFile, load_robot, write_primitives
+from tcs.robots.disabled_pairs import propose_disabled_pairs
 from tcs.robots.fit_robot import fit_robot
 
 
 def main() -> int:
-    """Fit, write, and print the table of docs/robots.md."""
-    if len(sys.argv) != 2:
-        print("usage: fit_primitives.py ROBOT", file=sys.stderr)
+    """Do what the arguments say."""
+    names = [argument for argument in sys.argv[1:] if argument != "--pairs"]
+    if len(names) != 1:
+        print(__doc__, file=sys.stderr)
         return 2
     try:
-        robot = load_robot(sys.argv[1])
-        fits = fit_robot(robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr))
-        write_primitives(Path(robot.primitives), [p for f in fits for p in f.fit.primitives])
+        robot = load_robot(names[0])
+        if "--pairs" in sys.argv:
+            path = Path(names[0])
+            if path.suffix != ".yaml":
+                path = data_folder() / "models" / "robots" / f"{robot.name}.yaml"
+            rewrite_pairs(robot, path)
+        else:
+            rewrite_primitives(robot)
     except TcsError as error:
         print(error, file=sys.stderr)
         return 1
+    return 0
+
+
+def rewrite_primitives(robot: RobotFile) -> None:
+    """Fit, write, and print the table of docs/robots.md."""
+    fits = fit_robot(robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr))
+    write_primitives(Path(robot.primitives), [p for f in fits for p in f.fit.primitives])
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
     for found in fits:
@@ -35,7 +53,23 @@ def main() -> int:
             f"| {found.body} | {len(fit.primitives)} | {fit.hull * 1e3:.3f} "
             f"| {fit.union * 1e3:.3f} | {fit.excess:.2f} |"
         )
-    return 0
+
+
+def rewrite_pairs(robot: RobotFile, path: Path) -> None:
+    """Find the pairs and put them where the YAML holds them."""
+    groups = [
+        {
+            "reason": group.reason,
+            "limits": group.limits,
+            "pairs": [list(pair) for pair in group.pairs],
+        }
+        for group in propose_disabled_pairs(robot)
+    ]
+    kept, _, _ = path.read_text(encoding="utf-8").partition("\ndisabled_groups:")
+    entry = yaml.safe_dump(
+        {"disabled_groups": groups}, sort_keys=False, width=95, default_flow_style=None
+    )
+    path.write_text(f"{kept.rstrip()}\n\n{entry}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ class Commands(TyperGroup):
             try:
                 return super().invoke(ctx)
             except TcsError as error:
-                say(str(error))
+                say(" ".join(str(error).splitlines()))
                 raise typer.Exit(1) from None
             except typer.Exit:
                 raise
@@ -77,7 +77,7 @@ def say(text: str) -> None:
 
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object."""
-    typer.echo(json.dumps(result, indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(result, indent=2))
 
 
 def paper() -> Console:

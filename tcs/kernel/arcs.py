@@ -12,6 +12,9 @@ MAX_ARCS = 6
 """Two arcs mirror each other about the direction of the goal; limits cut each at most in two, and
 the full turn of a continuous joint once more."""
 
+INSET = 1e-9
+"""How far inside the limits of joint 1 arcs end [rad]: a slack of 1e-9, far above its rounding."""
+
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 
 
@@ -63,7 +66,8 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
             first, last = middle - outer, middle - inner
             if side == 1:
                 first, last = middle + inner, middle + outer
-            first, last = max(first, lower), min(last, upper)
+            # A hair inside the limits, so that rounding does not make the very end infeasible.
+            first, last = max(first, lower + INSET), min(last, upper - INSET)
             if first > last:
                 continue
             if count and arcs[count - 1, 1] >= first:

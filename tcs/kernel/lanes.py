@@ -14,9 +14,9 @@ from tcs.kernel.solver import ArmSolver
 
 TINY = 1e-300
 """Keeps 0/0 at a singularity finite; such lanes are infeasible."""
-SINGULAR = 1e-14
-"""Squared sine of the angle to an axis below which a direction lies along it. An angle of 1e-7 rad
-still determines the joint to 1e-9 rad."""
+SHARP = 1e14
+"""Inverse of the squared sine of the angle to an axis below which a direction lies along it. An
+angle of 1e-7 rad still determines the joint to 1e-9 rad."""
 
 
 @jit
@@ -124,6 +124,7 @@ def solve_lanes(
     P6 = e20 * f02 + e21 * f12
     Q6 = e21 * f02 - e20 * f12
     N6 = P6 * P6 + Q6 * Q6 + TINY
+    root6 = np.sqrt(N6)
     for i in range(count):
         c1, s1 = cosines[i], sines[i]
         # Into L1, then from the shoulder S into the frame that joint 2 turns about.
@@ -146,6 +147,9 @@ def solve_lanes(
         N = P * P + Q * Q + TINY
         m = v2z - b22 * uz
         aim_left = N - m * m
+        # Out of reach, the nearest turn stands in, so that slack goes on smoothly.
+        root = np.sqrt(N)
+        m = min(max(m, -root), root)
         h = aim * np.sqrt(max(aim_left, 0.0))
         c3, s3 = (P * m - Q * h) / N, (Q * m + P * h) / N
         # Joint 2: turn the rest onto the goal.
@@ -193,6 +197,7 @@ def solve_lanes(
         # Joints 6, 5, 7.
         m = m7z - e22 * f22
         wrist_left = N6 - m * m
+        m = min(max(m, -root6), root6)
         h = wrist * np.sqrt(max(wrist_left, 0.0))
         c6, s6 = (P6 * m - Q6 * h) / N6, (Q6 * m + P6 * h) / N6
         rx, ry = c6 * f02 - s6 * f12, s6 * f02 + c6 * f12
@@ -209,8 +214,9 @@ def solve_lanes(
         c7 = f00 * px + f10 * py + f20 * gz
         s7 = f01 * px + f11 * py + f21 * gz
         left = min(elbow_left, min(aim_left / N, wrist_left / N6))
-        # Where the aim or the wrist lies along an axis, joint 2 or 5 is undetermined: no solution.
-        left = min(left, min(D2 - SINGULAR * square, D5 - SINGULAR))
+        # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
+        # directions are no solutions. Elsewhere these terms are far above any slack.
+        left = min(left, min(min(N, D2) * SHARP - square, D5 * SHARP - 1.0))
         left = min(left, c1 * mc1 + s1 * ms1 - h1)
         left = min(left, c2 * mc2 + s2 * ms2 - h2)
         left = min(left, c3 * mc3 + s3 * ms3 - h3)

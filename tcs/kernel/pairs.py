@@ -31,6 +31,8 @@ FINE_STEP = 0.0125
 dense scan of 11,520 samples (benchmarks/)."""
 LEAST_LANES = 8
 """Lanes that even the smallest window or arc gets: one vector of the processor."""
+FINEST_LANES = 8
+"""Lanes at each end of a feasible stretch, and about the peak of a window that shows none."""
 MAX_LANES = 512
 MAX_WINDOWS = 32
 MAX_CANDIDATES = 4096
@@ -110,6 +112,16 @@ def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
 
 
 @jit
+def _best_of(measure: FloatArray, count: int) -> int:
+    """Return the index of the greatest value, the first one of equals."""
+    best = 0
+    for i in range(1, count):
+        if measure[i] > measure[best]:
+            best = i
+    return best
+
+
+@jit
 def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     """Collect angles of the free joint, on every branch, at which all joints keep their limits.
 
@@ -166,22 +178,30 @@ def _look_closer(
             search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
             ends += 1
         before = inside
+    if ends == 0 and not before:
+        # Nothing yet: the window may be narrower than these lanes, about the highest of them.
+        peak = _best_of(search.slack, count)
+        middle = search.angle[peak]
+        return _look_between(arm, search, b, middle - step, middle + step, found)
     for e in range(ends):
-        found = _look_at_end(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
+        found = _look_between(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
     return found
 
 
 @jit
-def _look_at_end(
+def _look_between(
     arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
 ) -> int:
-    """Append feasible angles close to a joint limit: the best measure is often right there."""
-    step = fill_lanes(search, outer, inner, LEAST_LANES)
+    """Append feasible angles between two neighbouring lanes, themselves left out.
+
+    Close to a joint limit, where a feasible stretch ends, the best measure often is.
+    """
+    step = fill_lanes(search, outer, inner, FINEST_LANES)
     solve_lanes(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, LEAST_LANES - 1,
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES - 1,
         search.slack, search.measure,
     )  # fmt: skip
-    for i in range(1, LEAST_LANES - 1):
+    for i in range(1, FINEST_LANES - 1):
         if search.slack[i] >= 0.0:
             found = _add(search, b, i, abs(step), found)
     return found
@@ -197,16 +217,6 @@ def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
     search.found_measure[found] = search.measure[i]
     search.found_branch[found] = b
     return found + 1
-
-
-@jit
-def _best_of(measure: FloatArray, count: int) -> int:
-    """Return the index of the greatest value, the first one of equals."""
-    best = 0
-    for i in range(1, count):
-        if measure[i] > measure[best]:
-            best = i
-    return best
 
 
 @jit

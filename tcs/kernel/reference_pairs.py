@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tcs.kernel.arcs import PEAK_SLOPE
+from tcs.kernel.arcs import INSET, PEAK_SLOPE
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
     FINE_STEP,
+    FINEST_LANES,
     FIRST_LANES,
     GRIPPER_BLOCKED,
     JOINT_LIMITS,
@@ -203,7 +204,7 @@ def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], boo
     arcs: list[tuple[float, float]] = []
     for middle in (centre + 2 * math.pi * k for k in range(-2, 3)):
         for first, last in ((middle - outer, middle - inner), (middle + inner, middle + outer)):
-            first, last = max(first, lower), min(last, upper)
+            first, last = max(first, lower + INSET), min(last, upper - INSET)
             if first <= last and arcs and arcs[-1][1] >= first - 1e-12:
                 arcs[-1] = (arcs[-1][0], last)
             elif first <= last:
@@ -264,10 +265,21 @@ def look_closer(
     for i in range(1, count):
         if inside[i] != inside[i - 1]:
             outer, inner = (i - 1, i) if inside[i] else (i, i - 1)
-            fine = (angles[inner] - angles[outer]) / (LEAST_LANES - 1)
-            near = [angles[outer] + k * fine for k in range(1, LEAST_LANES - 1)]
-            found += candidates_at(chain, X_AG, branch, near, abs(fine))
+            found += look_between(chain, X_AG, branch, angles[outer], angles[inner])
+    if not any(inside):
+        slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
+        peak = angles[slack.index(max(slack))]
+        found += look_between(chain, X_AG, branch, peak - step, peak + step)
     return found
+
+
+def look_between(
+    chain: Chain, X_AG: Pose, branch: Branch, outer: float, inner: float
+) -> list[Candidate]:
+    """Return the feasible angles between two neighbouring lanes, themselves left out."""
+    fine = (inner - outer) / (FINEST_LANES - 1)
+    near = [outer + k * fine for k in range(1, FINEST_LANES - 1)]
+    return candidates_at(chain, X_AG, branch, near, abs(fine))
 
 
 def candidates_at(

@@ -25,6 +25,11 @@ meeting axes at one point, so only rounding is left, while the least offset buil
 is millimetres."""
 
 
+PARALLEL_TOLERANCE = 1e-6
+"""Sine of the angle between two axes below which they count as one: built arms have 90 degrees, or
+some tens of degrees; figures in a URDF carry six digits or more."""
+
+
 class ArmSolver(NamedTuple):
     """One arm's constants of the closed form. L1..L7 as in `Chain`; u is SW expressed in L3."""
 
@@ -64,6 +69,9 @@ def arm_solver(chain: Chain) -> ArmSolver:
     _require_meeting("2 and 3", chain.p[2])
     _require_meeting("5 and 6", chain.p[5])
     _require_meeting("6 and 7", chain.p[6])
+    _require_crossing("2 and 3", chain.R[2])
+    _require_crossing("5 and 6", chain.R[5])
+    _require_crossing("6 and 7", chain.R[6])
     w = chain.p[4]
     R3 = chain.R[3]
     u0 = chain.p[3] + R3[:, 2] * w[2]
@@ -114,6 +122,16 @@ def _require_meeting(axes: str, offset: FloatArray) -> None:
         raise ArmClassError(
             f"the arm is outside the closed-form class: axes {axes} pass each other "
             f"{distance:.4f} m apart. The class needs axes 2 and 3 to meet, and 5, 6 and 7."
+        )
+
+
+def _require_crossing(axes: str, R: FloatArray) -> None:
+    """Raise if two neighbouring axes that meet are one and the same line."""
+    sine = float(np.hypot(R[0, 2], R[1, 2]))
+    if sine < PARALLEL_TOLERANCE:
+        raise ArmClassError(
+            f"the arm is outside the closed-form class: axes {axes} are parallel. The class needs "
+            "axes 2 and 3 to cross, and 5, 6 and 7."
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,69 +45,86 @@ def propose_disabled_pairs(
 
     - one joint connects the two: they touch where it turns, and its limits keep them apart;
     - no more than three joints lie between them, and the original surfaces never come close: what
-      touches then is the room that primitives take beyond them;
+      touches then is the room that primitives take beyond them. If that needs the soft limits, the
+      group holds only while they are in force;
     - its primitives touch in every posture, so that its check would forbid all of them.
 
     Args:
         robot: The robot; its present disabled pairs do not matter.
-        postures: Postures drawn uniformly within the limits in force.
+        postures: Postures drawn uniformly within the hard limits.
         seed: Seed of the draws.
 
     Raises:
         RobotError: If the robot's model cannot be used.
     """
+    soft, hard = (robot.with_choices(limits=limits) for limits in ("soft", "hard"))
     model = robot.model()
-    sampled = sample_positions(robot, postures, seed)
     judge = SelfCollision(robot)
+    sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
     first = model.joints[robot.arm_joints[0]].child
     moved = {body for body in model.links if model.chain(first, body) is not None}
-    surfaces = Surfaces(robot)
-    neighbours: list[BodyPair] = []
-    apart: list[tuple[float, BodyPair]] = []
-    always: list[BodyPair] = []
+    surfaces = Surfaces(model)
+    found = _Found()
     for pair, count in sorted(counts.items()):
         if not moved & set(pair) or not set(pair) <= model.links.keys():
             continue
         joints = joints_between(model, *pair)
+        few = len(free_joints(model, joints)) <= _MOST_JOINTS
         if len(joints) == 1:
-            neighbours.append(pair)
-            continue
-        if len(free_joints(model, joints)) <= _MOST_JOINTS:
-            closest = surfaces.closest_approach(pair, seed)
-            if closest >= CLEAR:
-                apart.append((closest, pair))
-                continue
-        if count == postures:
-            always.append(pair)
-    least = min((closest for closest, _ in apart), default=0.0)
-    groups = (
-        ("neighbours: one joint connects them, and its limits keep them apart", neighbours),
-        (
-            "cannot meet: within the joint limits their surfaces stay at least "
-            f"{np.floor(least * 1e3):.0f} mm apart; only the room that primitives take touches",
-            [pair for _, pair in apart],
-        ),
-        (
-            f"overlap in each of {postures} postures: parts of one joint assembly, so a check "
-            "would forbid every posture",
-            always,
-        ),
-    )
-    return tuple(DisabledGroup(reason=why, pairs=tuple(pairs)) for why, pairs in groups if pairs)
+            found.neighbours.append(pair)
+        elif few and (closest := surfaces.closest_approach(pair, hard, seed)) >= CLEAR:
+            found.apart_hard[pair] = closest
+        elif count == postures:
+            found.always.append(pair)
+        elif few and (closest := surfaces.closest_approach(pair, soft, seed)) >= CLEAR:
+            found.apart_soft[pair] = closest
+    return found.groups(postures)
+
+
+@dataclass
+class _Found:
+    """Pairs by the reason for which they need no check; distances are closest approaches [m]."""
+
+    neighbours: list[BodyPair] = field(default_factory=list)
+    apart_hard: dict[BodyPair, float] = field(default_factory=dict)
+    apart_soft: dict[BodyPair, float] = field(default_factory=dict)
+    always: list[BodyPair] = field(default_factory=list)
+
+    def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
+        """Return the groups that hold any pair."""
+        apart = (
+            "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
+            "only the room that primitives take beyond them touches"
+        )
+        hard, soft = (
+            apart.format(limits, np.floor(min(pairs.values(), default=0.0) * 1e3))
+            for limits, pairs in (("hard", self.apart_hard), ("soft", self.apart_soft))
+        )
+        neighbours = "neighbours: one joint connects them, and its limits keep them apart"
+        always = (
+            f"primitives overlap in each of {postures} postures: parts of one joint assembly, so a "
+            "check would forbid every posture"
+        )
+        groups = (
+            DisabledGroup(reason=neighbours, pairs=tuple(self.neighbours)),
+            DisabledGroup(reason=hard, pairs=tuple(self.apart_hard)),
+            DisabledGroup(reason=always, pairs=tuple(self.always)),
+            DisabledGroup(reason=soft, limits="soft", pairs=tuple(self.apart_soft)),
+        )
+        return tuple(group for group in groups if group.pairs)
 
 
 class Surfaces:
     """The bodies' original surfaces as points, and how close two of them can come."""
 
-    def __init__(self, robot: RobotFile) -> None:
+    def __init__(self, model: Urdf) -> None:
         """Read the surfaces; points are spread when a body is first asked for."""
-        self._robot = robot
-        self._model = robot.model()
+        self._model = model
         self._triangles = body_triangles(self._model)
         self._points: dict[str, FloatArray] = {}
 
-    def closest_approach(self, pair: BodyPair, seed: int) -> float:
+    def closest_approach(self, pair: BodyPair, robot: RobotFile, seed: int) -> float:
         """Return how close two bodies' surfaces come [m], at most 0.05, within the limits in force.
 
         The joints between them are drawn at random, often at their limits; from the closest draws
@@ -114,18 +132,19 @@ class Surfaces:
 
         Args:
             pair: Names of the bodies.
+            robot: Whose limits are in force.
             seed: Seed of draws and points.
         """
         joints = joints_between(self._model, *pair)
         names = free_joints(self._model, joints)
-        limits = self._robot.joint_limits()
+        limits = robot.joint_limits()
         lower = np.array([max(limits[name][0], -np.pi) for name in names])
         upper = np.array([min(limits[name][1], np.pi) for name in names])
         tree = cKDTree(self._of(pair[0], seed))
         points = self._of(pair[1], seed)
 
         def distance(q: FloatArray) -> float:
-            positions = self._robot.with_mimics(dict(zip(names, map(float, q), strict=True)))
+            positions = robot.with_mimics(dict(zip(names, map(float, q), strict=True)))
             R_AB, p_AB = _relative_pose(self._model, pair, positions)
             seen = points @ R_AB.T + p_AB
             # Far points take the tree longest, and nobody asks how far they are.

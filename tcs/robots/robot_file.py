@@ -75,6 +75,8 @@ class DisabledGroup(_Data):
     """Pairs of bodies whose contact is never checked, and why."""
 
     reason: Annotated[str, Field(min_length=10)]
+    limits: Literal["soft", "hard"] = "hard"
+    """The widest limits under which the reason holds; "hard" holds under soft ones as well."""
     pairs: tuple[tuple[Name, Name], ...]
 
 
@@ -130,8 +132,9 @@ class RobotFile(_Data):
 
     @property
     def disabled_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Every pair of bodies whose contact is never checked."""
-        return tuple(pair for group in self.disabled_groups for pair in group.pairs)
+        """Every pair of bodies whose contact is not checked under the limits in force."""
+        holding = (g for g in self.disabled_groups if g.limits in ("hard", self.limits))
+        return tuple(pair for group in holding for pair in group.pairs)
 
     def urdf_path(self) -> Path:
         """Return where the URDF lies on this machine.

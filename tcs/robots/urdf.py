@@ -158,12 +158,24 @@ def _check_tree(model: Urdf) -> None:
             if link not in model.links:
                 where = f"URDF '{model.path}', joint '{joint.name}'"
                 raise UnknownNameError("link", link, model.links, where=where)
+        _check_mimic(model, joint)
     roots = [link for link in model.links if link not in model.parent_joints]
     if len(roots) != 1 or len(model.parent_joints) != len(model.joints):
         raise RobotError(
             f"URDF '{model.path}': its joints form no single tree "
             f"(links that nothing carries: {', '.join(roots) or 'none'})."
         )
+
+
+def _check_mimic(model: Urdf, joint: Joint) -> None:
+    """Refuse a joint that follows an unknown or fixed one, or at last itself."""
+    where = f"URDF '{model.path}', joint '{joint.name}', mimic"
+    seen = {joint.name}
+    while joint.mimic is not None:
+        joint = model.joint(joint.mimic.leader, where)
+        if joint.name in seen or not joint.is_movable:
+            raise RobotError(f"{where}: '{joint.name}' must be another joint, and movable.")
+        seen.add(joint.name)
 
 
 def _joint(element: ElementTree.Element, path: Path) -> Joint:

@@ -90,9 +90,7 @@ def test_feasible_angles_lie_in_the_arcs(lowered, arm_seed):
     for X_AG in goals(rng, chain, 40):
         goal, arcs, reach = arcs_of(arm, X_AG)
         for branch in arm.branches:
-            solve_lanes(
-                arm, goal, branch, np.cos(angles), np.sin(angles), DENSE, slack, measure
-            )
+            solve_lanes(arm, goal, branch, np.cos(angles), np.sin(angles), DENSE, slack, measure)
             feasible = angles[slack >= 0]
             seen += len(feasible)
             assert reach == IN_REACH or len(feasible) == 0

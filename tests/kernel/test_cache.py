@@ -24,7 +24,9 @@ KERNEL = ROOT / "tcs" / "kernel"
 @pytest.fixture
 def copy(tmp_path):
     """A copy of the kernel's sources."""
-    return Path(shutil.copytree(KERNEL, tmp_path / "kernel", ignore=shutil.ignore_patterns("__*")))
+    return Path(
+        shutil.copytree(KERNEL, tmp_path / "kernel", ignore=shutil.ignore_patterns("__pycache__"))
+    )
 
 
 def test_a_copy_has_the_same_digest(copy):
@@ -122,7 +124,8 @@ v = np.zeros(7)
 R, p = np.tile(np.eye(3)[[1, 2, 0]], (8, 1, 1)), np.full((8, 3), 0.2)
 n = np.zeros(3)
 arm = ArmSolver(R, p, n, n, n, n, n, v, v, v, v, v, np.zeros((1, 3), np.int64))
-print(isotropy_at(arm, np.linspace(0.1, 0.9, 7)), isotropy_at.stats.cache_hits.__len__(), jit_folder())
+value = isotropy_at(arm, np.linspace(0.1, 0.9, 7))
+print(value, len(isotropy_at.stats.cache_hits), jit_folder())
 """
 
 

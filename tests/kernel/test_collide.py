@@ -179,7 +179,9 @@ def test_balls_hold_their_shapes(first, second, rng):
 def test_one_inside_the_other_touches(first, second, rng):
     for _ in range(50):
         a = placed(KINDS[first], [0.5, 0.5, 0.5], rotation(rng), rng.normal(size=3))
-        b = placed(KINDS[second], [0.02, 0.01, 0.01], rotation(rng), a.p + rng.uniform(-0.2, 0.2, 3))
+        b = placed(
+            KINDS[second], [0.02, 0.01, 0.01], rotation(rng), a.p + rng.uniform(-0.2, 0.2, 3)
+        )
         assert closer(row(a), 0, row(b), 0, 1e-3)
         assert closer(row(b), 0, row(a), 0, 1e-9)
 
@@ -192,7 +194,7 @@ def test_one_inside_the_other_touches(first, second, rng):
         ),
         pytest.param(
             placed(BOX, [1, 1, 1]),
-            placed(BOX, [1, 1, 1], about(np.array([0, 0, 1.0]), np.pi / 4), [1.5 + np.sqrt(2), 0, 0]),
+            placed(BOX, [1, 1, 1], about(np.eye(3)[2], np.pi / 4), [1.5 + np.sqrt(2), 0, 0]),
             0.5,
             id="edge-face",
         ),

@@ -110,7 +110,9 @@ def test_lanes_agree_with_the_twin_branch_by_branch(chain, rng):
     missing = [signs for signs in twin if list(signs) not in arm.branches.tolist()]
     # Branches that were left out have no solution within the limits, ever.
     for _ in range(50):
-        twin = solutions(chain, link_poses(chain, random_joints(rng, chain))[-1], rng.uniform(-3, 3))
+        twin = solutions(
+            chain, link_poses(chain, random_joints(rng, chain))[-1], rng.uniform(-3, 3)
+        )
         assert all(twin[signs].slack < 1e-9 for signs in missing)
 
 

@@ -52,9 +52,7 @@ def test_distances_of_the_real_shapes_are_drakes_or_less(scene, lowered, full_gr
     X_WA, X_WB, level, q = posed(scene, lowered, full_grid, rng)
     links = link_poses(arrays.chain, q)
     query = scene.query_object()
-    parts = {
-        group: [part for part in scene.built.parts if part.group is group] for group in Group
-    }
+    parts = {group: [part for part in scene.built.parts if part.group is group] for group in Group}
     arm = [
         shape.moved(compose(X_WA, links[frame - 1]))
         for shape, frame in zip(shapes_of(arrays.arm, 0), arrays.arm.frame, strict=True)

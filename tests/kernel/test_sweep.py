@@ -136,9 +136,7 @@ def test_moving_room_goals_and_robot_together_changes_nothing(lowered, seed):
     scene, grid = toy_scene(chain_of(seed, lowered), seed), toy_grid()
     quarter, shift = turn(np.pi / 2), np.array([0.7, -1.3, 0.0])
     moved = scene._replace(
-        room=scene.room._replace(
-            R=quarter @ scene.room.R, p=scene.room.p @ quarter.T + shift
-        ),
+        room=scene.room._replace(R=quarter @ scene.room.R, p=scene.room.p @ quarter.T + shift),
         goal_R=quarter @ scene.goal_R,
         goal_p=scene.goal_p @ quarter.T + shift,
     )
@@ -349,7 +347,7 @@ def test_pairs_are_named_exactly_where_something_blocks(real):
     assert scores.pair.max() == len(scores.pair_names) - 1
 
 
-@pytest.mark.parametrize("number", [3, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_the_kernel_agrees_with_the_twin_on_real_pairs(real, number):
     small, _, scores = real
     joints = np.zeros((*scores.reason.shape, 7), np.float32)
@@ -371,7 +369,8 @@ def test_the_kernel_agrees_with_the_twin_on_real_pairs(real, number):
 def test_reached_pairs_are_true_for_the_twin(real, rng):
     small, _, scores = real
     reached = np.argwhere(scores.reason == REACHED)
-    for h, g in reached[rng.choice(len(reached), 40, replace=False)]:
+    # The twin takes a second a pair here; `tcs verify` has Drake judge thousands.
+    for h, g in reached[rng.choice(len(reached), 4, replace=False)]:
         q = np.asarray(scores.joints_of(int(h), int(g)))
         assert is_true(small.arrays, small.grid, h, g, q)
 
@@ -385,9 +384,12 @@ with open(sys.argv[1], "rb") as file:
     scene, grid, rows = pickle.load(file)
 problem = build_problem(scene, grid)
 goals = scene.goal_p.shape[1]
+shape = (rows[1] - rows[0], goals)
 scores = Scores(
-    np.full((rows[1] - rows[0], goals), 99, np.uint8), np.zeros((rows[1] - rows[0], goals), np.int32),
-    np.zeros((rows[1] - rows[0], goals), np.float32), np.zeros((rows[1] - rows[0], goals, 7), np.float32),
+    np.full(shape, 99, np.uint8),
+    np.zeros(shape, np.int32),
+    np.zeros(shape, np.float32),
+    np.zeros((*shape, 7), np.float32),
 )
 with np.errstate(all="ignore"):
     score_slice(problem, gripper_contacts(problem), *rows, scores)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
@@ -60,7 +62,9 @@ def room_shapes(rng, number, states):
         p = rng.uniform([-1, -1, 0.1], [1, 1, 1.5])
         parts.append(placed(kind, size, rotation(rng), p, pad=0.02 * (i % 2), body=1 + i // 2))
     shapes = as_shapes(parts)
-    moved = [shapes.p[0] + (s > 0) * rng.normal(scale=0.1, size=shapes.p[0].shape) for s in range(states)]
+    moved = [
+        shapes.p[0] + (s > 0) * rng.normal(scale=0.1, size=shapes.p[0].shape) for s in range(states)
+    ]
     return shapes._replace(R=np.repeat(shapes.R, states, axis=0), p=np.array(moved))
 
 
@@ -146,7 +150,7 @@ def scores_of(scene, grid, cuts=None):
     )
     grippers = gripper_contacts(problem)
     cuts = [0, *(cuts or []), size]
-    for start, stop in zip(cuts[:-1], cuts[1:], strict=True):
+    for start, stop in itertools.pairwise(cuts):
         part = Scores(*(array[start:stop] for array in scores))
         score_slice(problem, grippers, start, stop, part)
     return scores
@@ -154,7 +158,13 @@ def scores_of(scene, grid, cuts=None):
 
 def goal_in_base(scene, grid, h, goal):
     """Return X_AG at configuration h."""
-    shape = (grid.environment_states, len(grid.base_x), len(grid.base_y), len(grid.base_yaw), grid.torso_levels)
+    shape = (
+        grid.environment_states,
+        len(grid.base_x),
+        len(grid.base_y),
+        len(grid.base_yaw),
+        grid.torso_levels,
+    )
     s, x, y, yaw, torso = np.unravel_index(h, shape)
     X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     X_WA = compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))
