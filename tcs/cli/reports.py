@@ -68,8 +68,9 @@ def choice_as_json(choice: Choice) -> dict[str, Any]:
     """Return a choice as plain containers, its members in the order of the tour."""
     return {
         "members": [choice.members[i].to_json() for i in choice.order],
-        "reachability": choice.reachability,
-        "manipulability": choice.manipulability,
+        # Seven sevenths add up to 1 only after rounding.
+        "reachability": round(choice.reachability, 12),
+        "manipulability": round(choice.manipulability, 12),
         "cost": choice.cost,
         "utility": choice.utility,
         "seconds": choice.seconds,

@@ -233,8 +233,7 @@ def pair_touches(
     arm = work.arm
     _place_link(problem, work, i)
     if partner == ROOM:
-        # The room's shapes move with the base: this one may be out of date.
-        return _is_near(work, j) and closer(arm, i, work.room_A, j, problem.gap_room[i, j])
+        return closer(arm, i, work.room_A, j, problem.gap_room[i, j])
     if partner == BODY:
         return closer(arm, i, body_A, j, problem.gap_body[i, j])
     _place_link(problem, work, j)
@@ -258,12 +257,3 @@ def _place_link(problem: Problem, work: Workspace, i: int) -> None:
     """Place arm shape i in A from the link poses in the workspace."""
     frame = problem.link_frame[i]
     move(work.link_R[frame], work.link_p[frame], problem.links, i, work.arm, i)
-
-
-@jit
-def _is_near(work: Workspace, j: int) -> bool:
-    """Return whether room shape j is among those the arm could touch from here."""
-    for n in range(work.near_count[0]):
-        if work.near[n] == j:
-            return True
-    return False

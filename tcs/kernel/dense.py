@@ -15,8 +15,8 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.lanes import lane_joints, solve_lanes, wrist_goal
 from tcs.kernel.measure import isotropy_at
-from tcs.kernel.pairs import MAX_LANES, fill_lanes, new_search
 from tcs.kernel.problem import Problem
+from tcs.kernel.search import MAX_LANES, fill_lanes, new_search
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 DENSE_SAMPLES = 11_520

@@ -18,12 +18,8 @@ from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
-    FINE_STEP,
-    FINEST_LANES,
-    FIRST_LANES,
     GRIPPER_BLOCKED,
     JOINT_LIMITS,
-    LEAST_LANES,
     REACHED,
     REFINE_LANES,
     REFINEMENTS,
@@ -43,6 +39,7 @@ from tcs.kernel.reference import (
     solutions,
     turn,
 )
+from tcs.kernel.search import FINE_STEP, FINEST_LANES, FIRST_LANES, LEAST_LANES
 
 Branch = tuple[int, int, int]
 

@@ -25,11 +25,10 @@ from tcs.kernel.pairs import (
     JOINT_LIMITS,
     REACHED,
     TOO_FAR,
-    Search,
-    new_search,
     score_pair,
 )
 from tcs.kernel.problem import Problem
+from tcs.kernel.search import Search, new_search
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 

@@ -40,13 +40,23 @@ def _all_links(robot: RobotFile, model: Urdf, where: str) -> Mapping[str, str]:
     """Return the parent of every link, extra frame and extra body."""
     parents = {link: "" for link in model.links}
     parents |= {joint.child: joint.parent for joint in model.joints.values()}
-    for extra in (*robot.frames, *robot.bodies):
-        at = f"{where}, frame or body '{extra.name}'"
+    extras = (*robot.frames, *robot.bodies)
+    for extra in extras:
         if extra.name in parents:
-            raise RobotError(f"{at}: this name is taken. Choose another.")
-        # An extra may hang on an earlier one: a tool, and a frame at its tip.
-        _check_known(extra.parent, parents, f"{at}, parent")
+            raise RobotError(
+                f"{where}, frame or body '{extra.name}': this name is taken. Choose another."
+            )
         parents[extra.name] = extra.parent
+    for extra in extras:
+        at = f"{where}, frame or body '{extra.name}', parent"
+        _check_known(extra.parent, parents, at)
+    for extra in extras:
+        # One extra may hang on another: a tool, and a frame at its tip.
+        link = extra.name
+        for _ in extras:
+            link = link if link in model.links else parents[link]
+        if link not in model.links:
+            raise RobotError(f"{where}, frame or body '{extra.name}': it hangs on itself.")
     return parents
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +28,7 @@ _FAR = 0.05
 """Distances beyond this [m] are not told apart."""
 _MOST_JOINTS = 3
 """Up to so many joints between two bodies, the closest approach is searched for."""
+_POINT_SEED = 0
 _DRAWS = 300
 _DESCENTS = 6
 _AT_LIMIT = 0.3
@@ -123,6 +124,7 @@ class Surfaces:
         self._model = model
         self._triangles = body_triangles(self._model)
         self._points: dict[str, FloatArray] = {}
+        self._trees: dict[str, cKDTree] = {}
 
     def closest_approach(self, pair: BodyPair, robot: RobotFile, seed: int) -> float:
         """Return how close two bodies' surfaces come [m], at most 0.05, within the limits in force.
@@ -133,23 +135,17 @@ class Surfaces:
         Args:
             pair: Names of the bodies.
             robot: Whose limits are in force.
-            seed: Seed of draws and points.
+            seed: Seed of the draws.
         """
         joints = joints_between(self._model, *pair)
         names = free_joints(self._model, joints)
         limits = robot.joint_limits()
         lower = np.array([max(limits[name][0], -np.pi) for name in names])
         upper = np.array([min(limits[name][1], np.pi) for name in names])
-        tree = cKDTree(self._of(pair[0], seed))
-        points = self._of(pair[1], seed)
 
         def distance(q: FloatArray) -> float:
             positions = robot.with_mimics(dict(zip(names, map(float, q), strict=True)))
-            R_AB, p_AB = _relative_pose(self._model, pair, positions)
-            seen = points @ R_AB.T + p_AB
-            # Far points take the tree longest, and nobody asks how far they are.
-            near, _ = tree.query(seen, distance_upper_bound=_FAR)
-            return min(float(near.min()), _FAR)
+            return self.distance(pair, positions)
 
         rng = np.random.default_rng(seed)
         draws = rng.uniform(lower, upper, size=(_DRAWS, len(names)))
@@ -172,13 +168,28 @@ class Surfaces:
             closest = min(closest, float(descent.fun))
         return closest
 
-    def _of(self, body: str, seed: int) -> FloatArray:
+    def distance(self, pair: BodyPair, positions: Mapping[str, float]) -> float:
+        """Return how far two bodies' surfaces are apart [m], at most 0.05.
+
+        Args:
+            pair: Names of the bodies.
+            positions: Every joint between them [rad or m].
+        """
+        if pair[0] not in self._trees:
+            self._trees[pair[0]] = cKDTree(self._of(pair[0]))
+        R_AB, p_AB = _relative_pose(self._model, pair, positions)
+        seen = self._of(pair[1]) @ R_AB.T + p_AB
+        # Far points take the tree longest, and nobody asks how far they are.
+        near, _ = self._trees[pair[0]].query(seen, distance_upper_bound=_FAR)
+        return min(float(near.min()), _FAR)
+
+    def _of(self, body: str) -> FloatArray:
         """Return points on a body's surface in its frame [m], shape (n, 3): corners included."""
         if body not in self._points:
             triangles = self._triangles[body]
             edges = triangles[:, 1:] - triangles[:, :1]
             areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
-            rng = np.random.default_rng(seed)
+            rng = np.random.default_rng(_POINT_SEED)
             count = int(areas.sum() / SPACING**2) + 1
             chosen = rng.choice(len(triangles), count, p=areas / areas.sum())
             uv = rng.random((count, 2))
@@ -215,7 +226,7 @@ def _movable_above(model: Urdf, body: str) -> list[Joint]:
 
 
 def _relative_pose(
-    model: Urdf, pair: BodyPair, positions: dict[str, float]
+    model: Urdf, pair: BodyPair, positions: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Return R_AB and p_AoBo_A of the second body B of a pair in the first, A."""
     (R_A, p_A), (R_B, p_B) = (_pose_in_root(model, body, positions) for body in pair)
@@ -223,7 +234,7 @@ def _relative_pose(
 
 
 def _pose_in_root(
-    model: Urdf, body: str, positions: dict[str, float]
+    model: Urdf, body: str, positions: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
     chain = model.chain(model.root, body)
     assert chain is not None

@@ -77,7 +77,7 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
     hull = hull_volume(triangles)
     search = _Search(triangles)
     best: Fit | None = None
-    beam = [(search.volume(search.everything), (search.everything,))]
+    beam: Beam = [(search.volume(search.everything), (search.everything,))]
     for count in range(1, target.max_shapes + 1):
         if count > 1:
             beam = search.divide(beam)
@@ -99,7 +99,7 @@ class _Search:
     """Divisions of triangles into parts, judged by the summed volume of boxes in set frames."""
 
     def __init__(self, triangles: FloatArray) -> None:
-        self.everything = np.arange(len(triangles))
+        self.everything: IntArray = np.arange(len(triangles), dtype=np.int64)
         self.orientations = _orientations(corner_points(triangles))
         # Along each axis of each frame every triangle spans an interval; a box around several
         # triangles is the span of their intervals.

@@ -59,7 +59,7 @@ def geometry_triangles(geometry: Geometry) -> FloatArray:
     encloses the round body as well.
     """
     if geometry.mesh is not None:
-        return mesh_triangles(geometry.mesh) * np.array(geometry.size)
+        return np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
     if geometry.shape == "box":
         solid = trimesh.creation.box(geometry.size)
     elif geometry.shape == "cylinder":

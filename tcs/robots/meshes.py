@@ -72,8 +72,7 @@ def _content(mesh: Path) -> bytes:
 def _obj_text(mesh: Path) -> str:
     from trimesh.exchange.obj import export_obj
 
-    text = export_obj(_load(mesh), include_texture=False, include_color=False)
-    return str(text)
+    return str(export_obj(_load(mesh), include_texture=False, include_color=False))  # type: ignore[no-untyped-call]
 
 
 def _load(mesh: Path) -> trimesh.Trimesh:

@@ -225,6 +225,8 @@ def read_primitives(path: Path) -> tuple[Primitive, ...]:
         rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
     except OSError as error:
         raise RobotError(f"primitives '{path}' cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise RobotError(f"primitives '{path}' is no text file in UTF-8.") from error
     found = []
     for number, row in enumerate(rows, start=2):
         where = f"primitives '{path}', line {number}"

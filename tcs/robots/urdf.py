@@ -160,11 +160,21 @@ def _check_tree(model: Urdf) -> None:
                 raise UnknownNameError("link", link, model.links, where=where)
         _check_mimic(model, joint)
     roots = [link for link in model.links if link not in model.parent_joints]
-    if len(roots) != 1 or len(model.parent_joints) != len(model.joints):
+    # One joint above every link but the root: then whatever hangs nowhere runs in a circle.
+    adrift = len(roots) != 1 or len(model.parent_joints) != len(model.joints)
+    if adrift or not all(_reaches_root(model, link) for link in model.links):
         raise RobotError(
             f"URDF '{model.path}': its joints form no single tree "
             f"(links that nothing carries: {', '.join(roots) or 'none'})."
         )
+
+
+def _reaches_root(model: Urdf, link: str) -> bool:
+    for _ in model.links:
+        if link not in model.parent_joints:
+            return True
+        link = model.parent_joints[link].parent
+    return False
 
 
 def _check_mimic(model: Urdf, joint: Joint) -> None:

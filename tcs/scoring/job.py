@@ -201,7 +201,8 @@ def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | 
     grid = Grid.from_dict(file.grid)
     reachability, manipulability = file.sets.scores_of(members)
     return {
-        "reachability": reachability,
-        "manipulability": manipulability,
+        # Seven sevenths add up to 1 only after rounding.
+        "reachability": round(reachability, 12),
+        "manipulability": round(manipulability, 12),
         "members": [grid.configuration(h).to_json() for h in members],
     }

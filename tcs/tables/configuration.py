@@ -52,6 +52,8 @@ class InitialConfiguration:
     def to_json(self) -> dict[str, float]:
         """Return the configuration as plain numbers, angles in degrees under `..._deg` names.
 
+        Rounded to nine decimals, so that 29 steps of 0.05 m print as 1.45.
+
         >>> InitialConfiguration(
         ...     base_x=1.0, base_y=-0.5, base_yaw=0.0, torso=0.3,
         ...     environment=(("bed_height", 0.2),), environment_units=("m",),
@@ -69,4 +71,4 @@ class InitialConfiguration:
                 plain[f"{name}_deg"] = math.degrees(value)
             else:
                 plain[name] = float(value)
-        return plain
+        return {name: round(value, 9) for name, value in plain.items()}

@@ -8,8 +8,8 @@ import pytest
 from tcs.kernel import reference_pairs
 from tcs.kernel.arcs import IN_REACH, MAX_ARCS, OUT_OF_LIMITS, OUT_OF_REACH, elbow_arcs, windows_of
 from tcs.kernel.lanes import solve_lanes, wrist_goal
-from tcs.kernel.pairs import MAX_WINDOWS
 from tcs.kernel.reference import link_poses
+from tcs.kernel.search import MAX_WINDOWS
 from tcs.kernel.solver import arm_solver
 from tests.kernel.shapes import random_arm, random_joints, rotation
 

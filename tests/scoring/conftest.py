@@ -11,9 +11,9 @@ based_on: wheelchair
 name: small-room
 title: The wheelchair, seen from a few places
 grid:
-  base_x: {unit: m, start: 0.9, step: 0.2, count: 4}
-  base_y: {unit: m, start: -0.6, step: 0.3, count: 5}
-  base_yaw: {unit: deg, start: 90, step: 45, count: 5}
+  base_x: {unit: m, start: 0.5, step: 0.1, count: 8}
+  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
+  base_yaw: {unit: deg, start: 90, step: 45, count: 4}
   torso: {unit: m, start: 0.15, step: 0.15, count: 2}
 """
 

@@ -15,7 +15,7 @@ from tcs.tasks import load_task
 
 def test_a_small_room_is_reached_and_summed_up(small_file):
     figures = summary(small_file)
-    assert figures["configurations"] == 4 * 5 * 5 * 2
+    assert figures["configurations"] == 8 * 2 * 4 * 2
     assert figures["pairs"] == figures["configurations"] * 8
     assert sum(figures["reasons"].values()) == figures["pairs"]
     assert figures["reasons"]["reached"] == figures["reached_pairs"] > 0
@@ -65,7 +65,7 @@ def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_room, tmp_pa
     path = tmp_path / "room.yaml"
     path.write_text(
         f"based_on: {small_room}\nname: cluttered\n"
-        "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [1.2, -0.6, 0.45]}\n"
+        "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [0.9, -0.55, 0.45]}\n"
     )
     cluttered = score("shaving", path).scores
     assert cluttered.reached.sum() < small_file.scores.reached.sum()

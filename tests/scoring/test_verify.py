@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tcs.errors import StoreMismatchError, TcsError
-from tcs.scoring import verify
+from tcs.scoring import build_sets, load_job, verify
 from tcs.scoring.verify import estimated_recall
+from tcs.space import Grid
 
 
 def test_stored_answers_are_true(small_file):
@@ -49,13 +50,11 @@ def test_a_joint_beyond_its_limit_is_found(small_file):
     assert not found.is_sound
 
 
-def test_an_arm_inside_the_person_is_found(small_file, small_room, tmp_path, small_job):
-    # The same answers in a room where the person is as wide as the chair: only contact differs.
+def test_an_arm_too_close_to_the_person_is_found(small_file, small_room):
+    # The same answers in a room that asks for 25 cm of distance: only contact differs.
     text = small_room.read_text().replace("name: small-room", "name: tight-room")
     tight = small_room.parent / "tight-room.yaml"
     tight.write_text(text + "contact_margin: 0.25\n")
-    from tcs.scoring import load_job
-
     job = load_job("shaving", tight, "pr2")
     metadata = {
         **small_file.metadata,
@@ -85,9 +84,6 @@ def test_reached_pairs_taken_away_are_missed(small_file):
     stripped = dataclasses.replace(
         scores, reason=reason, isotropy=isotropy, arm_joints=scores.arm_joints[kept]
     )
-    from tcs.scoring import build_sets
-    from tcs.space import Grid
-
     sets = build_sets(stripped, Grid.from_dict(small_file.grid))
     found = verify(dataclasses.replace(small_file, scores=stripped, sets=sets), pairs=0, dense=60)
     assert found.missed > 0

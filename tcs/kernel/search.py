@@ -1,0 +1,200 @@
+"""Which values of the free joint are worth a collision check: arcs, windows, candidates."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arcs import MAX_ARCS, windows_of
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.solver import ArmSolver
+
+FIRST_LANES = 48
+"""Lanes over all arcs together in the first look: enough to find the feasible windows."""
+FINE_STEP = 0.0125
+"""Spacing [rad] of the second look inside the windows. Chosen by measurement: recall against a
+dense scan of 11,520 samples (benchmarks/)."""
+LEAST_LANES = 8
+"""Lanes that even the smallest window or arc gets: one vector of the processor."""
+FINEST_LANES = 8
+"""Lanes at each end of a feasible stretch, and about the peak of a window that shows none."""
+MAX_LANES = 512
+MAX_WINDOWS = 32
+MAX_CANDIDATES = 4096
+
+
+class Search(NamedTuple):
+    """Scratch of the search over the free joint, reused from pair to pair."""
+
+    goal: FloatArray
+    arcs: FloatArray
+    windows: FloatArray
+    ends: FloatArray
+    """Outer and inner side of the ends of feasible stretches [rad], shape (MAX_WINDOWS, 2)."""
+    angle: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    slack: FloatArray
+    measure: FloatArray
+    found_angle: FloatArray
+    """Free joint of each candidate [rad], shape (MAX_CANDIDATES,)."""
+    found_step: FloatArray
+    """Spacing [rad] of the lanes it was found with."""
+    found_measure: FloatArray
+    """Its isotropy to the sixth power; -1 once it was found to collide."""
+    found_branch: IntArray
+    """Row of its branch in `arm.branches`."""
+    q: FloatArray
+    """Joint angles in hand, shape (7,)."""
+    best: FloatArray
+    """Joint angles of the best solution so far, shape (7,)."""
+
+
+@jit
+def new_search() -> Search:
+    """Return scratch memory for one worker."""
+    return Search(
+        np.empty((4, 3)),
+        np.empty((MAX_ARCS, 2)),
+        np.empty((MAX_WINDOWS, 2)),
+        np.empty((MAX_WINDOWS, 2)),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES, np.int64),
+        np.empty(7),
+        np.empty(7),
+    )
+
+
+@jit
+def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
+    """Spread `count` >= 2 lanes evenly from first to last, ends included; return their spacing.
+
+    Cosines and sines follow by turning the first ones on: 512 turns lose about 1e-13, and the
+    joint angles of a solution are computed anew from its angle.
+    """
+    step = (last - first) / (count - 1)
+    c, s = np.cos(first), np.sin(first)
+    dc, ds = np.cos(step), np.sin(step)
+    for i in range(count):
+        search.angle[i] = first + i * step
+        search.cosine[i], search.sine[i] = c, s
+        c, s = c * dc - s * ds, s * dc + c * ds
+    return step
+
+
+@jit
+def best_of(measure: FloatArray, count: int) -> int:
+    """Return the index of the greatest value, the first one of equals."""
+    best = 0
+    for i in range(1, count):
+        if measure[i] > measure[best]:
+            best = i
+    return best
+
+
+@jit
+def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
+    """Collect angles of the free joint, on every branch, at which all joints keep their limits.
+
+    Args:
+        arm: The arm.
+        search: Its `goal` and `arcs` are set; its candidates get filled.
+        arcs: How many arcs there are.
+
+    Returns:
+        How many candidates were found.
+    """
+    length = 0.0
+    for k in range(arcs):
+        length += search.arcs[k, 1] - search.arcs[k, 0]
+    found = 0
+    for k in range(arcs):
+        first, last = search.arcs[k, 0], search.arcs[k, 1]
+        share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0
+        count = max(LEAST_LANES, int(share))
+        for b in range(len(arm.branches)):
+            step = fill_lanes(search, first, last, count)
+            solve_lanes(
+                arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
+                search.slack, search.measure,
+            )  # fmt: skip
+            windows = windows_of(search.slack, count, step, search.windows, 0)
+            for w in range(windows):
+                start = first + search.windows[w, 0] * step
+                stop = first + search.windows[w, 1] * step
+                found = _look_closer(arm, search, b, start, stop, found)
+    return found
+
+
+@jit
+def _look_closer(
+    arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
+) -> int:
+    """Append the feasible angles of one window on branch b; return how many there are now."""
+    count = min(max(LEAST_LANES, int((last - first) / FINE_STEP) + 1), MAX_LANES)
+    step = fill_lanes(search, first, last, count)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
+        search.slack, search.measure,
+    )  # fmt: skip
+    before = search.slack[0] >= 0.0
+    ends = 0
+    for i in range(count):
+        inside = search.slack[i] >= 0.0
+        if inside:
+            found = _add(search, b, i, step, found)
+        if inside != before and ends < MAX_WINDOWS:
+            # The outer and the inner side of an end of a feasible stretch.
+            search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
+            search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
+            ends += 1
+        before = inside
+    if ends == 0 and not before:
+        # Nothing yet: the window may be narrower than these lanes, about the highest of them.
+        peak = best_of(search.slack, count)
+        middle = search.angle[peak]
+        return _look_between(arm, search, b, middle - step, middle + step, found)
+    for e in range(ends):
+        found = _look_between(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
+    return found
+
+
+@jit
+def _look_between(
+    arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
+) -> int:
+    """Append feasible angles between two neighbouring lanes, themselves left out.
+
+    Close to a joint limit, where a feasible stretch ends, the best measure often is.
+    """
+    step = fill_lanes(search, outer, inner, FINEST_LANES)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES - 1,
+        search.slack, search.measure,
+    )  # fmt: skip
+    for i in range(1, FINEST_LANES - 1):
+        if search.slack[i] >= 0.0:
+            found = _add(search, b, i, abs(step), found)
+    return found
+
+
+@jit
+def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
+    """Append lane i as a candidate on branch b; return how many there are now."""
+    if found == MAX_CANDIDATES:
+        return found
+    search.found_angle[found] = search.angle[i]
+    search.found_step[found] = step
+    search.found_measure[found] = search.measure[i]
+    search.found_branch[found] = b
+    return found + 1
