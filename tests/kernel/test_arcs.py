@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from tcs.kernel import reference_pairs
-from tcs.kernel.arcs import IN_REACH, MAX_ARCS, OUT_OF_LIMITS, OUT_OF_REACH, elbow_arcs, windows_of
+from tcs.kernel.arcs import (
+    IN_REACH,
+    INSET,
+    MAX_ARCS,
+    OUT_OF_LIMITS,
+    OUT_OF_REACH,
+    elbow_arcs,
+    windows_of,
+)
 from tcs.kernel.lanes import solve_lanes, wrist_goal
 from tcs.kernel.reference import link_poses
 from tcs.kernel.search import MAX_WINDOWS
@@ -14,6 +22,8 @@ from tcs.kernel.solver import arm_solver
 from tests.kernel.shapes import random_arm, random_joints, rotation
 
 DENSE = 2000
+ENDS = 2 * INSET
+"""Arcs end a hair inside the limits of joint 1."""
 
 
 def arcs_of(arm, X_AG):
@@ -73,7 +83,7 @@ def test_arcs_are_what_a_dense_scan_finds(lowered, arm_seed):
         if limited:
             assert np.all((arcs >= lower) & (arcs <= upper))
         # |SW|^2 turns by at most 1 m^2 per radian here; at an arc's end it may turn as the root.
-        assert np.all(in_some(arcs, angles[left > 1e-9], 1e-12))
+        assert np.all(in_some(arcs, angles[left > 1e-9], ENDS))
         assert not np.any(in_some(arcs, angles[left < -1e-9], -1e-12))
 
 
@@ -132,7 +142,7 @@ def test_a_goal_above_the_axis_of_joint_1_leaves_the_whole_range_or_nothing(lowe
             # The wrist is on the axis up to rounding, so the arcs may be cut at one point.
             assert reach == IN_REACH
             assert np.sum(arcs[:, 1] - arcs[:, 0]) == pytest.approx(
-                chain.upper[0] - chain.lower[0], abs=1e-12
+                chain.upper[0] - chain.lower[0], abs=MAX_ARCS * ENDS
             )
         else:
             assert reach == OUT_OF_REACH
@@ -155,7 +165,7 @@ def test_arcs_wrap_where_the_goal_lies_behind(lowered, centre):
         left = distance_left(arm, chain, X_AG, angles)
         found += len(arcs)
         if len(arcs):
-            assert np.all(in_some(arcs, angles[left > 1e-9], 1e-12))
+            assert np.all(in_some(arcs, angles[left > 1e-9], ENDS))
         else:
             assert np.all(left < 1e-9)
     assert found > 0
