@@ -165,9 +165,7 @@ def process_times(task: str, path: Path, repeats: int) -> None:
 def verification(path: Path, options: argparse.Namespace) -> bool:
     """Re-check answers with Drake and the dense scan; return whether all are true."""
     begun = time.perf_counter()
-    found = verify(
-        load_scores(path), pairs=options.pairs, dense=options.dense, seed=options.seed
-    )
+    found = verify(load_scores(path), pairs=options.pairs, dense=options.dense, seed=options.seed)
     for name, value in found.to_json().items():
         row(f"verify: {name}", f"{value}")
     row("verify took", f"{time.perf_counter() - begun:.1f} s")
