@@ -9,8 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from tcs.documents import read_mapping
 from tcs.errors import DataFileError
 from tcs.paths import data_folder
 
@@ -56,11 +55,10 @@ def _files(folder: Path, pattern: str, *keys: str) -> list[tuple[Path, dict[str,
     found = []
     for path in sorted(folder.glob(pattern), key=lambda path: path.stem):
         try:
-            content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            reason = " ".join(str(error).split())
-            raise DataFileError(f"'{path}' cannot be read: {reason}. Install tcs again.") from error
-        if not isinstance(content, dict) or not all(key in content for key in keys):
+            content = read_mapping(path, f"'{path}'", DataFileError, known=keys)
+        except DataFileError as error:
+            raise DataFileError(f"{error} Install tcs again.") from error
+        if not all(key in content for key in keys):
             raise DataFileError(f"'{path}' lacks one of: {', '.join(keys)}. Install tcs again.")
         found.append((path, content))
     return found

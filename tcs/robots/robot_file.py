@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
+from tcs.documents import Document, Number, Placed, PositiveNumber, checked, read_mapping
 from tcs.errors import RobotError, UnknownNameError
 from tcs.paths import data_folder
 from tcs.robots.packages import resolve_uri
 from tcs.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.robots.urdf import Urdf, read_urdf
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-PositiveNumber = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Vector = tuple[Number, Number, Number]
 Name = Annotated[str, Field(min_length=1)]
 Positions = Mapping[Name, Number]
 
@@ -28,50 +23,32 @@ _FILES = ("urdf", "primitives")
 """Fields that name a file, relative to the robot file."""
 
 
-class _Data(BaseModel):
-    """A frozen mapping of the file that refuses keys it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _Placed(_Data):
-    """Something fixed to a link of the robot."""
+class _OnLink(Placed):
+    """Something named that is fixed to a link of the robot."""
 
     name: Name
     parent: Name
-    xyz: Vector = (0.0, 0.0, 0.0)
-    """Origin in the parent [m]."""
-    rpy_deg: Vector = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw about the parent's fixed axes [deg]."""
-
-    @property
-    def rpy(self) -> Vector:
-        """Roll, pitch, yaw about the parent's fixed axes [rad]."""
-        roll, pitch, yaw = (math.radians(angle) for angle in self.rpy_deg)
-        return roll, pitch, yaw
 
 
-class ExtraFrame(_Placed):
+class ExtraFrame(_OnLink):
     """A frame that the URDF lacks, e.g. the tip of a tool."""
 
 
-class BodyPrimitive(_Data):
+class BodyPrimitive(Placed):
     """One collision shape of an extra body."""
 
     kind: Literal["sphere", "capsule", "box"]
     size: tuple[PositiveNumber, ...]
     """Sphere: radius. Capsule: radius, length between cap centres. Box: full sizes [m]."""
-    xyz: Vector = (0.0, 0.0, 0.0)
-    rpy_deg: Vector = (0.0, 0.0, 0.0)
 
 
-class ExtraBody(_Placed):
+class ExtraBody(_OnLink):
     """A body that the URDF lacks, e.g. a tool in the hand."""
 
     primitives: tuple[BodyPrimitive, ...]
 
 
-class DisabledGroup(_Data):
+class DisabledGroup(Document):
     """Pairs of bodies whose contact is never checked, and why."""
 
     reason: Annotated[str, Field(min_length=10)]
@@ -80,7 +57,7 @@ class DisabledGroup(_Data):
     pairs: tuple[tuple[Name, Name], ...]
 
 
-class RobotFile(_Data):
+class RobotFile(Document):
     """A robot as its file says it; `load_robot` has checked it against the URDF."""
 
     name: Name
@@ -215,7 +192,7 @@ class RobotFile(_Data):
                 kind=shape.kind,
                 size=shape.size,
                 xyz=shape.xyz,
-                quaternion=quaternion_of_rpy([math.radians(angle) for angle in shape.rpy_deg]),
+                quaternion=quaternion_of_rpy(shape.rpy),
             )
             for body in self.bodies
             for shape in body.primitives
@@ -268,16 +245,14 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     from tcs.robots.checks import check_robot
 
     path = _path_of(str(name_or_path))
-    content = _read_yaml(path)
+    where = f"robot file '{path}'"
+    content = read_mapping(path, where, RobotError, known=RobotFile.model_fields)
     for key in _FILES:
         value = content.get(key)
         if isinstance(value, str) and not value.startswith("package://"):
             content[key] = str((path.parent / Path(value).expanduser()).resolve())
-    try:
-        robot = RobotFile.model_validate(content)
-    except ValidationError as error:
-        raise _complaint(error, path) from None
-    check_robot(robot, where=f"robot file '{path}'")
+    robot = checked(content, RobotFile, where, RobotError)
+    check_robot(robot, where=where)
     return robot
 
 
@@ -292,31 +267,3 @@ def _path_of(name_or_path: str) -> Path:
     if name_or_path not in robot_names():
         raise UnknownNameError("robot", name_or_path, robot_names())
     return _folder() / f"{name_or_path}.yaml"
-
-
-def _read_yaml(path: Path) -> dict[str, Any]:
-    where = f"robot file '{path}'"
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RobotError(f"{where} cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{where} is no text file in UTF-8.") from error
-    except (yaml.YAMLError, ValueError) as error:
-        text = re.sub(r"\s+", " ", str(error))
-        raise RobotError(f"{where} is no sound YAML: {text}.") from error
-    if not isinstance(content, dict):
-        raise RobotError(f"{where} must hold keys and values: {', '.join(RobotFile.model_fields)}.")
-    return content
-
-
-def _complaint(error: ValidationError, path: Path) -> RobotError | UnknownNameError:
-    """Return the first thing that is wrong with a robot file, as one line."""
-    first = error.errors()[0]
-    where = f"robot file '{path}'"
-    *parents, last = (str(part) for part in first["loc"] or ("file",))
-    if first["type"] == "extra_forbidden" and not parents:
-        return UnknownNameError("key", last, RobotFile.model_fields, where=where)
-    field = ".".join((*parents, last))
-    given = "" if first["type"] == "missing" else f" (given: {str(first['input'])[:60]!r})"
-    return RobotError(f"{where}, {field}: {first['msg']}{given}.")

@@ -7,9 +7,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
+from tcs.documents import (
+    Document,
+    Length,
+    Number,
+    Placed,
+    PositiveNumber,
+    checked,
+    read_mapping,
+)
 from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.paths import data_folder
 from tcs.space import Grid
@@ -21,36 +29,16 @@ BASED_ON = "based_on"
 WORLD = "world"
 """Name of the environment frame W as a parent."""
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-PositiveNumber = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Length = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Vector = tuple[Number, Number, Number]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
-class _Data(BaseModel):
-    """A frozen mapping of the file that refuses keys it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _Placed(_Data):
-    """Something that stands at a pose in its parent's frame."""
+class _NamedPlace(Placed):
+    """Something named that stands in its parent's frame."""
 
     name: Name
-    xyz: Vector = (0.0, 0.0, 0.0)
-    """Position of its origin in the parent [m]."""
-    rpy_deg: Vector = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw about the parent's fixed axes [deg]."""
-
-    @property
-    def rpy(self) -> Vector:
-        """Roll, pitch, yaw about the parent's fixed axes [rad]."""
-        roll, pitch, yaw = (math.radians(angle) for angle in self.rpy_deg)
-        return roll, pitch, yaw
 
 
-class ModelEntry(_Placed):
+class ModelEntry(_NamedPlace):
     """An SDFormat model that is part of the environment."""
 
     file: str
@@ -60,7 +48,7 @@ class ModelEntry(_Placed):
     """What a blocked configuration is blamed on: the link, or the single collision shape."""
 
 
-class Obstacle(_Placed):
+class Obstacle(_NamedPlace):
     """An obstacle of the user's own: a box, or any SDFormat model, fixed to the world."""
 
     box: tuple[PositiveNumber, PositiveNumber, PositiveNumber] | None = None
@@ -77,7 +65,7 @@ class Obstacle(_Placed):
 E = TypeVar("E", ModelEntry, Obstacle)
 
 
-class JointError(_Data):
+class JointError(Document):
     """How far one joint of the environment may be from where the robot believes it is."""
 
     distribution: Literal["normal"]
@@ -98,7 +86,7 @@ class JointError(_Data):
         return math.radians(self.std_deg) if self.std_deg is not None else float(self.std or 0.0)
 
 
-class EnvironmentFile(_Data):
+class EnvironmentFile(Document):
     """Everything that surrounds the robot, as its file says it."""
 
     name: Name
@@ -157,7 +145,7 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
             the data folder.
 
     Raises:
-        UnknownNameError: If no environment has that name.
+        UnknownNameError: If no environment has that name, or a key in the file is not known.
         EnvironmentFileError: If the file cannot be read or says something impossible.
         GridError: If its grid is none.
 
@@ -178,35 +166,18 @@ def _folder() -> Path:
 
 def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     """Return the environment of a file; `above` are the files that are based on it."""
-    content = _content(path)
+    where = f"environment file '{path}'"
+    known = (*EnvironmentFile.model_fields, BASED_ON)
+    content = read_mapping(path, where, EnvironmentFileError, known=known)
     base = content.pop(BASED_ON, None)
     if base is not None:
         content = {**_base(str(base), path, above).model_dump(), **content}
-    try:
-        environment = EnvironmentFile.model_validate(content)
-    except ValidationError as error:
-        raise EnvironmentFileError(_one_line(path, error)) from error
+    environment = checked(
+        content, EnvironmentFile, where, EnvironmentFileError, also_known=(BASED_ON,)
+    )
     # Only to refuse a bad grid here, where the file's name can be given.
-    Grid.from_spec(environment.grid, where=f"environment file '{path}', field 'grid'")
+    Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
     return _with_files_resolved(environment, path)
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise EnvironmentFileError(
-            f"environment file '{path}' cannot be read: {error.strerror}."
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise EnvironmentFileError(f"environment file '{path}' is not YAML: {reason}") from error
-    if not isinstance(content, dict):
-        raise EnvironmentFileError(
-            f"environment file '{path}' must be a mapping. "
-            f"Known keys: {', '.join(_known_keys([]))}."
-        )
-    return content
 
 
 def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> EnvironmentFile:
@@ -231,32 +202,6 @@ def _is_path(text: str) -> bool:
     return text.endswith(".yaml") or "/" in text or "\\" in text
 
 
-def _one_line(path: Path, error: ValidationError) -> str:
-    """Return the first complaint as one line: file, field, what is wrong, what is allowed."""
-    complaints = error.errors()
-    first = complaints[0]
-    location = [str(part) for part in first["loc"]]
-    field = ".".join(location)
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        message = f"unknown key. Known: {', '.join(_known_keys(location))}"
-    where = f", field '{field}'" if field else ""
-    more = f" ({len(complaints) - 1} more after this)" if len(complaints) > 1 else ""
-    return f"environment file '{path}'{where}: {message}.{more}"
-
-
-def _known_keys(location: list[str]) -> tuple[str, ...]:
-    """Return the keys that are known where an unknown one was found."""
-    nested: dict[str, type[_Data]] = {
-        "models": ModelEntry,
-        "obstacles": Obstacle,
-        "errors": JointError,
-    }
-    owner = nested.get(location[0], EnvironmentFile) if len(location) > 1 else EnvironmentFile
-    known = tuple(owner.model_fields)
-    return (*known, BASED_ON) if owner is EnvironmentFile else known
-
-
 def _with_files_resolved(environment: EnvironmentFile, path: Path) -> EnvironmentFile:
     def resolved(entry: E, field: str) -> E:
         if entry.file is None:
@@ -272,6 +217,6 @@ def _with_files_resolved(environment: EnvironmentFile, path: Path) -> Environmen
             f"{looked}. Give a path from the file's own folder, or an absolute one."
         )
 
-    models = tuple(resolved(m, f"models.{i}") for i, m in enumerate(environment.models))
-    obstacles = tuple(resolved(o, f"obstacles.{i}") for i, o in enumerate(environment.obstacles))
+    models = tuple(resolved(m, f"models[{i}]") for i, m in enumerate(environment.models))
+    obstacles = tuple(resolved(o, f"obstacles[{i}]") for i, o in enumerate(environment.obstacles))
     return environment.model_copy(update={"models": models, "obstacles": obstacles})

@@ -5,15 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
+from tcs.documents import Document, checked, read_mapping
 from tcs.errors import TaskError, UnknownNameError
 from tcs.paths import data_folder
-from tcs.tasks.documents import Document, read_document
 from tcs.tasks.task import Goal, Task
 
 
-class GoalEntry(Document):
+class _Entry(Document):
+    """What a task file says, without a guess at what it may have meant."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class GoalEntry(_Entry):
     """One goal as it is written."""
 
     body_frame: str
@@ -22,7 +28,7 @@ class GoalEntry(Document):
     weight: float = 1.0
 
 
-class AxisEntry(Document):
+class AxisEntry(_Entry):
     """What a task changes on one axis of an environment's grid."""
 
     start: float | None = None
@@ -30,7 +36,7 @@ class AxisEntry(Document):
     count: int | None = None
 
 
-class TaskFile(Document):
+class TaskFile(_Entry):
     """A task as it is written."""
 
     name: str
@@ -76,8 +82,9 @@ def _shipped() -> dict[str, Path]:
 
 
 def _read(path: Path) -> Task:
-    written = read_document(path, TaskFile, "task file")
     where = f"task file '{path}'"
+    content = read_mapping(path, where, TaskError, known=TaskFile.model_fields)
+    written = checked(content, TaskFile, where, TaskError)
     goals = []
     for i, entry in enumerate(written.goals):
         try:

@@ -117,14 +117,14 @@ WRONG = {
         "tool_frame: unknown .*'l_gripper_tool_fram'.*Did you mean 'l_gripper_tool_frame'",
     ),
     "unknown key": (change("tol_frame", "x"), "unknown key 'tol_frame'.*Did you mean 'tool_frame'"),
-    "missing key": (lambda content: content.pop("urdf"), "urdf: Field required"),
+    "missing key": (lambda content: content.pop("urdf"), "field 'urdf' is missing"),
     "unknown arm joint": (
         lambda content: content["arm_joints"].__setitem__(3, "l_elbow_flx_joint"),
         "arm_joints: unknown joint.*Did you mean 'l_elbow_flex_joint'",
     ),
     "six arm joints": (
         lambda content: content["arm_joints"].pop(),
-        r"arm_joints: Tuple should have at least 7",
+        r"field 'arm_joints' is .*, but list should have at least 7",
     ),
     "wrong order": (
         lambda content: content["arm_joints"].reverse(),
@@ -151,11 +151,14 @@ WRONG = {
     ),
     "posture that is no number": (
         put("postures", "wild", {"r_elbow_flex_joint": "bent"}),
-        r"postures\.wild\.r_elbow_flex_joint: .*number.*'bent'",
+        r"field 'postures\.wild\.r_elbow_flex_joint' is 'bent', but must be a valid number",
     ),
     "unknown posture": (change("posture", "tuckd"), "unknown posture 'tuckd'.*Did you mean"),
     "unknown gripper": (change("gripper", "ajar"), "unknown gripper 'ajar'"),
-    "limits of another kind": (change("limits", "none"), "limits: .*'soft' or 'hard'"),
+    "limits of another kind": (
+        change("limits", "none"),
+        "field 'limits' is 'none', but must be 'soft' or 'hard'",
+    ),
     "URDF not there": (change("urdf", "nowhere.urdf"), "there is no file"),
     "package not there": (
         change("urdf", "package://no_such_robot/a.urdf"),
@@ -170,7 +173,7 @@ WRONG = {
     ),
     "disabled pair without reason": (
         change("disabled_groups", [{"pairs": [["base_link", "torso_lift_link"]]}]),
-        "reason: Field required",
+        r"field 'disabled_groups\[0\]\.reason' is missing",
     ),
     "extra frame with a taken name": (
         change("frames", [{"name": "base_link", "parent": "base_footprint"}]),
@@ -202,6 +205,15 @@ def test_what_is_no_robot_file_is_refused(text, tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(RobotError, match=r"mine\.yaml"):
+        load_robot(path)
+
+
+def test_a_key_that_comes_twice_is_refused(content, tmp_path):
+    path = write(tmp_path, content)
+    path.write_text(path.read_text() + "title: another\n")
+    with pytest.raises(
+        RobotError, match=r"mine\.yaml' is no sound YAML: line .*'title' is there tw"
+    ):
         load_robot(path)
 
 

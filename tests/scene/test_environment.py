@@ -84,26 +84,34 @@ def test_unknown_name_gets_the_nearest():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"flor": True}, r"field 'flor': unknown key\. Known: name, .*floor"),
-        ({"models": [{"name": "a", "fil": "b"}]}, r"field 'models\.0\.file'.*required"),
+        ({"flor": True}, r"unknown key 'flor'\. Known: .*based_on.*Did you mean 'floor'"),
+        (
+            {"models": [{"name": "a", "fil": "b"}]},
+            r"field 'models\[0\]': unknown key 'fil'\. Known: file, .*'file'\?",
+        ),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1], "size": 1}]},
-            r"obstacles\.0\.size.*Known: name, xyz",
+            r"field 'obstacles\[0\]': unknown key 'size'\. Known: box, file",
         ),
-        ({"obstacles": [{"name": "a"}]}, r"obstacles\.0'.*either 'box"),
+        ({"obstacles": [{"name": "a"}]}, r"obstacles\[0\]'.*either 'box"),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1], "file": "x.sdf"}]},
-            r"obstacles\.0'.*either 'box",
+            r"obstacles\[0\]'.*either 'box",
         ),
-        ({"obstacles": [{"name": "a", "box": [1, 0, 1]}]}, r"obstacles\.0\.box\.1.*greater than 0"),
+        (
+            {"obstacles": [{"name": "a", "box": [1, 0, 1]}]},
+            r"obstacles\[0\]\.box\[1\]' is 0, but must be greater than 0",
+        ),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1]}] * 2},
             r"name 'a' is used twice",
         ),
         ({"obstacles": [{"name": "floor", "box": [1, 1, 1]}]}, r"'floor' is used twice or reserv"),
-        ({"models": [{"name": "a", "file": "nowhere.sdf"}]}, r"models\.0\.file.*nowhere\.sdf"),
+        ({"models": [{"name": "a", "file": "nowhere.sdf"}]}, r"models\[0\]\.file.*nowhere\.sdf"),
         ({"padding": {"a::b": -0.1}}, r"padding\.a::b.*greater than or equal to 0"),
         ({"contact_margin": float("nan")}, r"contact_margin"),
+        ({"joints": {"a": True}}, r"field 'joints\.a' is True, but must be a valid number"),
+        ({"title": 5, "name": 5}, r"field 'name' is 5, .* \(1 more after this one\.\)"),
         ({"errors": {"j": {"distribution": "normal"}}}, r"errors\.j'.*either 'std'"),
         ({"errors": {"j": {"distribution": "flat", "std": 1}}}, r"errors\.j\.distribution.*normal"),
     ],
@@ -111,7 +119,7 @@ def test_unknown_name_gets_the_nearest():
 )
 def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path, changes, said):
     path = written(tmp_path, **changes)
-    with pytest.raises(EnvironmentFileError, match=said) as caught:
+    with pytest.raises((EnvironmentFileError, UnknownNameError), match=said) as caught:
         load_environment(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -128,6 +136,13 @@ def test_what_is_no_mapping_is_refused(tmp_path, text):
     path = tmp_path / "room.yaml"
     path.write_text(text)
     with pytest.raises(EnvironmentFileError, match=r"room\.yaml"):
+        load_environment(path)
+
+
+def test_a_key_that_comes_twice_is_refused(tmp_path):
+    path = written(tmp_path)
+    path.write_text(path.read_text() + "title: another\n")
+    with pytest.raises(EnvironmentFileError, match=r"line .*: key 'title' is there twice"):
         load_environment(path)
 
 
