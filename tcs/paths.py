@@ -10,6 +10,8 @@ from tcs.errors import DataFileError, OutputError
 _PACKAGE = Path(__file__).resolve().parent
 _DATA_PARTS = ("models", "tasks")
 _CACHE_VARIABLE = "TCS_CACHE_DIR"
+CACHE_ADVICE = f"Set {_CACHE_VARIABLE} to a folder you may write to."
+"""What to do when the cache cannot be written."""
 
 
 def data_folder() -> Path:
@@ -23,21 +25,23 @@ def data_folder() -> Path:
     return _data_folder_of(_PACKAGE)
 
 
-def cache_folder() -> Path:
-    """Return the user's cache folder for `tcs`, made when it is not there yet.
+def cache_folder(*parts: str) -> Path:
+    """Return the user's cache folder for `tcs`, or one inside it, made when it is not there yet.
 
     It is `$TCS_CACHE_DIR` if that is set, else `$XDG_CACHE_HOME/tcs`, else `~/.cache/tcs`.
+
+    Args:
+        parts: Names of the folder inside it, from the top.
 
     Raises:
         OutputError: If the folder cannot be made.
     """
-    folder = _cache_place()
+    folder = _cache_place().joinpath(*parts)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"cache folder '{folder}' cannot be made: {error.strerror}. "
-            f"Set {_CACHE_VARIABLE} to a folder you may write to."
+            f"cache folder '{folder}' cannot be made: {error.strerror}. {CACHE_ADVICE}"
         ) from error
     return folder
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from tcs.errors import OutputError
 from tcs.space import Grid
 from tcs.store import ScoreFile
 from tcs.tables import Reason
+from tcs.writing import whole_file
 
 
 def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
@@ -51,17 +48,5 @@ def write_csv(path: Path, frame: pd.DataFrame) -> None:
     Raises:
         OutputError: If it cannot be written there.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
-    try:
-        frame.to_csv(beside, float_format="%.9g")
-        beside.replace(path)
-    except BaseException as error:
-        # Where no file could be made, there is none to remove; the first error is the one to tell.
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        if isinstance(error, OSError):
-            raise OutputError(
-                f"Table '{path}' cannot be written: {error.strerror or error}. Name a file in an "
-                "existing, writable folder."
-            ) from error
-        raise
+    with whole_file(path, "Table") as stream:
+        frame.to_csv(stream, float_format="%.9g")

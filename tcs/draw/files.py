@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from tcs.errors import OutputError
+from tcs.writing import whole_file
 
 FORMATS = ("png", "pdf", "svg")
 """What a picture may be written as; the end of its name says which."""
@@ -35,17 +33,5 @@ def save_figure(path: Path, figure: Figure, *, dpi: float = 130.0) -> None:
         OutputError: If its name ends in none of `FORMATS`, or it cannot be written there.
     """
     ending = check_format(path)
-    beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
-    try:
-        figure.savefig(beside, format=ending, dpi=dpi)
-        beside.replace(path)
-    except BaseException as error:
-        # Where no file could be made, there is none to remove; the first error is the one to tell.
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        if isinstance(error, OSError):
-            raise OutputError(
-                f"Picture '{path}' cannot be written: {error.strerror or error}. Name a file in an "
-                "existing, writable folder."
-            ) from error
-        raise
+    with whole_file(path, "Picture") as stream:
+        figure.savefig(stream, format=ending, dpi=dpi)

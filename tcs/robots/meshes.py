@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import OutputError, RobotError
-from tcs.paths import cache_folder
+from tcs.errors import RobotError
+from tcs.paths import CACHE_ADVICE, cache_folder
+from tcs.writing import whole_file
 
 if TYPE_CHECKING:
     import trimesh
@@ -39,11 +38,13 @@ def as_obj(mesh: Path) -> Path:
     """
     if mesh.suffix.lower() == ".obj":
         return mesh
-    folder = cache_folder() / "meshes"
     key = hashlib.sha256(_VERSION + mesh.suffix.lower().encode() + _content(mesh)).hexdigest()
-    target = folder / f"{mesh.stem}_{key[:16]}.obj"
+    target = cache_folder("meshes") / f"{mesh.stem}_{key[:16]}.obj"
     if not target.is_file():
-        _write_atomically(target, _obj_text(mesh))
+        text = _obj_text(mesh)
+        # Two processes may convert the same mesh.
+        with whole_file(target, "Converted mesh", advice=CACHE_ADVICE) as stream:
+            stream.write(text.encode())
     return target
 
 
@@ -87,19 +88,3 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
         raise RobotError(f"mesh '{mesh}' holds no triangle.")
     return loaded
-
-
-def _write_atomically(target: Path, text: str) -> None:
-    """Write under a temporary name, then rename: two processes may convert the same mesh."""
-    temporary: str | None = None
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=".part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, target)
-    except OSError as error:
-        raise OutputError(f"mesh cache '{target.parent}': {error.strerror}.") from error
-    finally:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import RobotError
+from tcs.writing import whole_file
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -204,7 +205,11 @@ def _points_in(shape: Primitive, samples: int, rng: np.random.Generator) -> Floa
 
 
 def write_primitives(path: Path, primitives: Iterable[Primitive]) -> None:
-    """Write primitives to a CSV file: metres with 6 decimals, quaternions (wxyz) with 9."""
+    """Write primitives to a CSV file: metres with 6 decimals, quaternions (wxyz) with 9.
+
+    Raises:
+        OutputError: If it cannot be written there.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
@@ -212,7 +217,8 @@ def write_primitives(path: Path, primitives: Iterable[Primitive]) -> None:
         sizes = [f"{s:.6f}" for s in p.size] + [""] * (3 - len(p.size))
         place = [f"{x + 0.0:.6f}" for x in p.xyz]
         writer.writerow([p.body, p.kind, *sizes, *place, *(f"{q + 0.0:.9f}" for q in p.quaternion)])
-    path.write_text(text.getvalue(), encoding="utf-8")
+    with whole_file(path, "Primitives file") as stream:
+        stream.write(text.getvalue().encode())
 
 
 def read_primitives(path: Path) -> tuple[Primitive, ...]:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import secrets
 from pathlib import Path
 
 import joblib
 
-from tcs.errors import OutputError
 from tcs.store.packing import pack, unpack
 from tcs.store.reader import explained, read_joblib
 from tcs.store.score_file import ScoreFile
+from tcs.writing import whole_file
 
 COMPRESSION = ("zlib", 3)
 """Arm joints are as good as random: higher levels and lzma take much longer for a few percent,
@@ -21,9 +19,6 @@ and lzma also to load."""
 
 def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
     """Write a score file, wholly or not at all.
-
-    It is written beside the target under another name, brought to the disk and then renamed.
-    Whatever goes wrong, Ctrl-C included, an older file of that name stays as it was.
 
     Args:
         path: Where to write; its folder must exist.
@@ -34,23 +29,8 @@ def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
     """
     path = Path(path)
     content = pack(file)
-    beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
-    try:
-        with beside.open("xb") as stream:
-            joblib.dump(content, stream, compress=COMPRESSION)
-            stream.flush()
-            os.fsync(stream.fileno())
-        beside.replace(path)
-    except BaseException as error:
-        # Where no file could be made, there is none to remove; the first error is the one to tell.
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        if isinstance(error, OSError):
-            raise OutputError(
-                f"Score file '{path}' cannot be written: {error.strerror or error}. Name a file "
-                "in an existing, writable folder with room for it."
-            ) from error
-        raise
+    with whole_file(path, "Score file") as stream:
+        joblib.dump(content, stream, compress=COMPRESSION)
 
 
 def load_scores(path: str | os.PathLike[str]) -> ScoreFile:

@@ -49,8 +49,8 @@ def test_unwritable_place(tcs_command, small_file, tmp_path):
 
 
 def test_half_a_table_is_not_left(tcs_command, small_file, tmp_path, monkeypatch):
-    def to_csv(_frame, path, **_options):
-        path.write_text("half")
+    def to_csv(_frame, stream, **_options):
+        stream.write(b"half")
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pd.DataFrame, "to_csv", to_csv)

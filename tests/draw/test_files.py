@@ -27,8 +27,8 @@ def test_old_picture_stays_when_the_new_one_fails(tmp_path, monkeypatch, error):
     path = tmp_path / "map.png"
     path.write_bytes(b"old")
 
-    def fail(_figure, target, **_options):
-        Path(target).write_bytes(b"half")
+    def fail(_figure, stream, **_options):
+        stream.write(b"half")
         raise error
 
     monkeypatch.setattr(Figure, "savefig", fail)
