@@ -13,6 +13,9 @@ from tcs.documents import read_mapping
 from tcs.errors import DataFileError
 from tcs.paths import data_folder
 
+_BASED_ON = "based_on"
+"""Key of an environment file that takes over from another one whatever it does not say itself."""
+
 
 def catalogue() -> dict[str, list[dict[str, Any]]]:
     """Return the tasks, environments and robots there are, each sorted by name.
@@ -55,10 +58,18 @@ def _files(folder: Path, pattern: str, *keys: str) -> list[tuple[Path, dict[str,
     found = []
     for path in sorted(folder.glob(pattern), key=lambda path: path.stem):
         try:
-            content = read_mapping(path, f"'{path}'", DataFileError, known=keys)
+            content = _read(path, keys)
         except DataFileError as error:
             raise DataFileError(f"{error} Install tcs again.") from error
         if not all(key in content for key in keys):
             raise DataFileError(f"'{path}' lacks one of: {', '.join(keys)}. Install tcs again.")
         found.append((path, content))
     return found
+
+
+def _read(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return what a file holds, with what it takes over from the one it is based on."""
+    content = read_mapping(path, f"'{path}'", DataFileError, known=keys)
+    if _BASED_ON not in content:
+        return content
+    return {**_read(path.with_name(f"{content[_BASED_ON]}.yaml"), keys), **content}

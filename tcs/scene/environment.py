@@ -18,9 +18,10 @@ from tcs.documents import (
     checked,
     read_mapping,
 )
-from tcs.errors import EnvironmentFileError, UnknownNameError
+from tcs.errors import EnvironmentFileError, GridError, UnknownNameError
 from tcs.paths import data_folder
-from tcs.space import Grid
+from tcs.scene.posture import Posture
+from tcs.space import Axis, Grid
 
 FLOOR = "floor"
 """Name under which the floor is reported."""
@@ -100,6 +101,8 @@ class EnvironmentFile(Document):
     """A floor at z = 0 that the arm must not touch; what stands on it is exempt."""
     joints: Mapping[str, Number] = {}
     """Joint positions that differ from 0 [m or rad]."""
+    posture: Mapping[str, Posture] = {}
+    """For each joint that others follow, e.g. a head rest, where those others stand."""
     body_frames: Mapping[str, str] = {}
     """Names that goals use for parts of the person, each a "model::link"."""
     padding: Mapping[str, Length] = {}
@@ -109,6 +112,9 @@ class EnvironmentFile(Document):
     grid: Mapping[str, Mapping[str, Any]]
     """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis that is
     none of the robot's moves the joint of its name."""
+    observed: Mapping[str, Mapping[str, Any]] = {}
+    """Axes that the robot finds as they are and cannot choose, in the same form: the joint of that
+    name is scored at each of the values."""
     errors: Mapping[str, JointError] = {}
     """How far off each joint may be (Table II of the TCS paper)."""
 
@@ -120,6 +126,34 @@ class EnvironmentFile(Document):
                 raise ValueError(f"name '{entry.name}' is used twice or reserved; rename one")
             names.append(entry.name)
         return self
+
+    @model_validator(mode="after")
+    def _a_joint_follows_one_other(self) -> Self:
+        leader_of: dict[str, str] = {}
+        for leader, posture in self.posture.items():
+            for name in posture.joints:
+                if name in self.posture:
+                    raise ValueError(f"posture: '{name}' follows '{leader}' and leads others")
+                if name in leader_of:
+                    raise ValueError(
+                        f"posture: '{name}' follows '{leader_of[name]}' and '{leader}'"
+                    )
+                leader_of[name] = leader
+        for field in ("joints", "errors", "grid", "observed"):
+            for name in getattr(self, field):
+                if name in leader_of:
+                    raise ValueError(
+                        f"{field}: '{name}' follows '{leader_of[name]}', so it cannot be set by "
+                        "hand; take it out here or under 'posture'"
+                    )
+        return self
+
+    @property
+    def observed_axes(self) -> tuple[Axis, ...]:
+        """The axes under `observed`, in the order they are written in."""
+        return tuple(
+            Axis.from_dict({**plain, "name": name}) for name, plain in self.observed.items()
+        )
 
     @property
     def placed(self) -> tuple[ModelEntry | Obstacle, ...]:
@@ -147,7 +181,7 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
     Raises:
         UnknownNameError: If no environment has that name, or a key in the file is not known.
         EnvironmentFileError: If the file cannot be read or says something impossible.
-        GridError: If its grid is none.
+        GridError: If its grid is none, or an observed axis is none.
 
     >>> load_environment("wheelchair").body_frames["head"]
     'person::head_center'
@@ -177,7 +211,19 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     )
     # Only to refuse a bad grid here, where the file's name can be given.
     Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
+    _check_observed(environment, where=f"{where}, field 'observed'")
     return _with_files_resolved(environment, path)
+
+
+def _check_observed(environment: EnvironmentFile, where: str) -> None:
+    """Refuse observed axes that are none, or that the grid has as well."""
+    for name, plain in environment.observed.items():
+        Axis.from_dict({**plain, "name": name}, where=where)
+        if name in environment.grid:
+            raise GridError(
+                f"{where}: axis '{name}' is one of the grid's too. The robot either chooses it "
+                "('grid') or finds it ('observed'): take it out of one of them."
+            )
 
 
 def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> EnvironmentFile:

@@ -12,7 +12,6 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
-from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.scene.chain import Axis, link_frames
 from tcs.scene.contacts import ContactRule, Group, Part, shape_of
@@ -76,6 +75,7 @@ def lower(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
     Raises:
         UnknownNameError: If a goal rides on a body frame that the environment does not have, the
             task allows contact between bodies that are not there, or a grid axis is no joint.
+        GridError: If a grid axis goes beyond its joint's limits, or is of another unit.
         EnvironmentFileError: If a shape is of a kind the kernel does not know.
     """
     before = scene.positions()
@@ -194,9 +194,7 @@ def _environment_states(
     """Return the poses in W of the room's shapes and of the goals, for each environment state."""
     axes = grid.environment_axes
     for axis in axes:
-        if axis.name not in scene.built.room_joints:
-            known = scene.built.room_joints
-            raise UnknownNameError("environment axis", axis.name, known, where=where)
+        scene.built.room_joints.check_axis(axis, where=where)
     rooms, goals = [], []
     for state in itertools.product(*(axis.values for axis in axes)):
         for axis, value in zip(axes, state, strict=True):

@@ -34,6 +34,7 @@ from tcs.errors import RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.robots import Primitive, RobotFile, robot_urdf
 from tcs.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
+from tcs.scene.joints import RoomJoints
 from tcs.scene.room import add_room, room_parts
 from tcs.scene.spec import SceneSpec
 
@@ -58,7 +59,7 @@ class ScenePlant:
         base_frame: B, the robot's base.
         arm_base_frame: A, the link that carries joint 1.
         tool_frame: T.
-        room_joints: Joints of the environment, by name.
+        room_joints: Joints of the environment.
         body_frames: Frames that goals may name.
         parts: Every collision shape: arm, body, room.
         rule: Which pairs of them are checked.
@@ -76,7 +77,7 @@ class ScenePlant:
     base_frame: Frame
     arm_base_frame: Frame
     tool_frame: Frame
-    room_joints: dict[str, Joint]
+    room_joints: RoomJoints
     body_frames: dict[str, Frame]
     parts: tuple[Part, ...]
     rule: ContactRule
@@ -97,7 +98,9 @@ def build_plant(
 
     Raises:
         RobotError: If the robot's model cannot be used.
-        EnvironmentFileError: If a model of the environment cannot be used.
+        EnvironmentFileError: If a model of the environment cannot be used, or a joint not go where
+            the file puts it.
+        GridError: If an observed axis is none of its joint's.
         UnknownNameError: If a file names something that is not there.
     """
     robot, environment = spec.robot, spec.environment
@@ -110,8 +113,6 @@ def build_plant(
     room = add_room(plant, environment)
     for name, value in robot.joint_positions().items():
         plant.GetJointByName(name, instance).set_default_positions([value])
-    for name, value in environment.joints.items():
-        room.joints[name].set_default_positions([value])
     plant.Finalize()
 
     torso = plant.GetJointByName(robot.torso_joint, instance) if robot.torso_joint else None

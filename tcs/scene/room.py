@@ -21,6 +21,7 @@ from pydrake.multibody.tree import (
 from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.scene.contacts import Group, Part
 from tcs.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
+from tcs.scene.joints import RoomJoints
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Wider than any room, so that the arm finds a floor wherever the robot stands; thick enough that
@@ -34,13 +35,13 @@ class Room:
 
     Attributes:
         links: Every link, by "model::link"; a box obstacle by its name alone.
-        joints: Every joint that moves, by name.
+        joints: Every joint that moves.
         named_by_link: Names of the models whose shapes are reported by link.
         floor: Whether there is a floor.
     """
 
     links: dict[str, RigidBody]
-    joints: dict[str, Joint]
+    joints: RoomJoints
     named_by_link: frozenset[str]
     floor: bool
 
@@ -49,11 +50,12 @@ def add_room(plant: MultibodyPlant, environment: EnvironmentFile) -> Room:
     """Add everything the environment file names to a plant that is not finalized.
 
     Raises:
-        EnvironmentFileError: If a model cannot be used.
+        EnvironmentFileError: If a model cannot be used, or a joint not go where the file puts it.
+        GridError: If an observed axis is none of its joint's.
         UnknownNameError: If the file names a parent, link or joint that is not there.
     """
     links: dict[str, RigidBody] = {}
-    joints: dict[str, Joint] = {}
+    by_name: dict[str, Joint] = {}
     where = f"environment '{environment.name}'"
     for entry in environment.placed:
         parent = _parent_frame(plant, entry, links, where)
@@ -70,17 +72,19 @@ def add_room(plant: MultibodyPlant, environment: EnvironmentFile) -> Room:
             joint = plant.get_joint(joint_index)
             if joint.num_positions() == 0:
                 continue
-            if joint.name() in joints:
+            if joint.name() in by_name:
                 raise EnvironmentFileError(
                     f"{here}: joint '{joint.name()}' is there twice. Rename it in one of the files."
                 )
-            joints[joint.name()] = joint
+            by_name[joint.name()] = joint
     if environment.floor:
         top = RigidTransform([0.0, 0.0, -_FLOOR_SIZE[2] / 2])
         plant.RegisterCollisionGeometry(
             plant.world_body(), top, Box(*_FLOOR_SIZE), FLOOR, ProximityProperties()
         )
+    joints = RoomJoints(by_name, environment.posture)
     _check_names(environment, links, joints, where)
+    joints.set_defaults(environment.joints, where=f"{where}, field 'joints'")
     by_link = {m.name for m in environment.models if m.named_by == "link"}
     by_link |= {o.name for o in environment.obstacles if o.box is not None}
     return Room(links, joints, frozenset(by_link), environment.floor)
@@ -196,7 +200,7 @@ def _fix(
 
 
 def _check_names(
-    environment: EnvironmentFile, links: Iterable[str], joints: dict[str, Joint], where: str
+    environment: EnvironmentFile, links: Iterable[str], joints: RoomJoints, where: str
 ) -> None:
     """Refuse names in the environment file that its models do not have."""
     for link in environment.padding:
@@ -207,13 +211,16 @@ def _check_names(
             raise UnknownNameError("link", link, links, where=f"{where}, body frame '{frame}'")
     for field in ("joints", "errors"):
         for joint in getattr(environment, field):
-            if joint not in joints:
-                raise UnknownNameError("joint", joint, joints, where=f"{where}, field '{field}'")
+            if joint not in joints.by_name:
+                known = joints.by_name
+                raise UnknownNameError("joint", joint, known, where=f"{where}, field '{field}'")
     for name, error in environment.errors.items():
-        turns = joints[name].type_name() == "revolute"
-        if turns != (error.std_deg is not None):
-            unit = "std_deg" if turns else "std"
+        if joints.turns(name) != (error.std_deg is not None):
+            unit = "std_deg" if joints.turns(name) else "std"
             raise EnvironmentFileError(
-                f"{where}, field 'errors.{name}': the joint is {joints[name].type_name()}, "
-                f"so give '{unit}'."
+                f"{where}, field 'errors.{name}': the joint is "
+                f"{joints.by_name[name].type_name()}, so give '{unit}'."
             )
+    joints.check_posture(where=where)
+    for axis in environment.observed_axes:
+        joints.check_axis(axis, where=f"{where}, field 'observed'")

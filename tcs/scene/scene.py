@@ -44,7 +44,9 @@ class Scene:
 
         Raises:
             RobotError: If the robot's model cannot be used.
-            EnvironmentFileError: If a model of the environment cannot be used.
+            EnvironmentFileError: If a model of the environment cannot be used, or a joint not go
+                where the file puts it.
+            GridError: If an observed axis is none of its joint's.
             UnknownNameError: If a file names something that is not there.
         """
         self.spec = spec
@@ -106,16 +108,15 @@ class Scene:
         self.built.plant.SetPositions(self._state, q)
 
     def set_joint(self, name: str, value: float) -> None:
-        """Set a joint of the environment [m or rad].
+        """Set a joint of the environment [m or rad], and with it all that follow it.
 
         Raises:
             UnknownNameError: If the environment has no such joint.
+            TcsError: If the joint follows another one, or does not go that far.
         """
-        joints = self.built.room_joints
-        if name not in joints:
-            where = f"environment '{self.spec.environment.name}'"
-            raise UnknownNameError("joint", name, joints, where=where)
-        self._set(joints[name].position_start(), value)
+        where = f"environment '{self.spec.environment.name}'"
+        for joint, position in self.built.room_joints.positions(name, value, where=where):
+            self._set(joint.position_start(), position)
 
     def positions(self) -> FloatArray:
         """Return the positions of all joints, for `restore`, shape (n,)."""

@@ -49,7 +49,7 @@ class RoomAlone:
         """Pose of "model::link" in W with these joints set, all others 0."""
         q = np.zeros(self.plant.num_positions())
         for name, value in joints.items():
-            q[self.room.joints[name].position_start()] = value
+            q[self.room.joints.by_name[name].position_start()] = value
         self.plant.SetPositions(self.state, q)
         X_WL = self.room.links[link].EvalPoseInWorld(self.state)
         self.plant.SetPositions(self.state, np.zeros(self.plant.num_positions()))
