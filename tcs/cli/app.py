@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tcs.cli import talk
+from tcs.cli import reports, talk
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -19,18 +19,16 @@ app = typer.Typer(
 
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-_Place = Annotated[
-    tuple[float, float, float] | None,
-    typer.Option(
-        "--here",
-        metavar="X Y YAW_DEG",
-        help="Where the robot is now, in the environment frame (m, m, deg).",
-    ),
-]
+_HERE = typer.Option(
+    "--here",
+    metavar="X Y YAW_DEG",
+    help="Where the robot is now, in the environment frame (m, m, deg).",
+)
 _Torso = Annotated[float, typer.Option(help="How high the torso is now, in metres.")]
 _Members = Annotated[
     int, typer.Option(min=1, max=2, help="At most so many places to stand at: 1 or 2.")
 ]
+_SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
 
 
 def main() -> None:
@@ -54,13 +52,7 @@ def list_known(as_json: _Json = False) -> None:
     """List the tasks, environments and robots there are."""
     from tcs.cli.catalogue import catalogue
 
-    known = catalogue()
-    if as_json:
-        talk.print_json(known)
-        return
-    from tcs.cli.reports import report_catalogue
-
-    report_catalogue(known)
+    talk.print_result(catalogue(), reports.report_catalogue, as_json=as_json)
 
 
 @app.command()
@@ -99,25 +91,13 @@ def score(
         )
         tcs.save(path, file)
     result = {**tcs.summary(file), "file": str(path)}
-    if as_json:
-        talk.print_json(result)
-        return
-    from tcs.cli.reports import report_scores
-
-    report_scores(result)
+    talk.print_result(result, reports.report_scores, as_json=as_json)
 
 
 @app.command()
 def select(
     file: _File,
-    here: Annotated[
-        tuple[float, float, float],
-        typer.Option(
-            "--here",
-            metavar="X Y YAW_DEG",
-            help="Where the robot is now, in the environment frame (m, m, deg).",
-        ),
-    ],
+    here: Annotated[tuple[float, float, float], _HERE],
     torso: _Torso = 0.0,
     at: Annotated[
         list[str] | None,
@@ -158,13 +138,8 @@ def select(
         ),
         max_members=max_members,
     )
-    from tcs.cli.reports import choice_as_json, report_choice
-
-    result = choice_as_json(choice)
-    if as_json:
-        talk.print_json(result)
-    else:
-        report_choice(result)
+    result = reports.choice_as_json(choice)
+    talk.print_result(result, reports.report_choice, as_json=as_json)
 
 
 @app.command()
@@ -183,47 +158,51 @@ def verify(
     loaded = tcs.load(file)
     with talk.progress_bar("pairs") as on_progress:
         found = tcs.verify(loaded, pairs=pairs, dense=dense, seed=seed, on_progress=on_progress)
-    if as_json:
-        talk.print_json(found.to_json())
-    else:
-        from tcs.cli.reports import report_verification
-
-        report_verification(found.to_json(), sound=found.is_sound)
+    talk.print_result(
+        found.to_json(),
+        lambda result: reports.report_verification(result, sound=found.is_sound),
+        as_json=as_json,
+    )
     if not found.is_sound:
         talk.say(f"some answers in '{file}' are false; do not use them.")
         raise typer.Exit(1)
 
 
-@app.command("map")
-def draw_map(
+@app.command(
+    "picture",
+    help="Draw the robot where it is to stand, its arm at a goal, from its collision shapes.\n\n"
+    + _SHOWN_SET,
+)
+@app.command(
+    "map",
+    help="Draw the best score per base place, from above, and where the chosen members stand.\n\n"
+    + _SHOWN_SET,
+)
+def draw(
+    context: typer.Context,
     file: _File,
     out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
-    here: _Place = None,
+    here: Annotated[tuple[float, float, float] | None, _HERE] = None,
     torso: _Torso = 0.0,
     max_members: _Members = 2,
     as_json: _Json = False,
 ) -> None:
-    """Draw the best score per base place, from above, and where the chosen members stand.
+    """Draw one of the two pictures, of the set chosen from here or of the best one."""
+    import tcs
+    from tcs.cli.places import check_writable, place
+    from tcs.draw import check_format, save_figure
 
-    With --here the set chosen from there, else the one with the best scores.
-    """
-    _draw(file, out, here, torso, max_members, as_json, "map_figure")
+    check_format(out)
+    check_writable(out)
+    loaded = tcs.load(file)
 
+    from tcs.cli import pictures
 
-@app.command("picture")
-def draw_picture(
-    file: _File,
-    out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
-    here: _Place = None,
-    torso: _Torso = 0.0,
-    max_members: _Members = 2,
-    as_json: _Json = False,
-) -> None:
-    """Draw the robot where it is to stand, its arm at a goal, from its collision shapes.
-
-    With --here the set chosen from there, else the one with the best scores.
-    """
-    _draw(file, out, here, torso, max_members, as_json, "scene_figure")
+    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members)
+    figure = pictures.map_figure if context.info_name == "map" else pictures.scene_figure
+    save_figure(out, figure(loaded, shown))
+    result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
+    talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
 
 
 @app.command()
@@ -246,36 +225,7 @@ def export(
 
     frame = score_frame(loaded, everything=everything)
     write_csv(out, frame)
-    if as_json:
-        talk.print_json({"file": str(out), "rows": len(frame), "columns": list(frame.columns)})
-    else:
-        typer.echo(f"wrote {out}: {len(frame):,} rows")
-
-
-def _draw(
-    file: Path,
-    out: Path,
-    here: tuple[float, float, float] | None,
-    torso: float,
-    max_members: int,
-    as_json: bool,
-    kind: str,
-) -> None:
-    """Write one of the two pictures, of the set chosen from here or of the best one."""
-    import tcs
-    from tcs.cli.places import check_writable, place
-    from tcs.draw import check_format, save_figure
-
-    check_format(out)
-    check_writable(out)
-    loaded = tcs.load(file)
-
-    from tcs.cli import pictures
-
-    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members)
-    save_figure(out, getattr(pictures, kind)(loaded, shown))
-    members = [member.to_json() for member in shown.members]
-    if as_json:
-        talk.print_json({"file": str(out), "members": members})
-    else:
-        typer.echo(f"wrote {out}")
+    result = {"file": str(out), "rows": len(frame), "columns": list(frame.columns)}
+    talk.print_result(
+        result, lambda _: typer.echo(f"wrote {out}: {len(frame):,} rows"), as_json=as_json
+    )

@@ -24,10 +24,10 @@ from tcs.kernel.arrays import BOX
 from tcs.scene import Scene, goal_poses
 from tcs.scene.contacts import Group, Part, shape_of
 from tcs.scene.environment import FLOOR
-from tcs.scoring import Job, load_job
+from tcs.scoring import Job, reopen
 from tcs.select import select
 from tcs.space import Grid
-from tcs.store import ScoreFile, check_scene
+from tcs.store import ScoreFile
 from tcs.tables import InitialConfiguration
 
 _STICK = (0.03, 0.004, 0.004)
@@ -76,7 +76,7 @@ def map_figure(file: ScoreFile, shown: Shown) -> Figure:
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = _stage(file)
+    job, scene, _ = reopen(file)
     base = _base_outline(scene)
     _set_room(scene, job.grid, shown.members)
     return draw_map(
@@ -101,17 +101,9 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
             "Nothing to draw: no goal is reached from any initial configuration. `tcs map` shows "
             "where the robot can stand at all."
         )
-    job, scene = _stage(file)
+    job, scene, _ = reopen(file)
     views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
     return draw_scene(views, title=f"{_title(job)}\n{shown.subtitle}")
-
-
-def _stage(file: ScoreFile) -> tuple[Job, Scene]:
-    """Return what a file was scored from, and its scene; refuse other models than those."""
-    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
-    scene = job.scene()
-    check_scene(file, job.lowered(scene).digest())
-    return job, scene
 
 
 def _title(job: Job) -> str:

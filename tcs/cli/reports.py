@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.table import Table
 
 from tcs.cli.talk import paper
-from tcs.select import Choice
+
+if TYPE_CHECKING:
+    # Listing what ships has no use for the arrays of a choice.
+    from tcs.select import Choice
 
 _REASONS = {
     "reached": "reached",

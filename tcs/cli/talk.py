@@ -75,9 +75,20 @@ def say(text: str) -> None:
     typer.echo(f"tcs: {text}", err=True)
 
 
-def print_json(result: dict[str, Any]) -> None:
-    """Print a result as one JSON object."""
-    typer.echo(json.dumps(result, indent=2))
+def print_result(
+    result: dict[str, Any], report: Callable[[dict[str, Any]], None], *, as_json: bool
+) -> None:
+    """Print a result, as one JSON object or for a person.
+
+    Args:
+        result: Plain containers.
+        report: Prints it for a person.
+        as_json: Whether one JSON object is asked for.
+    """
+    if as_json:
+        typer.echo(json.dumps(result, indent=2))
+    else:
+        report(result)
 
 
 def paper() -> Console:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tcs.scoring.job import Job, load_job, score, summary
+from tcs.scoring.reopen import reopen
 from tcs.scoring.sets import build_sets
 from tcs.scoring.sweep import Sweep, sweep, warm_up
 from tcs.scoring.verify import Verification, verify
@@ -13,6 +14,7 @@ __all__ = [
     "Verification",
     "build_sets",
     "load_job",
+    "reopen",
     "score",
     "summary",
     "sweep",

@@ -16,8 +16,9 @@ from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.reference import isotropy
 from tcs.scene import Scene, goal_poses
-from tcs.scoring.job import Job, load_job
-from tcs.store import ScoreFile, check_scene
+from tcs.scoring.job import Job
+from tcs.scoring.reopen import reopen
+from tcs.store import ScoreFile
 from tcs.tables import Reason, ScoreTable
 
 POSITION_BAR = 1e-6
@@ -113,10 +114,7 @@ def verify(
     """
     if pairs < 0 or dense < 0:
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
-    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
-    scene = job.scene()
-    lowered = job.lowered(scene)
-    check_scene(file, lowered.digest())
+    job, scene, lowered = reopen(file)
     rng = np.random.default_rng(seed)
     reason = file.scores.reason
     reached = _sample(rng, reason == Reason.REACHED, pairs)

@@ -1,0 +1,22 @@
+"""Build again what a score file was scored from."""
+
+from __future__ import annotations
+
+from tcs.scene import LoweredScene, Scene
+from tcs.scoring.job import Job, load_job
+from tcs.store import ScoreFile, check_scene
+
+
+def reopen(file: ScoreFile) -> tuple[Job, Scene, LoweredScene]:
+    """Return the job a file was scored from, its live scene, and that scene as arrays.
+
+    Raises:
+        UnknownNameError: If its task, environment or robot is not known here.
+        DataFileError: If a file that it names cannot be used.
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
+    scene = job.scene()
+    lowered = job.lowered(scene)
+    check_scene(file, lowered.digest())
+    return job, scene, lowered
