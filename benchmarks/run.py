@@ -98,7 +98,7 @@ def lowered_times(options: argparse.Namespace) -> None:
         for jobs, taken in times.items():
             swept = sweep(lowered, job.task.weights, jobs=jobs)
             taken.append(swept.scoring_seconds)
-    scores = swept.scores
+    scores = swept.tables[0]
     row("configurations x goals", f"{scores.configurations} x {scores.goals}")
     row("reasons", ", ".join(f"{name} {n}" for name, n in scores.reason_counts().items()))
     for jobs, taken in times.items():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from tcs.space import Grid
-from tcs.store import ScoreFile
+from tcs.store import Scored, ScoreFile, shown_state
 from tcs.tables import Reason
 from tcs.writing import whole_file
 
@@ -21,13 +22,24 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
         everything: Also the configurations that reach no goal.
 
     Returns:
-        Columns: the axes of the grid (angles as `..._deg`), `reachability` (P_R),
-        `manipulability` (P_M), and for each goal g `reason_g` and `isotropy_g`.
+        Columns: the observed axes and the axes of the grid (angles as `..._deg`), `reachability`
+        (P_R), `manipulability` (P_M), and for each goal g `reason_g` and `isotropy_g`. The flat
+        indices start again for each observed state.
     """
-    grid, scores = Grid.from_dict(file.grid), file.scores
-    rows = np.arange(grid.size) if everything else file.sets.candidates
+    states = zip(file.observed_states, file.tables, strict=True)
+    frames = [_frame(file, state, table, everything) for state, table in states]
+    return pd.concat(frames) if len(frames) > 1 else frames[0]
+
+
+def _frame(
+    file: ScoreFile, state: Mapping[str, float], table: Scored, everything: bool
+) -> pd.DataFrame:
+    """Return the rows of one table."""
+    grid, scores = Grid.from_dict(file.grid), table.scores
+    rows = np.arange(grid.size) if everything else table.sets.candidates
     values = grid.values(rows)
-    columns: dict[str, object] = {
+    columns: dict[str, object] = dict(shown_state(file.observed_axes, state))
+    columns |= {
         (f"{axis.name}_deg" if axis.unit == "deg" else axis.name): (
             np.degrees(values[axis.name]) if axis.unit == "deg" else values[axis.name]
         )

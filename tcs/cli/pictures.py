@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from tcs.scene import Scene, goal_poses
 from tcs.scene.contacts import Group, Part, shape_of
 from tcs.scene.environment import FLOOR
 from tcs.scoring import Job, reopen
-from tcs.select import select
+from tcs.select import nearest_table, select
 from tcs.space import Grid
 from tcs.store import ScoreFile
 from tcs.tables import InitialConfiguration
@@ -44,14 +45,31 @@ class Shown:
     """Its members in the order of the tour; none when no goal is reached from anywhere."""
     indices: tuple[int, ...]
     """Their flat configuration indices."""
+    table: int
+    """Number of the file's table it is a set of."""
     subtitle: str
     """Its scores, for a person."""
 
     @classmethod
-    def of(cls, file: ScoreFile, here: InitialConfiguration | None, max_members: int = 2) -> Shown:
-        """Return the set to choose from here, or the best one when `here` is None."""
+    def of(
+        cls,
+        file: ScoreFile,
+        here: InitialConfiguration | None,
+        max_members: int = 2,
+        observed: Mapping[str, float] | None = None,
+    ) -> Shown:
+        """Return the set to choose from here, or the best one when `here` is None.
+
+        Args:
+            file: A score file.
+            here: The current state.
+            max_members: Most members of the set.
+            observed: How the person is found: values of the observed axes [m or rad].
+        """
+        table = nearest_table(file, here, observed).index
+        sets = file.tables[table].sets
         if here is not None:
-            choice = select(file, here, max_members=max_members)
+            choice = select(file, here, max_members=max_members, observed=observed)
             members = tuple(choice.members[i] for i in choice.order)
             indices = tuple(choice.indices[i] for i in choice.order)
             what = (
@@ -59,15 +77,15 @@ class Shown:
                 f"travel cost {choice.cost:.2f}"
             )
         else:
-            indices = file.sets.best if max_members > 1 else file.sets.best_single
+            indices = sets.best if max_members > 1 else sets.best_single
             grid = Grid.from_dict(file.grid)
             members = tuple(grid.configuration(h) for h in indices)
             what = "best set"
         if not members:
-            return cls(None, (), (), "no goal is reached from anywhere")
-        reachability, manipulability = file.sets.scores_of(tuple(sorted(indices)))
+            return cls(None, (), (), table, "no goal is reached from anywhere")
+        reachability, manipulability = sets.scores_of(tuple(sorted(indices)))
         said = f"reaches {reachability:.0%} of the goals, manipulability {manipulability:.3f}"
-        return cls(here, members, indices, f"{what}: {said}")
+        return cls(here, members, indices, table, f"{what}: {said}")
 
 
 def map_figure(file: ScoreFile, shown: Shown) -> Figure:
@@ -76,11 +94,11 @@ def map_figure(file: ScoreFile, shown: Shown) -> Figure:
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene, _ = reopen(file)
+    job, scene = _stage(file, shown)
     base = _base_outline(scene)
-    _set_room(scene, job.grid, shown.members)
+    _set_room(scene, shown.members)
     return draw_map(
-        PlaceMap.of(file.scores, job.grid),
+        PlaceMap.of(file.tables[shown.table].scores, job.grid),
         _room(scene, job),
         [Stand(member, base) for member in shown.members],
         here=Stand(shown.here, base) if shown.here is not None else None,
@@ -101,16 +119,24 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
             "Nothing to draw: no goal is reached from any initial configuration. `tcs map` shows "
             "where the robot can stand at all."
         )
-    job, scene, _ = reopen(file)
+    job, scene = _stage(file, shown)
     views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
     return draw_scene(views, title=f"{_title(job)}\n{shown.subtitle}")
+
+
+def _stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
+    """Return what a file was scored from, and its scene; refuse other models than those."""
+    job, scene, _ = reopen(file)
+    for name, value in file.observed_states[shown.table].items():
+        scene.set_joint(name, value)
+    return job, scene
 
 
 def _title(job: Job) -> str:
     return f"{job.task.title} · {job.spec.environment.title} · {job.spec.robot.title}"
 
 
-def _set_room(scene: Scene, grid: Grid, members: tuple[InitialConfiguration, ...]) -> None:
+def _set_room(scene: Scene, members: tuple[InitialConfiguration, ...]) -> None:
     """Set the room as the first member wants it."""
     for name, value in members[0].environment if members else ():
         scene.set_joint(name, value)
@@ -119,13 +145,14 @@ def _set_room(scene: Scene, grid: Grid, members: tuple[InitialConfiguration, ...
 def _view(file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int) -> View:
     """Return the view of one member."""
     member, h = shown.members[number], shown.indices[number]
-    isotropy = file.scores.isotropy[list(shown.indices)]
+    scores = file.tables[shown.table].scores
+    isotropy = scores.isotropy[list(shown.indices)]
     serves = np.flatnonzero((isotropy.argmax(axis=0) == number) & (isotropy[number] > 0.0))
-    _set_room(scene, job.grid, (member,))
+    _set_room(scene, (member,))
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)
     current = int(serves[np.argmax(isotropy[number, serves])]) if serves.size else None
-    joints = file.scores.joints_of(h, current) if current is not None else None
+    joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)
     solids = [*_robot(scene), *_room(scene, job), *_goals(scene, job, current)]

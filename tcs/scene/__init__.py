@@ -10,6 +10,7 @@ from tcs.scene.environment import (
     environment_names,
     load_environment,
 )
+from tcs.scene.frames import body_frame_places
 from tcs.scene.lowering import LoweredScene, goal_poses, lower
 from tcs.scene.scene import Contact, Scene
 from tcs.scene.spec import SceneSpec
@@ -23,6 +24,7 @@ __all__ = [
     "Obstacle",
     "Scene",
     "SceneSpec",
+    "body_frame_places",
     "environment_names",
     "goal_poses",
     "load_environment",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
+from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -17,14 +19,15 @@ from tcs.scene import (
     LoweredScene,
     Scene,
     SceneSpec,
+    body_frame_places,
     environment_names,
     load_environment,
     lower,
 )
 from tcs.scoring.sets import build_sets
 from tcs.scoring.sweep import sweep
-from tcs.space import Grid
-from tcs.store import ScoreFile
+from tcs.space import Axis, Grid
+from tcs.store import Scored, ScoreFile, shown_state
 from tcs.tasks import Task, load_task
 
 MEASURE = "isotropy"
@@ -38,6 +41,19 @@ class Job:
     task: Task
     spec: SceneSpec
     grid: Grid
+    """What can be chosen."""
+    observed: tuple[Axis, ...] = ()
+    """What can only be observed: each state of these axes gets a table of its own."""
+
+    @property
+    def scored_grid(self) -> Grid:
+        """Everything that is scored: the grid once for each observed state, in C order."""
+        return Grid((*self.observed, *self.grid.axes))
+
+    @property
+    def tables(self) -> int:
+        """How many observed states there are."""
+        return math.prod(axis.count for axis in self.observed)
 
     def scene(self) -> Scene:
         """Return a new live scene in which this task's allowed contacts are allowed."""
@@ -45,7 +61,7 @@ class Job:
 
     def lowered(self, scene: Scene) -> LoweredScene:
         """Return the scene as arrays."""
-        return lower(scene, self.task, self.grid)
+        return lower(scene, self.task, self.scored_grid)
 
 
 def load_job(
@@ -75,7 +91,7 @@ def load_job(
     changes = task.grid_changes(environment.name)
     if changes:
         grid = grid.overridden(changes, where=f"task '{task.name}'")
-    return Job(task, SceneSpec(robot, environment), grid)
+    return Job(task, SceneSpec(robot, environment), grid, environment.observed_axes)
 
 
 def score(
@@ -110,12 +126,21 @@ def score(
     """
     begun = time.perf_counter()
     job = load_job(task, environment, robot)
-    lowered = job.lowered(job.scene())
+    scene = job.scene()
+    lowered = job.lowered(scene)
     swept = sweep(
-        lowered, job.task.weights, jobs=jobs, on_progress=on_progress, on_compile=on_compile
+        lowered,
+        job.task.weights,
+        tables=job.tables,
+        jobs=jobs,
+        on_progress=on_progress,
+        on_compile=on_compile,
     )
     sets_begun = time.perf_counter()
-    sets = build_sets(swept.scores, job.grid, min_distance=min_distance, jobs=jobs)
+    tables = tuple(
+        Scored.of(scores, build_sets(scores, job.grid, min_distance=min_distance, jobs=jobs))
+        for scores in swept.tables
+    )
     done = time.perf_counter()
     return ScoreFile(
         metadata={
@@ -138,8 +163,9 @@ def score(
         robot=job.spec.robot.model_dump(mode="json"),
         environment=job.spec.environment.model_dump(mode="json"),
         grid=job.grid.to_dict(),
-        scores=swept.scores,
-        sets=sets,
+        observed=[axis.to_dict() for axis in job.observed],
+        body_frames=body_frame_places(scene, job.scored_grid),
+        tables=tables,
     )
 
 
@@ -174,32 +200,47 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
 def summary(file: ScoreFile) -> dict[str, Any]:
     """Return the figures of a score file that a person wants to see first.
 
-    The keys are those of `tcs score --json`, except the name of the file.
+    Counts are those of all tables together. The best sets are those of the nominal table: the
+    person where they belong. The keys are those of `tcs score --json`, except the name of the
+    file.
     """
-    scores, sets, timings = file.scores, file.sets, file.metadata["timings"]
+    timings = file.metadata["timings"]
+    reasons: Counter[str] = Counter()
+    for table in file.tables:
+        reasons.update(table.scores.reason_counts())
+    pairs = sum(reasons.values())
+    goals = file.nominal.sets.weights.size
     return {
-        "configurations": scores.configurations,
-        "goals": scores.goals,
-        "pairs": scores.configurations * scores.goals,
-        "reached_pairs": int(scores.reached.sum()),
+        "configurations": pairs // goals,
+        "goals": goals,
+        "pairs": pairs,
+        "reached_pairs": reasons["reached"],
         "scoring_seconds": timings["scoring_seconds"],
         "compile_seconds": timings["compile_seconds"],
         "sets_seconds": timings["sets_seconds"],
         "total_seconds": timings["total_seconds"],
-        "candidates": len(sets.candidates),
-        "sets": sets.sets,
-        "best": _set_summary(file, sets.best),
-        "best_single": _set_summary(file, sets.best_single),
-        "reasons": scores.reason_counts(),
+        "candidates": sum(len(table.sets.candidates) for table in file.tables),
+        "sets": sum(table.sets.sets for table in file.tables),
+        "best": _set_summary(file, file.nominal.sets.best),
+        "best_single": _set_summary(file, file.nominal.sets.best_single),
+        "reasons": dict(reasons),
+        "tables": [
+            {
+                "observed": shown_state(file.observed_axes, state),
+                "candidates": len(table.sets.candidates),
+                "sets": table.sets.sets,
+            }
+            for state, table in zip(file.observed_states, file.tables, strict=True)
+        ],
     }
 
 
 def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | None:
-    """Return scores and members of a set; None when no goal is reached anywhere."""
+    """Return scores and members of a set of the nominal table; None when no goal is reached."""
     if not members:
         return None
     grid = Grid.from_dict(file.grid)
-    reachability, manipulability = file.sets.scores_of(members)
+    reachability, manipulability = file.nominal.sets.scores_of(members)
     return {
         # Seven sevenths add up to 1 only after rounding.
         "reachability": round(reachability, 12),

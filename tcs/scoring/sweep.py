@@ -25,7 +25,8 @@ moves, and scratch memory that stays in the processor's cache."""
 class Sweep:
     """The scores of a grid, and what they cost."""
 
-    scores: ScoreTable
+    tables: tuple[ScoreTable, ...]
+    """The grid's configurations, cut into as many tables as were asked for."""
     compile_seconds: float
     """Compiling the kernel, or loading its machine code."""
     scoring_seconds: float
@@ -36,6 +37,7 @@ def sweep(
     lowered: LoweredScene,
     weights: NDArray[np.float64],
     *,
+    tables: int = 1,
     jobs: int = 2,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
@@ -45,6 +47,8 @@ def sweep(
     Args:
         lowered: The scene.
         weights: Weights of the goals, sum 1, shape (goals,).
+        tables: How many equal parts to cut the scores into, e.g. one for each observed state
+            when the observed axes are the outermost of the grid.
         jobs: Number of threads; the scores do not depend on it.
         on_progress: Called with configurations done and in all.
         on_compile: Called first, when no earlier run has left machine code on this machine.
@@ -77,16 +81,22 @@ def sweep(
         if on_progress is not None:
             on_progress(done, size)
     scoring_seconds = time.perf_counter() - begun
-    pair, names = _named(contact, lowered, problem)
-    scores = ScoreTable(
-        isotropy=isotropy,
-        reason=reason,
-        pair=pair,
-        pair_names=names,
-        arm_joints=np.concatenate(joints) if joints else np.empty((0, 7), np.float32),
-        weights=np.asarray(weights, dtype=np.float64),
+    names = _name_contacts(contact, lowered, problem)
+    winning = np.concatenate(joints) if joints else np.empty((0, 7), np.float32)
+    winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
+    parts = tuple(
+        ScoreTable(
+            isotropy=isotropy[rows],
+            reason=reason[rows],
+            pair=contact[rows],
+            pair_names=names,
+            arm_joints=winning[winners[i] : winners[i + 1]],
+            weights=np.asarray(weights, dtype=np.float64),
+        )
+        for i in range(tables)
+        for rows in [slice(i * size // tables, (i + 1) * size // tables)]
     )
-    return Sweep(scores, compile_seconds, scoring_seconds)
+    return Sweep(parts, compile_seconds, scoring_seconds)
 
 
 def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> float:
@@ -117,16 +127,17 @@ def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int)
     return scores
 
 
-def _named(
+def _name_contacts(
     contact: NDArray[np.int32], lowered: LoweredScene, problem: Problem
-) -> tuple[NDArray[np.int32], tuple[tuple[str, str], ...]]:
-    """Return contact codes as indices into a list of pairs of names, and the list."""
-    codes, index = np.unique(contact, return_inverse=True)
+) -> tuple[tuple[str, str], ...]:
+    """Turn contact codes, in place, into indices of the returned pairs of names."""
     others = problem.room_bodies + problem.robot_bodies
     both = (*lowered.room_bodies, *lowered.robot_bodies)
-    names = tuple(
-        (lowered.robot_bodies[code // others], both[code % others]) for code in codes if code >= 0
-    )
-    # NO_CONTACT, -1, sorts first when it is there at all.
-    first = int(np.any(codes < 0))
-    return (index.reshape(contact.shape) - first).astype(np.int32), names
+    # A place for every code, NO_CONTACT (-1) last, where a negative index finds it.
+    there = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
+    there[contact] = True
+    codes = np.flatnonzero(there[:-1])
+    index = np.full(there.size, -1, dtype=np.int32)
+    index[codes] = np.arange(codes.size, dtype=np.int32)
+    np.take(index, contact, out=contact, mode="wrap")
+    return tuple((lowered.robot_bodies[code // others], both[code % others]) for code in codes)

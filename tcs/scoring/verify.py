@@ -18,8 +18,8 @@ from tcs.kernel.reference import isotropy
 from tcs.scene import Scene, goal_poses
 from tcs.scoring.job import Job
 from tcs.scoring.reopen import reopen
-from tcs.store import ScoreFile
-from tcs.tables import Reason, ScoreTable
+from tcs.store import Scored, ScoreFile
+from tcs.tables import Reason
 
 POSITION_BAR = 1e-6
 """Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
@@ -116,7 +116,7 @@ def verify(
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
     job, scene, lowered = reopen(file)
     rng = np.random.default_rng(seed)
-    reason = file.scores.reason
+    reason = np.concatenate([table.scores.reason for table in file.tables])
     reached = _sample(rng, reason == Reason.REACHED, pairs)
     unreached = [_sample(rng, reason == r, n) for r, n in _shares(reason, dense).items()]
     again = _sample(rng, reason == Reason.REACHED, dense)
@@ -127,13 +127,16 @@ def verify(
         if on_progress is not None:
             on_progress(next(count), total)
 
-    check = _Check(file.scores, build_problem(lowered.arrays, lowered.grid), _Judge(job, scene))
+    problem = build_problem(lowered.arrays, lowered.grid)
+    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene))
     findings = check.stored(reached, step)
     hits = [check.hits(part, step) for part in unreached]
     shortfall = check.shortfall(again, step)
     scanned, missed = [len(part) for part in unreached], [sum(part) for part in hits]
     sizes = [int(np.count_nonzero(reason == r)) for r in UNREACHED]
-    recall, interval = estimated_recall(int(file.scores.reached.sum()), sizes, scanned, missed)
+    recall, interval = estimated_recall(
+        int(np.count_nonzero(reason == Reason.REACHED)), sizes, scanned, missed
+    )
     return Verification(
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
@@ -152,23 +155,31 @@ def verify(
 
 
 Pairs = list[tuple[int, int]]
-"""Configurations and goals, (h, g)."""
+"""Configurations of all tables, counted on from one to the next, and goals: (h, g)."""
 
 
 @dataclass(frozen=True)
 class _Check:
     """The three kinds of checks on the scores of a file."""
 
-    scores: ScoreTable
+    tables: tuple[Scored, ...]
+    size: int
+    """Configurations in a table."""
     problem: Problem
     judge: _Judge
+
+    def isotropy(self, h: int, g: int) -> float:
+        """Return the stored isotropy."""
+        table, row = divmod(h, self.size)
+        return float(self.tables[table].scores.isotropy[row, g])
 
     def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
         """Return what Drake says of the stored solutions of reached pairs."""
         findings = []
         for h, g in pairs:
-            q = np.asarray(self.scores.joints_of(h, g), dtype=np.float64)
-            findings.append(self.judge.check(h, g, q, float(self.scores.isotropy[h, g])))
+            table, row = divmod(h, self.size)
+            q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
+            findings.append(self.judge.check(h, g, q, self.isotropy(h, g)))
             step()
         return findings
 
@@ -187,7 +198,7 @@ class _Check:
         short, q = [], np.empty(7)
         for h, g in pairs:
             value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
-            short.append(max(0.0, value - float(self.scores.isotropy[h, g])))
+            short.append(max(0.0, value - self.isotropy(h, g)))
             step()
         return short
 
@@ -279,12 +290,13 @@ class _Judge:
     def __init__(self, job: Job, scene: Scene) -> None:
         self._job, self._scene = job, scene
         self._lower, self._upper = scene.arm_limits
-        self._axes = [axis.name for axis in job.grid.environment_axes]
+        self._grid = job.scored_grid
+        self._axes = [axis.name for axis in self._grid.environment_axes]
 
     def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
         """Return what Drake finds at configuration h, goal g and joint angles q."""
         scene = self._scene
-        at = self._job.grid.values(np.array([h]))
+        at = self._grid.values(np.array([h]))
         scene.place_base(*(float(at[name][0]) for name in ("base_x", "base_y", "base_yaw")))
         scene.set_torso(float(at["torso"][0]))
         for name in self._axes:

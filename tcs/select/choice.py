@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from tcs.errors import SelectionError
+from tcs.select.observed import Match, nearest_table
 from tcs.select.search import PairIndex, best_pair
 from tcs.select.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.select.utility import UtilityWeights, utility
@@ -37,9 +39,10 @@ class SelectionTables:
     """The grid of initial configurations."""
 
     @classmethod
-    def of(cls, file: ScoreFile) -> SelectionTables:
-        """Return the tables of a loaded score file."""
-        return cls(file.sets, Grid.from_dict(file.grid))
+    def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
+        """Return one of the tables of a loaded score file, the nominal one by default."""
+        chosen = file.nominal if table is None else file.tables[table]
+        return cls(chosen.sets, Grid.from_dict(file.grid))
 
     @cached_property
     def index(self) -> PairIndex:
@@ -67,6 +70,8 @@ class Choice:
     """alpha P_R + beta P_M - gamma D, TCS eq. (5)."""
     seconds: float
     """How long choosing took [s]."""
+    match: Match | None = None
+    """Which table of the file was chosen from, and how far it is from what was observed."""
 
 
 def select(
@@ -76,6 +81,8 @@ def select(
     weights: UtilityWeights = _DEFAULT_WEIGHTS,
     travel: TravelWeights = _DEFAULT_TRAVEL,
     max_members: int = MOST_MEMBERS,
+    observed: Mapping[str, float] | None = None,
+    seen: Mapping[str, Sequence[float]] | None = None,
 ) -> Choice:
     """Return the stored set with the greatest utility from where the robot is.
 
@@ -88,6 +95,9 @@ def select(
         weights: alpha, beta, gamma.
         travel: What each kind of motion costs.
         max_members: 1 to choose a single configuration, 2 to allow a pair.
+        observed: How the person is found: values of the file's observed axes [m or rad]. The
+            table scored for the nearest values is used; what is not told counts as zero.
+        seen: The same told by places of body frames in W [m], by name.
 
     Raises:
         SelectionError: If no goal is reached from anywhere, the current state is not finite or
@@ -102,7 +112,17 @@ def select(
         raise SelectionError(
             f"At most {max_members} members asked for; sets of 1 to {MOST_MEMBERS} are stored."
         )
-    tables = SelectionTables.of(source) if isinstance(source, ScoreFile) else source
+    match = None
+    if isinstance(source, ScoreFile):
+        match = nearest_table(source, here, observed, seen)
+        tables = SelectionTables.of(source, match.index)
+    elif observed or seen:
+        raise SelectionError(
+            "Observations choose among the tables of a score file, but one table was given. "
+            "Give the file."
+        )
+    else:
+        tables = source
     sets = tables.sets
     if not len(sets.candidates):
         raise SelectionError(
@@ -116,7 +136,7 @@ def select(
     if max_members > 1 and len(sets.pair_cells):
         pair = best_pair(tables.index, legs, weights, float(singles[single]))
         rows = (pair.a, pair.b) if pair is not None else rows
-    return _choice(tables, legs, weights, rows, start)
+    return _choice(tables, legs, weights, rows, start, match)
 
 
 def _choice(
@@ -125,6 +145,7 @@ def _choice(
     weights: UtilityWeights,
     rows: tuple[int, ...],
     start: float,
+    match: Match | None,
 ) -> Choice:
     """Return the choice of the candidates with these numbers, begun at time `start`."""
     member = np.array(rows)
@@ -141,4 +162,5 @@ def _choice(
         cost=cost,
         utility=utility(reachability, manipulability, cost, weights),
         seconds=time.perf_counter() - start,
+        match=match,
     )

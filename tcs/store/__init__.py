@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from tcs.store.files import load_scores, save_scores
 from tcs.store.packing import FORMAT, FORMAT_VERSION
-from tcs.store.score_file import REQUIRED_METADATA, ScoreFile, check_scene
+from tcs.store.score_file import (
+    REQUIRED_METADATA,
+    Scored,
+    ScoreFile,
+    check_scene,
+    shown_state,
+)
 
 __all__ = [
     "FORMAT",
     "FORMAT_VERSION",
     "REQUIRED_METADATA",
     "ScoreFile",
+    "Scored",
     "check_scene",
     "load_scores",
     "save_scores",
+    "shown_state",
 ]

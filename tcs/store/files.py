@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
+import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import joblib
@@ -10,11 +13,8 @@ import joblib
 from tcs.store.packing import pack, unpack
 from tcs.store.reader import explained, read_joblib
 from tcs.store.score_file import ScoreFile
+from tcs.tables import ScoreTable
 from tcs.writing import whole_file
-
-COMPRESSION = ("zlib", 3)
-"""Arm joints are as good as random: higher levels and lzma take much longer for a few percent,
-and lzma also to load."""
 
 
 def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
@@ -28,9 +28,12 @@ def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
         OutputError: If it cannot be written there.
     """
     path = Path(path)
-    content = pack(file)
+    plain = io.BytesIO()
+    joblib.dump(pack(file), plain)
+    # Its large parts are folded already: level 0 adds a checksum over everything, and no more.
+    checked = zlib.compress(plain.getbuffer(), 0)
     with whole_file(path, "Score file") as stream:
-        joblib.dump(content, stream, compress=COMPRESSION)
+        stream.write(checked)
 
 
 def load_scores(path: str | os.PathLike[str]) -> ScoreFile:
@@ -47,4 +50,8 @@ def load_scores(path: str | os.PathLike[str]) -> ScoreFile:
     """
     path = Path(path)
     content = read_joblib(path)
-    return explained(path, lambda: unpack(content))
+
+    def explain(read: Callable[[], ScoreTable]) -> ScoreTable:
+        return explained(path, read)
+
+    return explained(path, lambda: unpack(content, explain))

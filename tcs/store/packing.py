@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
-from tcs.store.score_file import ScoreFile
-from tcs.tables import Reason, ScoreTable, SetTable
-from tcs.tables.sets import candidates_of
+from tcs.store.folding import fold, unfolded
+from tcs.store.score_file import DESCRIPTIONS, Scored, ScoreFile
+from tcs.tables import ScoreTable, SetTable
 
 FORMAT = "tcs scores"
 """What the file calls itself."""
 
-FORMAT_VERSION = 1
-"""Grows when older programs can no longer read a new file."""
+FORMAT_VERSION = 2
+"""Grows when the form of the file changes; other versions are refused."""
 
-_DESCRIPTIONS = ("metadata", "task", "robot", "environment", "grid")
+Explain = Callable[[Callable[[], ScoreTable]], ScoreTable]
+"""Calls a function and turns what it raises into one line about the file."""
 
 
 def pack(file: ScoreFile) -> dict[str, Any]:
@@ -26,17 +28,24 @@ def pack(file: ScoreFile) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        **{name: getattr(file, name) for name in _DESCRIPTIONS},
-        "scores": _packed_scores(file.scores),
-        "sets": _packed_sets(file.sets),
+        **{name: getattr(file, name) for name in DESCRIPTIONS},
+        "observed": file.observed,
+        "tables": [
+            {"sets": _packed_sets(table.sets), "scores": _packed_scores(table.scores)}
+            for table in file.tables
+        ],
     }
 
 
-def unpack(content: object) -> ScoreFile:
+def unpack(content: object, explain: Explain = lambda read: read()) -> ScoreFile:
     """Return the score file that was packed.
 
+    Args:
+        content: What `pack` returned.
+        explain: Called around the unfolding of scores, which waits until they are asked for.
+
     Raises:
-        StoreFormatError: If it is no score file, or of a version from the future.
+        StoreFormatError: If it is no score file, or of another version.
         TcsError: If its content contradicts itself.
     """
     content = _dict(content, "the file")
@@ -47,35 +56,53 @@ def unpack(content: object) -> ScoreFile:
         raise StoreFormatError("has no format version")
     if version > FORMAT_VERSION:
         raise StoreFormatError(
-            f"has format version {version}, and this program reads up to {FORMAT_VERSION}: "
+            f"has format version {version}, and this program reads version {FORMAT_VERSION}: "
             "update tcs"
         )
-    scores = _unpacked_scores(_dict(content.get("scores"), "scores"))
+    if version < FORMAT_VERSION:
+        raise StoreFormatError(
+            f"has format version {version} of an older tcs, and this program reads version "
+            f"{FORMAT_VERSION}"
+        )
     return ScoreFile(
-        **{name: _dict(content.get(name), name) for name in _DESCRIPTIONS},
-        scores=scores,
-        sets=_unpacked_sets(_dict(content.get("sets"), "sets"), scores),
+        **{name: _dict(content.get(name), name) for name in DESCRIPTIONS},
+        observed=_list(content, "observed"),
+        tables=tuple(
+            _unpacked_table(_dict(table, "table"), explain) for table in _list(content, "tables")
+        ),
     )
+
+
+def _unpacked_table(packed: dict[str, Any], explain: Explain) -> Scored:
+    """Return a table whose scores are unfolded when they are first asked for."""
+    sets = _unpacked_sets(_dict(packed.get("sets"), "sets"))
+    scores = _dict(packed.get("scores"), "scores")
+
+    def unfold() -> ScoreTable:
+        table = _unpacked_scores(scores, sets)
+        Scored(sets, lambda: table).check(table)
+        return table
+
+    return Scored(sets, lambda: explain(unfold))
 
 
 def _packed_scores(scores: ScoreTable) -> dict[str, Any]:
     return {
-        "reason": np.array(scores.reason),
-        "isotropy": scores.isotropy[scores.reached],
-        "pair_plus_one": _small(scores.pair.astype(np.int64) + 1),
+        "reason": fold(scores.reason),
+        "pair_plus_one": fold(_small(scores.pair.astype(np.int64) + 1)),
         "pair_names": [list(names) for names in scores.pair_names],
-        "arm_joints": _planes(scores.arm_joints),
-        "weights": np.array(scores.weights),
+        "arm_joints": fold(scores.arm_joints),
     }
 
 
-def _unpacked_scores(packed: dict[str, Any]) -> ScoreTable:
-    reason = _array(packed, "reason", "u1", 2)
-    reached = reason == Reason.REACHED
-    count = int(np.count_nonzero(reached))
+def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
+    goals = sets.weights.size
+    reason = unfolded(packed, "reason", "u1", (None, goals))
+    if len(sets.candidates) and sets.candidates[-1] >= len(reason):
+        raise StoreFormatError("has sets of more configurations than scores")
     isotropy = np.zeros(reason.shape, dtype=np.float32)
-    isotropy[reached] = _array(packed, "isotropy", "f4", 1, count)
-    pair = _array(packed, "pair_plus_one", "u", 2).astype(np.int64) - 1
+    isotropy[sets.candidates] = sets.isotropy
+    pair = unfolded(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
     names = packed.get("pair_names")
     if not isinstance(names, list) or not all(
         isinstance(n, list) and len(n) == 2 and all(isinstance(body, str) for body in n)
@@ -89,8 +116,8 @@ def _unpacked_scores(packed: dict[str, Any]) -> ScoreTable:
         reason=reason,
         pair=pair.astype(np.int32),
         pair_names=tuple((first, second) for first, second in names),
-        arm_joints=_from_planes(_array(packed, "arm_joints", "u1", 2, 4), 7),
-        weights=_array(packed, "weights", "f8", 1),
+        arm_joints=unfolded(packed, "arm_joints", "f4", (None, 7)),
+        weights=sets.weights,
     )
 
 
@@ -102,54 +129,68 @@ def _packed_sets(sets: SetTable) -> dict[str, Any]:
     return {
         "rule": sets.rule,
         "min_distance": float(sets.min_distance),
-        "cell": _small(sets.cell.astype(np.int64)),
-        "cell_xy": np.array(sets.cell_xy),
-        # Steps from one pair of cells to the next are mostly 1, and compress to nothing.
-        "pair_step": _small(np.diff(numbers, prepend=0)),
-        "pair_count": _small(sets.pair_count),
-        "reachability_values": values,
-        "reachability_code": _small(code.astype(np.int64)),
-        "pair_manipulability": np.array(sets.pair_manipulability),
-        "pair_sum": np.array(sets.pair_sum),
+        "weights": fold(sets.weights),
+        # Steps from one to the next are mostly small, and compress to little.
+        "candidate_step": fold(_steps(sets.candidates.astype(np.int64))),
+        "reached": fold(sets.reached.astype(np.uint8)),
+        "isotropy": fold(sets.isotropy[sets.reached]),
+        "cell": fold(_small(sets.cell.astype(np.int64))),
+        "cell_xy": fold(sets.cell_xy),
+        "pair_step": fold(_steps(numbers)),
+        "pair_count": fold(_small(sets.pair_count)),
+        "reachability_values": fold(values),
+        "reachability_code": fold(_small(code.astype(np.int64))),
+        "pair_manipulability": fold(sets.pair_manipulability),
+        "pair_sum": fold(sets.pair_sum),
         "best": list(sets.best),
         "best_single": list(sets.best_single),
     }
 
 
-def _unpacked_sets(packed: dict[str, Any], scores: ScoreTable) -> SetTable:
+def _unpacked_sets(packed: dict[str, Any]) -> SetTable:
     rule, min_distance = packed.get("rule"), packed.get("min_distance")
     if not isinstance(rule, str) or not isinstance(min_distance, float):
         raise StoreFormatError("has sets without a rule or a least distance")
-    candidates = candidates_of(scores.reached)
-    cell_xy = _array(packed, "cell_xy", "f8", 2)
-    values = _array(packed, "reachability_values", "f8", 1)
-    step = _array(packed, "pair_step", "u", 1)
-    kept = step.size
-    # Signed and summed in floating point first: forged steps must not wrap round to valid ones.
-    if step.sum(dtype=np.float64) > float(len(cell_xy)) ** 2:
-        raise StoreFormatError("has pairs of cells that do not exist")
-    numbers = np.cumsum(step.astype(np.int64))
-    code = _array(packed, "reachability_code", "u", 1, kept).astype(np.int64)
+    weights = unfolded(packed, "weights", "f8", (None,))
+    # A table has at most 20 million configurations: see `tcs.space.MAX_CONFIGURATIONS`.
+    candidates = _ascending(unfolded(packed, "candidate_step", "u", (None,)), 2**31, "candidates")
+    reached = unfolded(packed, "reached", "u1", (candidates.size, weights.size)) != 0
+    isotropy = np.zeros(reached.shape, dtype=np.float32)
+    isotropy[reached] = unfolded(packed, "isotropy", "f4", (int(np.count_nonzero(reached)),))
+    cell_xy = unfolded(packed, "cell_xy", "f8", (None, 2))
+    values = unfolded(packed, "reachability_values", "f8", (None,))
+    step = unfolded(packed, "pair_step", "u", (None,))
+    kept = (step.size,)
+    numbers = _ascending(step, len(cell_xy) ** 2 + 1, "pairs of cells")
+    code = unfolded(packed, "reachability_code", "u", kept).astype(np.int64)
     if np.any(code >= values.size):
         raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
     pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
     return SetTable(
         rule=rule,
         min_distance=min_distance,
-        weights=scores.weights,
-        candidates=candidates,
-        reached=scores.reached[candidates],
-        isotropy=scores.isotropy[candidates],
-        cell=_int32(_array(packed, "cell", "u", 1, candidates.size)),
+        weights=weights,
+        candidates=candidates.astype(np.int32),
+        reached=reached,
+        isotropy=isotropy,
+        cell=_int32(unfolded(packed, "cell", "u", candidates.shape)),
         cell_xy=cell_xy,
         pair_cells=pair_cells.astype(np.int32),
-        pair_count=_array(packed, "pair_count", "u", 1, kept).astype(np.int64),
+        pair_count=unfolded(packed, "pair_count", "u", kept).astype(np.int64),
         pair_reachability=values[code],
-        pair_manipulability=_array(packed, "pair_manipulability", "f4", 1, kept),
-        pair_sum=_array(packed, "pair_sum", "f4", 1, kept),
+        pair_manipulability=unfolded(packed, "pair_manipulability", "f4", kept),
+        pair_sum=unfolded(packed, "pair_sum", "f4", kept),
         best=_indices(packed, "best"),
         best_single=_indices(packed, "best_single"),
     )
+
+
+def _ascending(step: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
+    """Return the sums of steps, all of them below `end`."""
+    # Summed in floating point first: forged steps must not wrap round to valid ones.
+    if step.sum(dtype=np.float64) >= float(end):
+        raise StoreFormatError(f"has {what} that do not exist")
+    return np.cumsum(step.astype(np.int64))
 
 
 def _dict(value: object, what: str) -> dict[str, Any]:
@@ -158,20 +199,11 @@ def _dict(value: object, what: str) -> dict[str, Any]:
     return value
 
 
-def _array(
-    packed: dict[str, Any], name: str, kind: str, dimensions: int, length: int | None = None
-) -> NDArray[Any]:
-    """Return one array, checked: `kind` is an element type, or "u" for any unsigned one."""
-    array = packed.get(name)
-    if not isinstance(array, np.ndarray):
-        raise StoreFormatError(f"lacks the array '{name}'")
-    fits = array.dtype.kind == "u" if kind == "u" else array.dtype == np.dtype(kind)
-    if not fits or array.ndim != dimensions or (length is not None and len(array) != length):
-        raise StoreFormatError(
-            f"has an array '{name}' of type {array.dtype} and shape {array.shape}, which does not "
-            "belong there"
-        )
-    return array
+def _list(content: dict[str, Any], name: str) -> list[Any]:
+    value = content.get(name)
+    if not isinstance(value, list):
+        raise StoreFormatError(f"has no {name}")
+    return value
 
 
 def _indices(packed: dict[str, Any], name: str) -> tuple[int, ...]:
@@ -192,17 +224,6 @@ def _small(values: NDArray[np.int64]) -> NDArray[Any]:
     return values.astype(np.min_scalar_type(int(values.max(initial=0))))
 
 
-def _planes(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return the bytes of float32 values sorted by significance, shape (4, n).
-
-    Signs and exponents repeat and compress well once they stand together; mantissas do not.
-    """
-    return np.ascontiguousarray(values.astype("<f4").reshape(-1, 1).view(np.uint8).T)
-
-
-def _from_planes(planes: NDArray[np.uint8], columns: int) -> NDArray[np.float32]:
-    """Return the float32 values that `_planes` took apart, shape (n / columns, columns)."""
-    if planes.shape[1] % columns:
-        raise StoreFormatError(f"has arm joints that do not come in rows of {columns}")
-    values = np.ascontiguousarray(planes.T).view("<f4")
-    return values.astype(np.float32, copy=False).reshape(-1, columns)
+def _steps(ascending: NDArray[np.int64]) -> NDArray[Any]:
+    """Return the differences of ascending numbers, from 0."""
+    return _small(np.asarray(np.diff(ascending, prepend=0), dtype=np.int64))

@@ -22,11 +22,13 @@ def test_table_holds_the_scores(tcs_command, small_file, tmp_path):
         for name, value in grid.configuration(h).to_json().items():
             # Nine digits are written.
             assert row[name] == pytest.approx(value, rel=1e-8, abs=1e-12)
-        for g in range(file.scores.goals):
-            assert row[f"reason_{g}"] == Reason(file.scores.reason[h, g]).name.lower()
-            assert np.float32(row[f"isotropy_{g}"]) == file.scores.isotropy[h, g]
-    np.testing.assert_allclose(table["reachability"], file.scores.reachability(), rtol=1e-8)
-    np.testing.assert_allclose(table["manipulability"], file.scores.manipulability(), rtol=1e-8)
+        for g in range(file.nominal.scores.goals):
+            assert row[f"reason_{g}"] == Reason(file.nominal.scores.reason[h, g]).name.lower()
+            assert np.float32(row[f"isotropy_{g}"]) == file.nominal.scores.isotropy[h, g]
+    np.testing.assert_allclose(table["reachability"], file.nominal.scores.reachability(), rtol=1e-8)
+    np.testing.assert_allclose(
+        table["manipulability"], file.nominal.scores.manipulability(), rtol=1e-8
+    )
 
 
 def test_only_candidates_by_default(tcs_command, tmp_path):
@@ -36,8 +38,8 @@ def test_only_candidates_by_default(tcs_command, tmp_path):
     ran = tcs_command("export", stored, "--out", path)
     assert ran.code == 0
     table = pd.read_csv(path, index_col="configuration")
-    assert list(table.index) == file.sets.candidates.tolist()
-    assert 0 < len(table) < file.scores.configurations
+    assert list(table.index) == file.nominal.sets.candidates.tolist()
+    assert 0 < len(table) < file.nominal.scores.configurations
     assert f"{len(table):,} rows" in ran.out
 
 

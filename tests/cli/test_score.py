@@ -80,10 +80,10 @@ def test_score_on_a_real_scene(tcs_command, corner, tmp_path):
     assert (result["configurations"], result["goals"], result["pairs"]) == (36, 8, 288)
     assert result["file"] == str(path)
     file = tcs.load(path)
-    assert result["reached_pairs"] == int(file.scores.reached.sum()) > 0
+    assert result["reached_pairs"] == int(file.nominal.scores.reached.sum()) > 0
     assert sum(result["reasons"].values()) == 288
     assert set(result["best"]["members"][0]) == {"base_x", "base_y", "base_yaw_deg", "torso"}
-    singles = file.scores.reachability() + file.scores.manipulability()
+    singles = file.nominal.scores.reachability() + file.nominal.scores.manipulability()
     best = result["best_single"]
     # The report rounds each to twelve decimals.
     assert abs(best["reachability"] + best["manipulability"] - singles.max()) < 2e-12
@@ -96,8 +96,8 @@ def test_number_of_jobs_changes_nothing(tcs_command, corner, corner_file, tmp_pa
     ran = tcs_command("score", "shaving", "--environment", corner, "--jobs", 1, "--out", path)
     assert ran.code == 0
     one, two = tcs.load(path), tcs.load(corner_file)
-    np.testing.assert_array_equal(one.scores.isotropy, two.scores.isotropy)
-    np.testing.assert_array_equal(one.scores.arm_joints, two.scores.arm_joints)
+    np.testing.assert_array_equal(one.nominal.scores.isotropy, two.nominal.scores.isotropy)
+    np.testing.assert_array_equal(one.nominal.scores.arm_joints, two.nominal.scores.arm_joints)
 
 
 def test_verify_finds_a_sound_file_sound(tcs_command, corner_file):
@@ -109,15 +109,16 @@ def test_verify_finds_a_sound_file_sound(tcs_command, corner_file):
         *("max_isotropy_error", "limit_violations", "dense_checked", "missed", "recall"),
         *("recall_ci95", "mean_shortfall"),
     }
-    assert found["checked"] == min(20, int(tcs.load(corner_file).scores.reached.sum()))
+    assert found["checked"] == min(20, int(tcs.load(corner_file).nominal.scores.reached.sum()))
     assert found["false_reached"] == found["limit_violations"] == 0
 
 
 def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
     file = tcs.load(corner_file)
-    joints = file.scores.arm_joints.copy()
+    joints = file.nominal.scores.arm_joints.copy()
     joints[:, 0] += np.float32(0.01)
-    forged = dataclasses.replace(file, scores=dataclasses.replace(file.scores, arm_joints=joints))
+    scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
+    forged = dataclasses.replace(file, tables=(tcs.store.Scored.of(scores, file.nominal.sets),))
     path = tmp_path / "forged.tcs"
     tcs.save(path, forged)
     ran = tcs_command("verify", path, "--pairs", 5, "--dense", 0, "--json")

@@ -25,15 +25,15 @@ def test_a_small_room_is_reached_and_summed_up(small_file):
 
 def test_scores_do_not_depend_on_the_number_of_threads(small_job):
     lowered = small_job.lowered(small_job.scene())
-    one = sweep(lowered, small_job.task.weights, jobs=1).scores
-    two = sweep(lowered, small_job.task.weights, jobs=2).scores
+    one = sweep(lowered, small_job.task.weights, jobs=1).tables[0]
+    two = sweep(lowered, small_job.task.weights, jobs=2).tables[0]
     for name in ("reason", "isotropy", "pair", "arm_joints"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert one.pair_names == two.pair_names
 
 
 def test_blocked_pairs_name_the_bodies_in_contact(small_file):
-    scores = small_file.scores
+    scores = small_file.nominal.scores
     blocked = np.isin(scores.reason, (3, 5))
     assert blocked.any()
     assert np.all(scores.pair[blocked] >= 0)
@@ -58,7 +58,9 @@ def test_file_survives_the_disk(small_file, tmp_path):
     save_scores(path, small_file)
     again = load_scores(path)
     assert summary(again) == summary(small_file)
-    np.testing.assert_array_equal(again.scores.arm_joints, small_file.scores.arm_joints)
+    np.testing.assert_array_equal(
+        again.nominal.scores.arm_joints, small_file.nominal.scores.arm_joints
+    )
 
 
 def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_room, tmp_path):
@@ -67,11 +69,11 @@ def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_room, tmp_pa
         f"based_on: {small_room}\nname: cluttered\n"
         "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [0.9, -0.55, 0.45]}\n"
     )
-    cluttered = score("shaving", path).scores
-    assert cluttered.reached.sum() < small_file.scores.reached.sum()
+    cluttered = score("shaving", path).nominal.scores
+    assert cluttered.reached.sum() < small_file.nominal.scores.reached.sum()
     # Several convex parts: an obstacle may steer the search to a narrow free stretch that it had
     # no need to look for before, so a rare gain is possible; it must stay rare.
-    gained = cluttered.reached & ~small_file.scores.reached
+    gained = cluttered.reached & ~small_file.nominal.scores.reached
     assert gained.sum() <= 0.002 * cluttered.reached.sum()
 
 

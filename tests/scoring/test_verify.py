@@ -11,6 +11,7 @@ from tcs.errors import StoreMismatchError, TcsError
 from tcs.scoring import build_sets, load_job, verify
 from tcs.scoring.verify import estimated_recall
 from tcs.space import Grid
+from tcs.store import Scored
 
 
 def test_stored_answers_are_true(small_file):
@@ -25,10 +26,10 @@ def test_stored_answers_are_true(small_file):
 
 
 def with_joints(file, change):
-    joints = file.scores.arm_joints.copy()
+    joints = file.nominal.scores.arm_joints.copy()
     change(joints)
-    scores = dataclasses.replace(file.scores, arm_joints=joints)
-    return dataclasses.replace(file, scores=scores)
+    scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
+    return dataclasses.replace(file, tables=(Scored.of(scores, file.nominal.sets),))
 
 
 def test_a_joint_moved_by_a_hundredth_is_found(small_file):
@@ -74,7 +75,7 @@ def test_a_file_of_other_models_is_refused(small_file):
 
 def test_reached_pairs_taken_away_are_missed(small_file):
     # Declare every second reached pair blocked: the dense scan must find about all of them.
-    scores = small_file.scores
+    scores = small_file.nominal.scores
     reason, isotropy = scores.reason.copy(), scores.isotropy.copy()
     taken = np.argwhere(scores.reached)[::2]
     reason[taken[:, 0], taken[:, 1]] = 5
@@ -85,7 +86,8 @@ def test_reached_pairs_taken_away_are_missed(small_file):
         scores, reason=reason, isotropy=isotropy, arm_joints=scores.arm_joints[kept]
     )
     sets = build_sets(stripped, Grid.from_dict(small_file.grid))
-    found = verify(dataclasses.replace(small_file, scores=stripped, sets=sets), pairs=0, dense=60)
+    forged = dataclasses.replace(small_file, tables=(Scored.of(stripped, sets),))
+    found = verify(forged, pairs=0, dense=60)
     assert found.missed > 0
     assert found.recall < 0.9
     assert found.recall_ci95[0] <= found.recall <= found.recall_ci95[1]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from tcs.scoring.sets import build_sets
-from tcs.store import ScoreFile
+from tcs.store import Scored, ScoreFile
 from tests.tables.small import random_scores, small_grid
 
 METADATA = {
@@ -19,16 +21,22 @@ METADATA = {
 }
 
 
-def score_file(*, grid=None, share=0.4, **changes):
+SHIFT = {"name": "person_y", "unit": "m", "start": -0.05, "step": 0.05, "count": 3}
+"""An observed axis."""
+
+
+def score_file(*, grid=None, share=0.4, tables=1, **changes):
+    """Return a file with so many tables, each with other scores."""
     grid = grid or small_grid(nx=6, ny=4, bed=2)
-    scores = random_scores(grid, 5, seed=1, share=share)
+    scored = [random_scores(grid, 5, seed=1 + i, share=share) for i in range(tables)]
     parts = {
         "metadata": METADATA,
         "task": {"name": "shaving", "goals": [{"body_frame": "head", "position": (0.1, 0.0, 0.2)}]},
         "robot": {"name": "pr2"},
         "environment": {"name": "wheelchair", "wall": None, "obstacles": []},
         "grid": grid.to_dict(),
-        "scores": scores,
-        "sets": build_sets(scores, grid),
+        "observed": [],
+        "body_frames": {"head": [0.1] * (3 * tables * math.prod(grid.environment_shape))},
+        "tables": tuple(Scored.of(scores, build_sets(scores, grid)) for scores in scored),
     }
     return ScoreFile(**(parts | changes))

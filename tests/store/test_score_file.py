@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import GridError, StoreError, StoreMismatchError
-from tcs.store import check_scene
+from tcs.store import Scored, check_scene
 from tests.store.example import METADATA, score_file
 from tests.tables.small import random_scores, small_grid
 
@@ -25,14 +25,15 @@ def test_metadata_must_be_complete(key):
 
 def test_parts_must_belong_together():
     file = score_file()
-    with pytest.raises(StoreError, match="do not belong to a grid of 240"):
-        score_file(grid=small_grid(nx=6, ny=5, bed=2), scores=file.scores, sets=file.sets)
+    table = file.nominal
+    with pytest.raises(StoreError, match="more configurations than the grid has, 96"):
+        dataclasses.replace(file, grid=small_grid(nx=6, ny=4).to_dict(), body_frames={})
     others = random_scores(small_grid(nx=6, ny=4, bed=2), 5, seed=2)
     with pytest.raises(StoreError, match="sets do not belong to the scores"):
-        score_file(scores=others, sets=file.sets)
-    moved = dataclasses.replace(file.sets, cell_xy=file.sets.cell_xy + np.array([0.0, 0.05]))
+        Scored.of(others, table.sets)
+    moved = dataclasses.replace(table.sets, cell_xy=table.sets.cell_xy + np.array([0.0, 0.05]))
     with pytest.raises(StoreError, match="not those of the grid"):
-        score_file(sets=moved)
+        dataclasses.replace(file, tables=(Scored.of(table.scores, moved),))
     with pytest.raises(GridError):
         dataclasses.replace(file, grid={})
 

@@ -1,0 +1,91 @@
+"""Arrays folded small, one by one, so that each can be unfolded when it is needed."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import StoreFormatError
+
+LEVEL = 3
+"""Arm joints are as good as random: higher levels and lzma take much longer for a few percent,
+and lzma also to unfold."""
+
+MAX_BYTES = 2 * 1024**3
+"""Most bytes an array may unfold to: several times the largest, within a common machine."""
+
+_TYPES = ("u1", "u2", "u4", "u8", "f4", "f8")
+
+
+def fold(array: NDArray[Any]) -> dict[str, Any]:
+    """Return an array of numbers as plain containers around its compressed bytes."""
+    little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+    size = little.dtype.itemsize
+    # Bytes of equal significance together: signs and exponents repeat, mantissas do not.
+    planes = little.reshape(-1, 1).view(np.uint8).reshape(-1, size).T
+    folded = zlib.compress(planes.tobytes(), LEVEL)
+    return {
+        "type": f"{array.dtype.kind}{size}",
+        "shape": list(array.shape),
+        "bytes": np.frombuffer(folded, dtype=np.uint8),
+    }
+
+
+def unfolded(
+    packed: dict[str, Any], name: str, kind: str, shape: tuple[int | None, ...]
+) -> NDArray[Any]:
+    """Return the array that was folded and stored under a name, checked.
+
+    Args:
+        packed: The containers it is stored in.
+        name: Its name there.
+        kind: Its element type, or "u" for any unsigned one.
+        shape: Shape it must have, None where any length will do.
+
+    Raises:
+        StoreFormatError: If it is missing, damaged, or of another type or shape.
+    """
+    folded = packed.get(name)
+    if not isinstance(folded, dict):
+        raise StoreFormatError(f"lacks the array '{name}'")
+    found, said, data = folded.get("type"), folded.get("shape"), folded.get("bytes")
+    if (
+        found not in _TYPES
+        or not isinstance(said, list)
+        or not all(type(n) is int and 0 <= n <= MAX_BYTES for n in said)
+        or not isinstance(data, np.ndarray)
+        or data.dtype != np.uint8
+        or data.ndim != 1
+    ):
+        raise StoreFormatError(f"has an array '{name}' that is none")
+    fits = found[0] == "u" if kind == "u" else found == kind
+    if (
+        not fits
+        or len(said) != len(shape)
+        or any(n is not None and n != m for n, m in zip(shape, said, strict=True))
+    ):
+        raise StoreFormatError(
+            f"has an array '{name}' of type {found} and shape {said}, which does not belong there"
+        )
+    dtype = np.dtype(f"<{found}")
+    planes = np.frombuffer(_inflated(name, data, math.prod(said) * dtype.itemsize), dtype=np.uint8)
+    values = np.ascontiguousarray(planes.reshape(dtype.itemsize, -1).T).view(dtype)
+    return values.reshape(said).astype(dtype.newbyteorder("="), copy=False)
+
+
+def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
+    """Return the decompressed bytes, which must be as many as were said."""
+    if size > MAX_BYTES:
+        raise StoreFormatError(f"has an array '{name}' of {size} bytes; at most {MAX_BYTES}")
+    decompressor = zlib.decompressobj()
+    try:
+        inflated = decompressor.decompress(data.tobytes(), size + 1)
+    except (zlib.error, MemoryError) as error:
+        raise StoreFormatError(f"has a damaged array '{name}' ({error})") from None
+    if len(inflated) != size or not decompressor.eof or decompressor.unused_data:
+        raise StoreFormatError(f"has a damaged array '{name}' (not {size} bytes)")
+    return inflated
