@@ -37,17 +37,6 @@ def test_list_for_a_person(tcs_command):
         assert word in ran.out
 
 
-def test_list_loads_nothing_heavy(process):
-    heavy = ("pydrake", "numba", "matplotlib", "trimesh", "scipy")
-    before = (
-        "import atexit; atexit.register(lambda: print("
-        f"[m for m in {heavy} if m in sys.modules], file=sys.stderr))"
-    )
-    ran = process("list", "--json", before=before)
-    assert ran.code == 0
-    assert ran.err.strip() == "[]"
-
-
 def test_damaged_data_is_one_line(tcs_command, tmp_path, monkeypatch):
     for part in ("tasks/adl", "models/robots", "models/beds_wheelchairs"):
         (tmp_path / part).mkdir(parents=True)

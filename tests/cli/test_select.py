@@ -68,17 +68,6 @@ def test_select_for_a_person(tcs_command, small_file):
         assert word in ran.out
 
 
-def test_select_loads_neither_simulator_nor_compiler(process, small_file):
-    heavy = ("pydrake", "numba", "matplotlib")
-    before = (
-        "import atexit; atexit.register(lambda: print("
-        f"[m for m in {heavy} if m in sys.modules], file=sys.stderr))"
-    )
-    ran = process("select", small_file, *HERE, "--json", before=before)
-    assert ran.code == 0
-    assert ran.err.strip() == "[]"
-
-
 @pytest.mark.parametrize(
     "words",
     [
