@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tcs.tasks import task_names
+
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 DATA_PARTS = ("models", "tasks")
@@ -99,4 +101,4 @@ def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
         "print(data_folder()); print(*task_names()); print(len(load_task('shaving').goals))"
     )
     lines = run("-c", code, cwd=tmp_path, path=site).splitlines()
-    assert lines == [str(site / "tcs" / "_data"), "brushing feeding shaving", "8"]
+    assert lines == [str(site / "tcs" / "_data"), " ".join(task_names()), "8"]
