@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
-from tcs.errors import DataFileError, OutputError
+from tcs.errors import DataFileError, OutputError, UnknownNameError
 
 _PACKAGE = Path(__file__).resolve().parent
 _DATA_PARTS = ("models", "tasks")
@@ -23,6 +24,49 @@ def data_folder() -> Path:
         DataFileError: If neither place holds both folders.
     """
     return _data_folder_of(_PACKAGE)
+
+
+def shipped_files(pattern: str) -> dict[str, Path]:
+    """Return the data files that ship with `tcs`, by name, sorted.
+
+    Args:
+        pattern: Which ones, from the data folder, e.g. "models/robots/*.yaml".
+
+    Raises:
+        DataFileError: If there is no data folder.
+    """
+    files = {path.stem: path for path in data_folder().glob(pattern)}
+    return dict(sorted(files.items()))
+
+
+def named_file(
+    kind: str,
+    name_or_path: str | Path,
+    shipped: Mapping[str, Path],
+    *,
+    beside: Path | None = None,
+    where: str = "",
+) -> Path:
+    """Return the path of a data file.
+
+    Args:
+        kind: What is looked up, e.g. "robot".
+        name_or_path: Name of a file that ships with `tcs`, or a path: anything that ends in
+            `.yaml` or holds a path separator. Nothing checks that there is a file.
+        shipped: The files that ship, by name.
+        beside: Folder that a relative path starts from; None is the current one.
+        where: Where the name stood, for the message.
+
+    Raises:
+        UnknownNameError: If no file of that name ships.
+    """
+    text = str(name_or_path)
+    # Either separator: a path copied from another system is a path, not a name nobody knows.
+    if isinstance(name_or_path, Path) or text.endswith(".yaml") or "/" in text or "\\" in text:
+        return (beside or Path()) / Path(text).expanduser()
+    if text not in shipped:
+        raise UnknownNameError(kind, text, shipped, where=where)
+    return shipped[text]
 
 
 def cache_folder(*parts: str) -> Path:

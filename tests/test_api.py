@@ -1,11 +1,10 @@
 import doctest
 import importlib
-import subprocess
-import sys
 
 import pytest
 
 import tcs
+from tests.fresh import fresh
 from tests.store.example import score_file
 
 PROMISED = [
@@ -24,15 +23,6 @@ PROMISED = [
     "summary",
     "verify",
 ]
-
-
-def fresh(code: str) -> str:
-    """What a new interpreter prints."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
 
 
 def test_promise():

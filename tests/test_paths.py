@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 import tcs.paths
-from tcs.errors import DataFileError, OutputError
-from tcs.paths import cache_folder, data_folder
+from tcs.errors import DataFileError, OutputError, UnknownNameError
+from tcs.paths import cache_folder, data_folder, named_file, shipped_files
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -83,3 +83,46 @@ def test_importing_touches_no_folder(home, monkeypatch):
     monkeypatch.setenv("TCS_CACHE_DIR", str(home / "untouched"))
     runpy.run_path(str(tcs.paths.__file__))
     assert not (home / "untouched").exists()
+
+
+def test_shipped_files_are_found_by_name():
+    files = shipped_files("models/robots/*.yaml")
+    assert files["pr2"] == CHECKOUT / "models" / "robots" / "pr2.yaml"
+    assert list(files) == sorted(files)
+
+
+SHIPPED = {"bed": Path("/data/bed.yaml")}
+
+
+@pytest.mark.parametrize(
+    ("given", "path"),
+    [
+        ("bed", "/data/bed.yaml"),
+        ("bed.yaml", "bed.yaml"),
+        ("./bed", "bed"),
+        ("C:\\rooms\\bed", "C:\\rooms\\bed"),
+        ("/rooms/bed.yaml", "/rooms/bed.yaml"),
+        (Path("bed"), "bed"),
+        ("~/bed.yaml", "/home/of/user/bed.yaml"),
+    ],
+)
+def test_a_file_is_named_or_is_a_path(given, path, monkeypatch):
+    monkeypatch.setenv("HOME", "/home/of/user")
+    assert named_file("room", given, SHIPPED) == Path(path)
+
+
+def test_a_relative_path_may_start_beside_another_file():
+    assert named_file("room", "a.yaml", SHIPPED, beside=Path("/b")) == Path("/b/a.yaml")
+    assert named_file("room", "/a.yaml", SHIPPED, beside=Path("/b")) == Path("/a.yaml")
+    assert named_file("room", "bed", SHIPPED, beside=Path("/b")) == Path("/data/bed.yaml")
+
+
+def test_a_name_that_nothing_has_is_told_with_its_place():
+    with pytest.raises(UnknownNameError, match=r"^here: unknown room 'bad'.*Did you mean 'bed'\?"):
+        named_file("room", "bad", SHIPPED, where="here")
+
+
+def test_a_folder_inside_the_cache_is_made(tmp_path, monkeypatch):
+    monkeypatch.setenv("TCS_CACHE_DIR", str(tmp_path))
+    assert cache_folder("a", "b") == tmp_path / "a" / "b"
+    assert (tmp_path / "a" / "b").is_dir()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -11,7 +10,7 @@ from pydantic import Field, model_validator
 
 from tcs.documents import Document, Number, Placed, PositiveNumber, checked, read_mapping
 from tcs.errors import RobotError, UnknownNameError
-from tcs.paths import data_folder
+from tcs.paths import named_file, shipped_files
 from tcs.robots.packages import resolve_uri
 from tcs.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.robots.urdf import Urdf, read_urdf
@@ -228,7 +227,7 @@ def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:
 
 def robot_names() -> tuple[str, ...]:
     """Return the names of the robots that ship with `tcs`, sorted."""
-    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
+    return tuple(_shipped())
 
 
 def load_robot(name_or_path: str | Path) -> RobotFile:
@@ -244,7 +243,7 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     """
     from tcs.robots.checks import check_robot
 
-    path = _path_of(str(name_or_path))
+    path = named_file("robot", name_or_path, _shipped()).resolve()
     where = f"robot file '{path}'"
     content = read_mapping(path, where, RobotError, known=RobotFile.model_fields)
     for key in _FILES:
@@ -256,14 +255,5 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     return robot
 
 
-def _folder() -> Path:
-    return data_folder() / "models" / "robots"
-
-
-def _path_of(name_or_path: str) -> Path:
-    separators = [separator for separator in (os.sep, os.altsep) if separator]
-    if name_or_path.endswith(".yaml") or any(s in name_or_path for s in separators):
-        return Path(name_or_path).expanduser().resolve()
-    if name_or_path not in robot_names():
-        raise UnknownNameError("robot", name_or_path, robot_names())
-    return _folder() / f"{name_or_path}.yaml"
+def _shipped() -> dict[str, Path]:
+    return shipped_files("models/robots/*.yaml")

@@ -18,8 +18,8 @@ from tcs.documents import (
     checked,
     read_mapping,
 )
-from tcs.errors import EnvironmentFileError, GridError, UnknownNameError
-from tcs.paths import data_folder
+from tcs.errors import EnvironmentFileError, GridError
+from tcs.paths import data_folder, named_file, shipped_files
 from tcs.scene.posture import Posture
 from tcs.space import Axis, Grid
 
@@ -167,7 +167,7 @@ class EnvironmentFile(Document):
 
 def environment_names() -> tuple[str, ...]:
     """Return the names of the environments that ship with `tcs`, sorted."""
-    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
+    return tuple(_shipped())
 
 
 def load_environment(name_or_path: str | Path) -> EnvironmentFile:
@@ -186,12 +186,11 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
     >>> load_environment("wheelchair").body_frames["head"]
     'person::head_center'
     """
-    text = str(name_or_path)
-    if isinstance(name_or_path, Path) or _is_path(text):
-        return _read(Path(text).expanduser().absolute())
-    if text not in environment_names():
-        raise UnknownNameError("environment", text, environment_names())
-    return _read(_folder() / f"{text}.yaml")
+    return _read(named_file("environment", name_or_path, _shipped()).absolute())
+
+
+def _shipped() -> dict[str, Path]:
+    return shipped_files("models/beds_wheelchairs/*.yaml")
 
 
 def _folder() -> Path:
@@ -229,23 +228,14 @@ def _check_observed(environment: EnvironmentFile, where: str) -> None:
 def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> EnvironmentFile:
     """Return the environment that the file at `path` is based on."""
     chain = (*above, path)
-    if _is_path(name_or_path):
-        base = (path.parent / Path(name_or_path).expanduser()).absolute()
-    elif name_or_path in environment_names():
-        base = _folder() / f"{name_or_path}.yaml"
-    else:
-        where = f"environment file '{path}', field '{BASED_ON}'"
-        raise UnknownNameError("environment", name_or_path, environment_names(), where=where)
+    where = f"environment file '{path}', field '{BASED_ON}'"
+    base = named_file("environment", name_or_path, _shipped(), beside=path.parent, where=where)
+    base = base.absolute()
     if base.resolve() in [file.resolve() for file in chain]:
         raise EnvironmentFileError(
-            f"environment file '{path}', field '{BASED_ON}': '{name_or_path}' is based on this "
-            "file in turn. Name another one."
+            f"{where}: '{name_or_path}' is based on this file in turn. Name another one."
         )
     return _read(base, chain)
-
-
-def _is_path(text: str) -> bool:
-    return text.endswith(".yaml") or "/" in text or "\\" in text
 
 
 def _with_files_resolved(environment: EnvironmentFile, path: Path) -> EnvironmentFile:

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 
 from tcs.documents import Document, checked, read_mapping
 from tcs.errors import TaskError, UnknownNameError
-from tcs.paths import data_folder
+from tcs.paths import named_file, shipped_files
 from tcs.tasks.task import Goal, Task
 
 
@@ -51,7 +51,7 @@ class TaskFile(_Entry):
 
 def task_names() -> tuple[str, ...]:
     """Return the names of the tasks that ship with `tcs`, sorted."""
-    return tuple(sorted(_shipped()))
+    return tuple(_shipped())
 
 
 def load_task(name_or_path: str | Path) -> Task:
@@ -68,17 +68,11 @@ def load_task(name_or_path: str | Path) -> Task:
     >>> len(load_task("shaving").goals)
     8
     """
-    text = str(name_or_path)
-    if isinstance(name_or_path, Path) or text.endswith(".yaml") or "/" in text or "\\" in text:
-        return _read(Path(text).expanduser())
-    shipped = _shipped()
-    if text not in shipped:
-        raise UnknownNameError("task", text, shipped)
-    return _read(shipped[text])
+    return _read(named_file("task", name_or_path, _shipped()))
 
 
 def _shipped() -> dict[str, Path]:
-    return {path.stem: path for path in (data_folder() / "tasks").glob("*/*.yaml")}
+    return shipped_files("tasks/*/*.yaml")
 
 
 def _read(path: Path) -> Task:

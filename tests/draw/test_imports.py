@@ -1,5 +1,4 @@
-import subprocess
-import sys
+from tests.fresh import fresh
 
 
 def test_drawing_touches_no_global_state_and_no_scene():
@@ -7,5 +6,4 @@ def test_drawing_touches_no_global_state_and_no_scene():
         "import sys, tcs.draw;"
         "print([m for m in ('matplotlib.pyplot', 'pydrake', 'numba') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert fresh(code) == "[]"

@@ -1,5 +1,4 @@
-import subprocess
-import sys
+from tests.fresh import fresh
 
 
 def test_choosing_needs_neither_simulator_nor_compiler():
@@ -7,5 +6,4 @@ def test_choosing_needs_neither_simulator_nor_compiler():
         "import sys, tcs.select, tcs.store, tcs.tables;"
         "print([m for m in ('pydrake', 'numba', 'matplotlib') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert fresh(code) == "[]"
