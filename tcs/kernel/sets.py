@@ -22,20 +22,30 @@ class SetArrays(NamedTuple):
     """Number of each candidate in the order that breaks ties, shape (C,)."""
     start: IntArray
     """First row of each cell, shape (N + 1,)."""
+    state: IntArray
+    """Members of a set share this number, shape (C,); all 0 where they need not."""
     xy: FloatArray
     """Places of the cells [m], shape (N, 2)."""
     isotropy: FloatArray
     """Isotropy at each goal, 0 where not reached, shape (C, G)."""
     reached: BoolArray
     """Whether each goal is reached, shape (C, G)."""
+    single: FloatArray
+    """P_M of each candidate by itself, shape (C,)."""
     peak: FloatArray
     """Greatest isotropy in each cell at each goal, shape (N, G)."""
     weights: FloatArray
     """Weights of the goals, shape (G,)."""
     least_distance: float
     """Pairs of cells closer than this are left out [m]."""
-    threshold: float
-    """Pairs are kept when their P_M is greater than this."""
+    least_reachability: float
+    """Kept pairs have at least this P_R."""
+    least_manipulability: float
+    """Kept pairs have at least this P_M."""
+    least_gain: float
+    """The P_M of a kept pair is at least this much of that of either member."""
+    by_sum: bool
+    """Whether the best pair is that of the greatest P_R + P_M; else P_R counts before P_M."""
 
 
 class CellPairs(NamedTuple):
@@ -52,10 +62,11 @@ class CellPairs(NamedTuple):
 
 
 class BestPairs(NamedTuple):
-    """The pair with the greatest P_R + P_M in each cell of a slice."""
+    """The best pair in each cell of a slice."""
 
-    total: FloatArray
-    """P_R + P_M, -1 where no pair is kept, shape (rows,)."""
+    keys: FloatArray
+    """What pairs are ordered by: P_R + P_M and 0, or P_R and P_M; -1 where no pair is kept,
+    shape (rows, 2)."""
     members: IntArray
     """Candidate numbers a < b, shape (rows, 2)."""
 
@@ -80,38 +91,60 @@ def pair_manipulability(a: FloatArray, i: int, b: FloatArray, j: int, weights: F
 
 
 @jit
+def keep_best(
+    arrays: SetArrays,
+    i: int,
+    j: int,
+    reachability: float,
+    manipulability: float,
+    row: int,
+    best: BestPairs,
+) -> None:
+    """Write the pair of the rows i and j to `row` of `best` where it comes before what is there."""
+    first, second = reachability, manipulability
+    if arrays.by_sum:
+        first, second = reachability + manipulability, 0.0
+    keys, members = best.keys[row], best.members[row]
+    if first < keys[0] or (first == keys[0] and second < keys[1]):
+        return
+    a, b = min(arrays.number[i], arrays.number[j]), max(arrays.number[i], arrays.number[j])
+    tied = first == keys[0] and second == keys[1]
+    if tied and (a > members[0] or (a == members[0] and b > members[1])):
+        return
+    keys[0], keys[1] = first, second
+    members[0], members[1] = a, b
+
+
+@jit
 def bound_cell_pair(
     arrays: SetArrays, first: int, second: int, row: int, out: CellPairs, best: BestPairs
 ) -> None:
     """Go through the pairs between two cells, and write what is kept to `row` of `out`."""
     isotropy, peak, weights = arrays.isotropy, arrays.peak, arrays.weights
+    least = arrays.least_manipulability
     # No pair can beat the cells' peaks, at every goal, taken together.
-    if not pair_manipulability(peak, first, peak, second, weights) > arrays.threshold:
+    if pair_manipulability(peak, first, peak, second, weights) < least:
         return
     for i in range(arrays.start[first], arrays.start[first + 1]):
-        if not pair_manipulability(isotropy, i, peak, second, weights) > arrays.threshold:
+        if pair_manipulability(isotropy, i, peak, second, weights) < least:
             continue
         begin = i + 1 if first == second else arrays.start[second]
         for j in range(begin, arrays.start[second + 1]):
+            if arrays.state[i] != arrays.state[j]:
+                continue
             manipulability = pair_manipulability(isotropy, i, isotropy, j, weights)
-            if not manipulability > arrays.threshold:
+            larger = max(arrays.single[i], arrays.single[j])
+            if manipulability < least or manipulability < arrays.least_gain * larger:
                 continue
             reachability = pair_reachability(arrays.reached, i, j, weights)
+            if reachability < arrays.least_reachability:
+                continue
             total = reachability + manipulability
             out.kept[row, second] += 1
             out.reachability[row, second] = max(out.reachability[row, second], reachability)
             out.manipulability[row, second] = max(out.manipulability[row, second], manipulability)
             out.total[row, second] = max(out.total[row, second], total)
-            if total >= best.total[row]:
-                a = min(arrays.number[i], arrays.number[j])
-                b = max(arrays.number[i], arrays.number[j])
-                earlier = a < best.members[row, 0] or (
-                    a == best.members[row, 0] and b < best.members[row, 1]
-                )
-                if total > best.total[row] or earlier:
-                    best.total[row] = total
-                    best.members[row, 0] = a
-                    best.members[row, 1] = b
+            keep_best(arrays, i, j, reachability, manipulability, row, best)
 
 
 @jit

@@ -1,9 +1,8 @@
-"""Build the sets of one and two configurations worth choosing from, tau in the TCS paper."""
+"""Build the sets of configurations worth choosing from, tau in the TCS paper."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -12,9 +11,11 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.sets import BestPairs, CellPairs, SetArrays, bound_cells
+from tcs.scoring.floor import floor_of
 from tcs.space import ROBOT_AXES, Grid
 from tcs.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
-from tcs.tables.sets import DISTANCE_TOLERANCE, candidates_of
+from tcs.tables.rules import candidates_of, check_rule, order_keys, pair_limits, spaced_places
+from tcs.tables.sets import DISTANCE_TOLERANCE, MOST_MEMBERS
 
 CELLS_PER_SLICE = 16
 """Small enough to share the work evenly (early cells have more partners than late ones) and to
@@ -22,17 +23,26 @@ keep the buffers of a slice small; large enough that a slice takes much longer t
 
 
 def build_sets(
-    scores: ScoreTable, grid: Grid, *, min_distance: float = 0.40, jobs: int = 2
+    scores: ScoreTable,
+    grid: Grid,
+    *,
+    rule: str = "paper",
+    same_environment: bool = False,
+    max_members: int = 2,
+    min_distance: float = 0.40,
+    jobs: int = 2,
 ) -> SetTable:
-    """Return every set of one or two configurations kept by the paper's rule.
+    """Return every set of one or two configurations that a rule keeps.
 
-    Singles are kept when they reach a goal. Pairs are kept when their members stand at least
-    `min_distance` apart and their P_M is greater than the best P_M of a single. The search is
-    exact over all pairs; the result does not depend on `jobs`.
+    The search is exact over all pairs; the result does not depend on `jobs`.
 
     Args:
         scores: Scores of every configuration of the grid.
         grid: The grid.
+        rule: One of `tcs.tables.rules.RULES`. "paper": singles that reach a goal, and pairs whose
+            P_M is greater than the best P_M of a single. "code2015": as hrl_base_selection did.
+        same_environment: Whether the members of a set must share the state of the environment.
+        max_members: 1 to keep singles only, 2 to keep pairs too.
         min_distance: Least base x-y distance between the members of a pair [m]. The paper
             gives no figure; 0.40 is that of hrl_base_selection in gt-ros-pkg/hrl-assistive.
         jobs: Number of threads.
@@ -41,52 +51,59 @@ def build_sets(
         The sets; without any candidate when no goal is reached anywhere.
 
     Raises:
+        UnknownNameError: If there is no such rule.
         TcsError: If the scores are not those of the grid, or an argument is out of range.
 
     Source:
         TCS section IV-A, eq. (1) and (4).
     """
+    check_rule(rule)
     if scores.configurations != grid.size:
         raise TcsError(
             f"Sets: the score table has {scores.configurations} configurations, the grid "
             f"{grid.size}. Score this grid first."
         )
+    if not 1 <= max_members <= MOST_MEMBERS:
+        raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
     if not 0.0 <= min_distance < math.inf:
         raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
     if jobs < 1:
         raise TcsError(f"Sets: {jobs} jobs; must be at least 1.")
-    candidates = candidates_of(scores.reached)
+    candidates = candidates_of(scores.reached, scores.weights, rule)
+    state_size = grid.size // math.prod(grid.environment_shape)
+    state = candidates.astype(np.int64) // state_size
     cell, cell_xy = base_cells(grid, candidates)
-    arrays = _grouped(scores, candidates, cell, cell_xy, min_distance)
-    cells = len(cell_xy)
-    slices = [
-        (begin, min(begin + CELLS_PER_SLICE, cells))
-        for begin in range(0, max(cells, 1), CELLS_PER_SLICE)
-    ]
-    found = Parallel(n_jobs=jobs, prefer="threads")(
-        delayed(_bound_slice)(arrays, begin, end) for begin, end in slices
+    arrays = _grouped(
+        scores,
+        candidates,
+        cell,
+        state if same_environment else np.zeros_like(state),
+        cell_xy,
+        rule=rule,
+        min_distance=min_distance,
     )
-    pair_cells, between, best_pairs = zip(*found, strict=True)
-    best_single, best = _best_sets(scores, candidates, best_pairs)
+    pair_cells, between, best_pairs = _kept_pairs(arrays, jobs if max_members > 1 else 0)
+    best_single, best = _best_sets(scores, candidates, best_pairs, rule)
     return SetTable(
-        rule="paper",
+        rule=rule,
+        max_members=max_members,
         min_distance=float(min_distance),
+        same_environment=same_environment,
+        state_size=state_size,
         weights=scores.weights,
         candidates=candidates,
         reached=scores.reached[candidates],
         isotropy=scores.isotropy[candidates],
         cell=cell,
         cell_xy=cell_xy,
-        # Slices one after the other are in lexicographic order.
-        pair_cells=np.concatenate(pair_cells).astype(np.int32),
-        pair_count=np.concatenate([part.kept for part in between]),
-        pair_reachability=np.concatenate([part.reachability for part in between]),
-        pair_manipulability=_float32_above(
-            np.concatenate([part.manipulability for part in between])
-        ),
-        pair_sum=_float32_above(np.concatenate([part.total for part in between])),
+        pair_cells=pair_cells.astype(np.int32),
+        pair_count=between.kept,
+        pair_reachability=between.reachability,
+        pair_manipulability=_float32_above(between.manipulability),
+        pair_sum=_float32_above(between.total),
         best=best,
         best_single=best_single,
+        floor=floor_of(scores, grid),
     )
 
 
@@ -113,24 +130,58 @@ def _grouped(
     scores: ScoreTable,
     candidates: NDArray[np.int32],
     cell: NDArray[np.int32],
+    state: NDArray[np.int64],
     cell_xy: NDArray[np.float64],
+    *,
+    rule: str,
     min_distance: float,
 ) -> SetArrays:
     """Return what the kernel needs, candidates sorted by cell."""
     number = np.argsort(cell, kind="stable").astype(np.int64)
     start = np.searchsorted(cell[number], np.arange(len(cell_xy) + 1)).astype(np.int64)
     isotropy = scores.isotropy[candidates[number]].astype(np.float64)
+    reached = scores.reached[candidates[number]]
     single = tc_manipulability(isotropy, scores.weights)
+    limits = pair_limits(rule, tc_reachability(reached, scores.weights), single)
     return SetArrays(
         number=number,
         start=start,
-        xy=cell_xy,
+        state=state[number],
+        xy=spaced_places(rule, cell_xy),
         isotropy=isotropy,
-        reached=scores.reached[candidates[number]],
+        reached=reached,
+        single=single,
         peak=np.maximum.reduceat(isotropy, start[:-1], axis=0) if len(number) else isotropy,
         weights=scores.weights,
         least_distance=min_distance - DISTANCE_TOLERANCE,
-        threshold=float(single.max(initial=0.0)),
+        least_reachability=limits.reachability,
+        least_manipulability=limits.manipulability,
+        least_gain=limits.gain,
+        by_sum=rule != "code2015",
+    )
+
+
+def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, BestPairs]:
+    """Return what is kept between all cells by so many threads; nothing with none.
+
+    Returns:
+        The pairs of cells with a kept pair, lexicographic, shape (K, 2); what is kept between
+        them, arrays of shape (K,); and the best pair of each cell.
+    """
+    cells = arrays.start.size - 1 if jobs else 0
+    slices = [
+        (begin, min(begin + CELLS_PER_SLICE, cells))
+        for begin in range(0, max(cells, 1), CELLS_PER_SLICE)
+    ]
+    found = Parallel(n_jobs=max(jobs, 1), prefer="threads")(
+        delayed(_bound_slice)(arrays, begin, end) for begin, end in slices
+    )
+    # Slices one after the other are in lexicographic order.
+    pair_cells, between, best = zip(*found, strict=True)
+    return (
+        np.concatenate(pair_cells),
+        CellPairs(*(np.concatenate(parts) for parts in zip(*between, strict=True))),
+        BestPairs(*(np.concatenate(parts) for parts in zip(*best, strict=True))),
     )
 
 
@@ -145,7 +196,8 @@ def _bound_slice(arrays: SetArrays, begin: int, end: int) -> tuple[IntArray, Cel
     out = CellPairs(
         np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     )
-    best = BestPairs(np.full(end - begin, -1.0), np.full((end - begin, 2), -1, dtype=np.int64))
+    size = (end - begin, 2)
+    best = BestPairs(np.full(size, -1.0), np.full(size, -1, dtype=np.int64))
     bound_cells(arrays, begin, end, out, best)
     row, second = np.nonzero(out.kept)
     found = CellPairs(
@@ -158,21 +210,25 @@ def _bound_slice(arrays: SetArrays, begin: int, end: int) -> tuple[IntArray, Cel
 
 
 def _best_sets(
-    scores: ScoreTable, candidates: NDArray[np.int32], parts: Sequence[BestPairs]
+    scores: ScoreTable, candidates: NDArray[np.int32], pairs: BestPairs, rule: str
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the best single and the best set by P_R + P_M; ties go to the first."""
+    """Return the best single and the best set in the order of the rule; ties go to the first."""
     if not len(candidates):
         return (), ()
-    single = tc_reachability(scores.reached[candidates], scores.weights) + tc_manipulability(
-        scores.isotropy[candidates], scores.weights
+    keys = order_keys(
+        rule,
+        tc_reachability(scores.reached[candidates], scores.weights),
+        tc_manipulability(scores.isotropy[candidates], scores.weights),
     )
-    best_single: tuple[int, ...] = (int(candidates[np.argmax(single)]),)
-    total = np.concatenate([part.total for part in parts])
-    members = np.concatenate([part.members for part in parts])
-    first = np.lexsort((members[:, 1], members[:, 0], -total))[0]
+    single = np.lexsort((-keys[1], -keys[0]))[0]
+    best_single: tuple[int, ...] = (int(candidates[single]),)
+    if not len(pairs.keys):
+        return best_single, best_single
+    a, b = pairs.members.T
+    pair = np.lexsort((b, a, -pairs.keys[:, 1], -pairs.keys[:, 0]))[0]
     # Singles come before pairs, so a pair has to be better, not as good.
-    if total[first] > single.max():
-        return best_single, tuple(int(h) for h in candidates[members[first]])
+    if tuple(pairs.keys[pair]) > (keys[0][single], keys[1][single]):
+        return best_single, tuple(int(h) for h in candidates[pairs.members[pair]])
     return best_single, best_single
 
 

@@ -225,13 +225,23 @@ def _best_within(
     manipulability = np.zeros(a.size)
     for row, weight in zip(index.isotropy, goal_weights, strict=True):
         manipulability += float(weight) * np.maximum(row[a], row[b])
-    kept = manipulability > index.sets.pair_threshold
+    limits = index.sets.limits
+    kept = manipulability >= limits.manipulability
+    if limits.gain > 0.0:
+        single = index.sets.single_manipulability
+        kept &= manipulability >= limits.gain * np.maximum(single[a], single[b])
+    if index.sets.same_environment:
+        kept &= index.sets.state[a] == index.sets.state[b]
     a, b, manipulability = a[kept], b[kept], manipulability[kept]
-    if not a.size:
-        return None
     reachability = np.zeros(a.size)
     for reached, weight in zip(index.reached, goal_weights, strict=True):
         reachability += float(weight) * (reached[a] | reached[b])
+    if limits.reachability > 0.0:
+        kept = reachability >= limits.reachability
+        a, b = a[kept], b[kept]
+        reachability, manipulability = reachability[kept], manipulability[kept]
+    if not a.size:
+        return None
     cost = np.minimum(legs.from_here[a], legs.from_here[b]) + legs.between(a, b)
     utilities = utility(reachability, manipulability, cost, weights)
     best = utilities.max()

@@ -35,6 +35,11 @@ def fold(array: NDArray[Any]) -> dict[str, Any]:
     }
 
 
+def small(values: NDArray[np.int64]) -> NDArray[Any]:
+    """Return whole numbers >= 0 in the smallest unsigned type that holds them all."""
+    return values.astype(np.min_scalar_type(int(values.max(initial=0))))
+
+
 def unfolded(
     packed: dict[str, Any], name: str, kind: str, shape: tuple[int | None, ...]
 ) -> NDArray[Any]:

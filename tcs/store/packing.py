@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
-from tcs.store.folding import fold, unfolded
+from tcs.store.folding import fold, small, unfolded
 from tcs.store.score_file import DESCRIPTIONS, Scored, ScoreFile
-from tcs.tables import ScoreTable, SetTable
+from tcs.store.set_packing import packed_sets, unpacked_sets
+from tcs.tables import Reason, ScoreTable, SetTable
 
 FORMAT = "tcs scores"
 """What the file calls itself."""
@@ -31,7 +31,7 @@ def pack(file: ScoreFile) -> dict[str, Any]:
         **{name: getattr(file, name) for name in DESCRIPTIONS},
         "observed": file.observed,
         "tables": [
-            {"sets": _packed_sets(table.sets), "scores": _packed_scores(table.scores)}
+            {"sets": packed_sets(table.sets), "scores": _packed_scores(table.scores, table.sets)}
             for table in file.tables
         ],
     }
@@ -75,7 +75,7 @@ def unpack(content: object, explain: Explain = lambda read: read()) -> ScoreFile
 
 def _unpacked_table(packed: dict[str, Any], explain: Explain) -> Scored:
     """Return a table whose scores are unfolded when they are first asked for."""
-    sets = _unpacked_sets(_dict(packed.get("sets"), "sets"))
+    sets = unpacked_sets(_dict(packed.get("sets"), "sets"))
     scores = _dict(packed.get("scores"), "scores")
 
     def unfold() -> ScoreTable:
@@ -86,10 +86,14 @@ def _unpacked_table(packed: dict[str, Any], explain: Explain) -> Scored:
     return Scored(sets, lambda: explain(unfold))
 
 
-def _packed_scores(scores: ScoreTable) -> dict[str, Any]:
+def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
+    rest = scores.reached.copy()
+    rest[sets.candidates] = False
     return {
+        # The isotropy of the candidates is stored with the sets.
+        "isotropy_rest": fold(scores.isotropy[rest]),
         "reason": fold(scores.reason),
-        "pair_plus_one": fold(_small(scores.pair.astype(np.int64) + 1)),
+        "pair_plus_one": fold(small(scores.pair.astype(np.int64) + 1)),
         "pair_names": [list(names) for names in scores.pair_names],
         "arm_joints": fold(scores.arm_joints),
     }
@@ -102,6 +106,9 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
         raise StoreFormatError("has sets of more configurations than scores")
     isotropy = np.zeros(reason.shape, dtype=np.float32)
     isotropy[sets.candidates] = sets.isotropy
+    rest = reason == Reason.REACHED
+    rest[sets.candidates] = False
+    isotropy[rest] = unfolded(packed, "isotropy_rest", "f4", (int(np.count_nonzero(rest)),))
     pair = unfolded(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
     names = packed.get("pair_names")
     if not isinstance(names, list) or not all(
@@ -121,78 +128,6 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
     )
 
 
-def _packed_sets(sets: SetTable) -> dict[str, Any]:
-    cells = len(sets.cell_xy)
-    numbers = sets.pair_cells[:, 0].astype(np.int64) * cells + sets.pair_cells[:, 1]
-    # There are few different values: one for each subset of the goals at most.
-    values, code = np.unique(sets.pair_reachability, return_inverse=True)
-    return {
-        "rule": sets.rule,
-        "min_distance": float(sets.min_distance),
-        "weights": fold(sets.weights),
-        # Steps from one to the next are mostly small, and compress to little.
-        "candidate_step": fold(_steps(sets.candidates.astype(np.int64))),
-        "reached": fold(sets.reached.astype(np.uint8)),
-        "isotropy": fold(sets.isotropy[sets.reached]),
-        "cell": fold(_small(sets.cell.astype(np.int64))),
-        "cell_xy": fold(sets.cell_xy),
-        "pair_step": fold(_steps(numbers)),
-        "pair_count": fold(_small(sets.pair_count)),
-        "reachability_values": fold(values),
-        "reachability_code": fold(_small(code.astype(np.int64))),
-        "pair_manipulability": fold(sets.pair_manipulability),
-        "pair_sum": fold(sets.pair_sum),
-        "best": list(sets.best),
-        "best_single": list(sets.best_single),
-    }
-
-
-def _unpacked_sets(packed: dict[str, Any]) -> SetTable:
-    rule, min_distance = packed.get("rule"), packed.get("min_distance")
-    if not isinstance(rule, str) or not isinstance(min_distance, float):
-        raise StoreFormatError("has sets without a rule or a least distance")
-    weights = unfolded(packed, "weights", "f8", (None,))
-    # A table has at most 20 million configurations: see `tcs.space.MAX_CONFIGURATIONS`.
-    candidates = _ascending(unfolded(packed, "candidate_step", "u", (None,)), 2**31, "candidates")
-    reached = unfolded(packed, "reached", "u1", (candidates.size, weights.size)) != 0
-    isotropy = np.zeros(reached.shape, dtype=np.float32)
-    isotropy[reached] = unfolded(packed, "isotropy", "f4", (int(np.count_nonzero(reached)),))
-    cell_xy = unfolded(packed, "cell_xy", "f8", (None, 2))
-    values = unfolded(packed, "reachability_values", "f8", (None,))
-    step = unfolded(packed, "pair_step", "u", (None,))
-    kept = (step.size,)
-    numbers = _ascending(step, len(cell_xy) ** 2 + 1, "pairs of cells")
-    code = unfolded(packed, "reachability_code", "u", kept).astype(np.int64)
-    if np.any(code >= values.size):
-        raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
-    pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
-    return SetTable(
-        rule=rule,
-        min_distance=min_distance,
-        weights=weights,
-        candidates=candidates.astype(np.int32),
-        reached=reached,
-        isotropy=isotropy,
-        cell=_int32(unfolded(packed, "cell", "u", candidates.shape)),
-        cell_xy=cell_xy,
-        pair_cells=pair_cells.astype(np.int32),
-        pair_count=unfolded(packed, "pair_count", "u", kept).astype(np.int64),
-        pair_reachability=values[code],
-        pair_manipulability=unfolded(packed, "pair_manipulability", "f4", kept),
-        pair_sum=unfolded(packed, "pair_sum", "f4", kept),
-        best=_indices(packed, "best"),
-        best_single=_indices(packed, "best_single"),
-    )
-
-
-def _ascending(step: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
-    """Return the sums of steps, all of them below `end`."""
-    # Summed in floating point first: forged steps must not wrap round to valid ones.
-    if step.sum(dtype=np.float64) >= float(end):
-        raise StoreFormatError(f"has {what} that do not exist")
-    return np.cumsum(step.astype(np.int64))
-
-
 def _dict(value: object, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise StoreFormatError(f"has no {what}" if what != "the file" else "is not one of tcs")
@@ -204,26 +139,3 @@ def _list(content: dict[str, Any], name: str) -> list[Any]:
     if not isinstance(value, list):
         raise StoreFormatError(f"has no {name}")
     return value
-
-
-def _indices(packed: dict[str, Any], name: str) -> tuple[int, ...]:
-    members = packed.get(name)
-    if not isinstance(members, list) or not all(type(h) is int and 0 <= h < 2**31 for h in members):
-        raise StoreFormatError(f"has a '{name}' that is no list of configurations")
-    return tuple(members)
-
-
-def _int32(values: NDArray[Any]) -> NDArray[np.int32]:
-    if np.any(values > np.iinfo(np.int32).max):
-        raise StoreFormatError("has a number of a cell that is out of range")
-    return values.astype(np.int32)
-
-
-def _small(values: NDArray[np.int64]) -> NDArray[Any]:
-    """Return whole numbers >= 0 in the smallest unsigned type that holds them all."""
-    return values.astype(np.min_scalar_type(int(values.max(initial=0))))
-
-
-def _steps(ascending: NDArray[np.int64]) -> NDArray[Any]:
-    """Return the differences of ascending numbers, from 0."""
-    return _small(np.asarray(np.diff(ascending, prepend=0), dtype=np.int64))

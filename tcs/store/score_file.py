@@ -15,7 +15,8 @@ from tcs.errors import StoreError, StoreMismatchError
 from tcs.space import Axis, Grid
 from tcs.store.plain import plain
 from tcs.tables import ScoreTable, SetTable
-from tcs.tables.sets import DISTANCE_TOLERANCE, candidates_of
+from tcs.tables.rules import candidates_of
+from tcs.tables.sets import DISTANCE_TOLERANCE
 
 REQUIRED_METADATA: dict[str, type] = {
     "program_version": str,
@@ -77,7 +78,8 @@ class Scored:
         Raises:
             StoreError: If they are not.
         """
-        sets, candidates = self.sets, candidates_of(scores.reached)
+        sets = self.sets
+        candidates = candidates_of(scores.reached, scores.weights, sets.rule)
         if not (
             np.array_equal(sets.weights, scores.weights)
             and np.array_equal(sets.candidates, candidates)
@@ -145,6 +147,8 @@ class ScoreFile:
             sets = table.sets
             if len(sets.candidates) and sets.candidates[-1] >= grid.size:
                 raise StoreError(f"sets of more configurations than the grid has, {grid.size}.")
+            if sets.state_size * math.prod(grid.environment_shape) != grid.size:
+                raise StoreError("sets have another number of environment states than the grid.")
             places = grid.values(sets.candidates)
             for column, name in enumerate(("base_x", "base_y")):
                 gap = np.abs(sets.cell_xy[sets.cell, column] - places[name])

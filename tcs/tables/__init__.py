@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from tcs.tables.configuration import InitialConfiguration
 from tcs.tables.equations import tc_manipulability, tc_reachability
+from tcs.tables.floor import Floor
 from tcs.tables.scores import Reason, ScoreTable
 from tcs.tables.sets import SetTable
 
 __all__ = [
+    "Floor",
     "InitialConfiguration",
     "Reason",
     "ScoreTable",

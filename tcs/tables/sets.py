@@ -1,4 +1,4 @@
-"""The set table: every set of one or two initial configurations worth choosing from.
+"""The set table: every set of initial configurations worth choosing from.
 
 Pairs of configurations come in tens of millions, so they are not listed. They
 are grouped by the two base cells (x-y places) of their members, and for each
@@ -17,23 +17,15 @@ from numpy.typing import NDArray
 
 from tcs.tables.checks import read_only, require
 from tcs.tables.equations import tc_manipulability, tc_reachability
+from tcs.tables.floor import Floor
+from tcs.tables.rules import RULES, PairLimits, pair_limits
 
-RULES = ("paper",)
-"""Names of the rules that decide which sets are kept. "paper": singles that reach at least one
-goal; pairs whose P_M is greater than the best P_M of a single (TCS section IV-A)."""
+MOST_MEMBERS = 2
+"""Most members a set may have."""
 
 DISTANCE_TOLERANCE = 1e-9
 """Grid steps such as 0.05 are no binary fractions: 8 of them can come out 1e-16 short of 0.40 m,
 or 1e-15 far from the origin. Places that differ by a nanometre are the same place."""
-
-
-def candidates_of(reached: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return the configurations that reach at least one goal, ascending, shape (C,).
-
-    Args:
-        reached: Whether a goal is reached, shape (H, G).
-    """
-    return np.flatnonzero(reached.any(axis=1)).astype(np.int32)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,12 +38,18 @@ class SetTable:
 
     rule: str
     """Which sets are kept: one of `RULES`."""
+    max_members: int
+    """Sets of one to so many members are held."""
     min_distance: float
-    """Least base x-y distance between the members of a pair [m]."""
+    """Least base x-y distance between two members of a set [m]."""
+    same_environment: bool
+    """Whether all members of a set share the state of the environment, e.g. the bed's height."""
+    state_size: int
+    """How many configurations each state of the environment has: h // state_size is its number."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
     candidates: NDArray[np.int32]
-    """Flat configuration indices with at least one goal reached, ascending, shape (C,)."""
+    """Flat indices of the configurations kept as singles, ascending, shape (C,)."""
     reached: NDArray[np.bool_]
     """Whether a candidate reaches a goal, shape (C, G). Not the same as isotropy > 0, which
     a singular arm posture can have at a goal it does reach."""
@@ -72,9 +70,12 @@ class SetTable:
     pair_sum: NDArray[np.float32]
     """Greatest P_R + P_M of those pairs, rounded upward, shape (K,)."""
     best: tuple[int, ...]
-    """Configuration indices of the set with the greatest P_R + P_M; () without candidates."""
+    """Configuration indices of the best set: greatest P_R + P_M, or P_R before P_M by the rule
+    "code2015"; () without candidates."""
     best_single: tuple[int, ...]
     """The same among sets of one."""
+    floor: Floor
+    """Where the base can drive."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -104,7 +105,13 @@ class SetTable:
         require(
             self.rule in RULES, f"set table: unknown rule '{self.rule}'. Known: {', '.join(RULES)}."
         )
+        require(
+            1 <= self.max_members <= MOST_MEMBERS,
+            f"set table: max_members must be 1 to {MOST_MEMBERS}.",
+        )
         require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
+        require(self.state_size > 0, "set table: state_size must be positive.")
+        require(isinstance(self.floor, Floor), "set table: floor must be a Floor.")
         self._check_candidates()
         self._check_pairs()
 
@@ -117,7 +124,7 @@ class SetTable:
             f"set table: cell outside 0..{len(self.cell_xy) - 1}.",
         )
         require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
-        for name, size in (("best", 2), ("best_single", 1)):
+        for name, size in (("best", self.max_members), ("best_single", 1)):
             members = getattr(self, name)
             require(
                 isinstance(members, tuple)
@@ -169,9 +176,14 @@ class SetTable:
         return tc_manipulability(self.isotropy, self.weights)
 
     @cached_property
-    def pair_threshold(self) -> float:
-        """The P_M that a pair must exceed to be kept: the best P_M of a single."""
-        return float(self.single_manipulability.max(initial=0.0))
+    def limits(self) -> PairLimits:
+        """What the scores of a pair must come up to, to be kept."""
+        return pair_limits(self.rule, self.single_reachability, self.single_manipulability)
+
+    @cached_property
+    def state(self) -> NDArray[np.int64]:
+        """Number of the environment's state of each candidate, shape (C,)."""
+        return self.candidates.astype(np.int64) // self.state_size
 
     @cached_property
     def by_cell(self) -> NDArray[np.int64]:

@@ -69,14 +69,28 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.3)),
     bed_now=st.floats(0.0, 0.3),
     first_pairs=st.sampled_from([1, 5, search.FIRST_PAIRS]),
+    options=st.fixed_dictionaries(
+        {"rule": st.sampled_from(["paper", "code2015"]), "same_environment": st.booleans()}
+    ),
 )
 def test_equals_brute_force_over_all_kept_sets(
-    seed, goals, levels, share, beds, min_distance, weights, travel, where, bed_now, first_pairs
+    seed,
+    goals,
+    levels,
+    share,
+    beds,
+    min_distance,
+    weights,
+    travel,
+    where,
+    bed_now,
+    first_pairs,
+    options,
 ):
     bed, head = beds
     grid = small_grid(nx=5, ny=2, yaws=3, torsos=2 if not bed else 1, bed=bed, head=head)
     scores = random_scores(grid, goals, seed, levels=levels, share=share)
-    kept = all_sets(scores, grid, min_distance)
+    kept = all_sets(scores, grid, min_distance, **options)
     assume(kept)
     axes = grid.environment_axes
     travel = TravelWeights(
@@ -94,7 +108,7 @@ def test_equals_brute_force_over_all_kept_sets(
         environment=tuple((axis.name, bed_now) for axis in axes),
         environment_units=tuple(axis.held_unit for axis in axes),
     )
-    tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance), grid)
+    tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance, **options), grid)
     with pytest.MonkeyPatch.context() as patch:
         # Small tables open everything in the first round, unless it is made small too.
         patch.setattr(search, "FIRST_PAIRS", first_pairs)

@@ -25,8 +25,8 @@ SHIFT = {"name": "person_y", "unit": "m", "start": -0.05, "step": 0.05, "count":
 """An observed axis."""
 
 
-def score_file(*, grid=None, share=0.4, tables=1, **changes):
-    """Return a file with so many tables, each with other scores."""
+def score_file(*, grid=None, share=0.4, tables=1, options=None, **changes):
+    """Return a file with so many tables, each with other scores, its sets built with options."""
     grid = grid or small_grid(nx=6, ny=4, bed=2)
     scored = [random_scores(grid, 5, seed=1 + i, share=share) for i in range(tables)]
     parts = {
@@ -37,6 +37,8 @@ def score_file(*, grid=None, share=0.4, tables=1, **changes):
         "grid": grid.to_dict(),
         "observed": [],
         "body_frames": {"head": [0.1] * (3 * tables * math.prod(grid.environment_shape))},
-        "tables": tuple(Scored.of(scores, build_sets(scores, grid)) for scores in scored),
+        "tables": tuple(
+            Scored.of(scores, build_sets(scores, grid, **(options or {}))) for scores in scored
+        ),
     }
     return ScoreFile(**(parts | changes))

@@ -33,6 +33,8 @@ def assert_same(one, two):
             for of_one, of_two in zip(a, b, strict=True):
                 assert_same(of_one.sets, of_two.sets)
                 assert_same(of_one.scores, of_two.scores)
+        elif field.name == "floor":
+            assert_same(a, b)
         elif isinstance(a, np.ndarray):
             assert a.dtype == b.dtype
             np.testing.assert_array_equal(a, b)
@@ -40,9 +42,10 @@ def assert_same(one, two):
             assert a == b
 
 
+@pytest.mark.parametrize("options", [{}, {"rule": "code2015", "same_environment": True}])
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
-def test_load_of_save_is_the_same(path, share):
-    file = score_file(share=share)
+def test_load_of_save_is_the_same(path, share, options):
+    file = score_file(share=share, options=options)
     save_scores(path, file)
     loaded = load_scores(path)
     assert isinstance(loaded, ScoreFile)
@@ -283,6 +286,14 @@ FORGED = {
     "rule unknown": ("sets", "rule", lambda rule: "mine"),
     "rule missing": ("sets", "rule", lambda rule: None),
     "distance missing": ("sets", "min_distance", lambda distance: None),
+    "members missing": ("sets", "max_members", lambda members: True),
+    "states of another grid": ("sets", "state_size", lambda size: size + 1),
+    "environment no yes or no": ("sets", "same_environment", lambda same: 1),
+    "floor missing": ("sets", "floor", lambda floor: None),
+    "floor without a step": ("sets", "floor", lambda floor: floor | {"step": [0.1]}),
+    "floor of another shape": ("sets", "floor", lambda floor: floor | {"shape": [3, 3]}),
+    "floor without places": ("sets", "floor", lambda floor: floor | {"shape": [0, 3]}),
+    "enormous floor": ("sets", "floor", lambda floor: floor | {"shape": [2**40, 2**40]}),
     "best no candidate": ("sets", "best", lambda best: [2**30]),
     "best no number": ("sets", "best", lambda best: ["x"]),
     "best huge": ("sets", "best_single", lambda best: [2**70]),

@@ -59,17 +59,38 @@ def set_scores(scores, members):
     return reachability, manipulability
 
 
-def all_sets(scores, grid, min_distance):
+def all_sets(scores, grid, min_distance, rule="paper", same_environment=False):
     """Every kept set in the order that breaks ties: {members: (P_R, P_M)}."""
     singles = [(h,) for h in range(grid.size) if scores.reached[h].any()]
     kept = {members: set_scores(scores, members) for members in singles}
+    if rule == "code2015":
+        # A billionth short of two fifths is a rounding error.
+        kept = {members: both for members, both in kept.items() if both[0] >= 0.40 - 1e-9}
+        singles = list(kept)
+    best = max(kept.values(), default=(0.0, 0.0))
     threshold = max((manipulability for _, manipulability in kept.values()), default=0.0)
-    place = {h: (c.base_x, c.base_y) for (h,) in singles for c in [grid.configuration(h)]}
+    at = {h: grid.configuration(h) for (h,) in singles}
     for (a,), (b,) in itertools.combinations(singles, 2):
+        p, q = (at[a].base_x, at[a].base_y), (at[b].base_x, at[b].base_y)
+        if rule == "code2015":
+            p, q = np.round(p, 3), np.round(q, 3)
         # A nanometre short is not short: steps of 0.2 are no binary fractions.
-        if math.dist(place[a], place[b]) < min_distance - 1e-9:
+        if math.dist(p, q) < min_distance - 1e-9:
+            continue
+        if same_environment and at[a].environment != at[b].environment:
             continue
         both = set_scores(scores, (a, b))
-        if both[1] > threshold:
+        if rule == "code2015":
+            larger = max(kept[a,][1], kept[b,][1])
+            keep = both[1] >= 1.01 * best[1] and both[1] >= 1.01 * larger
+            keep = keep and both[0] >= 0.98 * best[0] - 1e-9
+        else:
+            keep = both[1] > threshold
+        if keep:
             kept[a, b] = both
     return kept
+
+
+def order_of(rule, scores):
+    """What sets with these P_R and P_M are ordered by, greatest first."""
+    return tuple(scores) if rule == "code2015" else scores[0] + scores[1]

@@ -4,14 +4,19 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
-from tcs.tables import SetTable
+from tcs.tables import Floor, SetTable
+
+NO_MOVES = Floor(start=(0.0, 0.0), step=(0.5, 0.5), moves=np.zeros((4, 2, 2), dtype=np.bool_))
 
 
 def parts():
     """Three candidates on two places 0.5 m apart; only the pair (4, 7) is kept."""
     return {
         "rule": "paper",
+        "max_members": 2,
         "min_distance": 0.4,
+        "same_environment": False,
+        "state_size": 5,
         "weights": np.array([0.5, 0.5]),
         "candidates": np.array([4, 5, 7], dtype=np.int32),
         "reached": np.array([[True, False], [True, False], [False, True]]),
@@ -25,13 +30,15 @@ def parts():
         "pair_sum": np.array([1.375], dtype=np.float32),
         "best": (4, 7),
         "best_single": (4,),
+        "floor": NO_MOVES,
     }
 
 
 def test_counts_and_scores():
     sets = SetTable(**parts())
     assert (sets.kept_pairs, sets.sets) == (1, 4)
-    assert sets.pair_threshold == 0.25
+    assert sets.limits.manipulability == np.nextafter(0.25, 1.0)
+    assert sets.state.tolist() == [0, 1, 1]
     assert sets.scores_of((4, 7)) == (1.0, 0.375)
     assert sets.scores_of((5,)) == (0.5, 0.0)
     np.testing.assert_array_equal(sets.by_cell, [0, 1, 2])
@@ -57,6 +64,9 @@ WRONG = {
     "rule": ({"rule": "mine"}, "unknown rule 'mine'. Known: paper"),
     "distance": ({"min_distance": -0.1}, "min_distance"),
     "distance nan": ({"min_distance": float("nan")}, "min_distance"),
+    "members": ({"max_members": 0}, "max_members"),
+    "states": ({"state_size": 0}, "state_size"),
+    "floor": ({"floor": None}, "floor must be a Floor"),
     "candidates": ({"candidates": np.array([4, 4, 7], dtype=np.int32)}, "ascending"),
     "negative candidate": ({"candidates": np.array([-4, 4, 7], dtype=np.int32)}, "ascending"),
     "cell": ({"cell": np.array([0, 0, 2], dtype=np.int32)}, r"cell outside 0\.\.1"),
