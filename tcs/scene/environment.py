@@ -135,9 +135,8 @@ class EnvironmentFile(Document):
                 if name in self.posture:
                     raise ValueError(f"posture: '{name}' follows '{leader}' and leads others")
                 if name in leader_of:
-                    raise ValueError(
-                        f"posture: '{name}' follows '{leader_of[name]}' and '{leader}'"
-                    )
+                    both = f"'{leader_of[name]}' and '{leader}'"
+                    raise ValueError(f"posture: '{name}' follows {both}; it can follow one")
                 leader_of[name] = leader
         for field in ("joints", "errors", "grid", "observed"):
             for name in getattr(self, field):

@@ -13,7 +13,7 @@ import yaml
 from tcs.errors import EnvironmentFileError, GridError, UnknownNameError
 from tcs.paths import data_folder
 from tcs.scene import Scene, SceneSpec, load_environment
-from tcs.space import Grid
+from tcs.space import Axis, Grid
 
 MINIMAL = {
     "name": "room",
@@ -27,11 +27,13 @@ MINIMAL = {
         "torso": {"unit": "m", "start": 0.0, "step": 0.1, "count": 2},
     },
 }
+SHIFT = {"unit": "m", "start": -0.1, "step": 0.05, "count": 5}
+FOLLOWED_BY_B = {"knots": [0, 1], "joints": {"b": [0, 1]}}
 
 
 def written(tmp_path: Path, **changes: object) -> Path:
     path = tmp_path / "room.yaml"
-    path.write_text(yaml.safe_dump({**MINIMAL, **changes}), encoding="utf-8")
+    path.write_text(yaml.safe_dump({**MINIMAL, **changes}, sort_keys=False), encoding="utf-8")
     return path
 
 
@@ -114,6 +116,46 @@ def test_unknown_name_gets_the_nearest():
         ({"title": 5, "name": 5}, r"field 'name' is 5, .* \(1 more after this one\.\)"),
         ({"errors": {"j": {"distribution": "normal"}}}, r"errors\.j'.*either 'std'"),
         ({"errors": {"j": {"distribution": "flat", "std": 1}}}, r"errors\.j\.distribution.*normal"),
+        ({"observed": {"person_y": 0.1}}, r"field 'observed\.person_y' is 0\.1, but must be"),
+        ({"posture": {"a": {"knots": [0, 1]}}}, r"posture\.a\.joints' is missing"),
+        ({"posture": {"a": {"knots": [0, 1], "joints": {}}}}, r"posture\.a\.joints'.* at least 1"),
+        ({"posture": {"a": {"joints": {"b": [0, 1]}}}}, r"posture\.a': give either 'knots'"),
+        (
+            {"posture": {"a": {"knots": [0, 1], "knots_deg": [0, 1], "joints": {"b": [0, 1]}}}},
+            r"posture\.a': give either 'knots'",
+        ),
+        (
+            {"posture": {"a": {"knots": [0], "joints": {"b": [0]}}}},
+            r"posture\.a\.knots'.*at least 2",
+        ),
+        (
+            {"posture": {"a": {"knots": [1, 1], "joints": {"b": [0, 1]}}}},
+            r"posture\.a': every knot must be greater",
+        ),
+        (
+            {"posture": {"a": {"knots": [0, 1, 2], "joints": {"b": [0, 1]}}}},
+            r"posture\.a': joint 'b' has 2 positions, but there are 3 knots",
+        ),
+        (
+            {"posture": {"a": FOLLOWED_BY_B, "b": {"knots": [0, 1], "joints": {"c": [0, 1]}}}},
+            r"posture: 'b' follows 'a' and leads others",
+        ),
+        (
+            {"posture": {"a": FOLLOWED_BY_B, "c": FOLLOWED_BY_B}},
+            r"posture: 'b' follows 'a' and 'c'; it can follow one",
+        ),
+        ({"posture": {"a": FOLLOWED_BY_B}, "joints": {"b": 1}}, r"joints: 'b' follows 'a'"),
+        (
+            {
+                "posture": {"a": FOLLOWED_BY_B},
+                "errors": {"b": {"distribution": "normal", "std": 1}},
+            },
+            r"errors: 'b' follows 'a', so it cannot be set by hand",
+        ),
+        (
+            {"posture": {"a": FOLLOWED_BY_B}, "observed": {"b": SHIFT}},
+            r"observed: 'b' follows 'a'",
+        ),
     ],
     ids=lambda value: str(value)[:40] if isinstance(value, dict) else "",
 )
@@ -129,6 +171,42 @@ def test_a_bad_grid_names_the_file(tmp_path):
     grid = {**MINIMAL["grid"], "torso": {"unit": "m", "start": 0.0, "step": 0.1, "count": 0}}
     with pytest.raises(GridError, match=r"room\.yaml', field 'grid'.*torso.*empty"):
         load_environment(written(tmp_path, grid=grid))
+
+
+@pytest.mark.parametrize(
+    ("axes", "error", "said"),
+    [
+        ({"person_y": {**SHIFT, "count": 0}}, GridError, "axis 'person_y': count is 0"),
+        ({"person_y": {**SHIFT, "unit": "cm"}}, GridError, "axis 'person_y': unit is 'cm'"),
+        ({"person_y": {"unit": "m"}}, GridError, "axis 'person_y' needs start, step, count"),
+        ({"person_y": {**SHIFT, "stop": 1}}, UnknownNameError, "axis 'person_y': unknown key"),
+        ({"torso": SHIFT}, GridError, "axis 'torso' is one of the grid's too.*'observed'"),
+    ],
+    ids=["empty", "unit", "missing", "key", "both"],
+)
+def test_a_bad_observed_axis_names_the_file(tmp_path, axes, error, said):
+    with pytest.raises(error, match=rf"room\.yaml', field 'observed': {said}"):
+        load_environment(written(tmp_path, observed=axes))
+
+
+def test_observed_axes_are_axes_in_the_order_of_the_file(tmp_path):
+    turn = {"unit": "deg", "start": -5, "step": 5, "count": 3}
+    environment = load_environment(written(tmp_path, observed={"turn": turn, "shift": SHIFT}))
+    assert environment.observed_axes == (
+        Axis("turn", "deg", -5, 5, 3),
+        Axis("shift", "m", -0.1, 0.05, 5),
+    )
+    assert load_environment(written(tmp_path)).observed_axes == ()
+
+
+def test_posture_and_observed_are_taken_over_from_the_base(tmp_path):
+    room = tmp_path / "room.yaml"
+    room.write_text("{name: room, based_on: bed}")
+    ours, bed = load_environment(room), load_environment("bed")
+    assert ours.posture == bed.posture
+    assert ours.observed_axes == bed.observed_axes
+    room.write_text("{name: room, based_on: bed, observed: {}}")
+    assert load_environment(room).observed_axes == ()
 
 
 @pytest.mark.parametrize("text", ["[1, 2]", "a: [", "\x00"], ids=["list", "torn", "binary"])

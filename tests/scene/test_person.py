@@ -2,66 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 from pydrake.geometry import Role
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial.transform import Rotation
 
-from tcs.scene.environment import load_environment
-from tcs.scene.room import add_room, room_parts
-
-DATA = Path(__file__).parents[1] / "data"
-BALL_RADIUS = 0.015
-"""Skin counts as exposed where a ball of 30 mm diameter can touch it [m]."""
-
-
-def rows(name):
-    with (DATA / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def numbers(row, *columns):
-    return np.array([float(row[column]) for column in columns])
-
-
-class RoomAlone:
-    """The wheelchair environment without any robot."""
-
-    def __init__(self):
-        self.environment = load_environment("wheelchair")
-        builder = DiagramBuilder()
-        self.plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-        self.room = add_room(self.plant, self.environment)
-        self.plant.Finalize()
-        self.inspector = graph.model_inspector()
-        self.parts = room_parts(self.plant, self.inspector, self.room, self.environment)
-        self.diagram = builder.Build()
-        self.context = self.diagram.CreateDefaultContext()
-        self.state = self.plant.GetMyContextFromRoot(self.context)
-
-    def pose(self, link, **joints):
-        """Pose of "model::link" in W with these joints set, all others 0."""
-        q = np.zeros(self.plant.num_positions())
-        for name, value in joints.items():
-            q[self.room.joints.by_name[name].position_start()] = value
-        self.plant.SetPositions(self.state, q)
-        X_WL = self.room.links[link].EvalPoseInWorld(self.state)
-        self.plant.SetPositions(self.state, np.zeros(self.plant.num_positions()))
-        return X_WL
-
-    def query(self):
-        return self.plant.get_geometry_query_input_port().Eval(self.state)
+from tests.scene.rooms import RoomAlone, numbers, rows
 
 
 @pytest.fixture(scope="module")
 def room():
-    return RoomAlone()
+    return RoomAlone("wheelchair")
 
 
 @pytest.mark.parametrize("row", rows("human_frames_chair.csv"), ids=lambda row: row["link"])
@@ -109,27 +61,16 @@ def test_every_body_part_can_be_named_by_a_goal(room):
     ],
 )
 def test_furniture_stands_where_the_mesh_has_it(room, item, lower, upper):
-    (part,) = [part for part in room.parts if part.name == f"wheelchair::{item}"]
-    box = room.inspector.GetShape(part.geometry)
-    half = np.array([box.width(), box.depth(), box.height()]) / 2
-    X_WG = room.query().GetPoseInWorld(part.geometry)
-    reach = np.abs(X_WG.rotation().matrix()) @ half
+    lowest, highest = room.reach(f"wheelchair::{item}")
     # The figures have five digits.
-    np.testing.assert_allclose(X_WG.translation() - reach, lower, atol=1e-5)
-    np.testing.assert_allclose(X_WG.translation() + reach, upper, atol=1e-5)
+    np.testing.assert_allclose(lowest, lower, atol=1e-5)
+    np.testing.assert_allclose(highest, upper, atol=1e-5)
 
 
 def test_the_chair_is_as_large_as_its_mesh(room):
-    lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
-    chair = [part for part in room.parts if part.name.startswith("wheelchair::")]
+    chair = {part.name for part in room.parts if part.name.startswith("wheelchair::")}
     assert len(chair) == 20
-    for part in chair:
-        box = room.inspector.GetShape(part.geometry)
-        half = np.array([box.width(), box.depth(), box.height()]) / 2
-        X_WG = room.query().GetPoseInWorld(part.geometry)
-        reach = np.abs(X_WG.rotation().matrix()) @ half
-        lowest = np.minimum(lowest, X_WG.translation() - reach)
-        highest = np.maximum(highest, X_WG.translation() + reach)
+    lowest, highest = room.reach(*chair)
     # Box of the whole mesh; our own parts follow it to within 3 mm.
     np.testing.assert_allclose(lowest, [0.0, -0.3325, 0.0], atol=0.003)
     np.testing.assert_allclose(highest, [1.2884, 0.3325, 0.89], atol=0.003)
@@ -178,34 +119,9 @@ def test_the_head_tilts_up_about_its_own_centre(room):
     )
 
 
-def distances_to_links(room, point):
-    """Signed distance from a point to the nearest shape of each body link."""
-    name_of = {part.geometry: part.name for part in room.parts}
-    least = {}
-    for found in room.query().ComputeSignedDistanceToPoint(point):
-        name = name_of[found.id_G]
-        if name.startswith("person::"):
-            least[name] = min(found.distance, least.get(name, np.inf))
-    return least
-
-
 @pytest.fixture(scope="module")
 def skin(room):
-    """Exposed skin points: link, point, outward normal, distance to every link's shapes."""
-    exposed = []
-    for row in rows("person_surface.csv"):
-        link = f"person::{row['link']}"
-        X_WL = room.pose(link)
-        point = X_WL @ numbers(row, "x", "y", "z")
-        normal = X_WL.rotation() @ numbers(row, "nx", "ny", "nz")
-        # The meshes reach into one another with slots and sockets that nothing ever meets. What
-        # lies inside another part is such a place, and so is what a ball cannot touch because
-        # another part is in its way.
-        others = distances_to_links(room, point + BALL_RADIUS * normal)
-        others.pop(link)
-        if min(others.values()) >= BALL_RADIUS:
-            exposed.append((link, distances_to_links(room, point)))
-    return exposed
+    return room.exposed_skin()
 
 
 def test_most_of_the_skin_is_judged(skin):
@@ -235,7 +151,7 @@ def test_padded_shapes_enclose_the_exposed_skin(room, skin):
 
 
 def test_models_load_without_a_word_from_drake(caplog):
-    RoomAlone()
+    RoomAlone("wheelchair")
     assert caplog.records == []
 
 

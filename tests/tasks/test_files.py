@@ -48,11 +48,32 @@ def refused(tmp_path):
     return message
 
 
-def test_the_three_tasks_of_the_wheelchair_ship():
-    assert {"shaving", "feeding", "brushing"} <= set(task_names())
+TABLE_1 = {
+    "shaving": ("wheelchair", "bed", "bed-no-wall"),
+    "feeding": ("wheelchair",),
+    "brushing": ("wheelchair",),
+    "bathing": ("bed",),
+    "scratching_upper_arm_left": ("bed",),
+    "scratching_upper_arm_right": ("bed",),
+    "scratching_forearm_left": ("bed",),
+    "scratching_forearm_right": ("bed",),
+    "scratching_thigh_left": ("bed",),
+    "scratching_thigh_right": ("bed",),
+    "scratching_chest": ("bed",),
+}
+"""The tasks of the TCS paper and where they are done: 13 rows of its Table I."""
 
 
-@pytest.mark.parametrize("name", ["shaving", "feeding", "brushing"])
+def test_the_rows_of_the_paper_ship():
+    assert {name: load_task(name).environments for name in task_names()} == TABLE_1
+    assert sum(len(environments) for environments in TABLE_1.values()) == 13
+
+
+def test_bathing_has_its_goals_on_seven_parts_of_the_body():
+    assert len({goal.body_frame for goal in load_task("bathing").goals}) == 7
+
+
+@pytest.mark.parametrize("name", TABLE_1)
 def test_figures_are_the_published_ones(name):
     task, rows = load_task(name), written(name)
     assert len(task.goals) == len(rows)
