@@ -13,26 +13,27 @@ MAX_ARCS = 6
 the full turn of a continuous joint once more."""
 
 INSET = 1e-9
-"""How far inside the limits of joint 1 arcs end [rad]: a slack of 1e-9, far above its rounding."""
+"""How far inside the limits of the free joint arcs end [rad]: a slack of 1e-9, far above its
+rounding."""
 
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 
 
 @jit
 def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int, int]:
-    """Fill the arcs of joint 1 from which the elbow can span the way from shoulder to wrist.
+    """Fill the arcs of the free joint at which the elbow can span the way from shoulder to wrist.
 
-    |SW|^2 is a cosine of q1 about the direction of the goal, and a cosine of q4: the limits of
-    joint 4 bound the first cosine from both sides.
+    |SW|^2 is a cosine of q1, the free joint, about the direction of the goal, and a cosine of q4:
+    the limits of joint 4 bound the first cosine from both sides.
 
     Args:
         arm: The arm.
         goal: From `wrist_goal`, shape (4, 3).
-        arcs: Filled with (first, last) [rad], shape (MAX_ARCS, 2); within the limits of joint 1.
+        arcs: Filled with (first, last) [rad], shape (MAX_ARCS, 2); within the joint's limits.
 
     Returns:
-        The number of arcs, and IN_REACH, OUT_OF_REACH (no angle of joint 1 at all would do) or
-        OUT_OF_LIMITS (joint 1 would have to pass its limits).
+        The number of arcs, and IN_REACH, OUT_OF_REACH (no angle at all would do) or OUT_OF_LIMITS
+        (the free joint would have to pass its limits).
     """
     wx, wy, wz = goal[0, 0], goal[0, 1], goal[0, 2]
     sx, sy, sz = arm.p[1, 0], arm.p[1, 1], arm.p[1, 2]
@@ -50,7 +51,7 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
         inner = np.arccos(min(max((steady - near) / swing, -1.0), 1.0))
     if steady + swing > far:
         outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0))
-    lower, upper = arm.lower[0], arm.upper[0]
+    lower, upper = arm.lower[arm.free], arm.upper[arm.free]
     if not upper - lower < 2.0 * np.pi:
         # One full turn about the direction of the goal holds all there is.
         if inner == 0.0:
@@ -118,5 +119,5 @@ def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, 
 
 PEAK_SLOPE = 4.0
 """How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
-difference of cosines of joint angles, which move at most a few radians per radian of joint 1
-away from singularities; steeper windows are narrower than what a dense scan resolves."""
+difference of cosines of joint angles, which move at most a few radians per radian of the free
+joint away from singularities; steeper windows are narrower than what a dense scan resolves."""

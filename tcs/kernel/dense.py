@@ -13,7 +13,8 @@ from tcs.kernel.contacts import (
     gripper_body_contact,
     new_workspace,
 )
-from tcs.kernel.lanes import lane_joints, solve_lanes, wrist_goal
+from tcs.kernel.ik import lane_joints, wrist_goal
+from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.measure import isotropy_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import MAX_LANES, fill_lanes, new_search
@@ -36,7 +37,7 @@ def dense_scan(
         problem: The scene, its goals and its grid.
         configuration: Flat index of the initial configuration.
         goal: Index of the goal, one whose gripper is free.
-        samples: How many angles, spread evenly over the limits of joint 1.
+        samples: How many angles, spread evenly over the limits of the free joint.
         joints: Filled with the solution [rad] when there is one, shape (7,).
     """
     arm = problem.arm
@@ -49,7 +50,7 @@ def dense_scan(
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
         return -1.0
     room_in_arm_base(problem, work, torso)
-    first, last = arm.lower[0], arm.upper[0]
+    first, last = arm.lower[arm.free], arm.upper[arm.free]
     if not np.isfinite(first):
         first, last = -np.pi, np.pi
     step = (last - first) / (samples - 1)
@@ -75,5 +76,5 @@ def dense_scan(
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             joints[:] = search.q
-            return isotropy_at(arm, joints)
+            return isotropy_at(problem.chain_R, problem.chain_p, joints)
     return -1.0

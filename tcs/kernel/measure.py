@@ -7,23 +7,23 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import place_links
-from tcs.kernel.solver import ArmSolver
 
 
 @jit
-def jacobian(arm: ArmSolver, q: FloatArray, J: FloatArray) -> None:
+def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatArray) -> None:
     """Fill the Jacobian of tool T in the arm base A.
 
     Args:
-        arm: The arm.
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
         q: Joint angles [rad], shape (7,).
         J: Filled, shape (6, 7), rows [angular; linear] [rad/rad; m/rad].
     """
     R, p = np.empty((8, 3, 3)), np.empty((8, 3))
-    place_links(arm.R, arm.p, q, R, p)
-    tool = np.empty(3)
+    place_links(chain_R, chain_p, q, R, p)
+    tool, f = np.empty(3), chain_p[7]
     for r in range(3):
-        offset = R[7, r, 0] * arm.p[7, 0] + R[7, r, 1] * arm.p[7, 1] + R[7, r, 2] * arm.p[7, 2]
+        offset = R[7, r, 0] * f[0] + R[7, r, 1] * f[1] + R[7, r, 2] * f[2]
         tool[r] = p[7, r] + offset
     for i in range(7):
         x, y, z = R[i + 1, 0, 2], R[i + 1, 1, 2], R[i + 1, 2, 2]
@@ -33,11 +33,12 @@ def jacobian(arm: ArmSolver, q: FloatArray, J: FloatArray) -> None:
 
 
 @jit
-def isotropy_at(arm: ArmSolver, q: FloatArray) -> float:
+def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
     """Return how evenly the arm can move its tool in every direction, at joint angles q.
 
     Args:
-        arm: The arm.
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
         q: Joint angles [rad], shape (7,).
 
     Returns:
@@ -48,7 +49,7 @@ def isotropy_at(arm: ArmSolver, q: FloatArray) -> float:
         sixth root keeps the measure below 1. Rows mix units: compare within one robot only.
     """
     J = np.empty((6, 7))
-    jacobian(arm, q, J)
+    jacobian(chain_R, chain_p, q, J)
     G = np.empty((6, 6))
     trace = 0.0
     for i in range(6):

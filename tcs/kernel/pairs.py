@@ -14,7 +14,8 @@ from tcs.kernel.contacts import (
     pair_touches,
     place_links,
 )
-from tcs.kernel.lanes import lane_joints, solve_lanes
+from tcs.kernel.ik import lane_joints
+from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import Search, best_of, fill_lanes, find_candidates
 from tcs.kernel.solver import ArmSolver
@@ -120,7 +121,7 @@ def _between(
         middle = 0.5 * (low + high)
         angle = first + middle * width
         lane_joints(arm, search.goal, arm.branches[b], angle, search.q)
-        place_links(arm.R, arm.p, search.q, work.link_R, work.link_p)
+        place_links(problem.chain_R, problem.chain_p, search.q, work.link_R, work.link_p)
         if pair_touches(problem, work, body_A, partner, i, j):
             low = middle
         elif pair_touches(problem, work, body_A, other, k, m):

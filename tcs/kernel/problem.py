@@ -21,6 +21,7 @@ class Problem(NamedTuple):
     """One scene, its goals and its grid."""
 
     arm: ArmSolver
+    """How the arm is solved, in reverse maybe; what follows is the arm itself."""
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
@@ -83,7 +84,6 @@ def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
     Raises:
         ArmClassError: If the closed form cannot solve the arm.
     """
-    arm = arm_solver(scene.chain)
     order = np.argsort(-scene.arm.frame.astype(np.int64), kind="stable")
     R_AB = np.swapaxes(scene.arm_base_R, 1, 2)
     from_arm_base = scene.body.p - scene.arm_base_p[:, None]
@@ -94,9 +94,9 @@ def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
     pads = scene.arm.pad[order], scene.body.pad, scene.room.pad
     margin = scene.margin
     return Problem(
-        arm=arm,
-        chain_R=arm.R,
-        chain_p=arm.p,
+        arm=arm_solver(scene.chain),
+        chain_R=_own(scene.chain.R),
+        chain_p=_own(scene.chain.p),
         links=pack(scene.arm, order)[0],
         link_frame=frame,
         link_body=scene.arm.body[order].astype(np.int64),

@@ -15,6 +15,8 @@ import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
 
+MEETING_TOLERANCE = 1e-9
+"""Link origins closer than this [m] are one point, up to rounding."""
 Pose = tuple[FloatArray, FloatArray]
 """Rotation (3, 3) and position (3,) [m]."""
 
@@ -88,8 +90,24 @@ class Solution:
     """>= 0 where the branch exists and every joint keeps its limits."""
 
 
-def solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, int, int], Solution]:
-    """Return the solutions at free joint q1 by branch: signs of elbow, aim and wrist."""
+def is_mirrored(chain: Chain) -> bool:
+    """Return whether axes 1, 2 and 3 meet, and 5 and 6, but not also 5, 6 and 7."""
+    return bool(np.any(np.abs(chain.p[[2, 5, 6]]) > MEETING_TOLERANCE))
+
+
+def free_joint(chain: Chain) -> int:
+    """Return the index of the joint whose angle is chosen: the first, or the last if mirrored."""
+    return 6 if is_mirrored(chain) else 0
+
+
+def solutions(chain: Chain, X_AG: Pose, angle: float) -> dict[tuple[int, int, int], Solution]:
+    """Return the solutions at an angle of the free joint by branch: signs of elbow, aim, wrist."""
+    solve = mirrored_solutions if is_mirrored(chain) else upright_solutions
+    return solve(chain, X_AG, angle)
+
+
+def upright_solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, int, int], Solution]:
+    """Return the solutions of an arm with a spherical wrist, from its base outward."""
     R_A7 = X_AG[0] @ chain.R[7].T
     wrist = X_AG[1] - R_A7 @ chain.p[7]
     X_AL1 = compose((chain.R[0], chain.p[0]), (turn(q1), np.zeros(3)))
@@ -115,13 +133,55 @@ def solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, int, int],
                 q5 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
                 N = (turn(q5) @ chain.R[5] @ turn(q6) @ chain.R[6]).T @ M
                 q7 = math.atan2(N[1, 0], N[0, 0])
-                q = np.array([q1, q2, q3, q4, q5, q6, q7])
-                slack = min(elbow_left, aim_left, wrist_left)
-                for i in range(7):
-                    q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
-                    slack = min(slack, kept)
-                found[elbow_sign, aim_sign, wrist_sign] = Solution(q, slack)
+                left = min(elbow_left, aim_left, wrist_left)
+                q = [q1, q2, q3, q4, q5, q6, q7]
+                found[elbow_sign, aim_sign, wrist_sign] = limited(chain, q, left)
     return found
+
+
+def mirrored_solutions(chain: Chain, X_AG: Pose, q7: float) -> dict[tuple[int, int, int], Solution]:
+    """Return the solutions of an arm with a spherical shoulder, from its tool inward.
+
+    The arm is not turned round here: joint 7 fixes the frame L6 and with it the wrist W, where
+    axes 5 and 6 meet; S is where axes 1, 2 and 3 meet, and stands still.
+    """
+    X_67 = compose((chain.R[6], chain.p[6]), (turn(q7), np.zeros(3)))
+    X_A6 = compose(compose(X_AG, inverse((chain.R[7], chain.p[7]))), inverse(X_67))
+    s = inverse(X_A6)[0] @ (chain.p[0] - X_A6[1])
+    elbow_left, cosine, phase = elbow(chain, float(s @ s))
+    found = {}
+    for elbow_sign in (1, -1):
+        q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
+        # From W to S as seen by what joint 5 turns against.
+        X_34 = compose((chain.R[3], chain.p[3]), (turn(q4), np.zeros(3)))
+        X_35 = compose(X_34, (chain.R[4], chain.p[4]))
+        k = inverse(X_35)[1]
+        aim_left, aims = turns_to_height(chain.R[5].T, k, s[2])
+        for aim_sign, q5 in zip((1, -1), (-t for t in aims), strict=True):
+            n = chain.R[5].T @ turn(-q5) @ k
+            q6 = math.atan2(n[1], n[0]) - math.atan2(s[1], s[0])
+            R_36 = X_35[0] @ turn(q5) @ chain.R[5] @ turn(q6)
+            M = chain.R[0].T @ X_A6[0] @ R_36.T
+            f = chain.R[2][:, 2]
+            shoulder_left, lifts = turns_to_height(chain.R[1], f, M[2, 2])
+            for lift_sign, q2 in zip((1, -1), lifts, strict=True):
+                e = chain.R[1] @ turn(q2) @ f
+                q1 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
+                N = (turn(q1) @ chain.R[1] @ turn(q2) @ chain.R[2]).T @ M
+                q3 = math.atan2(N[1, 0], N[0, 0])
+                left = min(elbow_left, aim_left, shoulder_left)
+                q = [q1, q2, q3, q4, q5, q6, q7]
+                found[elbow_sign, aim_sign, lift_sign] = limited(chain, q, left)
+    return found
+
+
+def limited(chain: Chain, angles: list[float], left: float) -> Solution:
+    """Return a solution turned into its limits, its slack no more than what is `left` anyway."""
+    q = np.array(angles)
+    for i in range(7):
+        q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
+        left = min(left, kept)
+    return Solution(q, left)
 
 
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:

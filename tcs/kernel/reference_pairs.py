@@ -31,7 +31,9 @@ from tcs.kernel.reference import (
     compose,
     distance,
     elbow,
+    free_joint,
     inverse,
+    is_mirrored,
     isotropy,
     jacobian,
     link_poses,
@@ -185,11 +187,16 @@ class Candidate:
 
 
 def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], bool]:
-    """Return the arcs of joint 1 from which the elbow spans the way, and whether any would."""
+    """Return the arcs of the free joint at which the elbow spans the way, and whether any would."""
     near, far = elbow_spans(chain)
-    wrist = inverse((chain.R[0], chain.p[0]))
-    w = compose(wrist, compose(X_AG, inverse((chain.R[7], chain.p[7]))))[1]
-    s = chain.p[1]
+    X_A7 = compose(X_AG, inverse((chain.R[7], chain.p[7])))
+    if is_mirrored(chain):
+        # Seen from L7 the shoulder stands still, and joint 7 turns the wrist backwards.
+        w = inverse((chain.R[6], chain.p[6]))[1]
+        s = inverse(X_A7)[0] @ (chain.p[0] - X_A7[1])
+    else:
+        # Seen from what joint 1 turns against, the wrist stands still and the shoulder turns.
+        w, s = compose(inverse((chain.R[0], chain.p[0])), X_A7)[1], chain.p[1]
     steady = float(w @ w + s @ s - 2 * w[2] * s[2])
     swing = 2 * math.hypot(w[0], w[1]) * math.hypot(s[0], s[1])
     if steady - swing > far or steady + swing < near:
@@ -197,7 +204,8 @@ def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], boo
     centre = math.atan2(w[1], w[0]) - math.atan2(s[1], s[0])
     inner = math.acos(min((steady - near) / swing, 1.0)) if steady - swing < near else 0.0
     outer = math.acos(max((steady - far) / swing, -1.0)) if steady + swing > far else math.pi
-    lower, upper = chain.lower[0], chain.upper[0]
+    free = free_joint(chain)
+    lower, upper = chain.lower[free], chain.upper[free]
     arcs: list[tuple[float, float]] = []
     for middle in (centre + 2 * math.pi * k for k in range(-2, 3)):
         for first, last in ((middle - outer, middle - inner), (middle + inner, middle + outer)):
@@ -308,9 +316,9 @@ def climb(stand: Stand, best: Candidate) -> Candidate:
     chain, step = stand.scene.chain, best.step
     for _ in range(REFINEMENTS):
         fine = 2 * step / (REFINE_LANES - 1)
-        near = []
+        near, angle = [], best.q[free_joint(chain)]
         for i in range(REFINE_LANES):
-            solution = solutions(chain, stand.X_AG, best.q[0] - step + i * fine)[best.branch]
+            solution = solutions(chain, stand.X_AG, angle - step + i * fine)[best.branch]
             if solution.slack >= 0:
                 value = isotropy(jacobian(chain, solution.q))
                 near.append(Candidate(solution.q, value, best.branch, fine))

@@ -8,10 +8,16 @@ The class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axe
 * joints 5, 6 and 7 are a spherical wrist,
 
 each with two solutions in general: a branch is a triple of signs.
+
+The mirror image: axes 1, 2 and 3 meet, and axes 5 and 6. Seen from its tool such an arm is one of
+the class above: its joints come in the order 7 .. 1, and it has to bring the arm base to where the
+goal sees it. So it is solved as that reversed arm, with joint 7 free; `ik` turns the goal round
+on the way in and the joints on the way out, and nothing between knows of it.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -30,13 +36,22 @@ PARALLEL_TOLERANCE = 1e-6
 some tens of degrees; figures in a URDF carry six digits or more."""
 
 
-class ArmSolver(NamedTuple):
-    """One arm's constants of the closed form. L1..L7 as in `Chain`; u is SW expressed in L3."""
+FIRST, LAST = 0, 6
+"""Indices of the joints that may be free."""
 
+
+class ArmSolver(NamedTuple):
+    """One arm's constants of the closed form. L1..L7 as in `Chain`; u is SW expressed in L3.
+
+    Of a mirrored arm, all but `free`, `lower` and `upper` is that of the reversed one.
+    """
+
+    free: int
+    """Index of the free joint in the real arm: FIRST, or LAST where it is solved in reverse."""
     R: FloatArray
-    """Rotations of the chain, shape (8, 3, 3)."""
+    """Rotations of the chain as it is solved, shape (8, 3, 3)."""
     p: FloatArray
-    """Translations of the chain [m], shape (8, 3)."""
+    """Translations of the chain as it is solved [m], shape (8, 3)."""
     u0: FloatArray
     """u = u0 + uc cos(q4) + us sin(q4) [m], shape (3,)."""
     uc: FloatArray
@@ -53,7 +68,7 @@ class ArmSolver(NamedTuple):
     middle_sin: FloatArray
     """sin(middle of the limits), 0 where there are none, shape (7,)."""
     lower: FloatArray
-    """Joint limits [rad], shape (7,), infinite where the joint is continuous."""
+    """Joint limits [rad] in the real arm's order, shape (7,); infinite where continuous."""
     upper: FloatArray
     branches: IntArray
     """Signs of sin(q4 - phase), of the aim and of the wrist that can occur within the limits,
@@ -63,15 +78,24 @@ class ArmSolver(NamedTuple):
 def arm_solver(chain: Chain) -> ArmSolver:
     """Return the closed-form constants of `chain`.
 
+    An arm that fits both classes, such as one with a spherical shoulder and a spherical wrist, is
+    solved as it stands.
+
     Raises:
-        ArmClassError: If the arm is outside the class; the message says which axes fail to meet.
+        ArmClassError: If the arm is outside both classes; the message says which axes fail to meet
+            and by how much.
     """
-    _require_meeting("2 and 3", chain.p[2])
-    _require_meeting("5 and 6", chain.p[5])
-    _require_meeting("6 and 7", chain.p[6])
-    _require_crossing("2 and 3", chain.R[2])
-    _require_crossing("5 and 6", chain.R[5])
-    _require_crossing("6 and 7", chain.R[6])
+    misses = _misses(chain, (2, 3), (5, 6, 7))
+    mirror_misses = _misses(chain, (1, 2, 3), (5, 6))
+    if misses and mirror_misses:
+        raise ArmClassError(
+            "the arm is outside the closed-form classes. One needs axes 2 and 3 to meet, and 5, 6 "
+            f"and 7 in one point, but {'; '.join(misses)}. Its mirror image needs axes 1, 2 and 3 "
+            f"to meet in one point, and 5 and 6, but {'; '.join(mirror_misses)}."
+        )
+    real = chain
+    if misses:
+        chain = reversed_chain(chain)
     w = chain.p[4]
     R3 = chain.R[3]
     u0 = chain.p[3] + R3[:, 2] * w[2]
@@ -99,6 +123,7 @@ def arm_solver(chain: Chain) -> ArmSolver:
         wrist_signs = _signs_within(lower[5] - wrist_phase, upper[5] - wrist_phase, True)
     branches = [(e, a, w_) for e in elbow_signs for a in (1, -1) for w_ in wrist_signs]
     return ArmSolver(
+        free=LAST if misses else FIRST,
         R=np.array(chain.R, order="C"),
         p=np.array(chain.p, order="C"),
         u0=u0,
@@ -109,30 +134,72 @@ def arm_solver(chain: Chain) -> ArmSolver:
         limit_cos=np.where(limited, np.cos(half), -1.0),
         middle_cos=np.where(limited, np.cos(middle), 0.0),
         middle_sin=np.where(limited, np.sin(middle), 0.0),
-        lower=np.array(lower, dtype=np.float64),
-        upper=np.array(upper, dtype=np.float64),
+        lower=np.array(real.lower, dtype=np.float64),
+        upper=np.array(real.upper, dtype=np.float64),
         branches=np.array(branches, dtype=np.int64),
     )
 
 
-def _require_meeting(axes: str, offset: FloatArray) -> None:
-    """Raise unless the origins of two neighbouring joints coincide."""
-    distance = float(np.linalg.norm(offset))
-    if distance > MEETING_TOLERANCE:
-        raise ArmClassError(
-            f"the arm is outside the closed-form class: axes {axes} pass each other "
-            f"{distance:.4f} m apart. The class needs axes 2 and 3 to meet, and 5, 6 and 7."
-        )
+def reversed_chain(chain: Chain) -> Chain:
+    """Return the same arm from tool to base: its own arm base is T and its tool A.
+
+    Joint i of the result is joint 8 - i of `chain`, with the same angle: half a turn about x on
+    either side of every joint makes up for the sense in which it turns.
+    """
+    R = np.swapaxes(chain.R[::-1], 1, 2)
+    p = -np.einsum("ijk,ik->ij", R, chain.p[::-1])
+    half_turn = np.diag([1.0, -1.0, -1.0])
+    before, after = np.stack([half_turn] * 8), np.stack([half_turn] * 8)
+    before[0] = after[7] = np.eye(3)
+    return Chain(
+        R=np.ascontiguousarray(before @ R @ after),
+        p=np.einsum("ijk,ik->ij", before, p),
+        lower=chain.lower[::-1].copy(),
+        upper=chain.upper[::-1].copy(),
+    )
 
 
-def _require_crossing(axes: str, R: FloatArray) -> None:
-    """Raise if two neighbouring axes that meet are one and the same line."""
-    sine = float(np.hypot(R[0, 2], R[1, 2]))
-    if sine < PARALLEL_TOLERANCE:
-        raise ArmClassError(
-            f"the arm is outside the closed-form class: axes {axes} are parallel. The class needs "
-            "axes 2 and 3 to cross, and 5, 6 and 7."
-        )
+def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
+    """Return what keeps groups of neighbouring axes from meeting, each group in one point.
+
+    Args:
+        chain: The arm.
+        groups: Axes, two or three in a row.
+    """
+    found = []
+    for axes in groups:
+        passes = [_closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
+        reasons = []
+        for i, passing in zip(axes, passes, strict=False):
+            if passing is None:
+                reasons.append(f"axes {i} and {i + 1} are parallel")
+            elif passing[0] > MEETING_TOLERANCE:
+                reasons.append(f"axes {i} and {i + 1} pass each other {passing[0]:.3g} m apart")
+        met = [passing for passing in passes if passing is not None]
+        slips = [abs(after[1] - before[2]) for before, after in itertools.pairwise(met)]
+        if not reasons and max(slips, default=0.0) > MEETING_TOLERANCE:
+            reasons.append(f"axis {axes[1]} meets {axes[0]} and {axes[2]} {slips[0]:.3g} m apart")
+        if not reasons and np.abs(chain.p[list(axes[:-1])]).max() > MEETING_TOLERANCE:
+            names = ", ".join(f"L{i}" for i in axes)
+            reasons.append(f"link frames {names} do not lie where their axes meet")
+        found += reasons
+    return found
+
+
+def _closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
+    """Return how the z axis of a frame passes that of another one at the pose (R, p) in it.
+
+    Returns:
+        Their distance, and where they come closest, on each axis from its origin [m]; None where
+        they are parallel.
+    """
+    square = float(R[0, 2] ** 2 + R[1, 2] ** 2)
+    if square < PARALLEL_TOLERANCE**2:
+        return None
+    cosine, along = float(R[2, 2]), float(R[:, 2] @ p)
+    apart = abs(float(R[0, 2] * p[1] - R[1, 2] * p[0])) / np.sqrt(square)
+    first, second = p[2] - cosine * along, cosine * p[2] - along
+    return apart, float(first / square), float(second / square)
 
 
 def _signs_within(lower: float, upper: float, limited: bool) -> list[int]:

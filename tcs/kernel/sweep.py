@@ -17,7 +17,7 @@ from tcs.kernel.contacts import (
     gripper_room_contact,
     new_workspace,
 )
-from tcs.kernel.lanes import wrist_goal
+from tcs.kernel.ik import wrist_goal
 from tcs.kernel.measure import isotropy_at, rounded_inward
 from tcs.kernel.pairs import (
     BODY_BLOCKED,
@@ -129,4 +129,4 @@ def _keep(
     rounded_inward(search.best, problem.arm.lower, problem.arm.upper, rounded)
     for i in range(7):
         scores.joints[row, g, i] = rounded[i]
-    scores.isotropy[row, g] = isotropy_at(problem.arm, rounded)
+    scores.isotropy[row, g] = isotropy_at(problem.chain_R, problem.chain_p, rounded)

@@ -42,7 +42,9 @@ def link_frames(axes: tuple[Axis, ...]) -> tuple[FloatArray, FloatArray]:
 
     Each L turns about its own z. Its origin is that of the joint frame, except where sliding it
     along the joint axis makes the closed form of the arm visible: L2 and L3 lie where axes 2 and
-    3 meet, L5, L6 and L7 where axes 5, 6 and 7 meet in one point.
+    3 meet, L5, L6 and L7 where axes 5, 6 and 7 meet in one point. An arm that lacks one of the
+    two may be the mirror image: then L1, L2 and L3 lie where axes 1, 2 and 3 meet in one point,
+    L5 and L6 where axes 5 and 6 meet.
 
     Args:
         axes: The seven joint axes, in the arm's order.
@@ -52,14 +54,29 @@ def link_frames(axes: tuple[Axis, ...]) -> tuple[FloatArray, FloatArray]:
     """
     R_AL = np.stack([axis.R_AJ @ _rotation_to_z(axis.direction_J) for axis in axes])
     p_AL = np.stack([axis.p_AJ for axis in axes])
-    shoulder = meeting_points(axes[1], axes[2])
+    shoulder, wrist = meeting_points(axes[1], axes[2]), _common_points(*axes[4:7])
+    if shoulder is None or wrist is None:
+        round_shoulder, round_wrist = _common_points(*axes[0:3]), meeting_points(axes[4], axes[5])
+        if round_shoulder is not None and round_wrist is not None:
+            p_AL[0:3], p_AL[4:6] = round_shoulder, round_wrist
+            return R_AL, p_AL
     if shoulder is not None:
-        p_AL[1], p_AL[2] = shoulder
-    # Axes 5 and 7 may be parallel at zero, so each is met with axis 6, where the point is sharp.
-    wrist, hand = meeting_points(axes[4], axes[5]), meeting_points(axes[6], axes[5])
-    if wrist is not None and hand is not None and np.linalg.norm(wrist[1] - hand[1]) < AXES_MEET:
-        p_AL[4], p_AL[5], p_AL[6] = wrist[0], wrist[1], hand[0]
+        p_AL[1:3] = shoulder
+    if wrist is not None:
+        p_AL[4:7] = wrist
     return R_AL, p_AL
+
+
+def _common_points(
+    first: Axis, middle: Axis, last: Axis
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return where three axes in a row meet in one point, one point on each, in A [m], or None."""
+    # The outer two may be parallel at zero, so each is met with the middle one, where the point is
+    # sharp.
+    inner, outer = meeting_points(first, middle), meeting_points(last, middle)
+    if inner is None or outer is None or np.linalg.norm(inner[1] - outer[1]) >= AXES_MEET:
+        return None
+    return inner[0], inner[1], outer[0]
 
 
 def meeting_points(first: Axis, second: Axis) -> tuple[FloatArray, FloatArray] | None:

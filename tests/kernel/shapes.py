@@ -64,14 +64,19 @@ def as_shapes(items, frame=0):
     )
 
 
-def random_arm(rng, *, limited=True):
-    """Return a random arm of the closed-form class: any twists, any other offsets."""
+def random_arm(rng, *, mirrored=False):
+    """Return a random arm of the closed-form class: any twists, any other offsets.
+
+    Args:
+        rng: Random numbers.
+        mirrored: Whether axes 1, 2 and 3 meet, and 5 and 6, instead of 2 and 3, and 5, 6 and 7.
+    """
     R = np.array([rotation(rng) for _ in range(8)])
     p = rng.uniform(-0.3, 0.3, (8, 3))
-    p[[2, 5, 6]] = 0.0
+    p[[1, 2, 5] if mirrored else [2, 5, 6]] = 0.0
     lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
     for i in range(7):
-        if limited and rng.random() < 0.75:
+        if rng.random() < 0.75:
             middle, half = rng.uniform(-2, 2), rng.uniform(0.4, 3.0)
             lower[i], upper[i] = middle - half, middle + half
     return Chain(R, p, lower, upper)

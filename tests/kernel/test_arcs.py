@@ -1,4 +1,4 @@
-"""The arcs of joint 1 and the windows in a row of lanes."""
+"""The arcs of the free joint and the windows in a row of lanes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from tcs.kernel.arcs import (
     elbow_arcs,
     windows_of,
 )
-from tcs.kernel.lanes import solve_lanes, wrist_goal
-from tcs.kernel.reference import link_poses
+from tcs.kernel.ik import wrist_goal
+from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.reference import free_joint, link_poses
 from tcs.kernel.search import MAX_WINDOWS
 from tcs.kernel.solver import arm_solver
+from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, random_joints, rotation
 
 DENSE = 2000
@@ -35,11 +37,16 @@ def arcs_of(arm, X_AG):
 
 def distance_left(arm, chain, X_AG, angles):
     """Return how far |SW|^2 is inside what the elbow spans [m^2], by forward kinematics."""
-    wrist = X_AG[1] - X_AG[0] @ chain.R[7].T @ chain.p[7]
-    v = chain.R[0].T @ (wrist - chain.p[0])
     c, s = np.cos(angles), np.sin(angles)
+    R_A7 = X_AG[0] @ chain.R[7].T
+    p_A7 = X_AG[1] - R_A7 @ chain.p[7]
+    if free_joint(chain) == 0:
+        v, other = chain.R[0].T @ (p_A7 - chain.p[0]), chain.p[1]
+    else:
+        # L6's origin in L7 at zero, turned back by joint 7; the shoulder in L7.
+        v, other = -chain.R[6].T @ chain.p[6], R_A7.T @ (chain.p[0] - p_A7)
     x = np.stack([c * v[0] + s * v[1], -s * v[0] + c * v[1], np.full_like(c, v[2])], axis=-1)
-    square = np.sum((x - chain.p[1]) ** 2, axis=-1)
+    square = np.sum((x - other) ** 2, axis=-1)
     near, far = reference_pairs.elbow_spans(chain)
     return np.minimum(square - near, far - square)
 
@@ -61,15 +68,23 @@ def goals(rng, chain, number):
             yield rotation(rng), rng.uniform(-length, length, 3)
 
 
-@pytest.mark.parametrize("arm_seed", ["pr2", *range(15)])
-def test_arcs_are_what_a_dense_scan_finds(lowered, arm_seed):
+@pytest.fixture(params=["pr2", "panda", *range(15), *(f"mirrored {i}" for i in range(15))], ids=str)
+def chain(request, lowered):
+    """Real arms, and random arms of either class."""
+    if request.param == "pr2":
+        return lowered.arrays.chain
+    if request.param == "panda":
+        return drake_arm("panda").chain
+    mirrored = isinstance(request.param, str)
+    seed = int(request.param.split()[1]) if mirrored else request.param
+    return random_arm(np.random.default_rng(seed), mirrored=mirrored)
+
+
+def test_arcs_are_what_a_dense_scan_finds(chain):
     rng = np.random.default_rng(1)
-    chain = lowered.arrays.chain
-    if arm_seed != "pr2":
-        chain = random_arm(np.random.default_rng(arm_seed))
-    arm = arm_solver(chain)
-    limited = np.isfinite(chain.lower[0])
-    lower, upper = (chain.lower[0], chain.upper[0]) if limited else (-np.pi, np.pi)
+    arm, free = arm_solver(chain), free_joint(chain)
+    limited = np.isfinite(chain.lower[free])
+    lower, upper = (chain.lower[free], chain.upper[free]) if limited else (-np.pi, np.pi)
     angles = np.linspace(lower, upper, DENSE)
     for X_AG in goals(rng, chain, 40):
         _, arcs, reach = arcs_of(arm, X_AG)
@@ -87,12 +102,8 @@ def test_arcs_are_what_a_dense_scan_finds(lowered, arm_seed):
         assert not np.any(in_some(arcs, angles[left < -1e-9], -1e-12))
 
 
-@pytest.mark.parametrize("arm_seed", ["pr2", *range(15)])
-def test_feasible_angles_lie_in_the_arcs(lowered, arm_seed):
+def test_feasible_angles_lie_in_the_arcs(chain):
     rng = np.random.default_rng(2)
-    chain = lowered.arrays.chain
-    if arm_seed != "pr2":
-        chain = random_arm(np.random.default_rng(arm_seed))
     arm = arm_solver(chain)
     angles = np.linspace(-np.pi, np.pi, DENSE)
     slack, measure = np.empty(DENSE), np.empty(DENSE)
@@ -109,12 +120,14 @@ def test_feasible_angles_lie_in_the_arcs(lowered, arm_seed):
     assert seen > 100
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("seed", range(15))
-def test_out_of_reach_and_out_of_limits_are_told_apart(seed):
+def test_out_of_reach_and_out_of_limits_are_told_apart(seed, mirrored):
     rng = np.random.default_rng(seed)
-    chain = random_arm(rng)
+    chain = random_arm(rng, mirrored=mirrored)
+    free = free_joint(chain)
     lower, upper = chain.lower.copy(), chain.upper.copy()
-    lower[0], upper[0] = 0.3, 0.9
+    lower[free], upper[free] = 0.3, 0.9
     chain = chain._replace(lower=lower, upper=upper)
     arm = arm_solver(chain)
     everywhere = np.linspace(-np.pi, np.pi, DENSE)

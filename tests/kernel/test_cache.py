@@ -118,13 +118,9 @@ SCRIPT = """
 import numpy as np
 from tcs.kernel.cache import jit_folder
 from tcs.kernel.measure import isotropy_at
-from tcs.kernel.solver import ArmSolver
 
-v = np.zeros(7)
 R, p = np.tile(np.eye(3)[[1, 2, 0]], (8, 1, 1)), np.full((8, 3), 0.2)
-n = np.zeros(3)
-arm = ArmSolver(R, p, n, n, n, n, n, v, v, v, v, v, np.zeros((1, 3), np.int64))
-value = isotropy_at(arm, np.linspace(0.1, 0.9, 7))
+value = isotropy_at(R, p, np.linspace(0.1, 0.9, 7))
 print(value, len(isotropy_at.stats.cache_hits), jit_folder())
 """
 

@@ -5,20 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.lanes import lane_joints, solve_lanes, within, wrist_goal
-from tcs.kernel.reference import isotropy, jacobian, link_poses, solutions
+from tcs.kernel.ik import lane_joints, within, wrist_goal
+from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.reference import free_joint, isotropy, jacobian, link_poses, solutions
 from tcs.kernel.solver import arm_solver
+from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 
-ARMS = ["pr2", *range(12)]
+ARMS = ["pr2", "tiago", "panda", *range(12), *(f"mirrored {i}" for i in range(12))]
 
 
 @pytest.fixture(params=ARMS, ids=str)
 def chain(request, lowered):
-    """The PR2's arm, and random arms of the class with random limits."""
+    """Real arms, and random arms of either class with random limits."""
     if request.param == "pr2":
         return lowered.arrays.chain
-    return random_arm(np.random.default_rng(request.param))
+    if request.param in ("tiago", "panda"):
+        return drake_arm(request.param).chain
+    mirrored = isinstance(request.param, str)
+    seed = int(request.param.split()[1]) if mirrored else request.param
+    return random_arm(np.random.default_rng(seed), mirrored=mirrored)
 
 
 def goal_of(arm, X_AG):
@@ -28,7 +34,7 @@ def goal_of(arm, X_AG):
 
 
 def lanes_at(arm, goal, branch, angles):
-    """Return slack and measure of each angle of joint 1."""
+    """Return slack and measure of each angle of the free joint."""
     angles = np.atleast_1d(angles)
     slack, measure = np.full(len(angles), np.nan), np.full(len(angles), np.nan)
     solve_lanes(arm, goal, branch, np.cos(angles), np.sin(angles), len(angles), slack, measure)
@@ -40,22 +46,22 @@ def is_regular(arm, chain, q):
 
     Errors of 1e-16 in a cosine grow to 1e-16/sine in its angle.
     """
-    found = solutions(chain, link_poses(chain, q)[-1], q[0])
+    found = solutions(chain, link_poses(chain, q)[-1], q[free_joint(chain)])
     own = min(np.max(np.abs(around(s.q - q))) for s in found.values())
     return own < 1e-7 and isotropy(jacobian(chain, q)) > 0.02
 
 
 def test_some_branch_returns_the_joints_that_made_the_goal(chain, rng):
     arm = arm_solver(chain)
-    regular = 0
+    regular, free = 0, free_joint(chain)
     for _ in range(100):
         q = random_joints(rng, chain)
         goal = goal_of(arm, link_poses(chain, q)[-1])
         errors = []
         for branch in arm.branches:
-            slack, _ = lanes_at(arm, goal, branch, q[0])
+            slack, _ = lanes_at(arm, goal, branch, q[free])
             joints = np.empty(7)
-            lane_joints(arm, goal, branch, q[0], joints)
+            lane_joints(arm, goal, branch, q[free], joints)
             # At a limit the slack is a difference of cosines, off by some 1e-12 at most.
             if slack[0] >= -1e-12:
                 errors.append(np.max(np.abs(around(joints - q))))
@@ -127,13 +133,14 @@ def test_slack_is_negative_out_of_reach(chain, rng):
             assert np.all(slack < 0)
 
 
-def test_joint_1_out_of_its_limits_is_infeasible(lowered, rng):
-    chain = lowered.arrays.chain
-    arm = arm_solver(chain)
+@pytest.mark.parametrize("name", ["pr2 left", "panda"])
+def test_the_free_joint_out_of_its_limits_is_infeasible(name, rng):
+    chain = drake_arm(name).chain
+    arm, free = arm_solver(chain), free_joint(chain)
     for _ in range(50):
         q = random_joints(rng, chain)
         goal = goal_of(arm, link_poses(chain, q)[-1])
-        outside = np.array([chain.lower[0] - 1e-6, chain.upper[0] + 1e-6, np.pi])
+        outside = np.array([chain.lower[free] - 1e-6, chain.upper[free] + 1e-6, np.pi])
         for branch in arm.branches:
             slack, _ = lanes_at(arm, goal, branch, outside)
             assert np.all(slack < 0)

@@ -8,9 +8,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tcs.errors import ArmClassError
-from tcs.kernel.reference import elbow, turn
-from tcs.kernel.solver import _cos_range, _signs_within, arm_solver
-from tests.kernel.shapes import random_arm
+from tcs.kernel.reference import compose, elbow, free_joint, link_poses, turn
+from tcs.kernel.solver import (
+    FIRST,
+    LAST,
+    _cos_range,
+    _signs_within,
+    arm_solver,
+    reversed_chain,
+)
+from tests.kernel.arms import drake_arm
+from tests.kernel.shapes import random_arm, straight_arm
 
 ends = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0)).map(sorted)
 
@@ -22,14 +30,93 @@ def test_the_pr2_belongs_to_the_class(lowered):
 
 
 @pytest.mark.parametrize(
-    ("row", "axes"), [(2, "2 and 3"), (5, "5 and 6"), (6, "6 and 7")], ids=["23", "56", "67"]
+    ("name", "free"),
+    [("pr2 left", FIRST), ("pr2 right", FIRST), ("tiago", FIRST), ("panda", LAST)],
+    ids=lambda value: str(value),
 )
-def test_axes_that_pass_each_other_are_refused_with_the_distance(lowered, row, axes):
-    chain = lowered.arrays.chain
+def test_real_arms_belong_to_one_of_the_classes(name, free):
+    chain = drake_arm(name).chain
+    assert arm_solver(chain).free == free
+    assert free_joint(chain) == free
+
+
+def test_an_arm_of_both_classes_is_solved_as_it_stands():
+    # Spherical shoulder and spherical wrist, like a KUKA iiwa: reversed it fits as well.
+    chain = straight_arm(np.full(7, 2.0), 0.0)
+    assert arm_solver(chain).free == FIRST
+    assert arm_solver(reversed_chain(chain)).free == FIRST
+    assert free_joint(chain) == FIRST
+
+
+def test_baxter_is_outside_and_the_message_says_by_how_much():
+    # Its URDF: shoulder 0.069 m from axis 1, wrist bend 0.01 m from the forearm's axis.
+    with pytest.raises(ArmClassError) as caught:
+        arm_solver(drake_arm("baxter").chain)
+    upright, mirrored = str(caught.value).split("Its mirror image")
+    assert "5, 6 and 7 in one point, but axes 5 and 6 pass each other 0.01 m apart" in upright
+    assert "axes 1 and 2 pass each other 0.069 m apart" in mirrored
+    assert "axes 5 and 6 pass each other 0.01 m apart" in mirrored
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("seed", range(10))
+def test_axes_that_pass_each_other_are_refused_with_their_distance(seed, mirrored):
+    rng = np.random.default_rng(seed)
+    chain = random_arm(rng, mirrored=mirrored)
+    i = int(rng.choice([1, 2, 5] if mirrored else [2, 5, 6]))
     p = chain.p.copy()
-    p[row] = [0.003, 0.0, 0.004]
-    with pytest.raises(ArmClassError, match=rf"axes {axes} pass each other 0\.0050 m apart"):
+    p[i] = rng.normal(scale=0.01, size=3)
+    chain = chain._replace(p=p)
+    (R, a), (S, b) = link_poses(chain, rng.uniform(-3, 3, 7))[i - 1 : i + 1]
+    along = np.stack([R[:, 2], -S[:, 2]], axis=1)
+    apart = np.sqrt(np.linalg.lstsq(along, b - a, rcond=None)[1][0])
+    # As many digits as the message shows.
+    with pytest.raises(
+        ArmClassError, match=f"axes {i} and {i + 1} pass each other {apart:.3g} m apart"
+    ):
+        arm_solver(chain)
+
+
+@pytest.mark.parametrize(("mirrored", "row"), [(False, 5), (False, 6), (True, 1), (True, 2)])
+def test_three_axes_that_meet_in_two_points_are_refused(mirrored, row, rng):
+    chain = random_arm(rng, mirrored=mirrored)
+    p = chain.p.copy()
+    # Along the middle one of the three axes.
+    p[row] = 0.004 * (np.eye(3)[2] if row in (2, 6) else chain.R[row][:, 2])
+    first, middle, last = (1, 2, 3) if mirrored else (5, 6, 7)
+    expected = rf"axis {middle} meets {first} and {last} 0\.004 m apart"
+    with pytest.raises(ArmClassError, match=expected):
         arm_solver(chain._replace(p=p))
+
+
+def test_parallel_axes_are_refused(rng):
+    chain = random_arm(rng)
+    R = chain.R.copy()
+    R[5] = turn(0.4)
+    with pytest.raises(ArmClassError, match="axes 5 and 6 are parallel"):
+        arm_solver(chain._replace(R=R))
+
+
+def test_link_frames_beside_the_meeting_point_are_refused(rng):
+    chain = random_arm(rng)
+    p = chain.p.copy()
+    p[2] = 0.1 * chain.R[2][:, 2]
+    with pytest.raises(ArmClassError, match="link frames L2, L3 do not lie where their axes meet"):
+        arm_solver(chain._replace(p=p))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_reversed_arm_sees_its_base_where_the_tool_does(seed):
+    rng = np.random.default_rng(seed)
+    chain = random_arm(rng, mirrored=bool(seed % 2))
+    back = reversed_chain(chain)
+    for q in rng.uniform(-3, 3, (10, 7)):
+        R, p = compose(link_poses(chain, q)[-1], link_poses(back, q[::-1])[-1])
+        # Sixteen products of rotations.
+        np.testing.assert_allclose(R, np.eye(3), atol=1e-14)
+        np.testing.assert_allclose(p, 0.0, atol=1e-14)
+    np.testing.assert_array_equal(back.lower[::-1], chain.lower)
+    np.testing.assert_array_equal(back.upper[::-1], chain.upper)
 
 
 def test_an_elbow_that_does_not_bend_the_arm_is_refused(lowered):
