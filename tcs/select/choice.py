@@ -68,6 +68,8 @@ class Choice:
     """D of the set from the current state."""
     utility: float
     """alpha P_R + beta P_M - gamma D, TCS eq. (5)."""
+    cut_off: int
+    """How many candidates were left out because there is no way to them from here."""
     seconds: float
     """How long choosing took [s]."""
     match: Match | None = None
@@ -101,7 +103,8 @@ def select(
 
     Raises:
         SelectionError: If no goal is reached from anywhere, the current state is not finite or
-            lacks an axis that costs something, or `max_members` is not stored.
+            lacks an axis that costs something, `max_members` is not stored, or there is no way
+            around the furniture to anywhere.
         UnknownNameError: If an environment axis has no such name.
 
     Source:
@@ -129,8 +132,16 @@ def select(
             "Nothing to choose from: no goal is reached from any initial configuration. Look at "
             "the reasons in the score table, then change the task, the grid or the environment."
         )
-    legs = legs_from(here, tables.grid, sets.candidates, tables.index.xy, travel)
+    legs = legs_from(
+        here, tables.grid, sets.candidates, sets.cell, tables.index.ways[travel.route], travel
+    )
+    if not np.any(legs.reachable):
+        raise SelectionError(
+            f"From ({here.base_x:.2f}, {here.base_y:.2f}) m there is no way around the furniture "
+            "to any place worth standing at. Check the place, or take straight lines."
+        )
     singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)
+    singles[~legs.reachable[sets.cell]] = -np.inf
     single = int(np.argmax(singles))
     rows: tuple[int, ...] = (single,)
     if max_members > 1 and len(sets.pair_cells):
@@ -161,6 +172,7 @@ def _choice(
         manipulability=manipulability,
         cost=cost,
         utility=utility(reachability, manipulability, cost, weights),
+        cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
         seconds=time.perf_counter() - start,
         match=match,
     )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tcs.select.travel import Legs
 from tcs.select.utility import UtilityWeights, utility
+from tcs.select.ways import StraightWays, Ways, WaysAround
 from tcs.tables import SetTable
 
 FloatArray = NDArray[np.float64]
@@ -41,11 +42,6 @@ class PairIndex:
     """The table."""
 
     @cached_property
-    def xy(self) -> FloatArray:
-        """Base places of the candidates [m], shape (C, 2)."""
-        return self.sets.cell_xy[self.sets.cell]
-
-    @cached_property
     def first(self) -> IntArray:
         """First cell of each group, shape (K,)."""
         return self.sets.pair_cells[:, 0].astype(np.int64)
@@ -69,12 +65,13 @@ class PairIndex:
         return self.sets.pair_sum.astype(np.float64)
 
     @cached_property
-    def distance(self) -> FloatArray:
-        """Distance between the two cells of each group [m], shape (K,)."""
-        xy = self.sets.cell_xy
-        dx = xy[self.second, 0] - xy[self.first, 0]
-        dy = xy[self.second, 1] - xy[self.first, 1]
-        return np.asarray(np.sqrt(dx * dx + dy * dy))
+    def ways(self) -> dict[str, Ways]:
+        """Distances between the cells by each of the routes."""
+        xy, groups = self.sets.cell_xy, self.sets.pair_cells.astype(np.int64)
+        return {
+            "straight": StraightWays(xy, groups),
+            "around": WaysAround(xy, groups, self.sets.floor),
+        }
 
     @cached_property
     def earliest(self) -> IntArray:
@@ -144,7 +141,7 @@ def best_pair(
 
 
 def _bounds(index: PairIndex, legs: Legs, weights: UtilityWeights) -> FloatArray:
-    """Return an upper bound on the utility in each group, shape (K,)."""
+    """Return an upper bound on the utility in each group, shape (K,); -inf out of reach."""
     alpha, beta = float(weights.reachability), float(weights.manipulability)
     reachability, manipulability = index.sets.pair_reachability, index.manipulability
     # The best reachability and the best manipulability may belong to two different pairs.
@@ -158,14 +155,15 @@ def _bounds(index: PairIndex, legs: Legs, weights: UtilityWeights) -> FloatArray
     np.minimum(gain, together, out=gain)
     if weights.travel > 0.0:
         gain -= float(weights.travel) * _least_costs(index, legs)
+    if not np.all(legs.reachable):
+        gain[~(legs.reachable[index.first] & legs.reachable[index.second])] = -np.inf
     return gain
 
 
 def _least_costs(index: PairIndex, legs: Legs) -> FloatArray:
     """Return a lower bound on the travel cost D in each group, shape (K,)."""
-    here_to_cell = legs.driving(legs.here_xy, index.sets.cell_xy)
-    approach = np.minimum(here_to_cell[index.first], here_to_cell[index.second])
-    cost = approach + legs.metre * index.distance
+    approach = np.minimum(legs.here_to_cell[index.first], legs.here_to_cell[index.second])
+    cost = approach + legs.metre * legs.ways.of_groups
     if legs.level_weights:
         # Turning, lifting and moving the bed obey the triangle inequality: a tour pays at least
         # the direct change to whichever member differs most from the current state.

@@ -1,8 +1,8 @@
 """What it costs to get from the current state to a set: D(h_k, h_0) in TCS eq. (5).
 
 D is the shortest open tour that starts at the current state h_0 and visits every
-member of the set. Legs are straight lines: the paper's choice, and too short
-where furniture is in the way.
+member of the set. A leg is driven straight, or around the furniture: see
+`tcs.select.ways`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.select.checks import check_coordinate, check_weight
+from tcs.select.ways import ROUTES, Ways
 from tcs.space import Grid
 from tcs.tables import InitialConfiguration
 
@@ -32,20 +33,25 @@ class TravelWeights:
     """
 
     metre: float = 1.0
-    """Per metre between base places, in a straight line."""
+    """Per metre driven."""
     turn: float = 0.0
     """Per radian between base headings, the shorter way round (0 to pi)."""
     torso: float = 0.0
     """Per metre of torso lift."""
     environment: tuple[tuple[str, float], ...] = ()
     """Per metre or radian of each named environment axis, e.g. ("bed_height", 2.0)."""
+    route: str = "straight"
+    """How the base drives: "straight", as in the paper, or "around" the furniture."""
 
     def __post_init__(self) -> None:
-        """Refuse weights that are negative or not finite.
+        """Refuse weights that are negative or not finite, and unknown routes.
 
         Raises:
             SelectionError: If a weight is no number from 0 to 1e9, or an axis is named twice.
+            UnknownNameError: If there is no such route.
         """
+        if self.route not in ROUTES:
+            raise UnknownNameError("route", str(self.route), ROUTES, where="travel")
         for name in ("metre", "turn", "torso"):
             check_weight(f"of travel per {name}", getattr(self, name))
         for name, value in self.environment:
@@ -63,8 +69,14 @@ class Legs:
     whole leg, in floating point too, and can bound it.
     """
 
-    xy: FloatArray
-    """Places of the candidates [m], shape (C, 2)."""
+    cell: NDArray[np.int32]
+    """Base cells of the candidates, shape (C,)."""
+    ways: Ways
+    """Distances between the cells."""
+    here_to_cell: FloatArray
+    """Cost of driving from the current place to each cell, 0 where there is no way, shape (N,)."""
+    reachable: NDArray[np.bool_]
+    """Whether there is a way from the current place to each cell, shape (N,)."""
     levels: FloatArray
     """What else the candidates differ in and costs something: heading if it has a weight,
     torso, environment axes [rad or m], shape (C, L)."""
@@ -72,34 +84,25 @@ class Legs:
     """Weight of each column of `levels`."""
     turns: bool
     """Whether the first column of `levels` is the heading, which wraps round."""
-    here_xy: FloatArray
-    """The current place [m], shape (2,)."""
     here_levels: FloatArray
     """The current values of `levels`, shape (L,)."""
     metre: float
     """Weight of driving, per metre."""
 
-    def driving(self, from_xy: FloatArray, to_xy: FloatArray) -> FloatArray:
-        """Return the cost of driving between places, shapes (..., 2), as shape (...)."""
-        dx = to_xy[..., 0] - from_xy[..., 0]
-        dy = to_xy[..., 1] - from_xy[..., 1]
-        return self.metre * np.sqrt(dx * dx + dy * dy)
-
     def between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
-        """Return the cost of the leg between candidates a and b, shape (n,)."""
-        driving = self.driving(self.xy[a], self.xy[b])
+        """Return the cost of the leg between candidates a and b, shape (...)."""
+        driving = self.metre * self.ways.between(self.cell[a], self.cell[b])
         return self._with_levels(driving, self.levels[a], self.levels[b])
 
     @cached_property
     def from_here(self) -> FloatArray:
         """Cost of the leg from the current state to each candidate, shape (C,)."""
-        driving = self.driving(self.here_xy, self.xy)
-        return self._with_levels(driving, self.here_levels, self.levels)
+        return self._with_levels(self.here_to_cell[self.cell], self.here_levels, self.levels)
 
     @cached_property
     def levels_from_here(self) -> FloatArray:
         """Cost of that leg without the driving, shape (C,)."""
-        nothing = np.zeros(len(self.xy))
+        nothing = np.zeros(len(self.cell))
         return self._with_levels(nothing, self.here_levels, self.levels)
 
     def _with_levels(
@@ -119,7 +122,8 @@ def legs_from(
     here: InitialConfiguration,
     grid: Grid,
     candidates: NDArray[np.int32],
-    xy: FloatArray,
+    cell: NDArray[np.int32],
+    ways: Ways,
     weights: TravelWeights,
 ) -> Legs:
     """Return the legs between the current state and the candidates of a grid.
@@ -128,24 +132,30 @@ def legs_from(
         here: The current state h_0. Environment axes matter only where they have a weight.
         grid: Grid of the candidates.
         candidates: Flat indices of the candidates, shape (C,).
-        xy: Their base places [m], shape (C, 2).
+        cell: Their base cells, shape (C,).
+        ways: Distances between the cells.
         weights: What each kind of motion costs.
 
     Raises:
         UnknownNameError: If a weight names an axis that the environment does not have.
-        SelectionError: If the current state is not finite, or lacks an axis with a weight.
+        SelectionError: If the current state is not finite, lacks an axis with a weight, or is no
+            place from which there is a way anywhere.
     """
     names, level_weights = _weighted_levels(grid, weights)
     current = _current_values(here, grid, names)
     # Columns are read only when they cost something: looking them up takes longer than choosing.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
+    metres = ways.from_place(float(here.base_x), float(here.base_y))
+    reachable = np.isfinite(metres)
     return Legs(
-        xy=xy,
+        cell=cell,
+        ways=ways,
+        here_to_cell=float(weights.metre) * np.where(reachable, metres, 0.0),
+        reachable=reachable,
         levels=np.stack(levels, axis=1) if names else np.zeros((len(candidates), 0)),
         level_weights=level_weights,
         turns=weights.turn > 0.0,
-        here_xy=np.array([here.base_x, here.base_y], dtype=np.float64),
         here_levels=np.array([current[name] for name in names], dtype=np.float64),
         metre=float(weights.metre),
     )

@@ -124,6 +124,13 @@ class SetTable:
             f"set table: cell outside 0..{len(self.cell_xy) - 1}.",
         )
         require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
+        along = (self.cell_xy - self.floor.start) / self.floor.step
+        inside = (np.rint(along) >= 0) & (np.rint(along) < self.floor.shape)
+        # A millionth of a step: what rounding leaves of some dozen steps, and to spare.
+        require(
+            bool(np.all(inside & (np.abs(along - np.rint(along)) < 1e-6))),
+            "set table: cell_xy must be places of the floor.",
+        )
         for name, size in (("best", self.max_members), ("best_single", 1)):
             members = getattr(self, name)
             require(

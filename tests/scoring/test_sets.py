@@ -165,5 +165,5 @@ def test_refuses(changes, message):
 
 def test_an_unknown_rule_is_named():
     grid = small_grid()
-    with pytest.raises(UnknownNameError, match="unknown rule 'papr'.*Did you mean 'paper'"):
+    with pytest.raises(UnknownNameError, match=r"unknown rule 'papr'.*Did you mean 'paper'"):
         build_sets(random_scores(grid, 2, seed=0), grid, rule="papr")

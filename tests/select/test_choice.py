@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 import math
 
@@ -7,9 +8,10 @@ import pytest
 from hypothesis import assume, given, settings
 
 from tcs.errors import SelectionError, UnknownNameError
+from tcs.scoring.floor import floor_of
 from tcs.scoring.sets import build_sets
 from tcs.select import SelectionTables, TravelWeights, UtilityWeights, search, select
-from tcs.tables import InitialConfiguration
+from tcs.tables import InitialConfiguration, Reason, ScoreTable
 from tests.tables.small import all_sets, random_scores, small_grid
 
 HERE = InitialConfiguration(base_x=-2.0, base_y=0.5, base_yaw=0.0, torso=0.0)
@@ -117,6 +119,82 @@ def test_equals_brute_force_over_all_kept_sets(
     assert choice.indices == members
     assert (choice.utility, choice.cost) == (value, cost)
     assert (choice.reachability, choice.manipulability) == kept[members]
+
+
+def floor_with_walls(grid, seed, share):
+    """A floor on which so many places of the grid can't be driven to, nor away from."""
+    rng = np.random.default_rng(seed)
+    blocked = rng.random((grid.axis("base_x").count, grid.axis("base_y").count)) < share
+    reason = np.full((grid.size, 1), Reason.TOO_FAR, dtype=np.uint8)
+    along = grid.indices(np.arange(grid.size))[:, -4:]
+    reason[blocked[along[:, 0], along[:, 1]]] = Reason.BODY_BLOCKED
+    scores = ScoreTable(
+        isotropy=np.zeros((grid.size, 1), dtype=np.float32),
+        reason=reason,
+        pair=np.full((grid.size, 1), -1, dtype=np.int32),
+        pair_names=(),
+        arm_joints=np.zeros((0, 7), dtype=np.float32),
+        weights=np.ones(1),
+    )
+    return floor_of(scores, grid)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    levels=st.sampled_from([0, 1, 2]),
+    blocked=st.sampled_from([0.1, 0.5, 0.8]),
+    weights=utility_weights,
+    metre=weight,
+    turn=weight,
+    where=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
+)
+def test_equals_brute_force_around_the_furniture(
+    seed, levels, blocked, weights, metre, turn, where
+):
+    grid = small_grid(nx=6, ny=5, yaws=2, torsos=1)
+    scores = random_scores(grid, 3, seed, levels=levels, share=0.3)
+    sets = dataclasses.replace(
+        build_sets(scores, grid), floor=floor_with_walls(grid, seed, blocked)
+    )
+    kept = all_sets(scores, grid, 0.4)
+    tables = SelectionTables(sets, grid)
+    ways = tables.index.ways["around"]
+    here = state(base_x=where[0], base_y=where[1], base_yaw=1.0)
+    travel = TravelWeights(metre=metre, turn=turn, route="around")
+    try:
+        metres = ways.from_place(*where)
+    except SelectionError:
+        with pytest.raises(SelectionError, match="no way around the furniture starts there"):
+            select(tables, here, weights=weights, travel=travel)
+        return
+    cell = dict(zip(sets.candidates.tolist(), sets.cell.tolist(), strict=True))
+    yaw = {h: grid.configuration(h).base_yaw for h in cell}
+    best = None
+    for members, both in kept.items():
+        if not all(np.isfinite(metres[cell[h]]) for h in members):
+            continue
+        costs = []
+        for first, *rest in itertools.permutations(members):
+            cost = metre * metres[cell[first]] + turn * abs(yaw[first] - 1.0)
+            for h in rest:
+                driven = metre * ways.between(np.array(cell[first]), np.array(cell[h]))
+                cost += driven + turn * abs(yaw[h] - yaw[first])
+            costs.append(cost)
+        value = weights.reachability * both[0] + weights.manipulability * both[1]
+        value -= weights.travel * min(costs)
+        if best is None or value > best[1]:
+            best = (members, value, min(costs))
+    if best is None:
+        with pytest.raises(SelectionError, match="there is no way around the furniture"):
+            select(tables, here, weights=weights, travel=travel)
+        return
+    choice = select(tables, here, weights=weights, travel=travel)
+    assert choice.cut_off == sum(not np.isfinite(metres[c]) for c in cell.values())
+    assert choice.utility == pytest.approx(best[1], rel=1e-12, abs=1e-12)
+    if not turn:
+        # Turns go through a modulus there and not here, which may cost a tie its last bit.
+        assert (choice.indices, choice.utility, choice.cost) == best
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -4,9 +4,11 @@ import math
 import numpy as np
 import pytest
 
-from tcs.errors import SelectionError
+from tcs.errors import SelectionError, UnknownNameError
+from tcs.scoring.sets import base_cells
 from tcs.select import TravelWeights, shortest_tour
 from tcs.select.travel import legs_from
+from tcs.select.ways import StraightWays
 from tcs.tables import InitialConfiguration
 from tests.tables.small import small_grid
 
@@ -15,8 +17,9 @@ GRID = small_grid(nx=3, ny=1, yaws=4, torsos=2, bed=2)
 
 def legs(here, travel, flat):
     candidates = np.array(flat, dtype=np.int32)
-    at = GRID.values(candidates)
-    return legs_from(here, GRID, candidates, np.stack([at["base_x"], at["base_y"]], axis=1), travel)
+    cell, xy = base_cells(GRID, candidates)
+    ways = StraightWays(xy, np.zeros((0, 2), dtype=np.int64))
+    return legs_from(here, GRID, candidates, cell, ways, travel)
 
 
 def state(yaw_deg=0.0, torso=0.0, bed=0.0):
@@ -100,3 +103,8 @@ def test_impossible_environment_weights_are_refused():
         TravelWeights(environment=(("bed_height", -1),))
     with pytest.raises(SelectionError, match="twice"):
         TravelWeights(environment=(("bed_height", 1.0), ("bed_height", 2.0)))
+
+
+def test_an_unknown_route_is_named():
+    with pytest.raises(UnknownNameError, match=r"unknown route 'arround'.*Did you mean 'around'"):
+        TravelWeights(route="arround")

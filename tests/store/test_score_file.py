@@ -31,7 +31,7 @@ def test_parts_must_belong_together():
     others = random_scores(small_grid(nx=6, ny=4, bed=2), 5, seed=2)
     with pytest.raises(StoreError, match="sets do not belong to the scores"):
         Scored.of(others, table.sets)
-    moved = dataclasses.replace(table.sets, cell_xy=table.sets.cell_xy + np.array([0.0, 0.05]))
+    moved = dataclasses.replace(table.sets, cell_xy=table.sets.cell_xy + np.array([0.0, 0.2]))
     with pytest.raises(StoreError, match="not those of the grid"):
         dataclasses.replace(file, tables=(Scored.of(table.scores, moved),))
     with pytest.raises(GridError):
