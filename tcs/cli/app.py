@@ -25,6 +25,14 @@ _HERE = typer.Option(
     help="Where the robot is now, in the environment frame (m, m, deg).",
 )
 _Torso = Annotated[float, typer.Option(help="How high the torso is now, in metres.")]
+_Observed = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="AXIS=VALUE",
+        help="How the person is found, e.g. person_y=0.03 (m; AXIS_deg=VALUE for angles); the "
+        "nearest state that was scored is used.",
+    ),
+]
 _Members = Annotated[
     int, typer.Option(min=1, max=2, help="At most so many places to stand at: 1 or 2.")
 ]
@@ -57,40 +65,44 @@ def list_known(as_json: _Json = False) -> None:
 
 @app.command()
 def score(
-    task: Annotated[str, typer.Argument(metavar="TASK", help="Name or YAML file of a task.")],
+    task: Annotated[
+        str | None,
+        typer.Argument(metavar="TASK", help="Name or YAML file of a task.", show_default=False),
+    ] = None,
     environment: Annotated[
-        str, typer.Option(help="Name or YAML file of an environment.")
-    ] = "wheelchair",
+        str | None,
+        typer.Option(help="Name or YAML file of an environment.", show_default="wheelchair"),
+    ] = None,
+    everything: Annotated[
+        bool,
+        typer.Option(
+            "--all", help="Every task in every environment it is for, or in the one named."
+        ),
+    ] = False,
     robot: Annotated[str, typer.Option(help="Name or YAML file of a robot.")] = "pr2",
     jobs: Annotated[int, typer.Option(min=1, help="Number of threads.")] = 2,
     out: Annotated[
         Path | None,
-        typer.Option(help="File to write.", show_default="<task>-<environment>-<robot>.tcs"),
+        typer.Option(
+            help="File to write; with --all, the folder.",
+            show_default="<task>-<environment>-<robot>.tcs",
+        ),
     ] = None,
     as_json: _Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to choose from."""
-    from tcs.cli.places import check_writable
+    if (task is None) != everything:
+        raise typer.BadParameter("name a task, or give --all for every one.", param_hint="TASK")
 
-    names = (Path(name).stem for name in (task, environment, robot))
-    path = out if out is not None else Path("-".join(names) + ".tcs")
-    check_writable(path)
+    from tcs.cli import rows
 
-    import tcs
-
-    with talk.progress_bar("configurations") as on_progress:
-        file = tcs.score(
-            task,
-            environment,
-            robot,
-            jobs=jobs,
-            on_progress=on_progress,
-            on_compile=lambda: talk.say(
-                "compiling for this machine, up to a minute; later runs do without."
-            ),
-        )
-        tcs.save(path, file)
-    result = {**tcs.summary(file), "file": str(path)}
+    if task is None:
+        results = rows.score_all(environment, robot, out or Path(), jobs=jobs)
+        talk.print_result({"rows": results}, reports.report_rows, as_json=as_json)
+        return
+    environment = environment or "wheelchair"
+    path = out or rows.default_path(task, environment, robot)
+    result = rows.score_one(task, environment, robot, path, jobs=jobs)
     talk.print_result(result, reports.report_scores, as_json=as_json)
 
 
@@ -120,11 +132,20 @@ def select(
         ),
     ] = None,
     max_members: _Members = 2,
+    observed: _Observed = None,
+    seen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FRAME=X,Y,Z",
+            help="Where a part of the body is seen, in the environment frame (m); tells how the "
+            "person is found, in place of --observed.",
+        ),
+    ] = None,
     as_json: _Json = False,
 ) -> None:
     """Choose where to stand now: the set with the greatest utility from here."""
     import tcs
-    from tcs.cli.places import axis_values, place
+    from tcs.cli.places import axis_values, frame_places, place, settings
 
     choice = tcs.select(
         tcs.load(file),
@@ -137,6 +158,8 @@ def select(
             environment=axis_values(axis_weight or (), "--axis-weight"),
         ),
         max_members=max_members,
+        observed=settings(observed or (), "--observed"),
+        seen=frame_places(seen or ()),
     )
     result = reports.choice_as_json(choice)
     talk.print_result(result, reports.report_choice, as_json=as_json)
@@ -185,11 +208,12 @@ def draw(
     here: Annotated[tuple[float, float, float] | None, _HERE] = None,
     torso: _Torso = 0.0,
     max_members: _Members = 2,
+    observed: _Observed = None,
     as_json: _Json = False,
 ) -> None:
     """Draw one of the two pictures, of the set chosen from here or of the best one."""
     import tcs
-    from tcs.cli.places import check_writable, place
+    from tcs.cli.places import check_writable, place, settings
     from tcs.draw import check_format, save_figure
 
     check_format(out)
@@ -198,7 +222,8 @@ def draw(
 
     from tcs.cli import pictures
 
-    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members)
+    found = settings(observed or (), "--observed")
+    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members, found)
     figure = pictures.map_figure if context.info_name == "map" else pictures.scene_figure
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}

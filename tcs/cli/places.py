@@ -28,20 +28,59 @@ def place(
     (('head_rest', 1.5707963267948966),)
     """
     x, y, yaw_deg = here
-    names, values, units = [], [], []
-    for name, value in axis_values(at, "--at"):
-        turns = name.endswith("_deg")
-        names.append(name.removesuffix("_deg"))
-        values.append(math.radians(value) if turns else value)
-        units.append("rad" if turns else "m")
+    set_now = settings(at, "--at")
+    units = ["rad" if name.endswith("_deg") else "m" for name, _ in axis_values(at, "--at")]
     return InitialConfiguration(
         base_x=x,
         base_y=y,
         base_yaw=math.radians(yaw_deg),
         torso=torso,
-        environment=tuple(zip(names, values, strict=True)),
+        environment=tuple(set_now.items()),
         environment_units=tuple(units),
     )
+
+
+def settings(given: Sequence[str], option: str) -> dict[str, float]:
+    """Return settings of axes given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg], in m and rad.
+
+    Args:
+        given: What stood on the command line.
+        option: Name of the option, for the message.
+
+    Raises:
+        SelectionError: If one is not of that form, or an axis is set twice.
+
+    >>> settings(["person_y=0.05"], "--observed")
+    {'person_y': 0.05}
+    """
+    found: dict[str, float] = {}
+    for name, value in axis_values(given, option):
+        axis = name.removesuffix("_deg")
+        if axis in found:
+            raise SelectionError(f"{option} sets '{axis}' twice. Give it once.")
+        found[axis] = math.radians(value) if name.endswith("_deg") else value
+    return found
+
+
+def frame_places(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return places of body frames given as "FRAME=X,Y,Z" [m].
+
+    Raises:
+        SelectionError: If one is not of that form.
+
+    >>> frame_places(["head=0.29,0.05,0.68"])
+    {'head': (0.29, 0.05, 0.68)}
+    """
+    places = {}
+    for text in given:
+        name, _, numbers = text.partition("=")
+        try:
+            places[name] = tuple(float(number) for number in numbers.split(","))
+        except ValueError:
+            raise SelectionError(
+                f"--seen is '{text}'; must be FRAME=X,Y,Z, e.g. head=0.29,0.05,0.68."
+            ) from None
+    return places
 
 
 def axis_values(given: Sequence[str], option: str) -> tuple[tuple[str, float], ...]:

@@ -12,7 +12,8 @@ from tcs.cli.talk import paper
 
 if TYPE_CHECKING:
     # Listing what ships has no use for the arrays of a choice.
-    from tcs.select import Choice
+    from tcs.select import Choice, Match
+from tcs.store import shown_state
 
 _REASONS = {
     "reached": "reached",
@@ -22,6 +23,8 @@ _REASONS = {
     "gripper_blocked": "gripper would touch something at the goal",
     "arm_blocked": "every arm posture would touch something",
 }
+_ROWS_WIDTH = 160
+"""Columns that the table of all rows needs."""
 _UNITS = {"base_x": "m", "base_y": "m", "torso": "m"}
 
 
@@ -67,6 +70,27 @@ def report_scores(result: Mapping[str, Any]) -> None:
     out.print(f"wrote {result['file']}")
 
 
+def report_rows(result: Mapping[str, Any]) -> None:
+    """Print the rows of every task in every environment, one line each."""
+    table = _table(
+        *("task", "environment", ">configurations", ">goals", ">reached", ">candidates", ">sets"),
+        *(">P_R P_M one", ">P_R P_M set", ">scored [s]", ">all [s]", ">file [MB]"),
+    )
+    for row in result["rows"]:
+        best = (row["best_single"], row["best"])
+        table.add_row(
+            row["task"],
+            row["environment"],
+            *(f"{row[key]:,}" for key in ("configurations", "goals", "reached_pairs")),
+            *(f"{row[key]:,}" for key in ("candidates", "sets")),
+            *(f"{b['reachability']:.3f} {b['manipulability']:.3f}" if b else "-" for b in best),
+            f"{row['scoring_seconds']:.2f}",
+            f"{row['total_seconds']:.2f}",
+            f"{row['file_bytes'] / 1e6:.2f}",
+        )
+    paper(_ROWS_WIDTH).print(table)
+
+
 def choice_as_json(choice: Choice) -> dict[str, Any]:
     """Return a choice as plain containers, its members in the order of the tour."""
     return {
@@ -77,6 +101,18 @@ def choice_as_json(choice: Choice) -> dict[str, Any]:
         "cost": choice.cost,
         "utility": choice.utility,
         "seconds": choice.seconds,
+        **_match_as_json(choice.match),
+    }
+
+
+def _match_as_json(match: Match | None) -> dict[str, Any]:
+    """Return which observed state was chosen for, and how far off it is."""
+    if match is None or not match.state:
+        return {}
+    return {
+        "observed": shown_state(match.axes, match.state),
+        "observed_off": shown_state(match.axes, match.off),
+        "frames_off": match.frames_off,
     }
 
 
@@ -89,6 +125,12 @@ def report_choice(result: Mapping[str, Any]) -> None:
         f"{result['manipulability']:.3f}, travel cost {result['cost']:.2f}, utility "
         f"{result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
     )
+    if "observed" in result:
+        state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
+        off = [f"{name} is {value:+g} off" for name, value in result["observed_off"].items()]
+        if result["frames_off"] is not None:
+            off.append(f"what is seen is {result['frames_off']:.3f} m off")
+        out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
 
 
 def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:

@@ -91,9 +91,9 @@ def print_result(
         report(result)
 
 
-def paper() -> Console:
-    """Return where results for a person go."""
-    width = None if sys.stdout.isatty() else _PIPE_WIDTH
+def paper(pipe_width: int = _PIPE_WIDTH) -> Console:
+    """Return where results for a person go; `pipe_width` columns wide where it is no terminal."""
+    width = None if sys.stdout.isatty() else pipe_width
     return Console(width=width, highlight=False, markup=False)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tcs.scoring.job import Job, load_job, score, summary
 from tcs.scoring.reopen import reopen
+from tcs.scoring.rows import all_rows
 from tcs.scoring.sets import build_sets
 from tcs.scoring.sweep import Sweep, sweep, warm_up
 from tcs.scoring.verify import Verification, verify
@@ -12,6 +13,7 @@ __all__ = [
     "Job",
     "Sweep",
     "Verification",
+    "all_rows",
     "build_sets",
     "load_job",
     "reopen",

@@ -36,6 +36,8 @@ class Match:
     """Observed minus scored value of each axis that was told [m or rad]."""
     frames_off: float | None
     """Root mean square distance of the frames seen from the scored ones [m], None if none were."""
+    axes: tuple[Axis, ...]
+    """The observed axes."""
 
 
 def nearest_table(
@@ -75,7 +77,7 @@ def nearest_table(
     index = int(np.ravel_multi_index(along, shape)) if along else 0
     state = file.observed_states[index]
     off = {name: float(value) - state[name] for name, value in observed.items()}
-    return Match(index, state, off, None)
+    return Match(index, state, off, None, file.observed_axes)
 
 
 def _nearest_value(axis: Axis, value: float) -> int:
@@ -120,7 +122,7 @@ def _nearest_to_frames(
             f"than {FARTHEST_FRAME:.2f} m. Check the frames and how the environment is set now, "
             "or score the scene as it is."
         )
-    return Match(index, file.observed_states[index], {}, least)
+    return Match(index, file.observed_states[index], {}, least, file.observed_axes)
 
 
 def _states(file: ScoreFile) -> int:

@@ -207,6 +207,7 @@ def shown_state(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[str,
             math.degrees(state[axis.name]) if axis.unit == "deg" else state[axis.name], 9
         )
         for axis in axes
+        if axis.name in state
     }
 
 

@@ -6,7 +6,7 @@ import joblib
 import pytest
 
 import tcs
-from tests.store.example import score_file
+from tests.store.example import SHIFT, score_file
 
 HERE = ("--here", "0.5", "-1", "90")
 
@@ -164,3 +164,33 @@ def test_nothing_to_choose_from(tcs_command, tmp_path):
     ran = tcs_command("select", path, *HERE)
     assert ran.code == 1
     assert "Nothing to choose from" in ran.err
+
+
+def test_the_observed_shift_is_told(tcs_command, tmp_path):
+    path = tmp_path / "shifts.tcs"
+    tcs.save(path, score_file(tables=3, observed=[SHIFT]))
+    ran = tcs_command("select", path, *HERE, "--observed", "person_y=0.04", "--json").json
+    assert ran["observed"] == {"person_y": 0.05}
+    assert ran["observed_off"] == {"person_y": -0.01}
+    seen = tcs_command("select", path, *HERE, "--seen", "head=0.1,0.1,0.12", "--json").json
+    assert seen["frames_off"] == pytest.approx(0.02)
+    said = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
+    assert "scored for person_y 0.05; person_y is -0.01 off" in said.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--observed", "person_y=0.2"), "scored are only -0.05 to 0.05 m"),
+        (("--observed", "person_y"), "NAME=NUMBER"),
+        (("--observed", "person_y=0", "--observed", "person_y=1"), "twice"),
+        (("--seen", "head=1,2,x"), "FRAME=X,Y,Z"),
+    ],
+)
+def test_a_shift_that_was_not_scored_is_told(process, tmp_path, words, said):
+    path = tmp_path / "shifts.tcs"
+    tcs.save(path, score_file(tables=3, observed=[SHIFT]))
+    ran = process("select", path, *HERE, *words)
+    assert ran.code == 1
+    assert said in ran.err
+    assert ran.err.count("\n") == 1

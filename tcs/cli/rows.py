@@ -1,0 +1,74 @@
+"""Score tasks and write their files: one, or every row of the paper's table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import tcs
+from tcs.cli import talk
+from tcs.cli.places import check_writable
+from tcs.errors import OutputError
+from tcs.scoring import all_rows
+
+
+def default_path(task: str, environment: str, robot: str) -> Path:
+    """Return the name of a score file, in the current folder."""
+    return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")
+
+
+def score_one(task: str, environment: str, robot: str, path: Path, *, jobs: int) -> dict[str, Any]:
+    """Score a task, write its file and return the summary.
+
+    Raises:
+        OutputError: If the file cannot be written, before anything is scored.
+        TcsError: Whatever `tcs.score` raises.
+    """
+    check_writable(path)
+    with talk.progress_bar(f"configurations, {Path(task).stem}") as on_progress:
+        file = tcs.score(
+            task,
+            environment,
+            robot,
+            jobs=jobs,
+            on_progress=on_progress,
+            on_compile=lambda: talk.say(
+                "compiling for this machine, up to a minute; later runs do without."
+            ),
+        )
+        tcs.save(path, file)
+    return {
+        "task": file.task["name"],
+        "environment": file.environment["name"],
+        **tcs.summary(file),
+        "file": str(path),
+        "file_bytes": path.stat().st_size,
+    }
+
+
+def score_all(
+    environment: str | None, robot: str, folder: Path, *, jobs: int
+) -> list[dict[str, Any]]:
+    """Score every task in every environment it is for, one file each, and return the summaries.
+
+    Args:
+        environment: Only this one.
+        robot: Name or path of a robot.
+        folder: Where the files go; made if it is not there.
+        jobs: Number of threads.
+
+    Raises:
+        OutputError: If the folder cannot be made or written.
+        TcsError: Whatever `tcs.score` raises. What was scored before is kept.
+    """
+    rows = all_rows(environment)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"folder '{folder}' cannot be made: {error.strerror}. Name a folder with --out."
+        ) from error
+    return [
+        score_one(task, room, robot, folder / default_path(task, room, robot), jobs=jobs)
+        for task, room in rows
+    ]
