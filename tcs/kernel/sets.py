@@ -61,6 +61,17 @@ class CellPairs(NamedTuple):
     """Their greatest P_R + P_M, shape (rows, N)."""
 
 
+class MemberPairs(NamedTuple):
+    """The kept pairs that each candidate is in; 0 where it is in none."""
+
+    reachability: FloatArray
+    """Their greatest P_R, shape (C,)."""
+    manipulability: FloatArray
+    """Their greatest P_M, shape (C,)."""
+    total: FloatArray
+    """Their greatest P_R + P_M, shape (C,)."""
+
+
 class BestPairs(NamedTuple):
     """The best pair in each cell of a slice."""
 
@@ -117,7 +128,13 @@ def keep_best(
 
 @jit
 def bound_cell_pair(
-    arrays: SetArrays, first: int, second: int, row: int, out: CellPairs, best: BestPairs
+    arrays: SetArrays,
+    first: int,
+    second: int,
+    row: int,
+    out: CellPairs,
+    members: MemberPairs,
+    best: BestPairs,
 ) -> None:
     """Go through the pairs between two cells, and write what is kept to `row` of `out`."""
     isotropy, peak, weights = arrays.isotropy, arrays.peak, arrays.weights
@@ -144,11 +161,22 @@ def bound_cell_pair(
             out.reachability[row, second] = max(out.reachability[row, second], reachability)
             out.manipulability[row, second] = max(out.manipulability[row, second], manipulability)
             out.total[row, second] = max(out.total[row, second], total)
+            for k in (i, j):
+                members.reachability[k] = max(members.reachability[k], reachability)
+                members.manipulability[k] = max(members.manipulability[k], manipulability)
+                members.total[k] = max(members.total[k], total)
             keep_best(arrays, i, j, reachability, manipulability, row, best)
 
 
 @jit
-def bound_cells(arrays: SetArrays, begin: int, end: int, out: CellPairs, best: BestPairs) -> None:
+def bound_cells(
+    arrays: SetArrays,
+    begin: int,
+    end: int,
+    out: CellPairs,
+    members: MemberPairs,
+    best: BestPairs,
+) -> None:
     """Go through the pairs between cells begin..end-1 and every cell not before them.
 
     Args:
@@ -156,6 +184,7 @@ def bound_cells(arrays: SetArrays, begin: int, end: int, out: CellPairs, best: B
         begin: First cell of the slice.
         end: Cell after the last.
         out: Filled with zeros, `end - begin` rows.
+        members: Filled with zeros.
         best: Filled with -1, `end - begin` rows.
     """
     for first in range(begin, end):
@@ -163,4 +192,4 @@ def bound_cells(arrays: SetArrays, begin: int, end: int, out: CellPairs, best: B
             dx = arrays.xy[second, 0] - arrays.xy[first, 0]
             dy = arrays.xy[second, 1] - arrays.xy[first, 1]
             if np.sqrt(dx * dx + dy * dy) >= arrays.least_distance:
-                bound_cell_pair(arrays, first, second, first - begin, out, best)
+                bound_cell_pair(arrays, first, second, first - begin, out, members, best)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
-from tcs.kernel.sets import BestPairs, CellPairs, SetArrays, bound_cells
+from tcs.kernel.sets import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.scoring.floor import floor_of
 from tcs.space import ROBOT_AXES, Grid
 from tcs.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
@@ -82,7 +82,7 @@ def build_sets(
         rule=rule,
         min_distance=min_distance,
     )
-    pair_cells, between, best_pairs = _kept_pairs(arrays, jobs if max_members > 1 else 0)
+    pair_cells, between, members, best_pairs = _kept_pairs(arrays, jobs if max_members > 1 else 0)
     best_single, best = _best_sets(scores, candidates, best_pairs, rule)
     return SetTable(
         rule=rule,
@@ -101,6 +101,9 @@ def build_sets(
         pair_reachability=between.reachability,
         pair_manipulability=_float32_above(between.manipulability),
         pair_sum=_float32_above(between.total),
+        member_reachability=members.reachability,
+        member_manipulability=_float32_above(members.manipulability),
+        member_sum=_float32_above(members.total),
         best=best,
         best_single=best_single,
         floor=floor_of(scores, grid),
@@ -161,12 +164,13 @@ def _grouped(
     )
 
 
-def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, BestPairs]:
+def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
     """Return what is kept between all cells by so many threads; nothing with none.
 
     Returns:
         The pairs of cells with a kept pair, lexicographic, shape (K, 2); what is kept between
-        them, arrays of shape (K,); and the best pair of each cell.
+        them, arrays of shape (K,); the kept pairs of each candidate, by its number; and the
+        best pair of each cell.
     """
     cells = arrays.start.size - 1 if jobs else 0
     slices = [
@@ -177,28 +181,35 @@ def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, Best
         delayed(_bound_slice)(arrays, begin, end) for begin, end in slices
     )
     # Slices one after the other are in lexicographic order.
-    pair_cells, between, best = zip(*found, strict=True)
+    pair_cells, between, members, best = zip(*found, strict=True)
+    # Sorted by number: the inverse of how the candidates were sorted by cell.
+    rows = np.argsort(arrays.number)
     return (
         np.concatenate(pair_cells),
         CellPairs(*(np.concatenate(parts) for parts in zip(*between, strict=True))),
+        MemberPairs(*(np.max(parts, axis=0)[rows] for parts in zip(*members, strict=True))),
         BestPairs(*(np.concatenate(parts) for parts in zip(*best, strict=True))),
     )
 
 
-def _bound_slice(arrays: SetArrays, begin: int, end: int) -> tuple[IntArray, CellPairs, BestPairs]:
+def _bound_slice(
+    arrays: SetArrays, begin: int, end: int
+) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
     """Return what is kept between cells begin..end-1 and every cell not before them.
 
     Returns:
         The pairs of cells with a kept pair, lexicographic, shape (k, 2); what is kept between
-        them, arrays of shape (k,); and the best pair of each cell of the slice.
+        them, arrays of shape (k,); the kept pairs of each candidate; and the best pair of each
+        cell of the slice.
     """
     shape = (end - begin, arrays.start.size - 1)
     out = CellPairs(
         np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     )
+    members = MemberPairs(*(np.zeros(arrays.number.size) for _ in range(3)))
     size = (end - begin, 2)
     best = BestPairs(np.full(size, -1.0), np.full(size, -1, dtype=np.int64))
-    bound_cells(arrays, begin, end, out, best)
+    bound_cells(arrays, begin, end, out, members, best)
     row, second = np.nonzero(out.kept)
     found = CellPairs(
         kept=out.kept[row, second],
@@ -206,7 +217,7 @@ def _bound_slice(arrays: SetArrays, begin: int, end: int) -> tuple[IntArray, Cel
         manipulability=out.manipulability[row, second],
         total=out.total[row, second],
     )
-    return np.stack([row + begin, second], axis=1), found, best
+    return np.stack([row + begin, second], axis=1), found, members, best
 
 
 def _best_sets(

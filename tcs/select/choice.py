@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from tcs.errors import SelectionError
+from tcs.select.index import PairIndex
 from tcs.select.observed import Match, nearest_table
-from tcs.select.search import PairIndex, best_pair
+from tcs.select.search import best_pair
 from tcs.select.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.select.utility import UtilityWeights, utility
 from tcs.space import Grid

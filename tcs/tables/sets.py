@@ -23,6 +23,12 @@ from tcs.tables.rules import RULES, PairLimits, pair_limits
 MOST_MEMBERS = 2
 """Most members a set may have."""
 
+_BOUNDS = tuple(
+    f"{of}_{what}"
+    for of in ("pair", "member")
+    for what in ("reachability", "manipulability", "sum")
+)
+
 DISTANCE_TOLERANCE = 1e-9
 """Grid steps such as 0.05 are no binary fractions: 8 of them can come out 1e-16 short of 0.40 m,
 or 1e-15 far from the origin. Places that differ by a nanometre are the same place."""
@@ -69,6 +75,12 @@ class SetTable:
     """Greatest P_M of those pairs, rounded upward, shape (K,)."""
     pair_sum: NDArray[np.float32]
     """Greatest P_R + P_M of those pairs, rounded upward, shape (K,)."""
+    member_reachability: NDArray[np.float64]
+    """Greatest P_R of the kept pairs that a candidate is in, exact, 0 if in none, shape (C,)."""
+    member_manipulability: NDArray[np.float32]
+    """Greatest P_M of those pairs, rounded upward, shape (C,)."""
+    member_sum: NDArray[np.float32]
+    """Greatest P_R + P_M of those pairs, rounded upward, shape (C,)."""
     best: tuple[int, ...]
     """Configuration indices of the best set: greatest P_R + P_M, or P_R before P_M by the rule
     "code2015"; () without candidates."""
@@ -98,6 +110,9 @@ class SetTable:
             "pair_reachability": (np.float64, (kept,)),
             "pair_manipulability": (np.float32, (kept,)),
             "pair_sum": (np.float32, (kept,)),
+            "member_reachability": (np.float64, (count,)),
+            "member_manipulability": (np.float32, (count,)),
+            "member_sum": (np.float32, (count,)),
         }
         for name, (dtype, shape) in shapes.items():
             view = read_only(f"set table: {name}", getattr(self, name), dtype, shape)
@@ -123,6 +138,7 @@ class SetTable:
             bool(np.all((self.cell >= 0) & (self.cell < len(self.cell_xy)))),
             f"set table: cell outside 0..{len(self.cell_xy) - 1}.",
         )
+        require(bool(np.all(np.diff(self.cell_start) > 0)), "set table: a cell has no candidate.")
         require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
         along = (self.cell_xy - self.floor.start) / self.floor.step
         inside = (np.rint(along) >= 0) & (np.rint(along) < self.floor.shape)
@@ -155,7 +171,7 @@ class SetTable:
             bool(np.all((self.pair_count > 0) & (self.pair_count <= size[first] * size[second]))),
             "set table: pair_count does not fit the number of candidates in its cells.",
         )
-        for name in ("pair_reachability", "pair_manipulability", "pair_sum"):
+        for name in _BOUNDS:
             bound = getattr(self, name)
             require(
                 bool(np.all((bound >= 0.0) & (bound < np.inf))),

@@ -60,6 +60,16 @@ def test_agrees_with_plain_loops_over_all_pairs(table, min_distance, bed, rule, 
             assert exact <= float(bound)
             assert float(np.nextafter(bound, np.float32(-1.0))) < exact
 
+    for c, h in enumerate(sets.candidates.tolist()):
+        of_h = [pair for members, pair in expected.items() if len(members) == 2 and h in members]
+        reachability, manipulability = np.array(of_h).reshape(-1, 2).T
+        assert sets.member_reachability[c] == reachability.max(initial=0.0)
+        for bound, exact in (
+            (sets.member_manipulability[c], manipulability.max(initial=0.0)),
+            (sets.member_sum[c], (reachability + manipulability).max(initial=0.0)),
+        ):
+            assert exact <= float(bound) <= float(np.nextafter(np.float32(exact), np.float32(9.0)))
+
     def key(members):
         return order_of(rule, expected[members])
 

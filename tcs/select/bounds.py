@@ -1,0 +1,120 @@
+"""Upper bounds on the utility of pairs, from here: of groups, of their members, of single pairs.
+
+A bound is either computed by the very operations of the utility on greater scores and smaller
+costs (rounding is monotone, so it cannot fall below), or widened by `SLACK`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.select.index import PairIndex
+from tcs.select.travel import Legs
+from tcs.select.utility import UtilityWeights
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SLACK = 1e-12
+"""Relative room for rounding in bounds that are not computed by the very operations of the
+utility: a dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could
+end up one bit below the utility it bounds, and lose a tie."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds for one query."""
+
+    index: PairIndex
+    """The sets."""
+    legs: Legs
+    """Travel costs from the current state."""
+    weights: UtilityWeights
+    """alpha, beta, gamma."""
+
+    @property
+    def travel(self) -> float:
+        """The weight of the travel cost, gamma."""
+        return float(self.weights.travel)
+
+    @cached_property
+    def groups(self) -> FloatArray:
+        """Bound on the utility of each group, shape (K,); -inf out of reach."""
+        index, legs = self.index, self.legs
+        bounds = self._group_gain - self.travel * self._driving
+        # Either member's best partner is no better than this, and the way to it no shorter.
+        rest = np.maximum.reduceat(self._rest[index.sets.by_cell], index.start)
+        rest = np.minimum(rest[index.first], rest[index.second])
+        np.minimum(bounds, rest - self.travel * self._driving + self._room, out=bounds)
+        if not np.all(legs.reachable):
+            bounds[~(legs.reachable[index.first] & legs.reachable[index.second])] = -np.inf
+        return bounds
+
+    def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
+        """Return a bound on the pairs of a group that a candidate is in, shape (n,)."""
+        gain = np.minimum(self._rest[member], self._group_gain[group] - self._levels[member])
+        return gain - (self.travel * self._driving[group] - self._room[group])
+
+    def of_pair(self, group: IntArray, a: IntArray, b: IntArray, cost: FloatArray) -> FloatArray:
+        """Return a bound on the utility of pairs whose cost is known, shape (n,)."""
+        gain = np.minimum(self._member_gain[a], self._member_gain[b])
+        return np.minimum(gain, self._group_gain[group]) - self.travel * cost
+
+    @cached_property
+    def _group_gain(self) -> FloatArray:
+        """Bound on alpha P_R + beta P_M of each group, shape (K,)."""
+        return self._gain(*self.index.group_scores)
+
+    @cached_property
+    def _member_gain(self) -> FloatArray:
+        """Bound on alpha P_R + beta P_M of the pairs of each candidate, shape (C,)."""
+        return self._gain(*self.index.member_scores)
+
+    def _gain(
+        self, reachability: FloatArray, manipulability: FloatArray, total: FloatArray
+    ) -> FloatArray:
+        """Return a bound on alpha P_R + beta P_M from bounds on P_R, P_M and their sum."""
+        alpha, beta = float(self.weights.reachability), float(self.weights.manipulability)
+        # The best reachability and the best manipulability may belong to two different pairs.
+        apart = alpha * reachability + beta * manipulability
+        # alpha P_R + beta P_M = (alpha - beta) P_R + beta (P_R + P_M), or with the roles swapped.
+        if alpha >= beta:
+            together = (alpha - beta) * reachability + beta * total
+        else:
+            together = alpha * total + (beta - alpha) * manipulability
+        return np.minimum(apart, together + SLACK * (alpha + beta))
+
+    @cached_property
+    def _driving(self) -> FloatArray:
+        """Cost of driving to the nearer cell of each group and on to the other, shape (K,)."""
+        index, legs = self.index, self.legs
+        approach = np.minimum(legs.here_to_cell[index.first], legs.here_to_cell[index.second])
+        return np.asarray(approach + legs.metre * legs.ways.of_groups)
+
+    @cached_property
+    def _levels(self) -> FloatArray:
+        """Gamma times the least cost of everything but driving with each candidate, shape (C,).
+
+        Turning, lifting and moving the bed obey the triangle inequality: a tour pays at least
+        the direct change from the current state to each of its members.
+        """
+        # Wrapping an angle leaves an absolute rounding error of some 1e-15 rad.
+        wrapping = SLACK * sum(self.legs.level_weights)
+        least = self.legs.levels_from_here * (1.0 - SLACK) - wrapping
+        return self.travel * np.maximum(least, 0.0)
+
+    @cached_property
+    def _rest(self) -> FloatArray:
+        """What is left of the gain with each candidate after that cost, shape (C,)."""
+        return self._member_gain - self._levels
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """Room for rounding in the difference of gain, levels and driving, shape (K,)."""
+        most = float(self.weights.reachability) + float(self.weights.manipulability)
+        most += float(self._levels.max(initial=0.0))
+        return SLACK * (most + self.travel * self._driving)
