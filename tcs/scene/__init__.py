@@ -12,6 +12,7 @@ from tcs.scene.environment import (
 )
 from tcs.scene.frames import body_frame_places
 from tcs.scene.lowering import LoweredScene, goal_poses, lower
+from tcs.scene.posture import Posture
 from tcs.scene.scene import Contact, Scene
 from tcs.scene.spec import SceneSpec
 
@@ -22,6 +23,7 @@ __all__ = [
     "LoweredScene",
     "ModelEntry",
     "Obstacle",
+    "Posture",
     "Scene",
     "SceneSpec",
     "body_frame_places",
