@@ -9,17 +9,16 @@ range are printed. Nothing here is a test: tests never depend on time.
 from __future__ import annotations
 
 import argparse
-import platform
 import resource
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from table import header, row, spread
 
 from tcs.kernel import reference_pairs
 from tcs.kernel.problem import build_problem
@@ -28,7 +27,6 @@ from tcs.select import SelectionTables, select
 from tcs.store import load_scores, save_scores
 from tcs.tables import InitialConfiguration, Reason
 
-PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
 REFERENCE_PAIRS = 12
 PLACES = 1000
 
@@ -36,9 +34,7 @@ PLACES = 1000
 def main() -> int:
     """Run every measurement and print it; the exit code is 1 when an answer was false."""
     options = parse()
-    row("machine", f"{platform.machine()}, {processor()}")
-    row("python", platform.python_version())
-    row("versions", ", ".join(f"{name} {version(name)}" for name in PACKAGES))
+    header()
     row("task", f"{options.task} in the wheelchair, PR2, seed {options.seed}")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scores.tcs"
@@ -61,28 +57,6 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--dense", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
-
-
-def row(name: str, text: str) -> None:
-    """Print one line of the table."""
-    print(f"{name:<34} {text}", flush=True)
-
-
-def spread(seconds: list[float], unit: str = "s", scale: float = 1.0) -> str:
-    """Return median and range."""
-    values = [scale * s for s in seconds]
-    middle, low, high = statistics.median(values), min(values), max(values)
-    return f"{middle:.3f} {unit} (median of {len(values)}, {low:.3f} .. {high:.3f})"
-
-
-def processor() -> str:
-    """Return the processor's name and how many cores there are."""
-    names = [
-        line.split(":", 1)[1].strip()
-        for line in Path("/proc/cpuinfo").read_text().splitlines()
-        if line.startswith("model name")
-    ]
-    return f"{names[0]} x {len(names)}" if names else platform.processor()
 
 
 def lowered_times(options: argparse.Namespace) -> None:

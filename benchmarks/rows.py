@@ -1,0 +1,117 @@
+"""Measure every row of the paper's Table I: scoring, sets, files, and the re-check of each.
+
+Usage: python benchmarks/rows.py [--out DIR] [--pairs 500] [--dense 200] [--repeats 3]
+
+`tcs score --all` runs once as a process of its own, machine code at hand; bathing on the bed is
+scored again a few times for its spread. The files stay in DIR, if one is named, for
+`benchmarks/selection.py`. Nothing here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from table import header, row, spread
+
+import tcs
+from tcs.scoring import load_job, sweep
+
+LOADS = 5
+
+
+def main() -> int:
+    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--pairs", type=int, default=500)
+    parser.add_argument("--dense", type=int, default=200)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    header()
+    bathing(options.repeats)
+    with tempfile.TemporaryDirectory() as folder:
+        rows = whole_process(options.out or Path(folder))
+        loads(rows)
+        return 0 if verification(rows, options) else 1
+
+
+def bathing(repeats: int) -> None:
+    """Measure the scoring of bathing on the bed, all shifts of the person, on two threads."""
+    job = load_job("bathing", "bed", "pr2")
+    lowered = job.lowered(job.scene())
+    swept = [sweep(lowered, job.task.weights, tables=job.tables) for _ in range(repeats)]
+    row("bathing, bed: scoring_seconds", spread([s.scoring_seconds for s in swept]))
+
+
+def whole_process(folder: Path) -> list[dict[str, object]]:
+    """Measure `tcs score --all` as one process, and print its rows."""
+    command = [sys.executable, "-m", "tcs", "score", "--all", "--out", str(folder), "--json"]
+    begun = time.perf_counter()
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    row("tcs score --all, whole process", f"{time.perf_counter() - begun:.1f} s")
+    # Linux counts in KiB.
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+    row("peak memory of that process", f"{peak / 1e9:.2f} GB")
+    rows: list[dict[str, object]] = json.loads(done.stdout)["rows"]
+    for r in rows:
+        one, best = r["best_single"], r["best"]
+        row(
+            f"{r['task']}, {r['environment']}",
+            f"{r['configurations']} x {r['goals']}, reached {r['reached_pairs']}, "
+            f"candidates {r['candidates']}, sets {r['sets']}, "
+            f"one P_R {one['reachability']:.3f} P_M {one['manipulability']:.3f}, "
+            f"set P_R {best['reachability']:.3f} P_M {best['manipulability']:.3f}, "
+            f"scoring {r['scoring_seconds']:.2f} s, sets {r['sets_seconds']:.2f} s, "
+            f"file {r['file_bytes'] / 1e6:.2f} MB",
+        )
+    return rows
+
+
+def loads(rows: list[dict[str, object]]) -> None:
+    """Measure how long the largest file takes to load, and all of its scores to unfold."""
+    path = Path(str(max(rows, key=lambda r: r["file_bytes"])["file"]))
+    loading, unfolding = [], []
+    for _ in range(LOADS):
+        begun = time.perf_counter()
+        file = tcs.load(path)
+        loading.append(time.perf_counter() - begun)
+        begun = time.perf_counter()
+        for table in file.tables:
+            _ = table.scores
+        unfolding.append(time.perf_counter() - begun)
+    row("largest file", f"{path.name}, {path.stat().st_size / 1e6:.2f} MB")
+    row("loaded, ready to choose", spread(loading))
+    row("all its scores unfolded", spread(unfolding))
+
+
+def verification(rows: list[dict[str, object]], options: argparse.Namespace) -> bool:
+    """Re-check every row with Drake and the dense scan; return whether all answers are true."""
+    sound = True
+    for r in rows:
+        begun = time.perf_counter()
+        found = tcs.verify(
+            tcs.load(str(r["file"])), pairs=options.pairs, dense=options.dense, seed=options.seed
+        )
+        low, high = found.recall_ci95
+        row(
+            f"verify {r['task']}, {r['environment']}",
+            f"checked {found.checked}, false {found.false_reached}, "
+            f"position {found.max_position_error:.1e} m, "
+            f"isotropy {found.max_isotropy_error:.1e}, missed {found.missed} of "
+            f"{found.dense_checked}, recall {found.recall:.5f} ({low:.4f} .. {high:.4f}), "
+            f"shortfall {found.mean_shortfall:.1e}, {time.perf_counter() - begun:.0f} s",
+        )
+        sound &= found.is_sound
+    return sound
+
+
+if __name__ == "__main__":
+    sys.exit(main())
