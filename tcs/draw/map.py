@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,8 @@ from tcs.tables import InitialConfiguration
 _MEMBER = "#d7263d"
 _HERE = "#111111"
 _BLOCKED = "#d4d8dd"
+_TITLE_WIDTH = 115
+"""Letters that fit into a line of the title."""
 _ARROW = 0.45
 """Length of a heading arrow [m]: a little beyond the front of a mobile robot."""
 
@@ -78,7 +81,8 @@ def draw_map(
         axes.set_xlabel("base x [m]")
     left.set_ylabel("base y [m]")
     _frame(left, places, members, here)
-    figure.suptitle(title + (f"\n{subtitle}" if subtitle else ""), fontsize=13)
+    lines = [*textwrap.wrap(title, _TITLE_WIDTH), *textwrap.wrap(subtitle, _TITLE_WIDTH)]
+    figure.suptitle("\n".join(lines), fontsize=13)
     _draw_legend(figure, room, members, here)
     return figure
 
@@ -103,7 +107,8 @@ def _draw_scores(
 
 def _draw_room(axes: Axes, room: Sequence[Solid]) -> None:
     """Draw shadows on the floor, what is lower first: the person sits on the chair."""
-    ordered = sorted(room, key=lambda solid: float(solid.corners[:, 2].max()))
+    # By their middles: a raised head rest reaches higher than the head that lies before it.
+    ordered = sorted(room, key=lambda solid: float(solid.corners[:, 2].mean()))
     axes.add_collection(
         PolyCollection(
             [solid.footprint for solid in ordered],
@@ -164,19 +169,22 @@ def _frame(axes: Axes, places: PlaceMap, members: Sequence[Stand], here: Stand |
 def _draw_legend(
     figure: Figure, room: Sequence[Solid], members: Sequence[Stand], here: Stand | None
 ) -> None:
-    """Say below what is what, and where the members stand in numbers."""
+    """Say below what is what, and beside it where robot and members stand in numbers."""
     kinds = [kind for kind in Kind if any(solid.kind is kind for solid in room)]
     handles: list[Artist] = [Patch(facecolor=kind.colour, label=kind.label) for kind in kinds]
     handles.append(Patch(facecolor=_BLOCKED, label="robot cannot stand here"))
     handles.append(Patch(facecolor="white", edgecolor="#bbbbbb", label="no goal in reach"))
     if here is not None:
         handles.append(Line2D([], [], ls=":", color=_HERE, label="way, as the travel cost has it"))
+    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=10)
+    stops: list[Artist] = []
+    if here is not None:
         said = _described(here.configuration)
-        handles.append(Patch(facecolor="none", edgecolor=_HERE, ls="--", label=f"now: {said}"))
+        stops.append(Patch(facecolor="none", edgecolor=_HERE, ls="--", label=f"now: {said}"))
     for number, stand in enumerate(members, start=1):
         said = _described(stand.configuration)
-        handles.append(Patch(facecolor="none", edgecolor=_MEMBER, label=f"{number}: {said}"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=10)
+        stops.append(Patch(facecolor="none", edgecolor=_MEMBER, label=f"{number}: {said}"))
+    figure.legend(handles=stops, loc="outside lower right", frameon=False, fontsize=10)
 
 
 def _described(configuration: InitialConfiguration) -> str:
