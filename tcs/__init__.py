@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tcs.errors import TcsError
+    from tcs.reasons import Explanation, explain
     from tcs.scoring import Verification, score, summary, verify
     from tcs.select import Choice, TravelWeights, UtilityWeights, select
     from tcs.store import ScoreFile
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Choice",
+    "Explanation",
     "InitialConfiguration",
     "ScoreFile",
     "TcsError",
@@ -35,6 +37,7 @@ __all__ = [
     "UtilityWeights",
     "Verification",
     "__version__",
+    "explain",
     "load",
     "save",
     "score",
@@ -45,12 +48,14 @@ __all__ = [
 
 _HOMES = {
     "Choice": ("tcs.select", "Choice"),
+    "Explanation": ("tcs.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.tables", "InitialConfiguration"),
     "ScoreFile": ("tcs.store", "ScoreFile"),
     "TcsError": ("tcs.errors", "TcsError"),
     "TravelWeights": ("tcs.select", "TravelWeights"),
     "UtilityWeights": ("tcs.select", "UtilityWeights"),
     "Verification": ("tcs.scoring", "Verification"),
+    "explain": ("tcs.reasons", "explain"),
     "load": ("tcs.store", "load_scores"),
     "save": ("tcs.store", "save_scores"),
     "score": ("tcs.scoring", "score"),

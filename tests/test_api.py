@@ -9,6 +9,7 @@ from tests.store.example import score_file
 
 PROMISED = [
     "Choice",
+    "Explanation",
     "InitialConfiguration",
     "ScoreFile",
     "TcsError",
@@ -16,6 +17,7 @@ PROMISED = [
     "UtilityWeights",
     "Verification",
     "__version__",
+    "explain",
     "load",
     "save",
     "score",

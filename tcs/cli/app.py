@@ -25,6 +25,13 @@ _HERE = typer.Option(
     help="Where the robot is now, in the environment frame (m, m, deg).",
 )
 _Torso = Annotated[float, typer.Option(help="How high the torso is now, in metres.")]
+_At = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="AXIS=VALUE",
+        help="How an axis of the environment is set now, in metres; AXIS_deg=VALUE for angles.",
+    ),
+]
 _Observed = Annotated[
     list[str] | None,
     typer.Option(
@@ -111,13 +118,7 @@ def select(
     file: _File,
     here: Annotated[tuple[float, float, float], _HERE],
     torso: _Torso = 0.0,
-    at: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="AXIS=VALUE",
-            help="How an axis of the environment is set now, in metres; AXIS_deg=VALUE for angles.",
-        ),
-    ] = None,
+    at: _At = None,
     alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
     beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
     gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
@@ -163,6 +164,73 @@ def select(
     )
     result = reports.choice_as_json(choice)
     talk.print_result(result, reports.report_choice, as_json=as_json)
+
+
+@app.command()
+def explain(
+    file: _File,
+    goal: Annotated[int, typer.Option(help="Number of the goal, from 0.", show_default=False)],
+    configuration: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of a configuration, as in `tcs export`.",
+            show_default="the best member of the best set",
+        ),
+    ] = None,
+    here: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y YAW_DEG",
+            help="A place instead, in the environment frame (m, m, deg); see --torso, --at.",
+        ),
+    ] = None,
+    torso: _Torso = 0.0,
+    at: _At = None,
+    metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
+    turn_weight: Annotated[float, typer.Option(help="Cost of a radian of turning.")] = 0.3,
+    torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso lift.")] = 1.0,
+    axis_weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=COST",
+            help="Cost of a metre (else 2) or radian (else 1) along an axis of the environment.",
+        ),
+    ] = None,
+    travel: Annotated[
+        str,
+        typer.Option(metavar="straight|around", help="How the base drives: around the furniture?"),
+    ] = "around",
+    observed: _Observed = None,
+    as_json: _Json = False,
+) -> None:
+    """Say why a goal is not reached, and the least change that would reach it."""
+    if configuration is not None and here is not None:
+        raise typer.BadParameter("give --configuration or --here, not both.", param_hint="--here")
+    if here is None and (at or torso):
+        raise typer.BadParameter("--torso and --at need --here.", param_hint="--here")
+
+    import tcs
+    from tcs.cli.explanations import report_explanation
+    from tcs.cli.places import axis_values, place, settings
+    from tcs.reasons import fix_weights
+    from tcs.space import Grid
+
+    loaded = tcs.load(file)
+    explanation = tcs.explain(
+        loaded,
+        goal,
+        place(here, torso, at or ()) if here is not None else configuration,
+        weights=fix_weights(
+            Grid.from_dict(loaded.grid),
+            metre=metre_weight,
+            turn=turn_weight,
+            torso=torso_weight,
+            environment=axis_values(axis_weight or (), "--axis-weight"),
+            route=travel,
+        ),
+        observed=settings(observed or (), "--observed"),
+    )
+    talk.print_result(explanation.to_json(), report_explanation, as_json=as_json)
 
 
 @app.command()

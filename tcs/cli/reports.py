@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tcs.select import Choice, Match
 from tcs.store import shown_state
 
-_REASONS = {
+REASONS = {
     "reached": "reached",
     "too_far": "too far for the arm",
     "joint_limits": "joint limits",
@@ -31,14 +31,14 @@ _UNITS = {"base_x": "m", "base_y": "m", "torso": "m"}
 def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
     """Print the tasks, environments and robots there are."""
     out = paper()
-    tasks = _table("task", "what", ">goals", "environments")
+    tasks = new_table("task", "what", ">goals", "environments")
     for task in known["tasks"]:
         places = ", ".join(task["environments"])
         tasks.add_row(task["name"], task["title"], str(task["goals"]), places)
-    environments = _table("environment", "what", "origin and axes")
+    environments = new_table("environment", "what", "origin and axes")
     for room in known["environments"]:
         environments.add_row(room["name"], room["title"], room["origin"])
-    robots = _table("robot", "what")
+    robots = new_table("robot", "what")
     for robot in known["robots"]:
         robots.add_row(robot["name"], robot["title"])
     for table in (tasks, environments, robots):
@@ -53,9 +53,9 @@ def report_scores(result: Mapping[str, Any]) -> None:
         f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} reach at least one goal, "
         f"{result['sets']:,} sets kept."
     )
-    reasons = _table("configuration and goal", ">pairs", ">share")
+    reasons = new_table("configuration and goal", ">pairs", ">share")
     for name, count in result["reasons"].items():
-        reasons.add_row(_REASONS[name], f"{count:,}", f"{count / result['pairs']:.1%}")
+        reasons.add_row(REASONS[name], f"{count:,}", f"{count / result['pairs']:.1%}")
     out.print(reasons)
     for key, what in (("best_single", "best place to stand"), ("best", "best set")):
         best = result[key]
@@ -66,13 +66,13 @@ def report_scores(result: Mapping[str, Any]) -> None:
             f"{what}: {best['reachability']:.1%} of the goals, "
             f"manipulability {best['manipulability']:.3f}"
         )
-        out.print(_members(best["members"]))
+        out.print(members_table(best["members"]))
     out.print(f"wrote {result['file']}")
 
 
 def report_rows(result: Mapping[str, Any]) -> None:
     """Print the rows of every task in every environment, one line each."""
-    table = _table(
+    table = new_table(
         *("task", "environment", ">configurations", ">goals", ">reached", ">candidates", ">sets"),
         *(">P_R P_M one", ">P_R P_M set", ">scored [s]", ">all [s]", ">file [MB]"),
     )
@@ -119,7 +119,7 @@ def _match_as_json(match: Match | None) -> dict[str, Any]:
 def report_choice(result: Mapping[str, Any]) -> None:
     """Print a choice."""
     out = paper()
-    out.print(_members(result["members"]))
+    out.print(members_table(result["members"]))
     out.print(
         f"{result['reachability']:.1%} of the goals, manipulability "
         f"{result['manipulability']:.3f}, travel cost {result['cost']:.2f}, utility "
@@ -150,20 +150,22 @@ def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
         ("mean isotropy left behind", f"{found['mean_shortfall']:.1e}"),
         ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
     )
-    table = _table("check", ">found")
+    table = new_table("check", ">found")
     for name, value in rows:
         table.add_row(name, value)
     paper().print(table)
 
 
-def _members(members: Sequence[Mapping[str, float]]) -> Table:
-    """Return the members of a set as a table, numbered."""
-    table = _table("stop", *(f">{_heading(name)}" for name in members[0]))
-    for number, member in enumerate(members, start=1):
+def members_table(
+    members: Sequence[Mapping[str, float]], heading: str = "stop", names: Sequence[str] = ()
+) -> Table:
+    """Return configurations as a table, by name if they have names, else numbered."""
+    table = new_table(heading, *(f">{_heading(name)}" for name in members[0]))
+    for number, member in enumerate(members):
         cells = (
             f"{v % 360.0:.0f}" if n == "base_yaw_deg" else f"{v:.2f}" for n, v in member.items()
         )
-        table.add_row(str(number), *cells)
+        table.add_row(names[number] if names else str(number + 1), *cells)
     return table
 
 
@@ -175,7 +177,7 @@ def _heading(name: str) -> str:
     return f"{name.removesuffix('_deg').replace('_', ' ')} [{unit}]"
 
 
-def _table(*headings: str) -> Table:
+def new_table(*headings: str) -> Table:
     """Return an empty table; a heading that starts with ">" is set flush right."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for heading in headings:

@@ -142,7 +142,7 @@ def legs_from(
             place from which there is a way anywhere.
     """
     names, level_weights = _weighted_levels(grid, weights)
-    current = _current_values(here, grid, names)
+    current = current_values(here, grid, names)
     # Columns are read only when they cost something: looking them up takes longer than choosing.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
@@ -198,7 +198,7 @@ def _weighted_levels(
     return tuple(name for name, _ in used), tuple(weight for _, weight in used)
 
 
-def _current_values(
+def current_values(
     here: InitialConfiguration, grid: Grid, names: tuple[str, ...]
 ) -> dict[str, float]:
     """Return the current value of every axis that is needed, checked."""

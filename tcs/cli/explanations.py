@@ -1,0 +1,160 @@
+"""Explanations for a person: why a goal is not reached, and what would reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+
+from tcs.cli.reports import REASONS, members_table, new_table
+from tcs.cli.talk import paper
+
+MOST_PAIRS = 4
+"""Pairs of bodies that are printed for each reason; `--json` has them all. The base is blocked a
+thousand times as often as the arm, and would leave no room for what blocks that."""
+
+
+def report_explanation(result: Mapping[str, Any]) -> None:
+    """Print an explanation, given as `Explanation.to_json` returns it."""
+    out = paper()
+    frame = f", on {result['body_frame']}" if result["body_frame"] else ""
+    out.print(f"Goal {result['goal']} of {result['task']} in {result['environment']}{frame}")
+    if result["observed"]:
+        state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
+        off = "".join(
+            f"; {name} is {value:+g} off" for name, value in result["observed_off"].items()
+        )
+        out.print(f"Scored for {state}{off}.")
+    if result["explained"] is not None:
+        _print_explained(out, result)
+    _print_fix(out, result)
+    _print_reasons(out, result)
+    _print_pairs(out, result)
+
+
+def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
+    """Print what came of the goal at the configuration that is explained."""
+    explained = result["explained"]
+    name = f"configuration {explained['configuration']}"
+    if explained["off"]:
+        off = ", ".join(_with_unit(axis, value) for axis, value in explained["off"].items())
+        out.print(f"The nearest that was scored is {name}; the place is off by {off}.")
+    if explained["reached"]:
+        out.print(f"It is reached from {name}, isotropy {explained['isotropy']:.3f}.")
+        return
+    pair = ""
+    if explained["pair"] is not None:
+        best = "the best one: " if explained["reason"] == "arm_blocked" else ""
+        pair = f" ({best}{_against(explained['pair'])})"
+    out.print(f"It is not reached from {name}: {REASONS[explained['reason']]}{pair}.")
+    reaching = result["best_set"]["reaching"]
+    if reaching:
+        members = " and ".join(str(h) for h in reaching)
+        out.print(f"The best set reaches it from configuration {members}.")
+
+
+def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
+    """Print the nearest configuration that reaches the goal, or what keeps them all from it."""
+    fix, explained = result["nearest_reaching"], result["explained"]
+    if fix is None:
+        _print_hopeless(out, result)
+        return
+    if not fix["changes"]:
+        return
+    out.print(f"Nearest that reaches it is configuration {fix['configuration']}:")
+    out.print(f"  {fix['sentence']}")
+    out.print(
+        members_table(
+            [explained["members"][0], fix["members"][0]], "", ("explained", "nearest reaching")
+        )
+    )
+    lost = fix["lost_goals"]
+    loses = f", and no longer {', '.join(map(str, lost))}" if lost else ""
+    goals = ", ".join(map(str, fix["reached_goals"]))
+    out.print(
+        f"It reaches {'goals' if len(fix['reached_goals']) > 1 else 'goal'} {goals}{loses}; "
+        f"manipulability {fix['manipulability']:.3f}, at this goal {fix['isotropy']:.3f}."
+    )
+    out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")
+    if fix["route"] != result["weights"]["route"]:
+        out.print(
+            "Driving is measured in straight lines: nobody drives from where the base can't be."
+        )
+
+
+def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
+    """Print what keeps every configuration from the goal."""
+    if result["cut_off"]:
+        out.print(
+            f"{result['cut_off']:,} configurations reach it, but there is no way around the "
+            "furniture to any of them."
+        )
+        return
+    farthest = result["farthest"]
+    pairs = [pair for pair in result["blocking_pairs"] if pair["reason"] == farthest["reason"]]
+    often = f", most often {_against(pairs[0]['pair'])}" if pairs else ""
+    out.print(
+        "No configuration of the grid reaches it. Nearest to it came "
+        f"{farthest['stopped']:,}: {REASONS[farthest['reason']]}{often}."
+    )
+
+
+def _print_reasons(out: Console, result: Mapping[str, Any]) -> None:
+    """Print the reasons over the whole grid, in the order of the checks."""
+    total = result["configurations"]
+    table = new_table("over the grid", ">configurations", ">of all", ">of those that came so far")
+    for check in result["checks"]:
+        share = f"{check['stopped'] / check['of']:.1%}" if check["of"] else "-"
+        table.add_row(
+            REASONS[check["reason"]],
+            f"{check['stopped']:,}",
+            f"{check['stopped'] / total:.1%}",
+            share,
+        )
+    reached = result["reasons"]["reached"]
+    table.add_row(REASONS["reached"], f"{reached:,}", f"{reached / total:.1%}", "")
+    out.print(table)
+
+
+def _print_pairs(out: Console, result: Mapping[str, Any]) -> None:
+    """Print the pairs of bodies that block most often."""
+    pairs = result["blocking_pairs"]
+    if not pairs:
+        return
+    table = new_table("blocked", "part", "against", ">configurations")
+    for check in result["checks"]:
+        blocking = [pair for pair in pairs if pair["reason"] == check["reason"]]
+        what = check["reason"].removesuffix("_blocked")
+        for pair in blocking[:MOST_PAIRS]:
+            table.add_row(what, *pair["pair"], f"{pair['count']:,}")
+        rest = blocking[MOST_PAIRS:]
+        if rest:
+            count = sum(pair["count"] for pair in rest)
+            table.add_row(what, f"{len(rest)} other pairs", "", f"{count:,}")
+    out.print(table)
+
+
+def _weights(weights: Mapping[str, Any], fix: Mapping[str, Any]) -> str:
+    """Return what each kind of change costs, in words."""
+    where = " around the furniture" if fix["route"] == "around" else ""
+    parts = [
+        f"{weights['metre']:g} per metre driven{where}",
+        f"{weights['turn']:g} per radian turned",
+        f"{weights['torso']:g} per metre of torso",
+    ]
+    for name, cost in weights["environment"].items():
+        unit = "metre" if name in fix["members"][0] else "radian"
+        parts.append(f"{cost:g} per {unit} of {name.replace('_', ' ')}")
+    return ", ".join(parts)
+
+
+def _against(pair: list[str]) -> str:
+    return f"{pair[0]} against {pair[1]}"
+
+
+def _with_unit(axis: str, value: float) -> str:
+    """Return the value of an axis with its name and unit."""
+    name = axis.removesuffix("_deg")
+    shown = "heading" if name == "base_yaw" else name.replace("_", " ")
+    return f"{shown} {value:+g} {'m' if name == axis else 'deg'}"

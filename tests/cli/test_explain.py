@@ -1,0 +1,155 @@
+import pytest
+
+import tcs
+from tcs.reasons import fix_weights
+from tcs.tables import Reason
+from tests.store.example import SHIFT, score_file
+from tests.tables.small import small_grid
+
+GRID = small_grid(nx=4, ny=3, yaws=4, torsos=2, bed=2, head=2)
+AT = ("--at", "bed_height=0.03", "--at", "head_rest_deg=30")
+HERE = ("--here", -0.45, 0.3, 100, "--torso", 0.1, *AT)
+
+
+@pytest.fixture
+def stored(tmp_path):
+    path = tmp_path / "scores.tcs"
+    tcs.save(path, score_file(grid=GRID, share=0.05))
+    return path
+
+
+def test_json_is_what_python_returns(tcs_command, stored):
+    ran = tcs_command("explain", stored, "--goal", 2, "--configuration", 17, "--json")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.json == tcs.explain(tcs.load(stored), 2, 17).to_json()
+    assert {"reasons", "blocking_pairs", "nearest_reaching"} <= set(ran.json)
+    assert {"members", "changes"} <= set(ran.json["nearest_reaching"])
+    assert sum(ran.json["reasons"].values()) == GRID.size
+
+
+def test_options_reach_the_explanation(tcs_command, stored):
+    words = (
+        *("--metre-weight", 0.5, "--turn-weight", 2, "--torso-weight", 0.1),
+        *("--axis-weight", "bed_height=7", "--travel", "straight"),
+    )
+    result = tcs_command("explain", stored, "--goal", 0, *HERE, *words, "--json").json
+    assert result["weights"] == {
+        "metre": 0.5,
+        "turn": 2.0,
+        "torso": 0.1,
+        "environment": {"bed_height": 7.0, "head_rest": 1.0},
+        "route": "straight",
+    }
+    assert result["explained"]["off"] == {
+        "base_x": 0.05,
+        "base_yaw_deg": 10.0,
+        "torso": -0.05,
+        "bed_height": 0.03,
+        "head_rest_deg": -5.0,
+    }
+    starts = {change["axis"]: change["from"] for change in result["nearest_reaching"]["changes"]}
+    assert starts.get("torso", 0.1) == 0.1
+    assert starts["head_rest_deg"] == 30.0
+
+
+def test_default_weights_are_those_of_the_library(tcs_command, stored):
+    told = tcs_command("explain", stored, "--goal", 0, "--json").json["weights"]
+    weights = fix_weights(GRID)
+    assert told.pop("environment") == dict(weights.environment)
+    assert told == {name: getattr(weights, name) for name in told}
+
+
+def test_observed_state(tcs_command, tmp_path):
+    path = tmp_path / "shifts.tcs"
+    tcs.save(path, score_file(tables=3, observed=[SHIFT], share=0.1))
+    words = ("explain", path, "--goal", 1, "--observed", "person_y=0.04")
+    result = tcs_command(*words, "--json").json
+    assert (result["observed"], result["observed_off"]) == ({"person_y": 0.05}, {"person_y": -0.01})
+    assert "person_y 0.05; person_y is -0.01 off" in tcs_command(*words).out
+    ran = tcs_command("explain", path, "--goal", 1, "--observed", "person_y=0.2")
+    assert ran.code == 1
+    assert "person_y" in ran.err
+
+
+def test_report(tcs_command, stored):
+    file = tcs.load(stored)
+    scores = file.nominal.scores
+    # One that the arm keeps from the goal.
+    h = int((scores.reason[:, 2] == Reason.ARM_BLOCKED).argmax())
+    out = tcs_command("explain", stored, "--goal", 2, "--configuration", h).out
+    explained = tcs.explain(file, 2, h)
+    assert explained.fix.sentence in " ".join(out.split())
+    first, second = explained.standing.pair
+    assert f"the best one: {first} against {second}" in " ".join(out.split())
+    for words in ("nearest reaching", "of those that came so far", "per metre of bed height"):
+        assert words in " ".join(out.split())
+
+
+def test_report_of_a_goal_that_is_reached(tcs_command, stored):
+    file = tcs.load(stored)
+    h = int(file.nominal.sets.candidates[0])
+    goal = int(file.nominal.scores.reached[h].argmax())
+    out = tcs_command("explain", stored, "--goal", goal, "--configuration", h).out
+    assert f"It is reached from configuration {h}" in out
+    assert "nearest reaching" not in out
+
+
+def test_report_of_a_goal_that_nothing_reaches(tcs_command, tmp_path):
+    path = tmp_path / "none.tcs"
+    tcs.save(path, score_file(grid=GRID, share=0.0))
+    ran = tcs_command("explain", path, "--goal", 0)
+    assert ran.code == 0
+    assert "No configuration of the grid reaches it. Nearest to it came" in " ".join(
+        ran.out.split()
+    )
+    assert tcs_command("explain", path, "--goal", 0, "--json").json["explained"] is None
+
+
+def test_quick_and_light(process, stored):
+    before = (
+        "import atexit; atexit.register(lambda: print([m for m in ('pydrake', 'numba', "
+        "'matplotlib', 'pandas', 'trimesh') if m in sys.modules], file=sys.stderr))"
+    )
+    ran = process("explain", stored, "--goal", 0, "--configuration", 3, before=before)
+    assert ran.code == 0
+    assert ran.err.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--goal", 5), "no goal 5: task 'shaving' has 5, numbered 0 to 4"),
+        (("--goal", -1), "no goal -1"),
+        (("--goal", 0, "--configuration", GRID.size), f"numbered 0 to {GRID.size - 1}"),
+        (("--goal", 0, "--configuration", -1), "no configuration -1"),
+        (("--goal", 0, "--here", 9, 0.3, 0, *AT), "base_x 9 m, beyond the grid"),
+        (("--goal", 0, "--here", 0, 0.3, 0), "lacks bed_height, head_rest"),
+        (("--goal", 0, *HERE, "--at", "bed_hight=0.1"), "Did you mean 'bed_height'"),
+        (("--goal", 0, "--here", 0, 0.3, 0, "--at", "bed_height"), "must be NAME=NUMBER"),
+        (("--goal", 0, "--here", 0, 0.3, 0, *AT[:2], "--at", "head_rest=1"), "must be in 'rad'"),
+        (("--goal", 0, "--axis-weight", "legs=1"), "unknown environment axis 'legs'"),
+        (("--goal", 0, "--turn-weight", -1), "Weight of travel per turn is -1"),
+        (("--goal", 0, "--travel", "flying"), "unknown route 'flying'"),
+        (("--goal", 0, "--observed", "person_y=0.1"), "unknown observed axis 'person_y'"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(tcs_command, stored, words, message):
+    ran = tcs_command("explain", stored, *words)
+    assert (ran.code, ran.out) == (1, "")
+    assert message in ran.err
+    assert ran.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param((), id="no goal"),
+        pytest.param(("--goal", "three"), id="no number"),
+        pytest.param(("--goal", 0, "--configuration", 1, *HERE), id="two places"),
+        pytest.param(("--goal", 0, "--torso", 0.1), id="torso of nothing"),
+        pytest.param(("--goal", 0, *AT), id="bed of nothing"),
+    ],
+)
+def test_misuse(tcs_command, stored, words):
+    ran = tcs_command("explain", stored, *words)
+    assert (ran.code, ran.out) == (2, "")
