@@ -108,7 +108,9 @@ def test_fix_starts_at_the_stated_place():
 
 
 def test_ties_go_to_the_greater_manipulability():
-    grid = small_grid(nx=3, ny=1, yaws=1, torsos=1)
+    grid = small_grid(nx=3, ny=1, yaws=1, torsos=1, step=0.15)
+    x = grid.values(np.arange(3))["base_x"]
+    assert x[1] - x[0] != x[2] - x[1]
     for values in ((0.2, 0.0, 0.6), (0.6, 0.0, 0.2)):
         file = made(grid, lambda h, values=values: values[h] or Reason.TOO_FAR)
         fix = tcs.explain(file, 0, 1, weights=fix_weights(grid, route="straight")).fix
