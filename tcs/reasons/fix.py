@@ -205,13 +205,12 @@ def _ways(
     From a configuration in which the body touches something nobody drives: lines tell what is
     near. A stated place is where the robot is, even if the nearest configuration is blocked.
     """
-    nothing = np.zeros((0, 2), dtype=np.int64)
     place = standing.place
     if route == "around" and (standing.off or standing.reason != Reason.BODY_BLOCKED):
-        around = WaysAround(cell_xy, nothing, floor)
+        around = WaysAround(cell_xy, floor)
         try:
             around.from_place(place.base_x, place.base_y)
         except SelectionError:
-            return "straight", StraightWays(cell_xy, nothing)
+            return "straight", StraightWays(cell_xy)
         return route, around
-    return "straight", StraightWays(cell_xy, nothing)
+    return "straight", StraightWays(cell_xy)

@@ -12,8 +12,11 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.sets import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.scoring.floor import floor_of
+from tcs.scoring.triples import kept_triples
 from tcs.space import ROBOT_AXES, Grid
 from tcs.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
+from tcs.tables.groups import Groups
+from tcs.tables.rounding import float32_above
 from tcs.tables.rules import candidates_of, check_rule, order_keys, pair_limits, spaced_places
 from tcs.tables.sets import DISTANCE_TOLERANCE, MOST_MEMBERS
 
@@ -32,18 +35,21 @@ def build_sets(
     min_distance: float = 0.40,
     jobs: int = 2,
 ) -> SetTable:
-    """Return every set of one or two configurations that a rule keeps.
+    """Return every set of one, two or three configurations that a rule keeps.
 
-    The search is exact over all pairs; the result does not depend on `jobs`.
+    The search is exact over all sets; the result does not depend on `jobs`.
 
     Args:
         scores: Scores of every configuration of the grid.
         grid: The grid.
         rule: One of `tcs.tables.rules.RULES`. "paper": singles that reach a goal, and pairs whose
-            P_M is greater than the best P_M of a single. "code2015": as hrl_base_selection did.
+            P_M is greater than the best P_M of a single; triples whose P_M is greater than the
+            best P_M of a pair and of a single. "code2015": as hrl_base_selection did, without
+            triples.
         same_environment: Whether the members of a set must share the state of the environment.
-        max_members: 1 to keep singles only, 2 to keep pairs too.
-        min_distance: Least base x-y distance between the members of a pair [m]. The paper
+        max_members: 1 to keep singles only, 2 to keep pairs too, 3 for triples. Triples take some
+            ten seconds for 5,000 candidates, 100 MB, and more for more.
+        min_distance: Least base x-y distance between two members of a set [m]. The paper
             gives no figure; 0.40 is that of hrl_base_selection in gt-ros-pkg/hrl-assistive.
         jobs: Number of threads.
 
@@ -52,7 +58,8 @@ def build_sets(
 
     Raises:
         UnknownNameError: If there is no such rule.
-        TcsError: If the scores are not those of the grid, or an argument is out of range.
+        TcsError: If the scores are not those of the grid, an argument is out of range, or there
+            are too many candidates for triples.
 
     Source:
         TCS section IV-A, eq. (1) and (4).
@@ -65,6 +72,10 @@ def build_sets(
         )
     if not 1 <= max_members <= MOST_MEMBERS:
         raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
+    if rule == "code2015" and max_members > 2:
+        raise TcsError(
+            "Sets: rule 'code2015' has sets of one and two; take rule 'paper' for three."
+        )
     if not 0.0 <= min_distance < math.inf:
         raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
     if jobs < 1:
@@ -84,6 +95,10 @@ def build_sets(
     )
     pair_cells, between, members, best_pairs = _kept_pairs(arrays, jobs if max_members > 1 else 0)
     best_single, best = _best_sets(scores, candidates, best_pairs, rule)
+    triples = None
+    if max_members > 2:
+        smaller = max(arrays.single.max(initial=0.0), between.manipulability.max(initial=0.0))
+        triples, best = _with_triples(scores, arrays, cell, float(smaller), candidates, best, jobs)
     return SetTable(
         rule=rule,
         max_members=max_members,
@@ -99,11 +114,12 @@ def build_sets(
         pair_cells=pair_cells.astype(np.int32),
         pair_count=between.kept,
         pair_reachability=between.reachability,
-        pair_manipulability=_float32_above(between.manipulability),
-        pair_sum=_float32_above(between.total),
+        pair_manipulability=float32_above(between.manipulability),
+        pair_sum=float32_above(between.total),
         member_reachability=members.reachability,
-        member_manipulability=_float32_above(members.manipulability),
-        member_sum=_float32_above(members.total),
+        member_manipulability=float32_above(members.manipulability),
+        member_sum=float32_above(members.total),
+        triples=triples,
         best=best,
         best_single=best_single,
         floor=floor_of(scores, grid),
@@ -243,7 +259,24 @@ def _best_sets(
     return best_single, best_single
 
 
-def _float32_above(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the least float32 not below each value: a bound must not round down."""
-    near = values.astype(np.float32)
-    return np.where(near < values, np.nextafter(near, np.float32(np.inf)), near)
+def _with_triples(
+    scores: ScoreTable,
+    arrays: SetArrays,
+    cell: NDArray[np.int32],
+    smaller: float,
+    candidates: NDArray[np.int32],
+    best: tuple[int, ...],
+    jobs: int,
+) -> tuple[Groups, tuple[int, ...]]:
+    """Return the triples with a greater P_M than `smaller`, and the best set with them."""
+    rows = cell[arrays.number].astype(np.int64)
+    triples, (total, members) = kept_triples(arrays, rows, float(np.nextafter(smaller, 1.0)), jobs)
+    if not members:
+        return triples, best
+    reached = np.logical_or.reduce(scores.reached[list(best)], axis=0)
+    isotropy = np.maximum.reduce(scores.isotropy[list(best)], axis=0)
+    so_far = tc_reachability(reached, scores.weights) + tc_manipulability(isotropy, scores.weights)
+    # Smaller sets come first, so a triple has to be better, not as good.
+    if total > so_far:
+        best = tuple(int(h) for h in candidates[list(members)])
+    return triples, best

@@ -1,4 +1,4 @@
-"""Upper bounds on the utility of pairs, from here: of groups, of their members, of single pairs.
+"""Upper bounds on the utility of sets, from here: of groups, of their members, of single sets.
 
 A bound is either computed by the very operations of the utility on greater scores and smaller
 costs (rounding is monotone, so it cannot fall below), or widened by `SLACK`.
@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.select.index import PairIndex
+from tcs.select.index import GroupIndex
 from tcs.select.travel import Legs
 from tcs.select.utility import UtilityWeights
 
@@ -29,8 +29,8 @@ end up one bit below the utility it bounds, and lose a tie."""
 class Bounds:
     """Bounds for one query."""
 
-    index: PairIndex
-    """The sets."""
+    index: GroupIndex
+    """The groups of sets."""
     legs: Legs
     """Travel costs from the current state."""
     weights: UtilityWeights
@@ -46,23 +46,33 @@ class Bounds:
         """Bound on the utility of each group, shape (K,); -inf out of reach."""
         index, legs = self.index, self.legs
         bounds = self._group_gain - self.travel * self._driving
-        # Either member's best partner is no better than this, and the way to it no shorter.
-        rest = np.maximum.reduceat(self._rest[index.sets.by_cell], index.start)
-        rest = np.minimum(rest[index.first], rest[index.second])
+        if index.members > 2:
+            # A path of several legs was not summed as the cost is.
+            bounds += self._room
+        # Each member's best set is no better than this, and the way to it no shorter.
+        by_cell = np.maximum.reduceat(self._rest[index.all.sets.by_cell], index.all.start)
+        rest = by_cell[index.cells[0]]
+        for cells in index.cells[1:]:
+            rest = np.minimum(rest, by_cell[cells])
         np.minimum(bounds, rest - self.travel * self._driving + self._room, out=bounds)
         if not np.all(legs.reachable):
-            bounds[~(legs.reachable[index.first] & legs.reachable[index.second])] = -np.inf
+            for cells in index.cells:
+                bounds[~legs.reachable[cells]] = -np.inf
         return bounds
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
-        """Return a bound on the pairs of a group that a candidate is in, shape (n,)."""
+        """Return a bound on the sets of a group that a candidate is in, shape (n,)."""
         gain = np.minimum(self._rest[member], self._group_gain[group] - self._levels[member])
         return gain - (self.travel * self._driving[group] - self._room[group])
 
-    def of_pair(self, group: IntArray, a: IntArray, b: IntArray, cost: FloatArray) -> FloatArray:
-        """Return a bound on the utility of pairs whose cost is known, shape (n,)."""
-        gain = np.minimum(self._member_gain[a], self._member_gain[b])
-        return np.minimum(gain, self._group_gain[group]) - self.travel * cost
+    def of_set(
+        self, group: IntArray, members: tuple[IntArray, ...], cost: FloatArray
+    ) -> FloatArray:
+        """Return a bound on the utility of sets whose cost is known, shape (n,)."""
+        gain = self._group_gain[group]
+        for member in members:
+            gain = np.minimum(gain, self._member_gain[member])
+        return gain - self.travel * cost
 
     @cached_property
     def _group_gain(self) -> FloatArray:
@@ -71,7 +81,7 @@ class Bounds:
 
     @cached_property
     def _member_gain(self) -> FloatArray:
-        """Bound on alpha P_R + beta P_M of the pairs of each candidate, shape (C,)."""
+        """Bound on alpha P_R + beta P_M of the sets of each candidate, shape (C,)."""
         return self._gain(*self.index.member_scores)
 
     def _gain(
@@ -79,7 +89,7 @@ class Bounds:
     ) -> FloatArray:
         """Return a bound on alpha P_R + beta P_M from bounds on P_R, P_M and their sum."""
         alpha, beta = float(self.weights.reachability), float(self.weights.manipulability)
-        # The best reachability and the best manipulability may belong to two different pairs.
+        # The best reachability and the best manipulability may belong to two different sets.
         apart = alpha * reachability + beta * manipulability
         # alpha P_R + beta P_M = (alpha - beta) P_R + beta (P_R + P_M), or with the roles swapped.
         if alpha >= beta:
@@ -90,10 +100,12 @@ class Bounds:
 
     @cached_property
     def _driving(self) -> FloatArray:
-        """Cost of driving to the nearer cell of each group and on to the other, shape (K,)."""
-        index, legs = self.index, self.legs
-        approach = np.minimum(legs.here_to_cell[index.first], legs.here_to_cell[index.second])
-        return np.asarray(approach + legs.metre * legs.ways.of_groups)
+        """Cost of driving to the nearest cell of each group and through all of them, shape (K,)."""
+        here = self.legs.here_to_cell
+        approach = here[self.index.cells[0]]
+        for cells in self.index.cells[1:]:
+            approach = np.minimum(approach, here[cells])
+        return np.asarray(approach + self.legs.metre * self.index.path(self.legs.ways))
 
     @cached_property
     def _levels(self) -> FloatArray:

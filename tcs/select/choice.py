@@ -10,17 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from tcs.errors import SelectionError
-from tcs.select.index import PairIndex
+from tcs.select.index import SetIndex
 from tcs.select.observed import Match, nearest_table
-from tcs.select.search import best_pair
+from tcs.select.search import best_set
 from tcs.select.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.select.utility import UtilityWeights, utility
 from tcs.space import Grid
 from tcs.store import ScoreFile
 from tcs.tables import InitialConfiguration, SetTable
-
-MOST_MEMBERS = 2
-"""Greatest number of members of the sets that are stored."""
+from tcs.tables.sets import MOST_MEMBERS
 
 _DEFAULT_WEIGHTS = UtilityWeights()
 _DEFAULT_TRAVEL = TravelWeights()
@@ -46,9 +44,9 @@ class SelectionTables:
         return cls(chosen.sets, Grid.from_dict(file.grid))
 
     @cached_property
-    def index(self) -> PairIndex:
+    def index(self) -> SetIndex:
         """The sets, prepared for the search."""
-        return PairIndex(self.sets)
+        return SetIndex(self.sets)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +69,8 @@ class Choice:
     """alpha P_R + beta P_M - gamma D, TCS eq. (5)."""
     cut_off: int
     """How many candidates were left out because there is no way to them from here."""
+    gap: float
+    """By how much a set of those that are held may be better at most; 0, the search is exact."""
     seconds: float
     """How long choosing took [s]."""
     match: Match | None = None
@@ -83,21 +83,22 @@ def select(
     *,
     weights: UtilityWeights = _DEFAULT_WEIGHTS,
     travel: TravelWeights = _DEFAULT_TRAVEL,
-    max_members: int = MOST_MEMBERS,
+    max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
     seen: Mapping[str, Sequence[float]] | None = None,
 ) -> Choice:
     """Return the stored set with the greatest utility from where the robot is.
 
     The result equals a search through all stored sets. Of sets with the same utility the first
-    wins: singles by configuration index, then pairs in lexicographic order.
+    wins: singles by configuration index, then pairs and then triples in lexicographic order.
 
     Args:
         source: A loaded score file; or its tables, which is faster when choosing repeatedly.
         here: The current state of robot and environment, h_0, in the environment frame.
         weights: alpha, beta, gamma.
         travel: What each kind of motion costs.
-        max_members: 1 to choose a single configuration, 2 to allow a pair.
+        max_members: 1 to choose a single configuration, 2 to allow a pair, 3 a triple; by default
+            whatever is stored.
         observed: How the person is found: values of the file's observed axes [m or rad]. The
             table scored for the nearest values is used; what is not told counts as zero.
         seen: The same told by places of body frames in W [m], by name.
@@ -112,10 +113,6 @@ def select(
         TCS eq. (5). The paper leaves D open; ours is the shortest tour through the members.
     """
     start = time.perf_counter()
-    if not 1 <= max_members <= MOST_MEMBERS:
-        raise SelectionError(
-            f"At most {max_members} members asked for; sets of 1 to {MOST_MEMBERS} are stored."
-        )
     match = None
     if isinstance(source, ScoreFile):
         match = nearest_table(source, here, observed, seen)
@@ -128,6 +125,8 @@ def select(
     else:
         tables = source
     sets = tables.sets
+    max_members = sets.max_members if max_members is None else max_members
+    _check_members(max_members, sets.max_members)
     if not len(sets.candidates):
         raise SelectionError(
             "Nothing to choose from: no goal is reached from any initial configuration. Look at "
@@ -145,10 +144,28 @@ def select(
     singles[~legs.reachable[sets.cell]] = -np.inf
     single = int(np.argmax(singles))
     rows: tuple[int, ...] = (single,)
-    if max_members > 1 and len(sets.pair_cells):
-        pair = best_pair(tables.index, legs, weights, float(singles[single]))
-        rows = (pair.a, pair.b) if pair is not None else rows
+    best = float(singles[single])
+    for groups in tables.index.groups[: max_members - 1]:
+        found = best_set(groups, legs, weights, best)
+        if found is not None:
+            rows, best = found.members, found.utility
     return _choice(tables, legs, weights, rows, start, match)
+
+
+def _check_members(asked: int, held: int) -> None:
+    """Refuse a number of members that is none, or greater than what the table holds."""
+    if asked < 1:
+        raise SelectionError(f"At most {asked} members asked for; must be 1 or more.")
+    if asked > held:
+        sizes = " and ".join(str(n) for n in range(1, held + 1))
+        raise SelectionError(
+            f"At most {asked} members asked for, but the table holds sets of {sizes} only. "
+            + (
+                f"Score the task again: tcs score ... --max-members {asked}."
+                if asked <= MOST_MEMBERS
+                else f"No set has more than {MOST_MEMBERS}."
+            )
+        )
 
 
 def _choice(
@@ -174,6 +191,7 @@ def _choice(
         cost=cost,
         utility=utility(reachability, manipulability, cost, weights),
         cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
+        gap=0.0,
         seconds=time.perf_counter() - start,
         match=match,
     )

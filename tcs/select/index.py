@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,50 +10,32 @@ from numpy.typing import NDArray
 
 from tcs.select.ways import StraightWays, Ways, WaysAround
 from tcs.tables import SetTable
+from tcs.tables.groups import Groups
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class PairIndex:
-    """What the search needs of a set table, independent of the query."""
+class SetIndex:
+    """The candidates, by cell and by goal."""
 
     sets: SetTable
     """The table."""
 
     @cached_property
-    def first(self) -> IntArray:
-        """First cell of each group, shape (K,)."""
-        return self.sets.pair_cells[:, 0].astype(np.int64)
+    def groups(self) -> tuple[GroupIndex, ...]:
+        """The groups of pairs, and of triples where the table holds them."""
+        kinds = [self.sets.pairs]
+        if self.sets.triples is not None:
+            kinds.append(self.sets.triples)
+        return tuple(GroupIndex(self, kind) for kind in kinds)
 
     @cached_property
-    def second(self) -> IntArray:
-        """Second cell of each group, shape (K,)."""
-        return self.sets.pair_cells[:, 1].astype(np.int64)
-
-    @cached_property
-    def group_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Bounds on P_R, P_M and P_R + P_M of each group in double precision, shapes (K,).
-
-        Products with float32 arrays would round to float32, and might round a bound down.
-        """
-        sets = self.sets
-        return (
-            sets.pair_reachability,
-            sets.pair_manipulability.astype(np.float64),
-            sets.pair_sum.astype(np.float64),
-        )
-
-    @cached_property
-    def member_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The same of the kept pairs that each candidate is in, shapes (C,)."""
-        sets = self.sets
-        return (
-            sets.member_reachability,
-            sets.member_manipulability.astype(np.float64),
-            sets.member_sum.astype(np.float64),
-        )
+    def ways(self) -> dict[str, Ways]:
+        """Distances between the cells by each of the routes."""
+        xy = self.sets.cell_xy
+        return {"straight": StraightWays(xy), "around": WaysAround(xy, self.sets.floor)}
 
     @cached_property
     def start(self) -> IntArray:
@@ -64,15 +46,6 @@ class PairIndex:
     def size(self) -> IntArray:
         """How many candidates each cell has, shape (N,)."""
         return np.asarray(np.diff(self.sets.cell_start))
-
-    @cached_property
-    def ways(self) -> dict[str, Ways]:
-        """Distances between the cells by each of the routes."""
-        xy, groups = self.sets.cell_xy, self.sets.pair_cells.astype(np.int64)
-        return {
-            "straight": StraightWays(xy, groups),
-            "around": WaysAround(xy, groups, self.sets.floor),
-        }
 
     @cached_property
     def earliest(self) -> IntArray:
@@ -89,7 +62,64 @@ class PairIndex:
         """Whether a goal is reached, one contiguous row for each goal, shape (G, C)."""
         return np.ascontiguousarray(self.sets.reached.T)
 
+
+@dataclass(frozen=True)
+class GroupIndex:
+    """Groups of sets of m members with the same base cells."""
+
+    all: SetIndex
+    """The candidates."""
+    groups: Groups
+    """The groups."""
+    _paths: dict[type[Ways], FloatArray] = field(default_factory=dict, repr=False)
+    """Shortest paths through the cells of each group that were asked for, by kind of way."""
+
+    @property
+    def members(self) -> int:
+        """m, how many members each set has."""
+        return int(self.groups.cells.shape[1])
+
     @cached_property
-    def pairs_within(self) -> IntArray:
-        """How many pairs of candidates there are to open in each group, shape (K,)."""
-        return np.asarray(self.size[self.first] * self.size[self.second])
+    def cells(self) -> tuple[IntArray, ...]:
+        """First, second, ... cell of each group, shapes (K,)."""
+        return tuple(np.ascontiguousarray(column, dtype=np.int64) for column in self.groups.cells.T)
+
+    @cached_property
+    def group_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Bounds on P_R, P_M and P_R + P_M of each group in double precision, shapes (K,).
+
+        Products with float32 arrays would round to float32, and might round a bound down.
+        """
+        groups = self.groups
+        return (
+            groups.reachability,
+            groups.manipulability.astype(np.float64),
+            groups.total.astype(np.float64),
+        )
+
+    @cached_property
+    def member_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The same of the kept sets that each candidate is in, shapes (C,)."""
+        groups = self.groups
+        return (
+            groups.member_reachability,
+            groups.member_manipulability.astype(np.float64),
+            groups.member_total.astype(np.float64),
+        )
+
+    @cached_property
+    def candidates_within(self) -> IntArray:
+        """How many candidates there are in the cells of each group, shape (K,)."""
+        return np.asarray(sum(self.all.size[cells] for cells in self.cells))
+
+    def path(self, ways: Ways) -> FloatArray:
+        """Return the least distance to drive between the cells of each group [m], shape (K,)."""
+        if type(ways) not in self._paths:
+            legs = [
+                ways.between(first, second)
+                for i, first in enumerate(self.cells)
+                for second in self.cells[i + 1 :]
+            ]
+            # Of three legs a path takes two.
+            self._paths[type(ways)] = np.sort(legs, axis=0)[: self.members - 1].sum(axis=0)
+        return self._paths[type(ways)]

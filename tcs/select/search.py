@@ -1,184 +1,236 @@
-"""Find the best kept pair without going through all of them: best-first branch and bound.
+"""Find the best kept set without going through all of them: best-first branch and bound.
 
-Pairs are grouped by the two base cells of their members. Groups are opened in the order of their
-bounds until no unopened one can win. In an opened group, members that cannot win with any partner
-are left out, then pairs whose way is too long; the scores of the others are computed.
+Sets of two or three are grouped by the base cells of their members. Groups are opened in the order
+of their bounds until no unopened one can win. In an opened group, members that cannot win with any
+partners are left out, then sets whose way is too long; the scores of the others are computed.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.select.bounds import Bounds
-from tcs.select.index import PairIndex
+from tcs.select.index import GroupIndex
 from tcs.select.travel import Legs
 from tcs.select.utility import UtilityWeights, utility
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FIRST_PAIRS = 2_000
-"""Pairs opened in the first round, of which most searches need no more; later rounds double, so
-that a search which has to open many groups does not spend its time on bookkeeping."""
+FIRST_CANDIDATES = 200
+"""Candidates looked at in the first round, of which most searches need no more; later rounds
+double, so that a search which has to open many groups does not spend its time on bookkeeping."""
 
-MOST_PAIRS = 500_000
-"""Most pairs opened at once. Nearly all of them are left out before they take memory; 14 goals
-would need some 50 MB for them."""
+MOST_CANDIDATES = 100_000
+"""Most candidates looked at in one round: a few milliseconds."""
+
+SETS_AT_ONCE = 500_000
+"""Sets formed at once: their scores need some 30 MB."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A pair and its utility."""
+    """A set and its utility."""
 
     utility: float
-    a: int
-    """Candidate number of the first member."""
-    b: int
-    """Candidate number of the second, greater than a."""
+    members: tuple[int, ...]
+    """Candidate numbers of the members, ascending."""
 
     def beats(self, other: Found | None) -> bool:
-        """Return whether this pair is to be chosen over another: utility, then order."""
+        """Return whether this set is to be chosen over another: utility, then order."""
         if other is None or self.utility != other.utility:
             return other is None or self.utility > other.utility
-        return (self.a, self.b) < (other.a, other.b)
+        return self.members < other.members
 
 
-def best_pair(
-    index: PairIndex, legs: Legs, weights: UtilityWeights, to_beat: float
+def best_set(
+    index: GroupIndex, legs: Legs, weights: UtilityWeights, to_beat: float
 ) -> Found | None:
-    """Return the kept pair with the greatest utility, the first among equals.
+    """Return the kept set with the greatest utility, the first among equals.
 
     Args:
-        index: The sets.
+        index: The groups of sets.
         legs: Travel costs from the current state.
         weights: alpha, beta, gamma.
-        to_beat: Utility of the best single; a pair has to be better, not as good.
+        to_beat: Utility of the best smaller set; a set has to be better, not as good.
 
     Returns:
-        The pair, or None when no pair is better than `to_beat`.
+        The set, or None when no set is better than `to_beat`.
     """
     bounds = Bounds(index, legs, weights)
     left = np.flatnonzero(bounds.groups > to_beat)
     best: Found | None = None
-    budget = FIRST_PAIRS
+    budget = FIRST_CANDIDATES
     while left.size:
         now, left = _split(bounds, left, budget)
-        found = _best_within(bounds, now, to_beat if best is None else best.utility)
-        if found is not None and found.utility > to_beat and found.beats(best):
-            best = found
+        for members, group in _sets_able_to_win(bounds, now, _least(best, to_beat)):
+            found = _best_of(bounds, members, group, _least(best, to_beat))
+            if found is not None and found.utility > to_beat and found.beats(best):
+                best = found
         left = _still_able_to_win(bounds, left, best)
-        budget = min(2 * budget, MOST_PAIRS)
+        budget = min(2 * budget, MOST_CANDIDATES)
     return best
+
+
+def _least(best: Found | None, to_beat: float) -> float:
+    """Return the utility that a set must have to be looked at."""
+    return to_beat if best is None else best.utility
 
 
 def _split(bounds: Bounds, left: IntArray, budget: int) -> tuple[IntArray, IntArray]:
     """Return the groups to open now, those with the greatest bounds, and the others."""
-    # A group holds at least one pair, so the groups of a budget are never more than the budget.
+    # A group has at least two candidates, so there are never more groups than the budget.
     if left.size > budget:
         order = np.argpartition(-bounds.groups[left], budget)
         front, rest = left[order[:budget]], left[order[budget:]]
     else:
         front, rest = left, left[:0]
     # Among equal bounds, open first what comes first in the order: all others can then be left.
-    a, b = _earliest_pair(bounds.index, front)
-    front = front[np.lexsort((b, a, -bounds.groups[front]))]
-    opened = max(
-        1, int(np.searchsorted(np.cumsum(bounds.index.pairs_within[front]), budget, "right"))
-    )
+    earliest = _earliest(bounds.index, front)
+    front = front[np.lexsort((*reversed(earliest), -bounds.groups[front]))]
+    looked_at = np.cumsum(bounds.index.candidates_within[front])
+    opened = max(1, int(np.searchsorted(looked_at, budget, "right")))
     return front[:opened], np.concatenate([front[opened:], rest])
 
 
 def _still_able_to_win(bounds: Bounds, left: IntArray, best: Found | None) -> IntArray:
-    """Return the groups that may hold a better pair, or an equal one earlier in the order."""
+    """Return the groups that may hold a better set, or an equal one earlier in the order."""
     if best is None:
         return left
     bound = bounds.groups[left]
     able = bound > best.utility
     equal = np.flatnonzero(bound == best.utility)
-    a, b = _earliest_pair(bounds.index, left[equal])
-    able[equal] = (a < best.a) | ((a == best.a) & (b < best.b))
+    earlier = np.zeros(equal.size, dtype=np.bool_)
+    tied = np.ones(equal.size, dtype=np.bool_)
+    for number, of_best in zip(_earliest(bounds.index, left[equal]), best.members, strict=True):
+        earlier |= tied & (number < of_best)
+        tied &= number == of_best
+    able[equal] = earlier
     return np.asarray(left[able])
 
 
-def _earliest_pair(index: PairIndex, groups: IntArray) -> tuple[IntArray, IntArray]:
-    """Return, for each group, candidate numbers a < b that none of its pairs comes before."""
-    first, second = index.earliest[index.first[groups]], index.earliest[index.second[groups]]
-    return np.minimum(first, second), np.maximum(first, second)
+def _earliest(index: GroupIndex, groups: IntArray) -> tuple[IntArray, ...]:
+    """Return, for each group, ascending candidate numbers that none of its sets comes before."""
+    return tuple(np.sort([index.all.earliest[cells[groups]] for cells in index.cells], axis=0))
 
 
-def _best_within(bounds: Bounds, groups: IntArray, least: float) -> Found | None:
-    """Return the best kept pair of some groups with at least this utility, the first of equals."""
-    index, legs = bounds.index, bounds.legs
-    a, b, group = _pairs_able_to_win(bounds, groups, least)
-    cost = np.minimum(legs.from_here[a], legs.from_here[b]) + legs.between(a, b)
-    # The way is known now; scores take longer, and few pairs can make up for theirs.
-    able = np.flatnonzero(bounds.of_pair(group, a, b, cost) >= least)
-    a, b, cost = a[able], b[able], cost[able]
-    goal_weights = index.sets.weights
-    manipulability = np.zeros(a.size)
-    for row, weight in zip(index.isotropy, goal_weights, strict=True):
-        manipulability += float(weight) * np.maximum(row[a], row[b])
-    limits = index.sets.limits
-    kept = manipulability >= limits.manipulability
-    if limits.gain > 0.0:
-        single = index.sets.single_manipulability
-        kept &= manipulability >= limits.gain * np.maximum(single[a], single[b])
-    if index.sets.same_environment:
-        kept &= index.sets.state[a] == index.sets.state[b]
-    a, b, cost, manipulability = a[kept], b[kept], cost[kept], manipulability[kept]
-    reachability = np.zeros(a.size)
-    for reached, weight in zip(index.reached, goal_weights, strict=True):
-        reachability += float(weight) * (reached[a] | reached[b])
-    if limits.reachability > 0.0:
-        kept = reachability >= limits.reachability
-        a, b, cost = a[kept], b[kept], cost[kept]
-        reachability, manipulability = reachability[kept], manipulability[kept]
-    if not a.size:
+def _best_of(
+    bounds: Bounds, members: tuple[IntArray, ...], group: IntArray, least: float
+) -> Found | None:
+    """Return the best kept of some sets with at least this utility, the first of equals."""
+    cost = tour_costs(bounds.legs, members)
+    # The way is known now; scores take longer, and few sets can make up for theirs.
+    able = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
+    members, cost = tuple(member[able] for member in members), cost[able]
+    every, sets = bounds.index.all, bounds.index.all.sets
+    manipulability = np.zeros(cost.size)
+    for isotropy, weight in zip(every.isotropy, sets.weights, strict=True):
+        most = isotropy[members[0]]
+        for member in members[1:]:
+            most = np.maximum(most, isotropy[member])
+        manipulability += float(weight) * most
+    reachability = np.zeros(cost.size)
+    for reached, weight in zip(every.reached, sets.weights, strict=True):
+        some = reached[members[0]]
+        for member in members[1:]:
+            some = some | reached[member]
+        reachability += float(weight) * some
+    kept = np.flatnonzero(_is_kept(bounds.index, members, reachability, manipulability))
+    if not kept.size:
         return None
-    utilities = utility(reachability, manipulability, cost, bounds.weights)
+    members = tuple(member[kept] for member in members)
+    utilities = utility(reachability[kept], manipulability[kept], cost[kept], bounds.weights)
     best = utilities.max()
     ties = np.flatnonzero(utilities == best)
-    first = ties[np.lexsort((b[ties], a[ties]))[0]]
-    return Found(float(best), int(a[first]), int(b[first]))
+    first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]
+    return Found(float(best), tuple(int(member[first]) for member in members))
 
 
-def _pairs_able_to_win(
+def _is_kept(
+    index: GroupIndex,
+    members: tuple[IntArray, ...],
+    reachability: FloatArray,
+    manipulability: FloatArray,
+) -> NDArray[np.bool_]:
+    """Return whether sets with these scores are kept by the rule, shape (n,)."""
+    sets = index.all.sets
+    kept = manipulability >= index.groups.least
+    if index.members == 2:
+        larger = np.maximum(*(sets.single_manipulability[member] for member in members))
+        kept &= manipulability >= sets.limits.gain * larger
+        kept &= reachability >= sets.limits.reachability
+    if sets.same_environment:
+        for member in members[1:]:
+            kept &= sets.state[member] == sets.state[members[0]]
+    return kept
+
+
+def tour_costs(legs: Legs, members: tuple[IntArray, ...]) -> FloatArray:
+    """Return the cost D of the shortest open tour from here through each set, shape (n,).
+
+    Legs are added in the order they are driven, as `tcs.select.shortest_tour` does.
+    """
+    numbers = range(len(members))
+    between = {
+        frozenset((i, j)): legs.between(members[i], members[j])
+        for i, j in itertools.combinations(numbers, 2)
+    }
+    least: FloatArray | None = None
+    for order in itertools.permutations(numbers):
+        cost = legs.from_here[members[order[0]]]
+        for i, j in itertools.pairwise(order):
+            cost = cost + between[frozenset((i, j))]
+        least = cost if least is None else np.minimum(least, cost)
+    return np.asarray(least)
+
+
+def _sets_able_to_win(
     bounds: Bounds, groups: IntArray, least: float
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return numbers a < b and group of the pairs of able members of some groups, shapes (n,)."""
+) -> Iterator[tuple[tuple[IntArray, ...], IntArray]]:
+    """Yield the sets of able members of some groups: candidate numbers, ascending, and group."""
     index = bounds.index
-    p, p_start, p_count = _members_able_to_win(bounds, groups, index.first[groups], least)
-    q, q_start, q_count = _members_able_to_win(bounds, groups, index.second[groups], least)
-    count = p_count * q_count
-    group = np.repeat(np.arange(groups.size), count)
-    within = np.arange(group.size) - np.repeat(np.cumsum(count) - count, count)
-    i, j = np.divmod(within, q_count[group])
-    a, b = p[p_start[group] + i], q[q_start[group] + j]
-    group = groups[group]
-    same = index.first[group] == index.second[group]
-    if np.any(same):
-        # Within one cell each pair comes up twice, and each candidate meets itself.
-        once = (a < b) | ~same
-        a, b, group = a[once], b[once], group[once]
-    return np.minimum(a, b), np.maximum(a, b), group
+    able = [_members_able_to_win(bounds, groups, cells[groups], least) for cells in index.cells]
+    count = np.prod([number for _, _, number in able], axis=0)
+    some = np.flatnonzero(count)
+    while some.size:
+        # At least one group, and as many as have not too many sets together.
+        end = max(1, int(np.searchsorted(np.cumsum(count[some]), SETS_AT_ONCE, "right")))
+        now, some = some[:end], some[end:]
+        which = np.repeat(now, count[now])
+        rest = np.arange(which.size) - np.repeat(np.cumsum(count[now]) - count[now], count[now])
+        members = []
+        for numbers, start, number in reversed(able):
+            rest, within = np.divmod(rest, number[which])
+            members.append(numbers[start[which] + within])
+        members.reverse()
+        group = groups[which]
+        once = np.ones(group.size, dtype=np.bool_)
+        for i, (cells, following) in enumerate(itertools.pairwise(index.cells)):
+            # Within one cell each set comes up several times, and a candidate meets itself.
+            once &= (cells[group] != following[group]) | (members[i] < members[i + 1])
+        if not np.all(once):
+            members, group = [member[once] for member in members], group[once]
+        yield tuple(np.sort(members, axis=0)), group
 
 
 def _members_able_to_win(
     bounds: Bounds, groups: IntArray, cells: IntArray, least: float
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return candidates of one cell of each group that may be in a pair with this utility.
+    """Return candidates of one cell of each group that may be in a set with this utility.
 
     Returns:
         Their numbers, group by group; where each group starts among them; how many it has.
     """
-    index = bounds.index
-    size = index.size[cells]
+    every = bounds.index.all
+    size = every.size[cells]
     which = np.repeat(np.arange(groups.size), size)
     within = np.arange(which.size) - np.repeat(np.cumsum(size) - size, size)
-    member = index.sets.by_cell[index.start[cells][which] + within]
+    member = every.sets.by_cell[every.start[cells][which] + within]
     able = bounds.of_member(groups[which], member) >= least
     count = np.bincount(which[able], minlength=groups.size)
     return member[able], np.cumsum(count) - count, count

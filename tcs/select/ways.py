@@ -34,8 +34,6 @@ class Ways(abc.ABC):
 
     cell_xy: FloatArray
     """Places of the cells in W [m], shape (N, 2)."""
-    groups: IntArray
-    """Pairs of cells that are asked for in every query, shape (K, 2)."""
 
     @abc.abstractmethod
     def from_place(self, x: float, y: float) -> FloatArray:
@@ -44,11 +42,6 @@ class Ways(abc.ABC):
     @abc.abstractmethod
     def between(self, first: IntArray, second: IntArray) -> FloatArray:
         """Return how far it is between cells that have a way from one place [m], shape (...)."""
-
-    @cached_property
-    def of_groups(self) -> FloatArray:
-        """How far it is between the cells of each group [m], shape (K,)."""
-        return self.between(self.groups[:, 0], self.groups[:, 1])
 
 
 class StraightWays(Ways):

@@ -12,6 +12,7 @@ from tcs.errors import StoreFormatError
 from tcs.store.folding import MAX_BYTES, fold, small, unfolded
 from tcs.tables import Floor, SetTable
 from tcs.tables.floor import MOVES
+from tcs.tables.groups import ARRAYS, Groups
 
 _PLAIN = {
     "rule": str,
@@ -51,6 +52,7 @@ def packed_sets(sets: SetTable) -> dict[str, Any]:
         "member_reachability": fold(sets.member_reachability),
         "member_manipulability": fold(sets.member_manipulability),
         "member_sum": fold(sets.member_sum),
+        "triples": None if sets.triples is None else _packed_groups(sets.triples, cells),
         "best": list(sets.best),
         "best_single": list(sets.best_single),
         "floor": {
@@ -103,9 +105,48 @@ def unpacked_sets(packed: dict[str, Any]) -> SetTable:
         member_reachability=unfolded(packed, "member_reachability", "f8", candidates.shape),
         member_manipulability=unfolded(packed, "member_manipulability", "f4", candidates.shape),
         member_sum=unfolded(packed, "member_sum", "f4", candidates.shape),
+        triples=_unpacked_groups(packed.get("triples"), len(cell_xy)),
         best=_indices(packed, "best"),
         best_single=_indices(packed, "best_single"),
         floor=_unpacked_floor(packed.get("floor")),
+    )
+
+
+def _packed_groups(groups: Groups, cells: int) -> dict[str, Any]:
+    """Return the plain containers that `_unpacked_groups` takes."""
+    number = np.zeros(len(groups.cells), dtype=np.int64)
+    for column in groups.cells.T.astype(np.int64):
+        number = number * cells + column
+    return {
+        "least": float(groups.least),
+        "step": fold(_steps(number)),
+        **{name: fold(getattr(groups, name)) for name in ARRAYS if name != "count"},
+        "count": fold(small(groups.count)),
+    }
+
+
+def _unpacked_groups(packed: object, cells: int) -> Groups | None:
+    """Return the sets of three that were packed, checked; None where there are none."""
+    if packed is None:
+        return None
+    if not isinstance(packed, dict) or type(packed.get("least")) is not float:
+        raise StoreFormatError("has sets of three that are none")
+    number = _ascending(unfolded(packed, "step", "u", (None,)), cells**3 + 1, "triples of cells")
+    wide = {"reachability": "f8", "member_reachability": "f8"}
+    return Groups(
+        least=packed["least"],
+        cells=np.stack(
+            [number // cells**2, number // cells % cells, number % cells]
+            if cells
+            else [number] * 3,
+            axis=1,
+        ).astype(np.int32),
+        count=unfolded(packed, "count", "u", number.shape).astype(np.int64),
+        **{
+            name: unfolded(packed, name, wide.get(name, "f4"), (None,))
+            for name in ARRAYS
+            if name != "count"
+        },
     )
 
 

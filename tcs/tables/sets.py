@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from tcs.tables.checks import read_only, require
 from tcs.tables.equations import tc_manipulability, tc_reachability
 from tcs.tables.floor import Floor
+from tcs.tables.groups import Groups
 from tcs.tables.rules import RULES, PairLimits, pair_limits
 
-MOST_MEMBERS = 2
+MOST_MEMBERS = 3
 """Most members a set may have."""
 
 _BOUNDS = tuple(
@@ -39,7 +40,7 @@ class SetTable:
     """All kept sets (tau in the TCS paper) of C candidates in N base cells; read-only.
 
     Order of the sets, which also breaks ties: the singles by configuration index, then the
-    pairs (a, b), a < b, in lexicographic order.
+    pairs (a, b), a < b, in lexicographic order, then the triples likewise.
     """
 
     rule: str
@@ -81,6 +82,8 @@ class SetTable:
     """Greatest P_M of those pairs, rounded upward, shape (C,)."""
     member_sum: NDArray[np.float32]
     """Greatest P_R + P_M of those pairs, rounded upward, shape (C,)."""
+    triples: Groups | None
+    """Kept sets of three; None where `max_members` is less."""
     best: tuple[int, ...]
     """Configuration indices of the best set: greatest P_R + P_M, or P_R before P_M by the rule
     "code2015"; () without candidates."""
@@ -129,6 +132,14 @@ class SetTable:
         require(isinstance(self.floor, Floor), "set table: floor must be a Floor.")
         self._check_candidates()
         self._check_pairs()
+        require(
+            isinstance(self.triples, Groups) and self.triples.cells.shape[1] == MOST_MEMBERS
+            if self.max_members == MOST_MEMBERS
+            else self.triples is None,
+            "set table: triples must be there where max_members is 3, and only there.",
+        )
+        if self.triples is not None:
+            self.triples.check(np.diff(self.cell_start))
 
     def _check_candidates(self) -> None:
         """Refuse candidates or cells that do not exist, and a best set of other members."""
@@ -185,8 +196,9 @@ class SetTable:
 
     @property
     def sets(self) -> int:
-        """Number of sets: singles and kept pairs."""
-        return len(self.candidates) + self.kept_pairs
+        """Number of sets: singles, kept pairs and kept triples."""
+        triples = self.triples.kept if self.triples is not None else 0
+        return len(self.candidates) + self.kept_pairs + triples
 
     @cached_property
     def single_reachability(self) -> NDArray[np.float64]:
@@ -202,6 +214,21 @@ class SetTable:
     def limits(self) -> PairLimits:
         """What the scores of a pair must come up to, to be kept."""
         return pair_limits(self.rule, self.single_reachability, self.single_manipulability)
+
+    @cached_property
+    def pairs(self) -> Groups:
+        """The kept sets of two."""
+        return Groups(
+            least=self.limits.manipulability,
+            cells=self.pair_cells,
+            count=self.pair_count,
+            reachability=self.pair_reachability,
+            manipulability=self.pair_manipulability,
+            total=self.pair_sum,
+            member_reachability=self.member_reachability,
+            member_manipulability=self.member_manipulability,
+            member_total=self.member_sum,
+        )
 
     @cached_property
     def state(self) -> NDArray[np.int64]:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from tcs.errors import TcsError, UnknownNameError
+from tcs.scoring import triples
 from tcs.scoring.sets import build_sets
 from tcs.tables import ScoreTable
 from tests.tables.small import all_sets, order_of, random_scores, small_grid
@@ -79,14 +80,92 @@ def test_agrees_with_plain_loops_over_all_pairs(table, min_distance, bed, rule, 
     assert sets.best_single == max(singles, key=key, default=())
 
 
+@settings(deadline=None, max_examples=60)  # the first example compiles
+@given(
+    table=small_tables,
+    min_distance=st.sampled_from([0.0, 0.2, 0.4, 3.0]),
+    bed=st.sampled_from([0, 2]),
+    same_environment=st.booleans(),
+    buffer=st.sampled_from([1, 50, triples.BUFFER]),
+)
+def test_triples_agree_with_plain_loops(table, min_distance, bed, same_environment, buffer):
+    grid = small_grid(nx=4, ny=2, yaws=2 if not bed else 1, bed=bed)
+    scores = random_scores(grid, **table)
+    with pytest.MonkeyPatch.context() as patch:
+        # Small tables fill no buffer, unless it is small too.
+        patch.setattr(triples, "BUFFER", buffer)
+        sets = build_sets(
+            scores,
+            grid,
+            max_members=3,
+            min_distance=min_distance,
+            same_environment=same_environment,
+        )
+    expected = all_sets(
+        scores, grid, min_distance, same_environment=same_environment, max_members=3
+    )
+    assert sets.sets == len(expected)
+    assert sets.best == max(expected, key=lambda members: sum(expected[members]), default=())
+    cell = dict(zip(sets.candidates.tolist(), sets.cell.tolist(), strict=True))
+    kept, of_member = {}, {}
+    for members, pair in expected.items():
+        if len(members) == 3:
+            kept.setdefault(tuple(sorted(cell[h] for h in members)), []).append(pair)
+            for h in members:
+                of_member.setdefault(h, []).append(pair)
+    found = sets.triples
+    assert [tuple(cells) for cells in found.cells.tolist()] == sorted(kept)
+    assert found.count.tolist() == [len(kept[cells]) for cells in sorted(kept)]
+    of_groups = [kept[cells] for cells in sorted(kept)]
+    of_members = [of_member.get(h, []) for h in sets.candidates.tolist()]
+    for prefix, groups in (("", of_groups), ("member_", of_members)):
+        for g, pairs in enumerate(groups):
+            reachability, manipulability = np.array(pairs).reshape(-1, 2).T
+            assert getattr(found, f"{prefix}reachability")[g] == reachability.max(initial=0.0)
+            for name, values in (
+                ("manipulability", manipulability),
+                ("total", reachability + manipulability),
+            ):
+                bound = getattr(found, prefix + name)[g]
+                exact = values.max(initial=0.0)
+                # Never below, and no more than one float32 step above.
+                assert exact <= float(bound)
+                assert float(bound) <= float(np.nextafter(np.float32(exact), np.float32(9.0)))
+
+
+def test_the_code_of_2015_has_no_triples():
+    grid = small_grid()
+    with pytest.raises(TcsError, match="'code2015' has sets of one and two"):
+        build_sets(random_scores(grid, 2, seed=0), grid, rule="code2015", max_members=3)
+
+
+def test_too_many_candidates_for_triples(monkeypatch):
+    monkeypatch.setattr(triples, "MOST_CANDIDATES", 5)
+    grid = small_grid()
+    with pytest.raises(TcsError, match="but at most 5 are allowed"):
+        build_sets(random_scores(grid, 2, seed=0), grid, max_members=3)
+
+
+def test_too_many_triples_of_places(monkeypatch):
+    grid = small_grid(nx=6)
+    scores = random_scores(grid, 5, seed=0)
+    monkeypatch.setattr(triples, "MOST_GROUPS", 3)
+    with pytest.raises(TcsError, match="more than 3 triples of places"):
+        build_sets(scores, grid, max_members=3)
+
+
 def test_result_does_not_depend_on_jobs():
     grid = small_grid(nx=12, ny=10)
-    scores = random_scores(grid, 5, seed=7, levels=3)
-    one, two = (build_sets(scores, grid, jobs=jobs) for jobs in (1, 2))
+    scores = random_scores(grid, 7, seed=7, levels=20, share=0.3)
+    one, two = (build_sets(scores, grid, jobs=jobs, max_members=3) for jobs in (1, 2))
     assert one.kept_pairs > 0
+    assert one.triples.kept > 0
     for field in dataclasses.fields(one):
-        if field.name != "floor":
+        if field.name not in ("floor", "triples"):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name))
+    for field in dataclasses.fields(one.triples):
+        of_one, of_two = getattr(one.triples, field.name), getattr(two.triples, field.name)
+        np.testing.assert_array_equal(of_one, of_two)
     np.testing.assert_array_equal(one.floor.moves, two.floor.moves)
 
 

@@ -58,7 +58,7 @@ utility_weights = st.builds(
 place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0, 3.0))
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=200)
 @given(
     seed=st.integers(0, 2**32 - 1),
     goals=st.integers(1, 5),
@@ -70,10 +70,15 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     travel=st.tuples(weight, weight, weight, weight, weight),
     where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.3)),
     bed_now=st.floats(0.0, 0.3),
-    first_pairs=st.sampled_from([1, 5, search.FIRST_PAIRS]),
+    first_candidates=st.sampled_from([1, 5, search.FIRST_CANDIDATES]),
     options=st.fixed_dictionaries(
-        {"rule": st.sampled_from(["paper", "code2015"]), "same_environment": st.booleans()}
-    ),
+        {
+            "rule": st.sampled_from(["paper", "code2015"]),
+            "same_environment": st.booleans(),
+            "max_members": st.sampled_from([1, 2, 3]),
+        }
+    ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
+    at_once=st.sampled_from([3, search.SETS_AT_ONCE]),
 )
 def test_equals_brute_force_over_all_kept_sets(
     seed,
@@ -86,8 +91,9 @@ def test_equals_brute_force_over_all_kept_sets(
     travel,
     where,
     bed_now,
-    first_pairs,
+    first_candidates,
     options,
+    at_once,
 ):
     bed, head = beds
     grid = small_grid(nx=5, ny=2, yaws=3, torsos=2 if not bed else 1, bed=bed, head=head)
@@ -113,7 +119,8 @@ def test_equals_brute_force_over_all_kept_sets(
     tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance, **options), grid)
     with pytest.MonkeyPatch.context() as patch:
         # Small tables open everything in the first round, unless it is made small too.
-        patch.setattr(search, "FIRST_PAIRS", first_pairs)
+        patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
+        patch.setattr(search, "SETS_AT_ONCE", at_once)
         choice = select(tables, here, weights=weights, travel=travel)
     members, value, cost = brute_force(kept, grid, here, weights, travel)
     assert choice.indices == members
@@ -200,7 +207,7 @@ def test_equals_brute_force_around_the_furniture(
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("levels", [0, 2, 50], ids=["distinct", "many ties", "some ties"])
 def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
-    monkeypatch.setattr(search, "FIRST_PAIRS", 20)
+    monkeypatch.setattr(search, "FIRST_CANDIDATES", 8)
     grid = small_grid(nx=12, ny=8, yaws=2, torsos=1, step=0.15)
     scores = random_scores(grid, 8, seed, levels=levels, share=0.2)
     kept = all_sets(scores, grid, 0.4)
@@ -266,9 +273,13 @@ def test_choice_says_what_was_chosen(tables):
 def test_one_member_at_most(tables):
     free = UtilityWeights(travel=0.0)
     assert select(tables, HERE, weights=free, max_members=1).indices == tables.sets.best_single
-    for members in (0, 3):
-        with pytest.raises(SelectionError, match=f"At most {members} members"):
-            select(tables, HERE, max_members=members)
+    with pytest.raises(SelectionError, match="At most 0 members"):
+        select(tables, HERE, max_members=0)
+    held = "holds sets of 1 and 2 only. Score the task again: tcs score ... --max-members 3."
+    with pytest.raises(SelectionError, match=held):
+        select(tables, HERE, max_members=3)
+    with pytest.raises(SelectionError, match="No set has more than 3"):
+        select(tables, HERE, max_members=4)
 
 
 def test_whole_turns_of_the_robot_change_nothing(tables):

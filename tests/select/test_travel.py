@@ -18,8 +18,7 @@ GRID = small_grid(nx=3, ny=1, yaws=4, torsos=2, bed=2)
 def legs(here, travel, flat):
     candidates = np.array(flat, dtype=np.int32)
     cell, xy = base_cells(GRID, candidates)
-    ways = StraightWays(xy, np.zeros((0, 2), dtype=np.int64))
-    return legs_from(here, GRID, candidates, cell, ways, travel)
+    return legs_from(here, GRID, candidates, cell, StraightWays(xy), travel)
 
 
 def state(yaw_deg=0.0, torso=0.0, bed=0.0):

@@ -12,7 +12,6 @@ from tcs.select.ways import WaysAround
 from tcs.tables import Floor
 from tcs.tables.floor import MOVES
 
-NO_GROUPS = np.zeros((0, 2), dtype=np.int64)
 STEP = (0.1, 0.2)
 
 
@@ -34,7 +33,7 @@ def place(floor, i, j):
 def ways_over(floor):
     """Ways whose cells are all places of a floor, row by row."""
     xy = np.array([place(floor, i, j) for i, j in np.ndindex(floor.shape)])
-    return WaysAround(xy, NO_GROUPS, floor)
+    return WaysAround(xy, floor)
 
 
 def shortest(floor, entries):
@@ -111,7 +110,7 @@ def test_round_a_bed():
     free[:31, 12:29] = False  # 3 m along x from the wall, 1.6 m wide
     floor = floor_of(free, step=(0.1, 0.1))
     one, other = place(floor, 20, 11), place(floor, 20, 29)
-    ways = WaysAround(np.array([one, other]), NO_GROUPS, floor)
+    ways = WaysAround(np.array([one, other]), floor)
     # 11 steps to beyond the end, 18 across, 11 back; the corners cannot be cut.
     assert ways.between(np.array(0), np.array(1)) == pytest.approx(4.0, abs=1e-12)
     np.testing.assert_allclose(ways.from_place(*one), [0.0, 4.0], atol=1e-12)

@@ -33,7 +33,7 @@ def assert_same(one, two):
             for of_one, of_two in zip(a, b, strict=True):
                 assert_same(of_one.sets, of_two.sets)
                 assert_same(of_one.scores, of_two.scores)
-        elif field.name == "floor":
+        elif dataclasses.is_dataclass(a):
             assert_same(a, b)
         elif isinstance(a, np.ndarray):
             assert a.dtype == b.dtype
@@ -42,7 +42,10 @@ def assert_same(one, two):
             assert a == b
 
 
-@pytest.mark.parametrize("options", [{}, {"rule": "code2015", "same_environment": True}])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"rule": "code2015", "same_environment": True}, {"max_members": 3}, {"max_members": 1}],
+)
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
 def test_load_of_save_is_the_same(path, share, options):
     file = score_file(share=share, options=options)
@@ -294,6 +297,8 @@ FORGED = {
     "floor of another shape": ("sets", "floor", lambda floor: floor | {"shape": [3, 3]}),
     "floor without places": ("sets", "floor", lambda floor: floor | {"shape": [0, 3]}),
     "enormous floor": ("sets", "floor", lambda floor: floor | {"shape": [2**40, 2**40]}),
+    "triples where none belong": ("sets", "triples", lambda triples: {"least": 0.5}),
+    "triples missing": ("sets", "max_members", lambda members: 3),
     "best no candidate": ("sets", "best", lambda best: [2**30]),
     "best no number": ("sets", "best", lambda best: ["x"]),
     "best huge": ("sets", "best_single", lambda best: [2**70]),

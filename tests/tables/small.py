@@ -59,7 +59,7 @@ def set_scores(scores, members):
     return reachability, manipulability
 
 
-def all_sets(scores, grid, min_distance, rule="paper", same_environment=False):
+def all_sets(scores, grid, min_distance, rule="paper", same_environment=False, max_members=2):
     """Every kept set in the order that breaks ties: {members: (P_R, P_M)}."""
     singles = [(h,) for h in range(grid.size) if scores.reached[h].any()]
     kept = {members: set_scores(scores, members) for members in singles}
@@ -70,15 +70,22 @@ def all_sets(scores, grid, min_distance, rule="paper", same_environment=False):
     best = max(kept.values(), default=(0.0, 0.0))
     threshold = max((manipulability for _, manipulability in kept.values()), default=0.0)
     at = {h: grid.configuration(h) for (h,) in singles}
-    for (a,), (b,) in itertools.combinations(singles, 2):
+
+    def together(a, b):
         p, q = (at[a].base_x, at[a].base_y), (at[b].base_x, at[b].base_y)
         if rule == "code2015":
             p, q = np.round(p, 3), np.round(q, 3)
-        # A nanometre short is not short: steps of 0.2 are no binary fractions.
-        if math.dist(p, q) < min_distance - 1e-9:
-            continue
         if same_environment and at[a].environment != at[b].environment:
-            continue
+            return False
+        # A nanometre short is not short: steps of 0.2 are no binary fractions.
+        return math.dist(p, q) >= min_distance - 1e-9
+
+    pairs = {
+        pair
+        for pair in itertools.combinations([h for (h,) in singles], 2)
+        if max_members > 1 and together(*pair)
+    }
+    for a, b in sorted(pairs):
         both = set_scores(scores, (a, b))
         if rule == "code2015":
             larger = max(kept[a,][1], kept[b,][1])
@@ -88,6 +95,14 @@ def all_sets(scores, grid, min_distance, rule="paper", same_environment=False):
             keep = both[1] > threshold
         if keep:
             kept[a, b] = both
+    if max_members > 2:
+        threshold = max((manipulability for _, manipulability in kept.values()), default=0.0)
+        for a, b in sorted(pairs):
+            for (c,) in singles:
+                if b < c and (a, c) in pairs and (b, c) in pairs:
+                    three = set_scores(scores, (a, b, c))
+                    if three[1] > threshold:
+                        kept[a, b, c] = three
     return kept
 
 

@@ -31,6 +31,7 @@ def parts():
         "member_reachability": np.array([1.0, 0.0, 1.0]),
         "member_manipulability": np.array([0.375, 0.0, 0.375], dtype=np.float32),
         "member_sum": np.array([1.375, 0.0, 1.375], dtype=np.float32),
+        "triples": None,
         "best": (4, 7),
         "best_single": (4,),
         "floor": NO_MOVES,
