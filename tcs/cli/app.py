@@ -41,7 +41,13 @@ _Observed = Annotated[
     ),
 ]
 _Members = Annotated[
-    int, typer.Option(min=1, max=2, help="At most so many places to stand at: 1 or 2.")
+    int | None,
+    typer.Option(
+        min=1,
+        max=3,
+        help="At most so many places to stand at: 1, 2 or 3.",
+        show_default="what the file holds",
+    ),
 ]
 _SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
 
@@ -95,6 +101,18 @@ def score(
             show_default="<task>-<environment>-<robot>.tcs",
         ),
     ] = None,
+    rules: Annotated[
+        str, typer.Option(help="Which sets are kept: paper, or code2015 as the original did.")
+    ] = "paper",
+    same_environment: Annotated[
+        bool,
+        typer.Option(
+            "--same-environment", help="Only sets for which the bed need not be moved in between."
+        ),
+    ] = False,
+    max_members: Annotated[
+        int, typer.Option(min=1, max=3, help="Most members of a set; 3 takes seconds more.")
+    ] = 2,
     as_json: _Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to choose from."""
@@ -103,13 +121,14 @@ def score(
 
     from tcs.cli import rows
 
+    kept = {"rule": rules, "same_environment": same_environment, "max_members": max_members}
     if task is None:
-        results = rows.score_all(environment, robot, out or Path(), jobs=jobs)
+        results = rows.score_all(environment, robot, out or Path(), jobs=jobs, **kept)
         talk.print_result({"rows": results}, reports.report_rows, as_json=as_json)
         return
     environment = environment or "wheelchair"
     path = out or rows.default_path(task, environment, robot)
-    result = rows.score_one(task, environment, robot, path, jobs=jobs)
+    result = rows.score_one(task, environment, robot, path, jobs=jobs, **kept)
     talk.print_result(result, reports.report_scores, as_json=as_json)
 
 
@@ -132,7 +151,13 @@ def select(
             help="Cost of a metre or radian along an axis of the environment.",
         ),
     ] = None,
-    max_members: _Members = 2,
+    travel: Annotated[
+        str,
+        typer.Option(
+            help="How the base drives: straight, as in the paper, or around the furniture."
+        ),
+    ] = "straight",
+    max_members: _Members = None,
     observed: _Observed = None,
     seen: Annotated[
         list[str] | None,
@@ -157,6 +182,7 @@ def select(
             turn=turn_weight,
             torso=torso_weight,
             environment=axis_values(axis_weight or (), "--axis-weight"),
+            route=travel,
         ),
         max_members=max_members,
         observed=settings(observed or (), "--observed"),
@@ -275,7 +301,7 @@ def draw(
     out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
     here: Annotated[tuple[float, float, float] | None, _HERE] = None,
     torso: _Torso = 0.0,
-    max_members: _Members = 2,
+    max_members: _Members = None,
     observed: _Observed = None,
     as_json: _Json = False,
 ) -> None:

@@ -26,7 +26,7 @@ from tcs.scene import Scene, goal_poses
 from tcs.scene.contacts import Group, Part, shape_of
 from tcs.scene.environment import FLOOR
 from tcs.scoring import Job, reopen
-from tcs.select import nearest_table, select
+from tcs.select import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.space import Grid
 from tcs.store import ScoreFile
 from tcs.tables import InitialConfiguration
@@ -55,7 +55,7 @@ class Shown:
         cls,
         file: ScoreFile,
         here: InitialConfiguration | None,
-        max_members: int = 2,
+        max_members: int | None = None,
         observed: Mapping[str, float] | None = None,
     ) -> Shown:
         """Return the set to choose from here, or the best one when `here` is None.
@@ -63,7 +63,7 @@ class Shown:
         Args:
             file: A score file.
             here: The current state.
-            max_members: Most members of the set.
+            max_members: Most members of the set; by default as many as the file holds.
             observed: How the person is found: values of the observed axes [m or rad].
         """
         table = nearest_table(file, here, observed).index
@@ -77,7 +77,7 @@ class Shown:
                 f"travel cost {choice.cost:.2f}"
             )
         else:
-            indices = sets.best if max_members > 1 else sets.best_single
+            indices = _best_of(file, table, max_members)
             grid = Grid.from_dict(file.grid)
             members = tuple(grid.configuration(h) for h in indices)
             what = "best set"
@@ -86,6 +86,19 @@ class Shown:
         reachability, manipulability = sets.scores_of(tuple(sorted(indices)))
         said = f"reaches {reachability:.0%} of the goals, manipulability {manipulability:.3f}"
         return cls(here, members, indices, table, f"{what}: {said}")
+
+
+def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int, ...]:
+    """Return the best set of a table with at most so many members, wherever the robot is."""
+    sets = file.tables[table].sets
+    if max_members is None or len(sets.best) <= max_members:
+        return sets.best
+    if max_members == 1:
+        return sets.best_single
+    anywhere = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
+    free = UtilityWeights(travel=0.0)
+    tables = SelectionTables.of(file, table)
+    return select(tables, anywhere, weights=free, max_members=max_members).indices
 
 
 def map_figure(file: ScoreFile, shown: Shown) -> Figure:

@@ -100,6 +100,8 @@ def choice_as_json(choice: Choice) -> dict[str, Any]:
         "manipulability": round(choice.manipulability, 12),
         "cost": choice.cost,
         "utility": choice.utility,
+        "gap": choice.gap,
+        "cut_off": choice.cut_off,
         "seconds": choice.seconds,
         **_match_as_json(choice.match),
     }
@@ -125,6 +127,10 @@ def report_choice(result: Mapping[str, Any]) -> None:
         f"{result['manipulability']:.3f}, travel cost {result['cost']:.2f}, utility "
         f"{result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
     )
+    if result["cut_off"]:
+        out.print(
+            f"left out: {result['cut_off']:,} configurations to which there is no way from here"
+        )
     if "observed" in result:
         state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
         off = [f"{name} is {value:+g} off" for name, value in result["observed_off"].items()]

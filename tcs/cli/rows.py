@@ -17,8 +17,18 @@ def default_path(task: str, environment: str, robot: str) -> Path:
     return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")
 
 
-def score_one(task: str, environment: str, robot: str, path: Path, *, jobs: int) -> dict[str, Any]:
+def score_one(
+    task: str, environment: str, robot: str, path: Path, *, jobs: int, **sets: Any
+) -> dict[str, Any]:
     """Score a task, write its file and return the summary.
+
+    Args:
+        task: Name or path of a task.
+        environment: Name or path of an environment.
+        robot: Name or path of a robot.
+        path: File to write.
+        jobs: Number of threads.
+        **sets: Options of `tcs.score` that say which sets are kept.
 
     Raises:
         OutputError: If the file cannot be written, before anything is scored.
@@ -31,6 +41,7 @@ def score_one(task: str, environment: str, robot: str, path: Path, *, jobs: int)
             environment,
             robot,
             jobs=jobs,
+            **sets,
             on_progress=on_progress,
             on_compile=lambda: talk.say(
                 "compiling for this machine, up to a minute; later runs do without."
@@ -47,7 +58,7 @@ def score_one(task: str, environment: str, robot: str, path: Path, *, jobs: int)
 
 
 def score_all(
-    environment: str | None, robot: str, folder: Path, *, jobs: int
+    environment: str | None, robot: str, folder: Path, *, jobs: int, **sets: Any
 ) -> list[dict[str, Any]]:
     """Score every task in every environment it is for, one file each, and return the summaries.
 
@@ -56,6 +67,7 @@ def score_all(
         robot: Name or path of a robot.
         folder: Where the files go; made if it is not there.
         jobs: Number of threads.
+        **sets: Options of `tcs.score` that say which sets are kept.
 
     Raises:
         OutputError: If the folder cannot be made or written.
@@ -69,6 +81,6 @@ def score_all(
             f"folder '{folder}' cannot be made: {error.strerror}. Name a folder with --out."
         ) from error
     return [
-        score_one(task, room, robot, folder / default_path(task, room, robot), jobs=jobs)
+        score_one(task, room, robot, folder / default_path(task, room, robot), jobs=jobs, **sets)
         for task, room in rows
     ]

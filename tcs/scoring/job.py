@@ -24,7 +24,7 @@ from tcs.scene import (
     load_environment,
     lower,
 )
-from tcs.scoring.sets import build_sets
+from tcs.scoring.sets import build_sets, check_set_options
 from tcs.scoring.sweep import sweep
 from tcs.space import Axis, Grid
 from tcs.store import Scored, ScoreFile, shown_state
@@ -100,6 +100,9 @@ def score(
     robot: str | Path | RobotFile = "pr2",
     *,
     jobs: int = 2,
+    rule: str = "paper",
+    same_environment: bool = False,
+    max_members: int = 2,
     min_distance: float = 0.40,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
@@ -111,7 +114,10 @@ def score(
         environment: Name, path or environment.
         robot: Name, path or robot.
         jobs: Number of threads; the result does not depend on it.
-        min_distance: Least base x-y distance between the members of a pair [m].
+        rule: Which sets are kept: "paper" or "code2015", see `tcs.scoring.build_sets`.
+        same_environment: Whether the members of a set must share the state of the environment.
+        max_members: Most members of a set, 1 to 3.
+        min_distance: Least base x-y distance between two members of a set [m].
         on_progress: Called with configurations scored and in all.
         on_compile: Called before the kernel compiles, when it has to.
 
@@ -123,8 +129,10 @@ def score(
         DataFileError: If a file cannot be used.
         GridError: If the grid is empty or enormous.
         ArmClassError: If the closed form cannot solve the arm.
+        TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
+    check_set_options(rule, max_members, min_distance)
     job = load_job(task, environment, robot)
     scene = job.scene()
     lowered = job.lowered(scene)
@@ -138,7 +146,18 @@ def score(
     )
     sets_begun = time.perf_counter()
     tables = tuple(
-        Scored.of(scores, build_sets(scores, job.grid, min_distance=min_distance, jobs=jobs))
+        Scored.of(
+            scores,
+            build_sets(
+                scores,
+                job.grid,
+                rule=rule,
+                same_environment=same_environment,
+                max_members=max_members,
+                min_distance=min_distance,
+                jobs=jobs,
+            ),
+        )
         for scores in swept.tables
     )
     done = time.perf_counter()
@@ -219,6 +238,9 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "compile_seconds": timings["compile_seconds"],
         "sets_seconds": timings["sets_seconds"],
         "total_seconds": timings["total_seconds"],
+        "rule": file.nominal.sets.rule,
+        "same_environment": file.nominal.sets.same_environment,
+        "max_members": file.nominal.sets.max_members,
         "candidates": sum(len(table.sets.candidates) for table in file.tables),
         "sets": sum(table.sets.sets for table in file.tables),
         "best": _set_summary(file, file.nominal.sets.best),

@@ -64,20 +64,12 @@ def build_sets(
     Source:
         TCS section IV-A, eq. (1) and (4).
     """
-    check_rule(rule)
+    check_set_options(rule, max_members, min_distance)
     if scores.configurations != grid.size:
         raise TcsError(
             f"Sets: the score table has {scores.configurations} configurations, the grid "
             f"{grid.size}. Score this grid first."
         )
-    if not 1 <= max_members <= MOST_MEMBERS:
-        raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
-    if rule == "code2015" and max_members > 2:
-        raise TcsError(
-            "Sets: rule 'code2015' has sets of one and two; take rule 'paper' for three."
-        )
-    if not 0.0 <= min_distance < math.inf:
-        raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
     if jobs < 1:
         raise TcsError(f"Sets: {jobs} jobs; must be at least 1.")
     candidates = candidates_of(scores.reached, scores.weights, rule)
@@ -124,6 +116,22 @@ def build_sets(
         best_single=best_single,
         floor=floor_of(scores, grid),
     )
+
+
+def check_set_options(rule: str, max_members: int, min_distance: float) -> None:
+    """Refuse options that `build_sets` would refuse, before anything is scored.
+
+    Raises:
+        UnknownNameError: If there is no such rule.
+        TcsError: If a number is out of range, or the rule has no sets of so many.
+    """
+    check_rule(rule)
+    if not 1 <= max_members <= MOST_MEMBERS:
+        raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
+    if rule == "code2015" and max_members > 2:
+        raise TcsError("Sets: rule 'code2015' has sets of one and two; for three take 'paper'.")
+    if not 0.0 <= min_distance < math.inf:
+        raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
 
 
 def base_cells(

@@ -1,11 +1,14 @@
+import dataclasses
 import math
 import os
 import pickle
 
 import joblib
+import numpy as np
 import pytest
 
 import tcs
+from tcs.store import Scored
 from tests.store.example import SHIFT, score_file
 
 HERE = ("--here", "0.5", "-1", "90")
@@ -21,7 +24,7 @@ def test_select_prints_the_choice(tcs_command, small_file):
     assert (ran.code, ran.err) == (0, "")
     result = ran.json
     assert set(result) == {
-        "members", "reachability", "manipulability", "cost", "utility", "seconds",
+        "members", "reachability", "manipulability", "cost", "utility", "seconds", "gap", "cut_off",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     # The order of the tour, which is not that of the indices.
@@ -74,7 +77,7 @@ def test_select_for_a_person(tcs_command, small_file):
         pytest.param((), id="no place"),
         pytest.param(("--here", "1", "2"), id="half a place"),
         pytest.param(("--here", "1", "2", "north"), id="no number"),
-        pytest.param((*HERE, "--max-members", "3"), id="three members"),
+        pytest.param((*HERE, "--max-members", "4"), id="four members"),
         pytest.param((*HERE, "--delta", "1"), id="unknown option"),
     ],
 )
@@ -89,6 +92,12 @@ def test_misuse_exits_with_2(tcs_command, small_file, words):
     ("words", "said"),
     [
         pytest.param((*HERE, "--gamma", "-1"), "Weight gamma (travel) is -1.0", id="negative"),
+        pytest.param(
+            (*HERE, "--max-members", "3"),
+            "holds sets of 1 and 2 only. Score the task again: tcs score ... --max-members 3.",
+            id="three members",
+        ),
+        pytest.param((*HERE, "--travel", "arround"), "Did you mean 'around'?", id="no route"),
         pytest.param((*HERE, "--alpha", "nan"), "Weight alpha (reachability) is nan", id="nan"),
         pytest.param(("--here", "inf", "0", "0"), "base_x is inf", id="far away"),
         pytest.param((*HERE, "--at", "bed=high"), "--at is 'bed=high'; must be", id="no number"),
@@ -194,3 +203,36 @@ def test_a_shift_that_was_not_scored_is_told(process, tmp_path, words, said):
     assert ran.code == 1
     assert said in ran.err
     assert ran.err.count("\n") == 1
+
+
+def test_travel_around_the_furniture(tcs_command, tmp_path):
+    file = score_file()
+    sets = file.nominal.sets
+    # A wall round the first base cell.
+    x, y = np.rint((sets.cell_xy[0] - sets.floor.start) / sets.floor.step).astype(int)
+    moves = sets.floor.moves.copy()
+    moves[:, x - 1 : x + 1, y - 1 : y + 2] = False
+    sets = dataclasses.replace(sets, floor=dataclasses.replace(sets.floor, moves=moves))
+    file = dataclasses.replace(file, tables=(Scored.of(file.nominal.scores, sets),))
+    path = tmp_path / "walled.tcs"
+    tcs.save(path, file)
+    words = ("select", path, "--here", -3, 0.5, 0, "--gamma", 0.5)
+    straight = tcs_command(*words, "--json").json
+    around = tcs_command(*words, "--travel", "around", "--json").json
+    travel = tcs.TravelWeights(route="around")
+    weights = tcs.UtilityWeights(travel=0.5)
+    choice = tcs.select(file, state(base_x=-3, base_y=0.5), weights=weights, travel=travel)
+    assert (around["cost"], around["utility"]) == (choice.cost, choice.utility)
+    assert (around["gap"], around["cut_off"]) == (0.0, choice.cut_off)
+    assert straight["cut_off"] == 0
+    assert around["cut_off"] == int(np.count_nonzero(sets.cell == 0)) > 0
+    assert around["cost"] != straight["cost"]
+    assert "to which there is no way from here" in tcs_command(*words, "--travel", "around").out
+
+
+def test_three_places_to_stand(tcs_command, tmp_path):
+    path = tmp_path / "three.tcs"
+    tcs.save(path, score_file(options={"max_members": 3}))
+    words = ("select", path, *HERE, "--gamma", 0, "--json")
+    assert len(tcs_command(*words).json["members"]) == 3
+    assert len(tcs_command(*words, "--max-members", 2).json["members"]) == 2
