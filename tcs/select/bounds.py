@@ -65,6 +65,18 @@ class Bounds:
         gain = np.minimum(self._rest[member], self._group_gain[group] - self._levels[member])
         return gain - (self.travel * self._driving[group] - self._room[group])
 
+    def of_two(self, group: IntArray, a: IntArray, b: IntArray) -> FloatArray:
+        """Return a bound on the sets of a group that two candidates are in, shape (n,).
+
+        A tour through both pays at least the change from here to one and on to the other.
+        """
+        gain = np.minimum(self._member_gain[a], self._member_gain[b])
+        levels = np.minimum(self._levels[a], self._levels[b])
+        levels += self._paid(self.legs.levels_between(a, b))
+        rest = np.minimum(gain, self._group_gain[group]) - levels
+        # As many roundings again as in the bound of one member.
+        return rest - (self.travel * self._driving[group] - 2.0 * self._room[group])
+
     def of_set(
         self, group: IntArray, members: tuple[IntArray, ...], cost: FloatArray
     ) -> FloatArray:
@@ -114,10 +126,13 @@ class Bounds:
         Turning, lifting and moving the bed obey the triangle inequality: a tour pays at least
         the direct change from the current state to each of its members.
         """
+        return self._paid(self.legs.levels_from_here)
+
+    def _paid(self, levels: FloatArray) -> FloatArray:
+        """Return gamma times a cost of changing levels, rounded down."""
         # Wrapping an angle leaves an absolute rounding error of some 1e-15 rad.
         wrapping = SLACK * sum(self.legs.level_weights)
-        least = self.legs.levels_from_here * (1.0 - SLACK) - wrapping
-        return self.travel * np.maximum(least, 0.0)
+        return self.travel * np.maximum(levels * (1.0 - SLACK) - wrapping, 0.0)
 
     @cached_property
     def _rest(self) -> FloatArray:

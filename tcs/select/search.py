@@ -8,8 +8,8 @@ partners are left out, then sets whose way is too long; the scores of the others
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ double, so that a search which has to open many groups does not spend its time o
 MOST_CANDIDATES = 100_000
 """Most candidates looked at in one round: a few milliseconds."""
 
-SETS_AT_ONCE = 500_000
-"""Sets formed at once: their scores need some 30 MB."""
+AT_ONCE = 500_000
+"""Sets, or parts of them, formed at once: their scores need some 30 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,22 +64,89 @@ def best_set(
     """
     bounds = Bounds(index, legs, weights)
     left = np.flatnonzero(bounds.groups > to_beat)
-    best: Found | None = None
+    search = _Search(bounds, to_beat)
     budget = FIRST_CANDIDATES
     while left.size:
         now, left = _split(bounds, left, budget)
-        for members, group in _sets_able_to_win(bounds, now, _least(best, to_beat)):
-            found = _best_of(bounds, members, group, _least(best, to_beat))
-            if found is not None and found.utility > to_beat and found.beats(best):
-                best = found
-        left = _still_able_to_win(bounds, left, best)
+        search.open(now)
+        left = _still_able_to_win(bounds, left, search.best)
         budget = min(2 * budget, MOST_CANDIDATES)
-    return best
+    return search.best
 
 
-def _least(best: Found | None, to_beat: float) -> float:
-    """Return the utility that a set must have to be looked at."""
-    return to_beat if best is None else best.utility
+@dataclass
+class _Search:
+    """The best set found so far."""
+
+    bounds: Bounds
+    to_beat: float
+    best: Found | None = None
+
+    @property
+    def least(self) -> float:
+        """The utility that a set must have to be looked at."""
+        return self.to_beat if self.best is None else self.best.utility
+
+    def open(self, groups: IntArray) -> None:
+        """Look at the sets of some groups."""
+        able = [
+            _members_able_to_win(self.bounds, groups, cells[groups], self.least)
+            for cells in self.bounds.index.cells
+        ]
+        which = np.repeat(np.arange(groups.size), able[0].size)
+        self._join(groups, which, (able[0].numbers,), able[1:])
+
+    def _join(
+        self,
+        groups: IntArray,
+        which: IntArray,
+        members: tuple[IntArray, ...],
+        able: list[_Able],
+    ) -> None:
+        """Add the remaining members to parts of sets, and note the best of the whole sets.
+
+        Args:
+            groups: The groups.
+            which: Position among them of each part, shape (n,).
+            members: First members of each part, from the first cells of its group, shapes (n,).
+            able: Able members of the cells that remain.
+        """
+        if not able:
+            ascending = tuple(np.sort(members, axis=0))
+            found = _best_of(self.bounds, ascending, groups[which], self.least)
+            if found is not None and found.utility > self.to_beat and found.beats(self.best):
+                self.best = found
+            return
+        count = able[0].size[which]
+        some = np.flatnonzero(count)
+        while some.size:
+            # At least one part, and as many as do not make too many at once.
+            end = max(1, int(np.searchsorted(np.cumsum(count[some]), AT_ONCE, "right")))
+            now, some = some[:end], some[end:]
+            part = np.repeat(now, count[now])
+            within = np.arange(part.size) - np.repeat(
+                np.cumsum(count[now]) - count[now], count[now]
+            )
+            last = able[0].numbers[able[0].start[which[part]] + within]
+            self._keep_on(groups, which[part], (*(m[part] for m in members), last), able[1:])
+
+    def _keep_on(
+        self,
+        groups: IntArray,
+        which: IntArray,
+        members: tuple[IntArray, ...],
+        able: list[_Able],
+    ) -> None:
+        """Leave out parts of sets that cannot win or come up twice, and go on with the others."""
+        one, other = self.bounds.index.cells[len(members) - 2 : len(members)]
+        group = groups[which]
+        # Within one cell each set comes up several times, and a candidate meets itself.
+        keep = (one[group] != other[group]) | (members[-2] < members[-1])
+        if able and self.bounds.legs.level_weights:
+            keep &= self.bounds.of_two(group, members[-2], members[-1]) >= self.least
+        if not np.all(keep):
+            which, members = which[keep], tuple(member[keep] for member in members)
+        self._join(groups, which, members, able)
 
 
 def _split(bounds: Bounds, left: IntArray, budget: int) -> tuple[IntArray, IntArray]:
@@ -189,43 +256,19 @@ def tour_costs(legs: Legs, members: tuple[IntArray, ...]) -> FloatArray:
     return np.asarray(least)
 
 
-def _sets_able_to_win(
-    bounds: Bounds, groups: IntArray, least: float
-) -> Iterator[tuple[tuple[IntArray, ...], IntArray]]:
-    """Yield the sets of able members of some groups: candidate numbers, ascending, and group."""
-    index = bounds.index
-    able = [_members_able_to_win(bounds, groups, cells[groups], least) for cells in index.cells]
-    count = np.prod([number for _, _, number in able], axis=0)
-    some = np.flatnonzero(count)
-    while some.size:
-        # At least one group, and as many as have not too many sets together.
-        end = max(1, int(np.searchsorted(np.cumsum(count[some]), SETS_AT_ONCE, "right")))
-        now, some = some[:end], some[end:]
-        which = np.repeat(now, count[now])
-        rest = np.arange(which.size) - np.repeat(np.cumsum(count[now]) - count[now], count[now])
-        members = []
-        for numbers, start, number in reversed(able):
-            rest, within = np.divmod(rest, number[which])
-            members.append(numbers[start[which] + within])
-        members.reverse()
-        group = groups[which]
-        once = np.ones(group.size, dtype=np.bool_)
-        for i, (cells, following) in enumerate(itertools.pairwise(index.cells)):
-            # Within one cell each set comes up several times, and a candidate meets itself.
-            once &= (cells[group] != following[group]) | (members[i] < members[i + 1])
-        if not np.all(once):
-            members, group = [member[once] for member in members], group[once]
-        yield tuple(np.sort(members, axis=0)), group
+class _Able(NamedTuple):
+    """Candidates of one cell of each of some groups that may be in a set that wins."""
+
+    numbers: IntArray
+    """Their numbers, group by group."""
+    start: IntArray
+    """Where each group starts among them."""
+    size: IntArray
+    """How many each group has."""
 
 
-def _members_able_to_win(
-    bounds: Bounds, groups: IntArray, cells: IntArray, least: float
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return candidates of one cell of each group that may be in a set with this utility.
-
-    Returns:
-        Their numbers, group by group; where each group starts among them; how many it has.
-    """
+def _members_able_to_win(bounds: Bounds, groups: IntArray, cells: IntArray, least: float) -> _Able:
+    """Return candidates of one cell of each group that may be in a set with this utility."""
     every = bounds.index.all
     size = every.size[cells]
     which = np.repeat(np.arange(groups.size), size)
@@ -233,4 +276,4 @@ def _members_able_to_win(
     member = every.sets.by_cell[every.start[cells][which] + within]
     able = bounds.of_member(groups[which], member) >= least
     count = np.bincount(which[able], minlength=groups.size)
-    return member[able], np.cumsum(count) - count, count
+    return _Able(member[able], np.cumsum(count) - count, count)

@@ -105,6 +105,10 @@ class Legs:
         nothing = np.zeros(len(self.cell))
         return self._with_levels(nothing, self.here_levels, self.levels)
 
+    def levels_between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
+        """Return the cost of the leg between candidates without the driving, shape (...)."""
+        return self._with_levels(np.zeros(np.shape(a)), self.levels[a], self.levels[b])
+
     def _with_levels(
         self, driving: FloatArray, from_levels: FloatArray, to_levels: FloatArray
     ) -> FloatArray:

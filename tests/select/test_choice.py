@@ -78,7 +78,7 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
             "max_members": st.sampled_from([1, 2, 3]),
         }
     ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
-    at_once=st.sampled_from([3, search.SETS_AT_ONCE]),
+    at_once=st.sampled_from([3, search.AT_ONCE]),
 )
 def test_equals_brute_force_over_all_kept_sets(
     seed,
@@ -120,7 +120,7 @@ def test_equals_brute_force_over_all_kept_sets(
     with pytest.MonkeyPatch.context() as patch:
         # Small tables open everything in the first round, unless it is made small too.
         patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
-        patch.setattr(search, "SETS_AT_ONCE", at_once)
+        patch.setattr(search, "AT_ONCE", at_once)
         choice = select(tables, here, weights=weights, travel=travel)
     members, value, cost = brute_force(kept, grid, here, weights, travel)
     assert choice.indices == members
