@@ -13,8 +13,8 @@ MAX_ARCS = 6
 the full turn of a continuous joint once more."""
 
 INSET = 1e-9
-"""How far inside the limits of the free joint arcs end [rad]: a slack of 1e-9, far above its
-rounding."""
+"""How far inside the limits of free joint and elbow arcs end [rad]: a slack of about 1e-9, far
+above its rounding, which must not decide whether the outermost lane is feasible."""
 
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 
@@ -48,9 +48,11 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
     if steady - swing > far or steady + swing < near:
         return 0, OUT_OF_REACH
     if steady - swing < near:
-        inner = np.arccos(min(max((steady - near) / swing, -1.0), 1.0))
+        inner = INSET + np.arccos(min(max((steady - near) / swing, -1.0), 1.0))
     if steady + swing > far:
-        outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0))
+        outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0)) - INSET
+    if inner > outer:
+        return 0, OUT_OF_REACH
     lower, upper = arm.lower[arm.free], arm.upper[arm.free]
     if not upper - lower < 2.0 * np.pi:
         # One full turn about the direction of the goal holds all there is.
@@ -67,11 +69,11 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
             first, last = middle - outer, middle - inner
             if side == 1:
                 first, last = middle + inner, middle + outer
-            # A hair inside the limits, so that rounding does not make the very end infeasible.
             first, last = max(first, lower + INSET), min(last, upper - INSET)
             if first > last:
                 continue
-            if count and arcs[count - 1, 1] >= first:
+            # Where arcs join, half a turn away from the goal, rounding leaves a gap.
+            if count and arcs[count - 1, 1] >= first - INSET:
                 arcs[count - 1, 1] = last
             elif count < MAX_ARCS:
                 arcs[count, 0], arcs[count, 1] = first, last

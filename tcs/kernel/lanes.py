@@ -128,7 +128,9 @@ def solve_lanes(
         kx = b00 * rx + b01 * ry + b02 * uz
         ky = b10 * rx + b11 * ry + b12 * uz
         D2 = kx * kx + ky * ky
-        D = D2 + TINY
+        # Where the aim succeeds, D is D2; out of reach it keeps (c2, s2) an angle, so that slack
+        # goes on as smoothly as the search for narrow windows takes it to.
+        D = np.sqrt(D2 * (v2x * v2x + v2y * v2y) + TINY)
         c2, s2 = (kx * v2x + ky * v2y) / D, (kx * v2y - ky * v2x) / D
         # Axis 7, its x axis and the tool offset, into L3.
         gx, gy, gz = c1 * zx + s1 * zy, -s1 * zx + c1 * zy, zz
@@ -175,7 +177,7 @@ def solve_lanes(
         kx = e00 * rx + e01 * ry + e02 * f22
         ky = e10 * rx + e11 * ry + e12 * f22
         D5 = kx * kx + ky * ky
-        D = D5 + TINY
+        D = np.sqrt(D5 * (m7x * m7x + m7y * m7y) + TINY)
         c5, s5 = (kx * m7x + ky * m7y) / D, (kx * m7y - ky * m7x) / D
         px, py = c5 * k7x + s5 * k7y, -s5 * k7x + c5 * k7y
         gx = e00 * px + e10 * py + e20 * k7z
@@ -184,6 +186,9 @@ def solve_lanes(
         px, py = c6 * gx + s6 * gy, -s6 * gx + c6 * gy
         c7 = f00 * px + f10 * py + f20 * gz
         s7 = f01 * px + f11 * py + f21 * gz
+        # Of length 1 but where wrist or aim are out of reach: as for joint 2.
+        D = np.sqrt(c7 * c7 + s7 * s7 + TINY)
+        c7, s7 = c7 / D, s7 / D
         left = min(elbow_left, min(aim_left / N, wrist_left / N6))
         # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
         # directions are no solutions. Elsewhere these terms are far above any slack.

@@ -165,10 +165,11 @@ def mirrored_solutions(chain: Chain, X_AG: Pose, q7: float) -> dict[tuple[int, i
             f = chain.R[2][:, 2]
             shoulder_left, lifts = turns_to_height(chain.R[1], f, M[2, 2])
             for lift_sign, q2 in zip((1, -1), lifts, strict=True):
-                e = chain.R[1] @ turn(q2) @ f
-                q1 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
-                N = (turn(q1) @ chain.R[1] @ turn(q2) @ chain.R[2]).T @ M
-                q3 = math.atan2(N[1, 0], N[0, 0])
+                # From the inside out, as the kernel: it matters to the slack where there is none.
+                R_13 = chain.R[1] @ turn(q2) @ chain.R[2]
+                q3 = math.atan2(R_13[2, 1], R_13[2, 0]) - math.atan2(M[2, 1], M[2, 0])
+                N = M @ (R_13 @ turn(q3)).T
+                q1 = math.atan2(-N[0, 1], N[0, 0])
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
                 found[elbow_sign, aim_sign, lift_sign] = limited(chain, q, left)

@@ -206,11 +206,14 @@ def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], boo
     outer = math.acos(max((steady - far) / swing, -1.0)) if steady + swing > far else math.pi
     free = free_joint(chain)
     lower, upper = chain.lower[free], chain.upper[free]
+    inner, outer = inner + INSET * (inner > 0), outer - INSET * (outer < math.pi)
+    if inner > outer:
+        return [], False
     arcs: list[tuple[float, float]] = []
     for middle in (centre + 2 * math.pi * k for k in range(-2, 3)):
         for first, last in ((middle - outer, middle - inner), (middle + inner, middle + outer)):
             first, last = max(first, lower + INSET), min(last, upper - INSET)
-            if first <= last and arcs and arcs[-1][1] >= first - 1e-12:
+            if first <= last and arcs and arcs[-1][1] >= first - INSET:
                 arcs[-1] = (arcs[-1][0], last)
             elif first <= last:
                 arcs.append((first, last))
@@ -232,7 +235,8 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
     length = sum(last - first for first, last in arcs)
     found = []
     for first, last in arcs:
-        count = max(LEAST_LANES, int(FIRST_LANES * (last - first) / length) if length else 0)
+        share = FIRST_LANES * (last - first) / length if length else 0
+        count = max(LEAST_LANES, int(share + 0.5))
         angles = [first + i * (last - first) / (count - 1) for i in range(count)]
         looks = [solutions(chain, X_AG, angle) for angle in angles]
         for branch in looks[0]:

@@ -121,7 +121,8 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
         share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0
-        count = max(LEAST_LANES, int(share))
+        # Rounded: cut off, rounding errors would decide over a lane where arcs mirror each other.
+        count = max(LEAST_LANES, int(share + 0.5))
         for b in range(len(arm.branches)):
             step = fill_lanes(search, first, last, count)
             solve_lanes(

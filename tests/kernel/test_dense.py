@@ -9,17 +9,15 @@ from tcs.kernel import reference_pairs
 from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import isotropy, jacobian
-from tests.kernel.shapes import random_arm
+from tcs.kernel.reference import free_joint, isotropy, jacobian
+from tests.kernel.judge import chain_of
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 
 SEEDS = range(10)
 
 
 def scene_of(seed, lowered):
-    chain = lowered.arrays.chain
-    if seed % 2:
-        chain = random_arm(np.random.default_rng(seed))
+    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
     return toy_scene(chain, seed, obstacles=3 + seed), toy_grid()
 
 
@@ -83,17 +81,19 @@ def test_nothing_is_found_too_far_away(lowered):
     assert dense_scan(problem, 0, 0, 500, np.empty(7)) == -1.0
 
 
+@pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
 @pytest.mark.parametrize("samples", [2, 511, 512, 513, 514, 1025])
-def test_every_number_of_samples_is_walked_to_its_end(lowered, samples):
+def test_every_number_of_samples_is_walked_to_its_end(lowered, samples, mirrored):
     # Lanes come in blocks of 512; a goal reached only at the last angle shows a lost block.
-    chain = lowered.arrays.chain
+    chain = chain_of(4, lowered, mirrored=mirrored)
+    free = free_joint(chain)
     scene, grid = toy_scene(chain, 4, obstacles=0, goals=5), toy_grid()
     scores = scores_of(scene, grid)
     h, g = np.argwhere(scores.reason == REACHED)[0]
-    angle = float(scores.joints[h, g, 0])
+    angle = float(scores.joints[h, g, free])
     lower, upper = chain.lower.copy(), chain.upper.copy()
-    lower[0], upper[0] = angle - 0.5, angle
+    lower[free], upper[free] = angle - 0.5, angle
     problem = build_problem(scene._replace(chain=chain._replace(lower=lower, upper=upper)), grid)
     q = np.full(7, np.nan)
     assert dense_scan(problem, h, g, samples, q) >= 0.0
-    assert q[0] <= angle
+    assert q[free] <= angle

@@ -1,0 +1,58 @@
+"""The plain-loop twin as the judge of the kernel's answers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel import reference_pairs
+from tcs.kernel.pairs import ARM_BLOCKED, REACHED
+from tcs.kernel.reference import free_joint
+from tests.kernel.arms import drake_arm
+from tests.kernel.shapes import random_arm
+
+ROUNDING = 2e-6
+"""Joints are float32: seven roundings of 1.2e-7 rad move a far corner by up to 1e-6 m."""
+
+
+def chain_of(seed, lowered, *, mirrored=False):
+    """Return the arm of the PR2, or the Panda's if mirrored; a random one for odd seeds."""
+    if seed % 2 == 0:
+        return drake_arm("panda").chain if mirrored else lowered.arrays.chain
+    chain = random_arm(np.random.default_rng(seed), mirrored=mirrored)
+    # The twin walks the arcs of the free joint between limits only.
+    lower, upper = chain.lower.copy(), chain.upper.copy()
+    free = free_joint(chain)
+    lower[free], upper[free] = -2.0, 2.5
+    return chain._replace(lower=lower, upper=upper)
+
+
+def is_true(scene, grid, h, g, q):
+    """Return whether the twin finds joints q at the goal, in their limits and free."""
+    eased = scene._replace(
+        margin=scene.margin - ROUNDING,
+        room=scene.room._replace(pad=np.maximum(scene.room.pad - ROUNDING, 0.0)),
+    )
+    return reference_pairs.confirms(eased, grid, int(h), int(g), q.astype(np.float64))
+
+
+def compare(scene, grid, scores, pairs):
+    """Hold the kernel's answers against the twin's, away from contact."""
+    for h, g in pairs:
+        twin = reference_pairs.score(scene, grid, int(h), int(g))
+        reason = int(scores.reason[h, g])
+        if reason == REACHED and twin.reason == ARM_BLOCKED:
+            # The kernel looks between two contacts as well; the twin can judge what it found.
+            assert is_true(scene, grid, h, g, scores.joints[h, g])
+        elif twin.clearance > 1e-6:  # at contact, rounding decides
+            assert reason == twin.reason, (h, g)
+            # Both look at the same angles; what is stored is that of joints rounded to float32.
+            assert abs(scores.isotropy[h, g] - twin.isotropy) < 1e-6, (h, g)
+
+
+def stratified(rng, reason, number):
+    """Return up to `number` random pairs of every reason that occurs."""
+    pairs = []
+    for value in np.unique(reason):
+        found = np.argwhere(reason == value)
+        pairs.extend(found[rng.choice(len(found), min(number, len(found)), replace=False)])
+    return pairs
