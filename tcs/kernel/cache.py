@@ -58,7 +58,7 @@ def jit_folder() -> Path | None:
 def is_compiled() -> bool:
     """Return whether an earlier run has left machine code for the whole scoring kernel."""
     folder = jit_folder()
-    return folder is not None and any(folder.rglob("sweep.score_slice*.nbc"))
+    return folder is not None and any(folder.rglob("sweep._score_slice*.nbc"))
 
 
 def jit(function: _Function) -> _Function:

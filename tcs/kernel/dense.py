@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
+    Workspace,
     arm_contact,
     at_goal,
     gripper_body_contact,
@@ -17,14 +19,13 @@ from tcs.kernel.ik import lane_joints, wrist_goal
 from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.measure import isotropy_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import MAX_LANES, fill_lanes, new_search
+from tcs.kernel.search import MAX_LANES, Search, fill_lanes, new_search
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 DENSE_SAMPLES = 11_520
 """Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
 
 
-@jit
 def dense_scan(
     problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
 ) -> float:
@@ -40,8 +41,23 @@ def dense_scan(
         samples: How many angles, spread evenly over the limits of the free joint.
         joints: Filled with the solution [rad] when there is one, shape (7,).
     """
-    arm = problem.arm
+    # Made here, where they outlive the call: the compiled code only borrows them.
     work, search = new_workspace(problem), new_search()
+    return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))
+
+
+@jit
+def _dense_scan(
+    owned_problem: Problem,
+    owned_work: Workspace,
+    owned_search: Search,
+    configuration: int,
+    goal: int,
+    samples: int,
+    joints: FloatArray,
+) -> float:
+    problem, work, search = borrowed(owned_problem), borrowed(owned_work), borrowed(owned_search)
+    arm = problem.arm
     torso = configuration % problem.torso_levels
     state = stand(problem, work, configuration // problem.torso_levels)
     goal_in_arm_base(problem, work, state, torso, goal)

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
 from tcs.kernel.arrays import IntArray
+from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
+    Workspace,
     base_contact,
     gripper_body_contact,
     gripper_room_contact,
@@ -60,7 +62,6 @@ def gripper_contacts(problem: Problem) -> IntArray:
     return codes
 
 
-@jit
 def score_slice(
     problem: Problem, grippers: IntArray, start: int, stop: int, scores: Scores
 ) -> None:
@@ -73,8 +74,22 @@ def score_slice(
         stop: One after the last.
         scores: Filled; every array holds stop - start rows.
     """
-    work = new_workspace(problem)
-    search = new_search()
+    # Made here, where they outlive the call: the compiled code only borrows them.
+    _score_slice(problem, new_workspace(problem), new_search(), grippers, start, stop, scores)
+
+
+@jit
+def _score_slice(
+    owned_problem: Problem,
+    owned_work: Workspace,
+    owned_search: Search,
+    grippers: IntArray,
+    start: int,
+    stop: int,
+    owned_scores: Scores,
+) -> None:
+    problem, scores = borrowed(owned_problem), borrowed(owned_scores)
+    work, search = borrowed(owned_work), borrowed(owned_search)
     rounded = np.empty(7)
     place, base_code, state = -1, NO_CONTACT, 0
     for h in range(start, stop):
