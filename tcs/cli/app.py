@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tcs.cli import reports, talk
+from tcs.cli import reports, robots, talk
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -16,6 +16,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(robots.app, name="robot")
 
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

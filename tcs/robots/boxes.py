@@ -52,8 +52,15 @@ def corner_points(triangles: FloatArray) -> FloatArray:
 
 
 def hull_volume(triangles: FloatArray) -> float:
-    """Return the volume of the convex hull of triangles [m^3], shape (n, 3, 3)."""
-    return float(ConvexHull(triangles.reshape(-1, 3)).volume)
+    """Return the volume of the convex hull of triangles [m^3], shape (n, 3, 3).
+
+    A flat part has none; it counts as the box around it, a tenth of a millimetre thick.
+    """
+    points = triangles.reshape(-1, 3)
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:
+        return float(np.maximum(np.ptp(points, axis=0), _THINNEST).prod())
 
 
 def tightest_orientation(points: FloatArray) -> FloatArray:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
+from tcs.robots.extras import model_with_extras
 from tcs.robots.geometry import body_triangles, welded_top
+from tcs.robots.pose import pose_in_root
 from tcs.robots.robot_file import DisabledGroup, RobotFile
 from tcs.robots.self_collision import BodyPair, SelfCollision, sample_positions
 from tcs.robots.urdf import Joint, Urdf
@@ -24,6 +25,12 @@ SPACING = 0.005
 CLEAR = 0.008
 """Surfaces whose points never come closer than this [m] do not meet: they are at least half of it
 apart even where both surfaces lie between their points."""
+_FINER = 0.2
+"""Parts that glide past each other a few millimetres apart are looked at once more, with points
+and clearance smaller by this factor."""
+_MEETING = CLEAR * _FINER
+"""Closer than this [m] is never clear: whoever comes so close meets, and need not be looked at
+further."""
 _FAR = 0.05
 """Distances beyond this [m] are not told apart."""
 _MOST_JOINTS = 3
@@ -44,7 +51,8 @@ def propose_disabled_pairs(
     whose primitives touch in none of the postures is left enabled, for its check costs little and
     may yet catch something. Of the others a pair is proposed when
 
-    - one joint connects the two: they touch where it turns, and its limits keep them apart;
+    - one joint of the URDF connects the two: they touch where it turns, and its limits keep them
+      apart (an extra body, such as a tool, was not built that way and gets no such credit);
     - no more than three joints lie between them, and the original surfaces never come close: what
       touches then is the room that primitives take beyond them. If that needs the soft limits, the
       group holds only while they are in force;
@@ -58,28 +66,35 @@ def propose_disabled_pairs(
     Raises:
         RobotError: If the robot's model cannot be used.
     """
-    soft, hard = (robot.with_choices(limits=limits) for limits in ("soft", "hard"))
-    model = robot.model()
+    both = hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
+    model = model_with_extras(robot)
+    built = robot.model().links.keys()
     judge = SelfCollision(robot)
     sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
     first = model.joints[robot.arm_joints[0]].child
     moved = {body for body in model.links if model.chain(first, body) is not None}
-    surfaces = Surfaces(model)
+    surfaces, fine = Surfaces(model), Surfaces(model, scale=_FINER)
     found = _Found()
     for pair, count in sorted(counts.items()):
-        if not moved & set(pair) or not set(pair) <= model.links.keys():
+        if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
             continue
         joints = joints_between(model, *pair)
         few = len(free_joints(model, joints)) <= _MOST_JOINTS
-        if len(joints) == 1:
+        if len(joints) == 1 and built >= set(pair):
             found.neighbours.append(pair)
-        elif few and (closest := surfaces.closest_approach(pair, hard, seed)) >= CLEAR:
-            found.apart_hard[pair] = closest
+            continue
+        near = [surfaces.closest_approach(pair, limits, seed) if few else 0.0 for limits in both]
+        if near[0] >= CLEAR:
+            found.apart_hard[pair] = near[0]
         elif count == postures:
             found.always.append(pair)
-        elif few and (closest := surfaces.closest_approach(pair, soft, seed)) >= CLEAR:
-            found.apart_soft[pair] = closest
+        elif near[1] >= CLEAR:
+            found.apart_soft[pair] = near[1]
+        elif near[0] >= _MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= _MEETING:
+            found.apart_hard[pair] = gap
+        elif near[1] >= _MEETING and (gap := fine.closest_approach(pair, soft, seed)) >= _MEETING:
+            found.apart_soft[pair] = gap
     return found.groups(postures)
 
 
@@ -119,12 +134,23 @@ class _Found:
 class Surfaces:
     """The bodies' original surfaces as points, and how close two of them can come."""
 
-    def __init__(self, model: Urdf) -> None:
-        """Read the surfaces; points are spread when a body is first asked for."""
+    def __init__(self, model: Urdf, scale: float = 1.0) -> None:
+        """Read the surfaces; points are spread when a body is first asked for.
+
+        Args:
+            model: The robot.
+            scale: How many times smaller than usual distances are looked at.
+        """
         self._model = model
+        self._spacing = SPACING * scale
+        self._clear = CLEAR * scale
         self._triangles = body_triangles(self._model)
         self._points: dict[str, FloatArray] = {}
         self._trees: dict[str, cKDTree] = {}
+
+    def has(self, body: str) -> bool:
+        """Return whether a body has a surface."""
+        return body in self._triangles
 
     def closest_approach(self, pair: BodyPair, robot: RobotFile, seed: int) -> float:
         """Return how close two bodies' surfaces come [m], at most 0.05, within the limits in force.
@@ -151,9 +177,14 @@ class Surfaces:
         draws = rng.uniform(lower, upper, size=(_DRAWS, len(names)))
         ends = np.where(rng.random(draws.shape) < 0.5, lower, upper)
         draws = np.where(rng.random(draws.shape) < _AT_LIMIT, ends, draws)
-        found = sorted(((distance(q), tuple(q)) for q in draws), key=lambda item: item[0])
+        found: list[tuple[float, tuple[float, ...]]] = []
+        for q in draws:
+            found.append((distance(q), tuple(q)))
+            if found[-1][0] < _MEETING:
+                return found[-1][0]
+        found.sort(key=lambda item: item[0])
         closest = found[0][0]
-        if closest < CLEAR:
+        if closest < self._clear:
             return closest
         for start_distance, start in found[:_DESCENTS]:
             if start_distance >= _FAR:
@@ -175,12 +206,14 @@ class Surfaces:
             pair: Names of the bodies.
             positions: Every joint between them [rad or m].
         """
-        if pair[0] not in self._trees:
-            self._trees[pair[0]] = cKDTree(self._of(pair[0]))
-        R_AB, p_AB = _relative_pose(self._model, pair, positions)
-        seen = self._of(pair[1]) @ R_AB.T + p_AB
+        # The tree takes the body of many points; each point of the other costs a query.
+        many, few = sorted(pair, key=lambda body: -len(self._of(body)))
+        if many not in self._trees:
+            self._trees[many] = cKDTree(self._of(many))
+        R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
+        seen = self._of(few) @ R_AB.T + p_AB
         # Far points take the tree longest, and nobody asks how far they are.
-        near, _ = self._trees[pair[0]].query(seen, distance_upper_bound=_FAR)
+        near, _ = self._trees[many].query(seen, distance_upper_bound=_FAR)
         return min(float(near.min()), _FAR)
 
     def _of(self, body: str) -> FloatArray:
@@ -190,7 +223,7 @@ class Surfaces:
             edges = triangles[:, 1:] - triangles[:, :1]
             areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
             rng = np.random.default_rng(_POINT_SEED)
-            count = int(areas.sum() / SPACING**2) + 1
+            count = int(areas.sum() / self._spacing**2) + 1
             chosen = rng.choice(len(triangles), count, p=areas / areas.sum())
             uv = rng.random((count, 2))
             # The half of the square beyond its diagonal folds back onto the triangle.
@@ -229,23 +262,5 @@ def _relative_pose(
     model: Urdf, pair: BodyPair, positions: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Return R_AB and p_AoBo_A of the second body B of a pair in the first, A."""
-    (R_A, p_A), (R_B, p_B) = (_pose_in_root(model, body, positions) for body in pair)
+    (R_A, p_A), (R_B, p_B) = (pose_in_root(model, body, positions) for body in pair)
     return R_A.T @ R_B, R_A.T @ (p_B - p_A)
-
-
-def _pose_in_root(
-    model: Urdf, body: str, positions: Mapping[str, float]
-) -> tuple[FloatArray, FloatArray]:
-    chain = model.chain(model.root, body)
-    assert chain is not None
-    R, p = np.eye(3), np.zeros(3)
-    for joint in chain:
-        p = p + R @ np.array(joint.xyz)
-        R = R @ Rotation.from_euler("xyz", joint.rpy).as_matrix()
-        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-        q = positions.get(joint.name, 0.0)
-        if joint.type == "prismatic":
-            p = p + R @ axis * q
-        elif joint.is_movable:
-            R = R @ Rotation.from_rotvec(axis * q).as_matrix()
-    return R, p

@@ -27,6 +27,11 @@ _SPLITS = 8
 """Splits of one cluster that are pursued."""
 _ENOUGH = 0.04
 """A further shape must save this share of the hull's volume, or it is not worth its cost."""
+_FINE = 15_000
+"""More triangles than this are not divided one by one: small neighbours stay together, or a finely
+meshed cover would take many minutes."""
+_MOST_UNITS = 4_000
+"""So many groups of triangles at most are divided then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,16 +101,30 @@ Beam = list[tuple[float, Parts]]
 
 
 class _Search:
-    """Divisions of triangles into parts, judged by the summed volume of boxes in set frames."""
+    """Divisions of triangles into parts, judged by the summed volume of boxes in set frames.
+
+    A part is a set of units: a triangle each, or several small ones that lie side by side.
+    """
 
     def __init__(self, triangles: FloatArray) -> None:
-        self.everything: IntArray = np.arange(len(triangles), dtype=np.int64)
+        units = _units(triangles)
+        self._order = np.argsort(units, kind="stable")
+        starts = np.flatnonzero(np.diff(units[self._order], prepend=-1))
+        self._starts = np.append(starts, len(triangles))
+        self.everything: IntArray = np.arange(len(starts), dtype=np.int64)
         self.orientations = _orientations(corner_points(triangles))
-        # Along each axis of each frame every triangle spans an interval; a box around several
-        # triangles is the span of their intervals.
-        seen = np.einsum("nci,kij->kncj", triangles, self.orientations)
-        self._low, self._high = seen.min(axis=2), seen.max(axis=2)
+        # Along each axis of each frame every unit spans an interval; a box around several units is
+        # the span of their intervals.
+        ordered = triangles[self._order]
+        seen = [ordered @ R for R in self.orientations]
+        self._low = np.stack([np.minimum.reduceat(s.min(axis=1), starts) for s in seen])
+        self._high = np.stack([np.maximum.reduceat(s.max(axis=1), starts) for s in seen])
         self._splits: dict[bytes, list[tuple[float, IntArray, IntArray]]] = {}
+
+    def triangles_of(self, part: IntArray) -> IntArray:
+        """Return the indices of a part's triangles."""
+        pieces = [self._order[self._starts[unit] : self._starts[unit + 1]] for unit in part]
+        return np.sort(np.concatenate(pieces))
 
     def volume(self, part: IntArray) -> float:
         """Return the volume of the smallest box around a part in the set frames [m^3]."""
@@ -154,6 +173,27 @@ class _Search:
         return sorted(distinct.values(), key=lambda s: (s[0], s[1].tobytes()))[:_SPLITS]
 
 
+def _units(triangles: FloatArray) -> IntArray:
+    """Return the unit that each triangle belongs to, numbered from 0, shape (n,)."""
+    count = len(triangles)
+    if count <= _FINE:
+        return np.arange(count, dtype=np.int64)
+    middles = triangles.mean(axis=1)
+    sizes = np.ptp(triangles, axis=1).max(axis=1)
+    cell = float(np.ptp(middles, axis=0).max()) / 100
+    while True:
+        # A triangle that is larger than its cell would stretch what it is kept together with.
+        alone = sizes > cell
+        keys = np.floor((middles - middles.min(axis=0)) / cell).astype(np.int64)
+        keys[alone] = np.array([-1, -1, 0])
+        keys[alone, 2] = np.arange(int(alone.sum()))
+        _, units = np.unique(keys, axis=0, return_inverse=True)
+        if units.max() < _MOST_UNITS:
+            return np.asarray(units.reshape(-1), dtype=np.int64)
+        # At last the cell holds everything.
+        cell *= 1.25
+
+
 def _running_volumes(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the smallest box volume around the first 1, 2, ... triangles, shape (n,)."""
     size = np.maximum.accumulate(high, axis=1) - np.minimum.accumulate(low, axis=1)
@@ -172,7 +212,7 @@ def _orientations(points: FloatArray) -> FloatArray:
 
 def _finish(body: str, triangles: FloatArray, parts: Parts, search: _Search, hull: float) -> Fit:
     """Return the tightest primitives for a division, each freed of what others enclose."""
-    shapes = [_tightest(body, triangles[part], search) for part in parts]
+    shapes = [_tightest(body, triangles[search.triangles_of(part)], search) for part in parts]
     best: Fit | None = None
     # Who is freed first matters; with many shapes the rotations of the order must do.
     orders: list[tuple[int, ...]] = [

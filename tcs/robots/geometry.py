@@ -15,7 +15,8 @@ from tcs.robots.urdf import Geometry, Urdf, Vector
 FloatArray = NDArray[np.float64]
 
 MARKER_SIZE = 0.011
-"""A box with no side longer than this [m] marks a frame and is no part of the robot."""
+"""A box, cylinder or ball no longer or wider than this [m] marks a frame and is no part of the
+robot."""
 
 _ROUND_SECTIONS = 48
 
@@ -24,7 +25,7 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
     """Return the triangles of every body that has a surface, in its own frame [m].
 
     Visual and collision geometry both count: either may show something that the other lacks.
-    Boxes of at most `MARKER_SIZE` are skipped, for they only mark frames.
+    Boxes, cylinders and balls of at most `MARKER_SIZE` are skipped, for they only mark frames.
 
     Args:
         model: The robot.
@@ -103,4 +104,10 @@ def welded_top(model: Urdf, body: str) -> tuple[str, FloatArray, FloatArray]:
 
 
 def _is_marker(geometry: Geometry) -> bool:
-    return geometry.shape == "box" and max(geometry.size) <= MARKER_SIZE
+    if geometry.mesh is not None:
+        return False
+    # Radius before length, where there are any.
+    widths = (
+        geometry.size if geometry.shape == "box" else (2 * geometry.size[0], *geometry.size[1:])
+    )
+    return max(widths) <= MARKER_SIZE

@@ -96,6 +96,23 @@ class Primitive:
         radius = self.size[0] + tolerance
         return np.asarray(np.square(p_PoQ_P).sum(axis=-1) <= radius**2)
 
+    def distance(self, p_BoQ_B: FloatArray) -> FloatArray:
+        """Return how far points of the body lie outside the primitive [m], 0 inside.
+
+        Args:
+            p_BoQ_B: Points in the body frame [m], shape (..., 3).
+
+        Returns:
+            Shape (...).
+        """
+        p_PoQ_P = np.abs((p_BoQ_B - np.array(self.xyz)) @ self.rotation)
+        half, radius = np.array(self.size) / 2, 0.0
+        if self.kind != "box":
+            radius = self.size[0]
+            half = np.array([0.0, 0.0, self.size[1] / 2 if self.kind == "capsule" else 0.0])
+        beyond = np.linalg.norm(np.maximum(p_PoQ_P - half, 0.0), axis=-1)
+        return np.asarray(np.maximum(beyond - radius, 0.0))
+
     def contains_triangles(self, triangles: FloatArray, *, tolerance: float = 0.0) -> BoolArray:
         """Return which triangles lie wholly in the primitive: it is convex, so corners decide.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,8 @@ Positions = Mapping[Name, Number]
 
 _FILES = ("urdf", "primitives")
 """Fields that name a file, relative to the robot file."""
+BASED_ON = "based_on"
+"""Key of a file that takes over whatever it does not say itself from another robot."""
 
 
 class _OnLink(Placed):
@@ -245,14 +247,29 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
 
     path = named_file("robot", name_or_path, _shipped()).resolve()
     where = f"robot file '{path}'"
-    content = read_mapping(path, where, RobotError, known=RobotFile.model_fields)
+    content = _content(path)
+    robot = checked(content, RobotFile, where, RobotError, also_known=(BASED_ON,))
+    check_robot(robot, where=where)
+    return robot
+
+
+def _content(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Return what a file says, with what it takes over; `above` are the files based on it."""
+    where = f"robot file '{path}'"
+    content = read_mapping(path, where, RobotError, known=(*RobotFile.model_fields, BASED_ON))
     for key in _FILES:
         value = content.get(key)
         if isinstance(value, str) and not value.startswith("package://"):
             content[key] = str((path.parent / Path(value).expanduser()).resolve())
-    robot = checked(content, RobotFile, where, RobotError)
-    check_robot(robot, where=where)
-    return robot
+    base = content.pop(BASED_ON, None)
+    if base is None:
+        return content
+    chain = (*above, path)
+    field = f"{where}, field '{BASED_ON}'"
+    file = named_file("robot", str(base), _shipped(), beside=path.parent, where=field).resolve()
+    if file in chain:
+        raise RobotError(f"{field}: '{base}' is based on this file in turn. Name another one.")
+    return {**_content(file, chain), **content}
 
 
 def _shipped() -> dict[str, Path]:

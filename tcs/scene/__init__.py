@@ -11,7 +11,7 @@ from tcs.scene.environment import (
     load_environment,
 )
 from tcs.scene.frames import body_frame_places
-from tcs.scene.lowering import LoweredScene, goal_poses, lower
+from tcs.scene.lowering import LoweredScene, arm_chain, goal_poses, lower
 from tcs.scene.posture import Posture
 from tcs.scene.scene import Contact, Scene
 from tcs.scene.spec import SceneSpec
@@ -26,6 +26,7 @@ __all__ = [
     "Posture",
     "Scene",
     "SceneSpec",
+    "arm_chain",
     "body_frame_places",
     "environment_names",
     "goal_poses",

@@ -104,7 +104,7 @@ def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
     scene.place_base(0.0, 0.0, 0.0)
     scene.set_arm(np.zeros(len(built.arm_joints)))
     torso_levels = grid.axis("torso").values
-    chain, X_AL = _chain(scene)
+    chain, X_AL = arm_chain(scene)
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
     room_poses, goal_poses = _environment_states(scene, room, task, grid, where)
 
@@ -140,8 +140,12 @@ def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
     )
 
 
-def _chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
-    """Return the arm's chain, and the poses of its link frames in A with all joints at zero."""
+def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
+    """Return the arm's chain, and the poses of its link frames in A with all joints at zero.
+
+    Args:
+        scene: The scene, its arm at zero.
+    """
     built, state = scene.built, scene.plant_context
     axes = []
     for joint in built.arm_joints:

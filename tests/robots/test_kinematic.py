@@ -11,7 +11,7 @@ from pydrake.multibody.tree import RevoluteJoint
 from scipy.spatial.transform import Rotation
 
 from tcs.robots import kinematic_urdf, robot_urdf
-from tcs.robots.disabled_pairs import _pose_in_root
+from tcs.robots.pose import pose_in_root
 from tcs.robots.robot_file import ExtraFrame
 from tcs.robots.self_collision import sample_positions
 
@@ -94,7 +94,7 @@ def test_kinematics_are_those_of_the_original(pr2, frame):
         expected = original_pose(pr2.urdf_path(), frame, positions)
         # A metre of arm in double precision: some 1e-15; 1e-12 leaves room for other builds.
         np.testing.assert_allclose(pose(plant, frame, positions), expected, atol=1e-12)
-        R, p = _pose_in_root(pr2.model(), frame, positions)
+        R, p = pose_in_root(pr2.model(), frame, positions)
         np.testing.assert_allclose(R, expected[:3, :3], atol=1e-12)
         np.testing.assert_allclose(p, expected[:3, 3], atol=1e-12)
 

@@ -1,0 +1,235 @@
+"""The check-up of a robot: everything that scoring relies on, looked at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tcs.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
+from tcs.robots import RobotFile
+from tcs.robots.enclosure import BodyEnclosure, enclosure
+from tcs.scene import Contact, EnvironmentFile, Scene, SceneSpec, arm_chain
+
+MOST_EXCESS = 2.0
+"""Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
+look: they block goals that the real arm reaches."""
+
+_NOWHERE = EnvironmentFile(
+    name="nowhere",
+    title="Nothing at all",
+    origin="the robot's base",
+    source="none: there is nothing in it",
+    floor=False,
+    grid={},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Limits of one joint that scoring moves [rad or m]; infinite where it turns on and on.
+
+    Attributes:
+        name: The joint.
+        soft: Of the URDF's `safety_controller`; the hard ones where it says none.
+        hard: Of the URDF's `limit`.
+        in_force: Those of the two that the robot file chooses.
+    """
+
+    name: str
+    soft: tuple[float, float]
+    hard: tuple[float, float]
+    in_force: tuple[float, float]
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the joint turns on and on."""
+        return math.isinf(self.in_force[0])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain containers; no limits are null, for JSON knows no infinity."""
+        pairs = {"in_force": self.in_force, "soft": self.soft, "hard": self.hard}
+        plain = {k: None if self.is_continuous else list(pair) for k, pair in pairs.items()}
+        return {"continuous": self.is_continuous, **plain}
+
+
+@dataclass(frozen=True)
+class RobotCheck:
+    """What a check-up found.
+
+    Attributes:
+        robot: The robot that was looked at.
+        arm: Its arm's class.
+        limits: Limits of the arm's joints, and of the torso if there is one, last.
+        bodies: How the primitives enclose each body with a surface.
+        rest: Where the arm was for self-collision, by joint [rad]: at 0, or at the nearest limit.
+        margin: Contacts closer than this count [m].
+        contacts: Pairs that scoring checks and that are closer than that at rest.
+        trip: The IK round trip; None for an arm outside the closed-form classes.
+        seed: Seed of the round trip's postures.
+    """
+
+    robot: RobotFile
+    arm: ArmClass
+    limits: tuple[JointLimits, ...]
+    bodies: tuple[BodyEnclosure, ...]
+    rest: Mapping[str, float]
+    margin: float
+    contacts: tuple[Contact, ...]
+    trip: RoundTrip | None
+    seed: int
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Bodies that the robot file adds: there is no mesh to hold their primitives against."""
+        return tuple(body.name for body in self.robot.bodies)
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.problems
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What keeps the robot from being scored, or its scores from being right."""
+        found = []
+        if self.arm.solver is None:
+            found.append(self.arm.reason)
+        found += [
+            f"joint '{joint.name}' cannot move: its limits in force are both {joint.in_force[0]:g}."
+            for joint in self.limits
+            if joint.in_force[0] == joint.in_force[1]
+        ]
+        found += [_stands_out(body) for body in self.bodies if body.outside]
+        found += [
+            f"'{first}' and '{second}' are {distance * 1e3:.1f} mm apart with the arm at rest, "
+            f"less than the margin of {self.margin * 1e3:g} mm: mend their primitives, or name the "
+            "pair under disabled_groups if it may touch."
+            for first, second, distance in self.contacts
+        ]
+        if self.trip is not None and self.trip.recovered < self.trip.samples:
+            lost = self.trip.samples - self.trip.recovered
+            found.append(
+                f"{lost} of {self.trip.samples} random postures are not among the kernel's "
+                "solutions for their own tool pose."
+            )
+        return tuple(found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not wrong, but worth knowing."""
+        found = []
+        bulky = [b for b in self.bodies if b.body in self._moved and b.excess > MOST_EXCESS]
+        found += [
+            f"the primitives of '{body.body}' take {body.excess:.2f} times the volume of its hull: "
+            "goals may count as blocked that the real arm reaches."
+            for body in bulky
+        ]
+        if self.unseen:
+            found.append(
+                f"no mesh to hold the primitives against: {', '.join(self.unseen)} "
+                "(bodies of the robot file)."
+            )
+        if self.robot.limits == "soft" and all(j.soft == j.hard for j in self.limits):
+            found.append("limits: soft, but the URDF has no safety_controller: the hard ones hold.")
+        return tuple(found)
+
+    @property
+    def _moved(self) -> frozenset[str]:
+        """Bodies of the URDF that the arm moves."""
+        model = self.robot.model()
+        first = model.joints[self.robot.arm_joints[0]].child
+        return frozenset(body for body in model.links if model.chain(first, body) is not None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything as plain containers."""
+        return {
+            "robot": self.robot.name,
+            "sound": self.is_sound,
+            "problems": list(self.problems),
+            "notes": list(self.notes),
+            "arm_class": self.arm.to_json(),
+            "limits": {
+                "in_force": self.robot.limits,
+                "joints": {joint.name: joint.to_json() for joint in self.limits},
+            },
+            "enclosed": {
+                "enclosed": not any(body.outside for body in self.bodies),
+                "triangles": sum(body.triangles for body in self.bodies),
+                "outside": sum(body.outside for body in self.bodies),
+                "bodies": {
+                    body.body: {
+                        "triangles": body.triangles,
+                        "outside": body.outside,
+                        "farthest_m": body.farthest if math.isfinite(body.farthest) else None,
+                    }
+                    for body in self.bodies
+                },
+                "without_mesh": list(self.unseen),
+            },
+            "excess_volume": {body.body: body.excess for body in self.bodies},
+            "self_collision": {
+                "rest_rad": dict(self.rest),
+                "margin_m": self.margin,
+                "pairs": [
+                    {"bodies": [first, second], "distance_m": distance}
+                    for first, second, distance in self.contacts
+                ],
+            },
+            "ik_round_trip": None
+            if self.trip is None
+            else {**self.trip.to_json(), "seed": self.seed},
+        }
+
+
+def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCheck:
+    """Return what a look at everything that scoring relies on finds.
+
+    Args:
+        robot: The robot, as `load_robot` returns it.
+        samples: Random postures of the IK round trip.
+        seed: Seed of their draws.
+
+    Raises:
+        RobotError: If a model or mesh of the robot cannot be used.
+        OutputError: If the kernel's cache cannot be written.
+    """
+    scene = Scene(SceneSpec(robot, _NOWHERE))
+    scene.set_arm(np.zeros(len(robot.arm_joints)))
+    arm = arm_class(arm_chain(scene)[0])
+    positions = robot.with_mimics({})
+    rest = {name: positions[name] for name in robot.arm_joints}
+    scene.set_arm(list(rest.values()))
+    contacts = scene.violations()
+    return RobotCheck(
+        robot=robot,
+        arm=arm,
+        limits=_limits(robot),
+        bodies=enclosure(robot),
+        rest=rest,
+        margin=_NOWHERE.contact_margin,
+        contacts=contacts,
+        trip=None if arm.solver is None else round_trip(scene, arm.solver, samples, seed),
+        seed=seed,
+    )
+
+
+def _limits(robot: RobotFile) -> tuple[JointLimits, ...]:
+    joints, in_force = robot.model().joints, robot.joint_limits()
+    torso = () if robot.torso_joint is None else (robot.torso_joint,)
+    return tuple(
+        JointLimits(name, joints[name].soft, joints[name].hard, in_force[name])
+        for name in (*robot.arm_joints, *torso)
+    )
+
+
+def _stands_out(body: BodyEnclosure) -> str:
+    if math.isinf(body.farthest):
+        return f"'{body.body}' has a surface, but no primitive: fit one."
+    return (
+        f"'{body.body}': {body.outside} of {body.triangles} triangles lie wholly in none of its "
+        f"primitives, up to {body.farthest * 1e3:.1f} mm out: fit them anew."
+    )

@@ -1,0 +1,76 @@
+"""The commands `tcs robot ...`: draft a robot file from a URDF, and check one up."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from tcs.cli import talk
+
+app = typer.Typer(
+    help="Robots: draft a file from any URDF, and check one up.", no_args_is_help=True
+)
+
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+@app.command()
+def check(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Name or YAML file of a robot.")],
+    samples: Annotated[
+        int, typer.Option(min=1, help="Random postures of the IK round trip.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
+    as_json: _Json = False,
+) -> None:
+    """Check a robot up: arm class, limits, shapes, self-collision, IK; exit 1 if it is unfit."""
+    from tcs.checkup import check_up
+    from tcs.robots import load_robot
+
+    found = check_up(load_robot(robot), samples=samples, seed=seed)
+    talk.print_result(found.to_json(), _report_check, as_json=as_json)
+    if not found.is_sound:
+        talk.say(f"robot '{found.robot.name}' is not fit for scoring as it is.")
+        raise typer.Exit(1)
+
+
+def _report_check(found: dict[str, Any]) -> None:
+    """Print a check-up for a person."""
+    arm, trip, touch = found["arm_class"], found["ik_round_trip"], found["self_collision"]
+    echo = typer.echo
+    echo(f"robot            {found['robot']}")
+    echo(f"arm class        {arm['class'] or 'outside the closed-form classes'}")
+    distances = ", ".join(
+        f"{axes} {'parallel' if metres is None else f'{metres * 1e3:.3g} mm'}"
+        for axes, metres in arm["metres_from_meeting"].items()
+    )
+    echo(f"axes miss by     {distances}")
+    echo(f"limits           {found['limits']['in_force']}")
+    for name, joint in found["limits"]["joints"].items():
+        echo(f"  {name:<28} {_range(joint)}")
+    shapes = found["enclosed"]
+    echo(f"enclosed         {shapes['triangles'] - shapes['outside']:,} of "
+         f"{shapes['triangles']:,} triangles")  # fmt: skip
+    echo("excess volume    " + ("largest: " if found["excess_volume"] else "none"))
+    largest = sorted(found["excess_volume"].items(), key=lambda item: -item[1])
+    for body, excess in largest[:5]:
+        echo(f"  {body:<28} {excess:.2f}")
+    echo(f"self-collision   {len(touch['pairs'])} pairs closer than {touch['margin_m'] * 1e3:g} mm")
+    if trip is not None:
+        echo(
+            f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} postures found again, "
+            f"joints to {trip['max_joint_error_rad']:.1e} rad, "
+            f"tool to {trip['max_position_error_m']:.1e} m"
+        )
+    for kind in ("problems", "notes"):
+        for line in found[kind]:
+            echo(f"{kind[:-1]:<16} {line}")
+
+
+def _range(joint: dict[str, Any]) -> str:
+    if joint["continuous"]:
+        return "continuous"
+    shown = {kind: "[{:.4f}, {:.4f}]".format(*joint[kind]) for kind in ("in_force", "hard")}
+    same = shown["in_force"] == shown["hard"]
+    return shown["in_force"] + ("" if same else f"  hard {shown['hard']}")
