@@ -22,7 +22,8 @@ _Owned = TypeVar("_Owned")
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """Return the value with every array in it, however deep in tuples, stripped of its owner."""
     if isinstance(kind, types.Array):
-        array = cgutils.create_struct_proxy(kind)(context, builder, value)
+        proxy: Any = cgutils.create_struct_proxy
+        array = proxy(kind)(context, builder, value)
         array.meminfo = ir.Constant(array.meminfo.type, None)
         array.parent = ir.Constant(array.parent.type, None)
         return array._getvalue()
