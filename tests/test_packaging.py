@@ -14,9 +14,10 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 DATA_PARTS = ("models", "tasks")
 
-# Distributions whose module is called otherwise, and one that is found by its files alone.
+# Distributions whose module is called otherwise; one that is found by its files alone, and one
+# that trimesh imports for us.
 MODULE_OF = {"drake": "pydrake", "pyyaml": "yaml"}
-WITHOUT_MODULE = {"example-robot-data"}
+WITHOUT_MODULE = {"example-robot-data", "pycollada"}
 
 
 def dependencies() -> set[str]:

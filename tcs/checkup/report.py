@@ -12,11 +12,17 @@ import numpy as np
 from tcs.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
 from tcs.robots import RobotFile
 from tcs.robots.enclosure import BodyEnclosure, enclosure
+from tcs.robots.geometry import body_triangles
+from tcs.robots.pose import pose_in_root
 from tcs.scene import Contact, EnvironmentFile, Scene, SceneSpec, arm_chain
 
 MOST_EXCESS = 2.0
 """Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
 look: they block goals that the real arm reaches."""
+
+SUNK = 0.02
+"""Surfaces that reach farther below the floor than this [m] mean that the root does not lie on it;
+models of wheels sink in by millimetres."""
 
 _NOWHERE = EnvironmentFile(
     name="nowhere",
@@ -67,6 +73,7 @@ class RobotCheck:
         bodies: How the primitives enclose each body with a surface.
         rest: Where the arm was for self-collision, by joint [rad]: at 0, or at the nearest limit.
         margin: Contacts closer than this count [m].
+        lowest: Height of the lowest point of any surface above the root, the arm at rest [m].
         contacts: Pairs that scoring checks and that are closer than that at rest.
         trip: The IK round trip; None for an arm outside the closed-form classes.
         seed: Seed of the round trip's postures.
@@ -78,6 +85,7 @@ class RobotCheck:
     bodies: tuple[BodyEnclosure, ...]
     rest: Mapping[str, float]
     margin: float
+    lowest: float
     contacts: tuple[Contact, ...]
     trip: RoundTrip | None
     seed: int
@@ -110,6 +118,11 @@ class RobotCheck:
             "pair under disabled_groups if it may touch."
             for first, second, distance in self.contacts
         ]
+        if self.lowest < -SUNK:
+            found.append(
+                f"its surface reaches {-self.lowest:.3f} m below '{self.robot.root_body}', but the "
+                "root has to lie on the floor: give the URDF a link there that carries the rest."
+            )
         if self.trip is not None and self.trip.recovered < self.trip.samples:
             lost = self.trip.samples - self.trip.recovered
             found.append(
@@ -171,6 +184,7 @@ class RobotCheck:
                 "without_mesh": list(self.unseen),
             },
             "excess_volume": {body.body: body.excess for body in self.bodies},
+            "lowest_point_m": self.lowest,
             "self_collision": {
                 "rest_rad": dict(self.rest),
                 "margin_m": self.margin,
@@ -200,7 +214,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
     scene = Scene(SceneSpec(robot, _NOWHERE))
     scene.set_arm(np.zeros(len(robot.arm_joints)))
     arm = arm_class(arm_chain(scene)[0])
-    positions = robot.with_mimics({})
+    positions = robot.with_mimics(robot.joint_positions())
     rest = {name: positions[name] for name in robot.arm_joints}
     scene.set_arm(list(rest.values()))
     contacts = scene.violations()
@@ -211,6 +225,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         bodies=enclosure(robot),
         rest=rest,
         margin=_NOWHERE.contact_margin,
+        lowest=_lowest(robot, positions),
         contacts=contacts,
         trip=None if arm.solver is None else round_trip(scene, arm.solver, samples, seed),
         seed=seed,
@@ -224,6 +239,15 @@ def _limits(robot: RobotFile) -> tuple[JointLimits, ...]:
         JointLimits(name, joints[name].soft, joints[name].hard, in_force[name])
         for name in (*robot.arm_joints, *torso)
     )
+
+
+def _lowest(robot: RobotFile, positions: Mapping[str, float]) -> float:
+    """Return the height of the lowest point of any surface above the root [m]."""
+    model, lows = robot.model(), [0.0]
+    for body, triangles in body_triangles(model).items():
+        R, p = pose_in_root(model, body, positions)
+        lows.append(float((triangles @ R[2] + p[2]).min()))
+    return min(lows)
 
 
 def _stands_out(body: BodyEnclosure) -> str:

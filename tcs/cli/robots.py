@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,6 +14,52 @@ app = typer.Typer(
 )
 
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+@app.command()
+def new(
+    urdf: Annotated[
+        str, typer.Argument(metavar="URDF", help="Path or package:// address of a URDF.")
+    ],
+    tool: Annotated[str, typer.Option(help="Link of the URDF that has to come to a goal.")],
+    base: Annotated[
+        str | None,
+        typer.Option(help="Link that the arm starts at or beyond.", show_default="the root"),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write.", show_default="<urdf>.yaml")
+    ] = None,
+    as_json: _Json = False,
+) -> None:
+    """Draft a robot file from any URDF, with its collision shapes in a CSV file beside it."""
+    from tcs.cli.places import check_writable
+    from tcs.robots.draft import check_free, draft_robot, write_draft
+
+    path = out or Path(f"{Path(urdf).stem}.yaml")
+    check_writable(check_free(path))
+    with talk.progress_bar("bodies") as on_progress:
+        draft = draft_robot(urdf, tool, base=base, name=path.stem, on_progress=on_progress)
+    shapes = write_draft(draft, path)
+    robot = draft.robot
+    result = {
+        "file": str(path),
+        "primitives": str(shapes),
+        "arm_base": robot.arm_base,
+        "arm_joints": list(robot.arm_joints),
+        "torso_joint": robot.torso_joint,
+        "tool_frame": robot.tool_frame,
+        "disabled_pairs": len(robot.disabled_pairs),
+        "remarks": list(draft.remarks),
+    }
+    talk.print_result(result, _report_draft, as_json=as_json)
+
+
+def _report_draft(result: dict[str, Any]) -> None:
+    """Print for a person what was drafted."""
+    typer.echo(f"wrote {result['file']} and {result['primitives']}")
+    for remark in result["remarks"]:
+        typer.echo(f"- {remark}")
+    typer.echo(f"Look it over, then: tcs robot check {result['file']}")
 
 
 @app.command()

@@ -72,8 +72,7 @@ def propose_disabled_pairs(
     judge = SelfCollision(robot)
     sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
-    first = model.joints[robot.arm_joints[0]].child
-    moved = {body for body in model.links if model.chain(first, body) is not None}
+    moved, hand = (_moved_by(model, robot.arm_joints[i]) for i in (0, -1))
     surfaces, fine = Surfaces(model), Surfaces(model, scale=_FINER)
     found = _Found()
     for pair, count in sorted(counts.items()):
@@ -91,6 +90,9 @@ def propose_disabled_pairs(
             found.always.append(pair)
         elif near[1] >= CLEAR:
             found.apart_soft[pair] = near[1]
+        elif set(pair) <= hand:
+            # Never checked either, so a long look would be wasted.
+            continue
         elif near[0] >= _MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= _MEETING:
             found.apart_hard[pair] = gap
         elif near[1] >= _MEETING and (gap := fine.closest_approach(pair, soft, seed)) >= _MEETING:
@@ -231,6 +233,12 @@ class Surfaces:
             inner = triangles[chosen, 0] + np.einsum("ni,nij->nj", uv, edges[chosen])
             self._points[body] = np.concatenate([inner, triangles.reshape(-1, 3)])
         return self._points[body]
+
+
+def _moved_by(model: Urdf, joint: str) -> set[str]:
+    """Return every body that a joint moves."""
+    first = model.joints[joint].child
+    return {body for body in model.links if model.chain(first, body) is not None}
 
 
 def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.robots.boxes import corner_points, enclose
+from tcs.robots.boxes import corner_points, enclose, hull_volume
 from tcs.robots.fitting import Fit, Target, fit_triangles
 from tcs.robots.geometry import (
     body_triangles,
@@ -18,7 +18,7 @@ from tcs.robots.geometry import (
     surface_geometries,
     welded_top,
 )
-from tcs.robots.primitives import Primitive
+from tcs.robots.primitives import Primitive, union_volume
 from tcs.robots.robot_file import RobotFile
 from tcs.robots.urdf import Urdf
 
@@ -55,7 +55,7 @@ def fit_robot(
 
     What is welded to the root (a base with its wheels) is enclosed as one body; other bodies each
     on their own. Bodies of the same shape, such as those of a left and a right arm, get the same
-    primitives.
+    primitives. What the URDF draws as a few boxes keeps these.
 
     Args:
         robot: The robot.
@@ -85,8 +85,9 @@ def fit_robot(
         key = _shape_key(model, body) if len(members) == 1 else body
         R, p = _key_frame(model, body)
         if key not in fits:
-            fits[key] = fit_triangles(body, own, targets.get(key, REST)), R, p
-            fit = fits[key][0]
+            target = targets.get(key, REST)
+            fit = _as_drawn(model, body, members, target) or fit_triangles(body, own, target)
+            fits[key] = fit, R, p
         else:
             fit = _transferred(fits[key], body, own, R, p)
         results.append(BodyFit(body=body, enclosed=tuple(members), fit=fit))
@@ -118,6 +119,24 @@ def _in_frame_of(
         in_top = triangles[member] @ R_AM.T + p_AM
         pieces.append(triangles[member] if member == body else (in_top - p_AB) @ R_AB)
     return np.concatenate(pieces)
+
+
+def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit | None:
+    """Return the boxes that the URDF draws, if there is nothing else and they are few."""
+    drawn = [(member, g) for member in members for g in surface_geometries(model, member)]
+    if len(drawn) > target.max_shapes or any(g.shape != "box" for _, g in drawn):
+        return None
+    shapes, pieces = [], []
+    _, R_AB, _ = welded_top(model, body)
+    for member, geometry in drawn:
+        own = place(geometry_triangles(geometry), geometry.xyz, geometry.rpy)
+        triangles = _in_frame_of(model, body, [member], {member: own})
+        _, R_AM, _ = welded_top(model, member)
+        R_BG = R_AB.T @ R_AM @ Rotation.from_euler("xyz", geometry.rpy).as_matrix()
+        shapes.append(enclose(body, corner_points(triangles), "box", R_BG))
+        pieces.append(triangles)
+    hull = hull_volume(np.concatenate(pieces))
+    return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
 
 
 def _moved_by(model: Urdf, joint: str) -> set[str]:

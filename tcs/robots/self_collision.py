@@ -35,6 +35,9 @@ from tcs.robots.urdf import Geometry, Urdf
 FloatArray = NDArray[np.float64]
 BodyPair = tuple[str, str]
 
+MARGIN = 0.001
+"""Primitives closer than this [m] touch: what scoring counts as contact unless a room says more."""
+
 
 class SelfCollision:
     """A robot alone, as a Drake plant that tells which of its bodies touch.
@@ -64,7 +67,7 @@ class SelfCollision:
         for primitive in robot.load_primitives():
             # Extra bodies have no mesh: their primitives are all there is.
             if not hulls or primitive.body not in model.links:
-                add.primitive(primitive)
+                add.primitive(primitive if hulls else primitive.shrunk(-MARGIN / 2))
         plant.Finalize()
         self._bodies = add.bodies
         _compare_all_but_welded(scene_graph.collision_filter_manager(), self._bodies, robot)
@@ -79,6 +82,8 @@ class SelfCollision:
 
     def touching(self, positions: Mapping[str, float]) -> frozenset[BodyPair]:
         """Return the pairs of bodies that touch, each sorted by name.
+
+        Primitives touch when they come closer than `MARGIN`, hulls when they overlap.
 
         Args:
             positions: Joints [rad or m]; those not named stay where they were.
