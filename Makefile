@@ -10,10 +10,10 @@ PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint format benchmark clean
+.PHONY: help demo test test-all lint format benchmark benchmark-peers clean
 
 help:  ## List the targets
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
 
 demo: $(STAMP)  ## Score, choose, verify and draw shaving in the wheelchair; results in out/demo
 	@mkdir -p $(OUT)
@@ -38,7 +38,15 @@ format: $(STAMP)  ## Rewrite the code in house format and fix what can be fixed
 	$(BIN)/ruff check --fix .
 
 benchmark: $(STAMP)  ## Print the measured numbers with machine, versions and spread
+	@mkdir -p $(OUT)
 	$(BIN)/python benchmarks/run.py
+	$(BIN)/python benchmarks/rows.py --out $(OUT)/rows
+	$(BIN)/python benchmarks/selection.py
+
+benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the same problems
+	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[benchmarks]' || \
+	  echo "Not every peer could be installed; what is absent is left out with a line." >&2
+	$(BIN)/python benchmarks/peers.py
 
 clean:  ## Remove everything the other targets made
 	rm -rf $(VENV) $(OUT) build dist

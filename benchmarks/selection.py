@@ -10,14 +10,13 @@ are those of one thread's processor beside those of the clock. Nothing here is a
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 import time
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from table import header, row
 
 from tcs.errors import SelectionError
 from tcs.scoring import build_sets
@@ -27,7 +26,6 @@ from tcs.space import Grid
 from tcs.store import load_scores
 from tcs.tables import InitialConfiguration, Reason, ScoreTable, SetTable
 
-PACKAGES = ("tcs", "numpy", "scipy", "joblib")
 GOALS = 14
 CANDIDATES_AT_ONCE = 16
 
@@ -40,9 +38,7 @@ def main() -> int:
     parser.add_argument("--checked", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    row("machine", f"{platform.machine()}, {processor()}")
-    row("python", platform.python_version())
-    row("versions", ", ".join(f"{name} {version(name)}" for name in PACKAGES))
+    header()
     row("places, checked, seed", f"{options.places}, {options.checked}, {options.seed}")
     wrong = 0
     for name, tables in sources(options.files):
@@ -220,21 +216,6 @@ def bed_like_scores(grid: Grid) -> ScoreTable:
         arm_joints=np.zeros((int(np.count_nonzero(isotropy)), 7), dtype=np.float32),
         weights=np.full(GOALS, 1.0 / GOALS),
     )
-
-
-def row(name: str, text: str) -> None:
-    """Print one line of the table."""
-    print(f"{name:<34} {text}", flush=True)
-
-
-def processor() -> str:
-    """Return the processor's name and how many cores there are."""
-    names = [
-        line.split(":", 1)[1].strip()
-        for line in Path("/proc/cpuinfo").read_text().splitlines()
-        if line.startswith("model name")
-    ]
-    return f"{names[0]} x {len(names)}" if names else platform.processor()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,143 @@
+"""What the sweep costs: threads, grid size, its parts, and Drake's floor under it."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+import numpy as np
+from lane_costs import measure_shares
+from peer_drake import WinnersChecker
+from peer_problems import Bench, Pair
+from table import row, spread
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.problem import UNCHECKED, Problem
+from tcs.kernel.sweep import Scores, score_slice
+from tcs.scoring import sweep
+from tcs.scoring.sweep import SLICE
+from tcs.tables import Reason
+
+GRID_PARTS = (8, 4, 2, 1)
+"""Every how manieth base x of the grid is scored."""
+EVERY = 4
+"""Every how manieth slice of the grid the parts are timed on."""
+SERIES = ("1", "2", "cpu", "floor", "floor cpu", "overlaps")
+ARM_GAPS = ("gap_room", "gap_body", "gap_arm")
+
+
+def sweep_costs(bench: Bench, repeats: int) -> None:
+    """Print scoring on one and on two threads, and what Drake needs to check each winner once."""
+    weights, pairs = bench.job.task.weights, bench.scores.reason.size
+    checker = WinnersChecker(bench.lowered)
+    winners = _winners(bench, checker)
+    taken: dict[str, list[float]] = {name: [] for name in SERIES}
+    checked, overlapping = checker.check(winners), 0
+    for _ in range(repeats):
+        taken["1"].append(sweep(bench.lowered, weights, jobs=1).scoring_seconds)
+        used = time.process_time()
+        taken["2"].append(sweep(bench.lowered, weights, jobs=2).scoring_seconds)
+        taken["cpu"].append(time.process_time() - used)
+        checked = checker.check(winners)
+        taken["floor"].append(checked.seconds)
+        taken["floor cpu"].append(checked.processor_seconds)
+        seconds, overlapping = checker.overlaps(winners)
+        taken["overlaps"].append(seconds)
+    for jobs in ("1", "2"):
+        rate = pairs / float(np.median(taken[jobs]))
+        row(f"whole sweep, jobs {jobs}", f"{spread(taken[jobs])}, {rate:.3g} pairs a second")
+    row("  processor time, jobs 2", spread(taken["cpu"]))
+    row("thread scaling 1 -> 2", _ratio(taken["1"], taken["2"]))
+    row("floor: each winner checked once", f"{spread(taken['floor'])}, {len(winners)} winners")
+    row("  processor time", spread(taken["floor cpu"]))
+    row("  checker's contexts; winners hit", f"{checked.contexts}; {checked.colliding}")
+    row("  overlap or not, processor time", f"{spread(taken['overlaps'])}, {overlapping} hit")
+    row("floor / sweep, both on 2 threads", _ratio(taken["floor"], taken["2"]))
+    row("  by processor time", _ratio(taken["floor cpu"], taken["cpu"]))
+
+
+def grid_costs(bench: Bench, repeats: int) -> None:
+    """Print what a configuration costs on parts of the grid: the same all along if linear."""
+    size = len(bench.scores.reason)
+    each: dict[int, list[float]] = {part: [] for part in GRID_PARTS}
+    count = dict.fromkeys(GRID_PARTS, size)
+    for _ in range(repeats):
+        for part in GRID_PARTS:
+            grid = bench.lowered.grid._replace(base_x=bench.lowered.grid.base_x[::part])
+            lowered = dataclasses.replace(bench.lowered, grid=grid)
+            swept = sweep(lowered, bench.job.task.weights, jobs=1)
+            count[part] = len(swept.tables[0].reason)
+            each[part].append(swept.scoring_seconds / count[part])
+    for part in GRID_PARTS:
+        text = f"{count[part]} configurations, each {spread(each[part], 'us', 1e6)}"
+        row(f"1/{part} of the grid, jobs 1", text)
+
+
+def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
+    """Print how the kernel's time splits up, found by leaving parts of the work out.
+
+    The sweep itself runs on altered data: without goals only the base is checked; with an elbow
+    that spans no distance the reach test turns every goal away; with no shape of the arm to check
+    there is no collision. The differences are the parts. Inverse kinematics and the measure share
+    a loop: `lane_costs` tells them apart.
+    """
+    problem = bench.problem
+    no_goals = {"goal_R": problem.goal_R[:, :0].copy(), "goal_p": problem.goal_p[:, :0].copy()}
+    no_reach = problem.arm._replace(elbow_cos=np.array([-np.inf, -np.inf]))
+    no_gaps = {name: np.full_like(getattr(problem, name), UNCHECKED) for name in ARM_GAPS}
+    stages = {
+        "base": (problem._replace(**no_goals), bench.grippers[:, :0].copy()),
+        "reach": (problem._replace(arm=no_reach), bench.grippers),
+        "solved": (problem._replace(**no_gaps), bench.grippers),
+        "all": (problem, bench.grippers),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in stages}
+    for _ in range(repeats):
+        for name, (stage, grippers) in stages.items():
+            taken[name].append(_processor_seconds(stage, grippers, len(bench.scores.reason)))
+    base, reach, solved, whole = (np.array(taken[name]) for name in stages)
+    row(f"kernel on 1/{EVERY} of the grid, jobs 1", f"{spread(list(whole))}, of which")
+    _part("base check", base / whole)
+    _part("prefilter: too far", (reach - base) / whole)
+    shares = np.array(measure_shares(problem.arm, pairs, repeats))
+    if shares.size:
+        _part("inverse kinematics", (solved - reach) / whole * (1.0 - shares))
+        _part("measure", (solved - reach) / whole * shares)
+    else:
+        _part("inverse kinematics, measure", (solved - reach) / whole)
+    _part("collision of arm and gripper", (whole - solved) / whole)
+
+
+def _winners(bench: Bench, checker: WinnersChecker) -> FloatArray:
+    """Return the checker's configurations of all reached pairs."""
+    h, _ = np.nonzero(bench.scores.reason == Reason.REACHED)
+    at = bench.job.scored_grid.values(h)
+    base = np.stack([at["base_x"], at["base_y"], at["base_yaw"]], axis=1)
+    arm = bench.scores.arm_joints.astype(np.float64)
+    return checker.configurations(base, h % bench.problem.torso_levels, arm)
+
+
+def _processor_seconds(problem: Problem, grippers: IntArray, size: int) -> float:
+    """Return the processor time of every EVERY-th slice of the grid."""
+    goals, used = problem.goal_p.shape[1], 0.0
+    for start in range(0, size, EVERY * SLICE):
+        stop = min(start + SLICE, size)
+        shape = (stop - start, goals)
+        scores = Scores(
+            reason=np.empty(shape, np.uint8),
+            contact=np.empty(shape, np.int32),
+            isotropy=np.zeros(shape, np.float32),
+            joints=np.zeros((*shape, 7), np.float32),
+        )
+        begun = time.process_time()
+        score_slice(problem, grippers, start, stop, scores)
+        used += time.process_time() - begun
+    return used
+
+
+def _part(name: str, shares: FloatArray) -> None:
+    row(f"  {name}", spread(list(100.0 * shares), "%"))
+
+
+def _ratio(first: list[float], second: list[float]) -> str:
+    return spread([a / b for a, b in zip(first, second, strict=True)], "x")

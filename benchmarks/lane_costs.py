@@ -1,0 +1,94 @@
+"""How much of the lanes' time the measure takes, by compiling their loop without it."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+import time
+from collections.abc import Callable
+
+import numba
+import numpy as np
+from peer_problems import Pair
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.ik import wrist_goal
+from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.solver import ArmSolver
+
+LANES = 48
+ROUNDS = 20
+"""Passes over all goals in one timing: milliseconds, so that the clock is fine enough."""
+
+
+def measure_shares(arm: ArmSolver, pairs: tuple[Pair, ...], repeats: int) -> list[float]:
+    """Return which share of the lanes' time goes into the measure, once for each repeat.
+
+    Empty if the loop does not store the measure in a way that can be taken out.
+    """
+    bare = lanes_without_measure()
+    if bare is None:
+        return []
+    goals = np.empty((len(pairs), 4, 3))
+    for pair, goal in zip(pairs, goals, strict=True):
+        wrist_goal(arm, pair.X_AG[:3, :3].copy(), pair.X_AG[:3, 3].copy(), goal)
+    for function in (bare, solve_lanes):
+        _run(function, arm, goals, LANES, 1)
+    shares = []
+    for _ in range(repeats):
+        used = []
+        for function in (bare, solve_lanes):
+            begun = time.process_time()
+            _run(function, arm, goals, LANES, ROUNDS)
+            used.append(time.process_time() - begun)
+        shares.append(1.0 - used[0] / used[1])
+    return shares
+
+
+def lanes_without_measure() -> Callable[..., None] | None:
+    """Return the loop over the lanes compiled without storing the measure, None if it cannot be.
+
+    The compiler then drops by itself all that only the measure needs.
+    """
+    function = solve_lanes.py_func
+    stripper = _Stripper()
+    tree = stripper.visit(ast.parse(textwrap.dedent(inspect.getsource(function))))
+    if not stripper.removed:
+        return None
+    tree.body[0].decorator_list = []
+    names = dict(function.__globals__)
+    exec(compile(ast.fix_missing_locations(tree), "lanes without measure", "exec"), names)
+    compiled: Callable[..., None] = numba.jit(**solve_lanes.targetoptions)(names[function.__name__])
+    return compiled
+
+
+class _Stripper(ast.NodeTransformer):
+    """Takes out every `measure[...] = ...`."""
+
+    def __init__(self) -> None:
+        self.removed = 0
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        target = node.targets[0]
+        stores = isinstance(target, ast.Subscript) and isinstance(target.value, ast.Name)
+        if stores and target.value.id == "measure":
+            self.removed += 1
+            return ast.Pass()
+        return node
+
+
+@numba.njit(nogil=True)
+def _run(
+    function: Callable[..., None], arm: ArmSolver, goals: FloatArray, lanes: int, rounds: int
+) -> None:
+    """Solve lanes spread over a full turn for every goal and branch."""
+    cosines, sines = np.empty(lanes), np.empty(lanes)
+    for i in range(lanes):
+        angle = 2.0 * np.pi * i / lanes
+        cosines[i], sines[i] = np.cos(angle), np.sin(angle)
+    slack, measure = np.empty(lanes), np.empty(lanes)
+    for _ in range(rounds):
+        for k in range(len(goals)):
+            for b in range(len(arm.branches)):
+                function(arm, goals[k], arm.branches[b], cosines, sines, lanes, slack, measure)

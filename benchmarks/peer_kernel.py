@@ -1,0 +1,113 @@
+"""Our kernel on single pairs: one configuration, one goal, everything that a sweep does for it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from peer_problems import Answer, Bench, Pair
+
+from tcs.kernel.arrays import IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import Workspace, new_workspace
+from tcs.kernel.problem import Problem
+from tcs.kernel.search import Search, new_search
+
+# `score_slice` is this with memory of its own, but not compiled itself: from Python, a call costs
+# more than a pair.
+from tcs.kernel.sweep import Scores, _score_slice
+from tcs.tables import Reason
+
+REPEATS = 32
+"""How often a pair is solved in one call for its own time: the clock does not tell microseconds."""
+
+
+@jit
+def score_each(
+    problem: Problem,
+    work: Workspace,
+    search: Search,
+    grippers: IntArray,
+    configurations: IntArray,
+    repeats: int,
+    scores: Scores,
+) -> None:
+    """Score configurations one by one, as slices of one, the whole row of them `repeats` times.
+
+    Args:
+        problem: The scene, with a single goal.
+        work: Scratch memory.
+        search: Scratch memory.
+        grippers: From `gripper_contacts`, of that goal.
+        configurations: Flat indices, shape (n,).
+        repeats: How often.
+        scores: Filled, n rows.
+    """
+    for _ in range(repeats):
+        for i in range(len(configurations)):
+            h = configurations[i]
+            one = Scores(
+                scores.reason[i : i + 1],
+                scores.contact[i : i + 1],
+                scores.isotropy[i : i + 1],
+                scores.joints[i : i + 1],
+            )
+            _score_slice(problem, work, search, grippers, h, h + 1, one)
+
+
+class Kernel:
+    """Our kernel, best collision-free solution of each pair, on one thread.
+
+    Unlike the peers it also checks base and gripper, and looks for the best solution.
+    """
+
+    labels = ("tcs kernel, the best one",)
+
+    def __init__(self, bench: Bench) -> None:
+        """Cut the problem into one for each goal."""
+        goals = range(bench.problem.goal_p.shape[1])
+        self._problems = [
+            bench.problem._replace(
+                goal_R=np.ascontiguousarray(bench.problem.goal_R[:, g : g + 1]),
+                goal_p=np.ascontiguousarray(bench.problem.goal_p[:, g : g + 1]),
+            )
+            for g in goals
+        ]
+        self._grippers = [np.ascontiguousarray(bench.grippers[:, g : g + 1]) for g in goals]
+        self._work, self._search = new_workspace(bench.problem), new_search()
+        # Load or compile the machine code.
+        self._score(0, np.zeros(1, np.int64), 1)
+
+    def solve(self, pair: Pair, rng: np.random.Generator) -> tuple[Answer, ...]:
+        """Return the best solution, if any, and its share of REPEATS runs in one call."""
+        rows = np.array([pair.configuration])
+        begun = time.process_time()
+        scores = self._score(pair.goal, rows, REPEATS)
+        seconds = (time.process_time() - begun) / REPEATS
+        reached = scores.reason[0, 0] == Reason.REACHED
+        return (Answer(seconds, (scores.joints[0, 0].astype(float),) if reached else ()),)
+
+    def seconds(self, pairs: tuple[Pair, ...]) -> float:
+        """Return the processor time of solving all pairs once, each time one after the other.
+
+        Every pair is another one than the one before, as in a sweep; REPEATS rounds are timed.
+        """
+        used = 0.0
+        for g in range(len(self._problems)):
+            rows = np.array([pair.configuration for pair in pairs if pair.goal == g], np.int64)
+            if rows.size:
+                begun = time.process_time()
+                self._score(g, rows, REPEATS)
+                used += time.process_time() - begun
+        return used / REPEATS
+
+    def _score(self, g: int, rows: IntArray, repeats: int) -> Scores:
+        scores = Scores(
+            reason=np.empty((rows.size, 1), np.uint8),
+            contact=np.empty((rows.size, 1), np.int32),
+            isotropy=np.zeros((rows.size, 1), np.float32),
+            joints=np.zeros((rows.size, 1, 7), np.float32),
+        )
+        memory = self._work, self._search
+        score_each(self._problems[g], *memory, self._grippers[g], rows, repeats, scores)
+        return scores

@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from tcs.kernel.reference import link_poses
+from tcs.scoring import load_job
+
+FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
+# Python reads None as "there is no such module".
+WITHOUT_PEERS = """
+import runpy, sys
+sys.modules.update(eaik=None, trac_ik=None, pinocchio=None)
+sys.argv = sys.argv[1:]
+sys.path.insert(0, {folder!r})
+runpy.run_path({script!r}, run_name="__main__")
+"""
+
+
+@pytest.fixture
+def module(monkeypatch):
+    """Import a script's module by its plain name, as the scripts do, and forget it afterwards."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    yield importlib.import_module
+    for path in FOLDER.glob("*.py"):
+        sys.modules.pop(path.stem, None)
+
+
+@pytest.fixture(scope="module")
+def chain():
+    job = load_job("shaving", "wheelchair", "pr2")
+    return job.lowered(job.scene()).arrays.chain
+
+
+def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run peers.py on a machine without any of the optional peers."""
+    program = WITHOUT_PEERS.format(folder=str(FOLDER), script=str(FOLDER / "peers.py"))
+    command = [sys.executable, "-c", program, "peers.py", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("script", ["rows.py", "run.py", "selection.py"])
+def test_each_script_says_how_it_is_used(script):
+    command = [sys.executable, str(FOLDER / script), "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"usage: {script}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--help"], 0, "--problems"),
+        (["--peers", "eaik,moveit"], 2, "'moveit' is unknown; there are drake, eaik, tracik"),
+        (["--problems", "1"], 2, "--problems must be 2 or more"),
+    ],
+)
+def test_the_command_line_is_checked_before_anything_is_built(arguments, code, said):
+    done = peers(*arguments)
+    assert done.returncode == code
+    assert said in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("package", ["eaik", "trac_ik", "pinocchio"])
+def test_an_absent_peer_is_skipped_with_a_line(module, monkeypatch, capsys, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    script = module("peers")
+    kinds = dict(zip(("eaik", "trac_ik", "pinocchio"), script.OPTIONAL.values(), strict=True))
+    assert script.made(*kinds[package], None) == []
+    printed = capsys.readouterr().out
+    assert printed.startswith(kinds[package][0])
+    assert "skipped: " in printed
+    assert printed.count("\n") == 1
+
+
+def test_a_peer_that_cannot_take_the_arm_says_why(module, capsys):
+    script = module("peers")
+
+    def refuse(chain):
+        raise module("peer_arms").UnfitArmError("no closed form")
+
+    assert script.made("EAIK", refuse, None) == []
+    assert re.fullmatch(r"EAIK +skipped: no closed form\n", capsys.readouterr().out)
+
+
+def test_the_urdf_handed_over_is_the_arm(module, chain):
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModelsFromString(module("peer_arms").urdf(chain), "urdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("arm_base"))
+    plant.Finalize()
+    # The URDF says "continuous" by leaving the limits out.
+    np.testing.assert_array_equal(plant.GetPositionLowerLimits(), chain.lower)
+    np.testing.assert_array_equal(plant.GetPositionUpperLimits(), chain.upper)
+    context = plant.CreateDefaultContext()
+    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, 7)):
+        plant.SetPositions(context, q)
+        X = plant.GetFrameByName("tool").CalcPoseInWorld(context)
+        R, p = link_poses(chain, q)[-1]
+        # Eight rotations written as angles: some roundings of 1e-16 each.
+        np.testing.assert_allclose(X.rotation().matrix(), R, atol=1e-14)
+        np.testing.assert_allclose(X.translation(), p, atol=1e-14)
+
+
+def test_angles_are_turned_to_their_limits(module):
+    turned = module("peer_problems").turned
+    lower, upper = np.array([-1.0, 5.0, -np.inf]), np.array([1.0, 7.0, np.inf])
+    q = turned(np.array([6.0, 0.0, 7.0]), lower, upper)
+    # One turn is subtracted or added: one rounding.
+    np.testing.assert_allclose(q, np.array([6.0, 0.0, 7.0]) + 2 * np.pi * np.array([-1, 1, -1]))
+
+
+@pytest.mark.slow
+def test_a_small_run_prints_every_part():
+    done = peers("--problems", "4", "--repeats", "1")
+    assert done.returncode == 0, done.stderr
+    texts: dict[str, list[str]] = {}
+    for line in done.stdout.splitlines():
+        # Columns are two spaces or more apart, and names may be indented.
+        name, *cells = re.split(r"  +", line.strip())
+        texts.setdefault(name, []).append(" | ".join(cells))
+    # Ours finds what the dense scan finds, and what it finds stands before Drake.
+    answers, times = texts["tcs kernel, the best one"]
+    assert answers == "2 of 2 | 2 of 2 | 0 of 2 | 0 of 2 | 1.0"
+    assert "(" in times
+    free = texts["Drake IK, min distance, 5 tries"][0].split(" | ")[3]
+    assert free == "0 of 2"
+    assert all(texts[name][0].startswith("skipped: ") for name in ("EAIK", "TRAC-IK"))
+    # Drake's checker has a context for each thread, and refuses no winner.
+    assert texts["checker's contexts; winners hit"] == ["2; 0"]
+    parts = ("base check", "prefilter: too far", "inverse kinematics", "measure")
+    shares = [float(texts[p][0].split(" %")[0]) for p in (*parts, "collision of arm and gripper")]
+    # All of it, up to what rounding to three digits leaves out; each part is a real one.
+    assert sum(shares) == pytest.approx(100.0, abs=0.01)
+    assert min(shares) > 0.0
