@@ -82,6 +82,23 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
 
 
 @jit
+def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
+    """Return whether a window narrower than the spacing may hide about infeasible lane i.
+
+    Args:
+        slack: Of neighbouring lanes, shape (>= count,).
+        i: The lane.
+        count: How many lanes there are.
+        step: Their spacing [rad].
+    """
+    if slack[i] >= 0.0 or slack[i] <= -PEAK_SLOPE * step:
+        return False
+    left = slack[i - 1] if i > 0 else -np.inf
+    right = slack[i + 1] if i + 1 < count else -np.inf
+    return left <= slack[i] and right <= slack[i]
+
+
+@jit
 def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, found: int) -> int:
     """Append the stretches of a row of lanes in which feasible angles lie or may hide.
 
@@ -109,17 +126,15 @@ def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, 
             found += 1
             i = j + 1
             continue
-        left = slack[i - 1] if i > 0 else -np.inf
-        right = slack[i + 1] if i + 1 < count else -np.inf
-        peak = slack[i] >= left and slack[i] >= right
-        if peak and slack[i] > -PEAK_SLOPE * step and left < 0.0 and right < 0.0:
+        if is_peak(slack, i, count, step):
             windows[found, 0], windows[found, 1] = max(i - 1, 0), min(i + 1, count - 1)
             found += 1
         i += 1
     return found
 
 
-PEAK_SLOPE = 4.0
+PEAK_SLOPE = 10.0
 """How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
-difference of cosines of joint angles, which move at most a few radians per radian of the free
-joint away from singularities; steeper windows are narrower than what a dense scan resolves."""
+difference of cosines of joint angles, which move a few radians per radian of the free joint, and
+up to 13 where one limit is left just as another is met. A peak lies at most half a spacing from
+its best lane, so this allows for slopes of 20."""

@@ -41,7 +41,7 @@ from tcs.kernel.reference import (
     solutions,
     turn,
 )
-from tcs.kernel.search import FINE_STEP, FINEST_LANES, FIRST_LANES, LEAST_LANES
+from tcs.kernel.search import FINE_STEP, FINEST_LANES, FIRST_LANES, LEAST_LANES, PEAK_LOOKS
 
 Branch = tuple[int, int, int]
 
@@ -255,11 +255,19 @@ def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
         if i - 1 not in inside:
             j = next(k for k in range(i, last + 1) if k == last or slack[k + 1] < 0)
             windows.append((max(i - 1, 0), min(j + 1, last)))
+    windows += [(max(i - 1, 0), min(i + 1, last)) for i in peaks_of(slack, step)]
+    return windows
+
+
+def peaks_of(slack: list[float], step: float) -> list[int]:
+    """Return the infeasible lanes about which a window narrower than the spacing may hide."""
+    last = len(slack) - 1
+    peaks = []
     for i, left in enumerate(slack):
         sides = [slack[k] for k in (i - 1, i + 1) if 0 <= k <= last]
-        if -PEAK_SLOPE * step < left < 0 and all(s < 0 and s <= left for s in sides):
-            windows.append((max(i - 1, 0), min(i + 1, last)))
-    return windows
+        if -PEAK_SLOPE * step < left < 0 and all(s <= left for s in sides):
+            peaks.append(i)
+    return peaks
 
 
 def look_closer(
@@ -269,17 +277,32 @@ def look_closer(
     count = max(LEAST_LANES, int((last - first) / FINE_STEP) + 1)
     step = (last - first) / (count - 1)
     angles = [first + i * step for i in range(count)]
-    inside = [solutions(chain, X_AG, angle)[branch].slack >= 0 for angle in angles]
+    slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
+    inside = [left >= 0 for left in slack]
     found = candidates_at(chain, X_AG, branch, angles, step)
     for i in range(1, count):
         if inside[i] != inside[i - 1]:
             outer, inner = (i - 1, i) if inside[i] else (i, i - 1)
             found += look_between(chain, X_AG, branch, angles[outer], angles[inner])
-    if not any(inside):
-        slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
-        peak = angles[slack.index(max(slack))]
-        found += look_between(chain, X_AG, branch, peak - step, peak + step)
+    for i in peaks_of(slack, step):
+        found += close_in(chain, X_AG, branch, angles[i], step, (first, last))
     return found
+
+
+def close_in(
+    chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float, ends: tuple[float, float]
+) -> list[Candidate]:
+    """Return the feasible angles about an infeasible peak, found by ever narrower looks."""
+    for _ in range(PEAK_LOOKS):
+        low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
+        step = (high - low) / (FINEST_LANES - 1)
+        angles = [low + i * step for i in range(FINEST_LANES)]
+        found = candidates_at(chain, X_AG, branch, angles, step)
+        slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
+        if found or max(slack) < -PEAK_SLOPE * step:
+            return found
+        middle = angles[slack.index(max(slack))]
+    return []
 
 
 def look_between(
