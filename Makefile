@@ -41,7 +41,7 @@ benchmark: $(STAMP)  ## Print the measured numbers with machine, versions and sp
 	@mkdir -p $(OUT)
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/rows.py --out $(OUT)/rows
-	$(BIN)/python benchmarks/selection.py
+	$(BIN)/python benchmarks/selection.py $(OUT)/rows/bathing-bed-pr2.tcs $(OUT)/rows/shaving-wheelchair-pr2.tcs
 
 benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the same problems
 	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[benchmarks]' || \
