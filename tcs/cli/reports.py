@@ -23,7 +23,7 @@ REASONS = {
     "gripper_blocked": "gripper would touch something at the goal",
     "arm_blocked": "every arm posture would touch something",
 }
-_ROWS_WIDTH = 160
+_ROWS_WIDTH = 170
 """Columns that the table of all rows needs."""
 _UNITS = {"base_x": "m", "base_y": "m", "torso": "m"}
 
@@ -188,5 +188,9 @@ def new_table(*headings: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for heading in headings:
         right = heading.startswith(">")
-        table.add_column(heading.removeprefix(">"), justify="right" if right else "left")
+        # Where a terminal is too narrow, names go on in the next line: cut off, left and right
+        # arm would look the same.
+        table.add_column(
+            heading.removeprefix(">"), justify="right" if right else "left", overflow="fold"
+        )
     return table

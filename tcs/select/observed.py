@@ -22,6 +22,9 @@ from tcs.tables import InitialConfiguration
 FARTHEST_FRAME = 0.10
 """Greatest distance [m], root mean square over the frames seen, between where they are and where
 they were scored: four of the bed's shifts. Farther off, the scores are those of another scene."""
+FARTHEST_ALONE = 0.10
+"""The same for a single scored value without a step [m or rad]: no neighbour says how far it is
+to stand for, and 0.10 rad moves what is a metre from the joint by as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,8 @@ def nearest_table(
         file: A score file.
         here: The current state; how the environment is set tells where frames are to be expected.
             None where that is not known.
-        observed: Values of the observed axes [m or rad]; what is not told counts as zero.
+        observed: Values of the observed axes [m or rad]; what is not told counts as zero, or as
+            the only value that was scored.
         seen: Places of body frames in W [m], by name.
 
     Raises:
@@ -70,8 +74,11 @@ def nearest_table(
     for name in observed:
         if name not in names:
             raise UnknownNameError("observed axis", name, names, where="score file")
+    # Untold, an axis with a single value is where it was scored: there is nothing to choose.
+    untold = [float(axis.values[0]) if axis.count == 1 else 0.0 for axis in file.observed_axes]
     along = [
-        _nearest_value(axis, float(observed.get(axis.name, 0.0))) for axis in file.observed_axes
+        _nearest_value(axis, float(observed.get(axis.name, value)))
+        for axis, value in zip(file.observed_axes, untold, strict=True)
     ]
     shape = tuple(axis.count for axis in file.observed_axes)
     index = int(np.ravel_multi_index(along, shape)) if along else 0
@@ -86,14 +93,18 @@ def _nearest_value(axis: Axis, value: float) -> int:
         raise SelectionError(f"Observed '{axis.name}' is {value}; must be a finite number.")
     distance = np.abs(axis.values - value)
     nearest = int(np.argmin(distance))
-    half = float(np.diff(axis.values[:2])[0]) / 2.0 if axis.count > 1 else math.inf
     # Half a step beyond the ends is as near as it gets between them.
+    half = (math.radians(axis.step) if axis.unit == "deg" else axis.step) / 2.0
+    if axis.step == 0.0:
+        half = FARTHEST_ALONE
     if distance[nearest] > half * (1.0 + 1e-9):
-        unit = axis.held_unit
+        unit, first, last = axis.held_unit, axis.values[0], axis.values[-1]
+        scored = f"is only {first:g} {unit}"
+        if axis.count > 1:
+            scored = f"are only {first:g} to {last:g} {unit}, {axis.count} values"
         raise SelectionError(
-            f"Observed '{axis.name}' is {value:g} {unit}, but scored are only {axis.values[0]:g} "
-            f"to {axis.values[-1]:g} {unit}, {axis.count} values. Score an environment whose "
-            f"'observed' axis reaches it, or move the person."
+            f"Observed '{axis.name}' is {value:g} {unit}, but scored {scored}. Score an "
+            "environment whose 'observed' axis reaches it, or move the person."
         )
     return nearest
 

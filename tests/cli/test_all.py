@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tcs
+from tcs.cli import reports
 from tests.store.example import METADATA, score_file
 
 ROWS = {
@@ -58,6 +59,22 @@ def test_a_person_gets_one_line_a_row(tcs_command, stand_in, tmp_path):
     (line,) = [line for line in ran.out.splitlines() if "shaving" in line]
     assert "bed-no-wall" in line
     assert "…" not in ran.out
+
+
+def test_every_name_and_number_is_printed_in_full(tcs_command, stand_in, tmp_path, capsys):
+    rows = tcs_command("score", "--all", "--out", tmp_path, "--json").json["rows"]
+    # As many digits as the largest of the real rows has in each column.
+    large = {
+        **dict.fromkeys(("configurations", "sets"), 8_888_888),
+        **dict.fromkeys(("reached_pairs", "candidates"), 88_888),
+        **dict.fromkeys(("scoring_seconds", "total_seconds"), 888.88),
+        **{"goals": 14, "file_bytes": 88_880_000},
+    }
+    reports.report_rows({"rows": [row | large for row in rows]})
+    lines = capsys.readouterr().out.splitlines()
+    for task, environment in ROWS:
+        assert sum(line.split()[:3] == [task, environment, "8,888,888"] for line in lines) == 1
+    assert not any("…" in line for line in lines)
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,23 @@ def test_what_is_not_told_is_nominal(file):
     assert nearest_table(score_file(), at()).index == 0
 
 
+@pytest.mark.parametrize(
+    ("step", "near", "far"),
+    [(0.05, (0.276, 0.324), (0.274, 5.0)), (0.0, (0.21, 0.39), (0.19, -5.0))],
+)
+def test_a_single_value_does_not_stand_for_everything(step, near, far):
+    alone = {**SHIFTS, "start": 0.3, "step": step, "count": 1}
+    file = score_file(observed=[alone])
+    assert nearest_table(file).index == 0
+    for told in near:
+        assert nearest_table(file, at(), {"person_y": told}).off["person_y"] == pytest.approx(
+            told - 0.3, abs=1e-12
+        )
+    for told in far:
+        with pytest.raises(SelectionError, match=r"scored is only 0\.3 m"):
+            nearest_table(file, at(), {"person_y": told})
+
+
 def test_two_axes_are_matched_one_by_one():
     file = score_file(tables=15, observed=[SHIFTS, TILTS])
     match = nearest_table(file, at(), {"head_tilt": math.radians(12.0), "person_y": -0.04})
