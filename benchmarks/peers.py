@@ -186,6 +186,8 @@ def show_ratios(
         blocks: Indices of the problems that were solved together.
     """
     row("our problems a second, 1 thread", f"{len(ours) / np.sum(ours):.3g}")
+    if len(records) == 1:
+        return
     kinds = (np.ones_like(reachable), reachable, ~reachable)
     _cells("time / ours", "all", "reachable", "unreachable", width=32)
     for label, record in list(records.items())[1:]:
