@@ -172,10 +172,11 @@ def select(
 ) -> None:
     """Choose where to stand now: the set with the greatest utility from here."""
     import tcs
-    from tcs.cli.places import axis_values, frame_places, place, settings
+    from tcs.cli.places import axis_values, frame_places, observed_settings, place
 
+    loaded = tcs.load(file)
     choice = tcs.select(
-        tcs.load(file),
+        loaded,
         place(here, torso, at or ()),
         weights=tcs.UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma),
         travel=tcs.TravelWeights(
@@ -186,7 +187,7 @@ def select(
             route=travel,
         ),
         max_members=max_members,
-        observed=settings(observed or (), "--observed"),
+        observed=observed_settings(observed or (), loaded.observed_axes),
         seen=frame_places(seen or ()),
     )
     result = reports.choice_as_json(choice)
@@ -238,7 +239,7 @@ def explain(
 
     import tcs
     from tcs.cli.explanations import report_explanation
-    from tcs.cli.places import axis_values, place, settings
+    from tcs.cli.places import axis_values, observed_settings, place
     from tcs.reasons import fix_weights
     from tcs.space import Grid
 
@@ -255,7 +256,7 @@ def explain(
             environment=axis_values(axis_weight or (), "--axis-weight"),
             route=travel,
         ),
-        observed=settings(observed or (), "--observed"),
+        observed=observed_settings(observed or (), loaded.observed_axes),
     )
     talk.print_result(explanation.to_json(), report_explanation, as_json=as_json)
 
@@ -308,7 +309,7 @@ def draw(
 ) -> None:
     """Draw one of the two pictures, of the set chosen from here or of the best one."""
     import tcs
-    from tcs.cli.places import check_writable, place, settings
+    from tcs.cli.places import check_writable, observed_settings, place
     from tcs.draw import check_format, save_figure
 
     check_format(out)
@@ -317,7 +318,7 @@ def draw(
 
     from tcs.cli import pictures
 
-    found = settings(observed or (), "--observed")
+    found = observed_settings(observed or (), loaded.observed_axes)
     shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members, found)
     figure = pictures.map_figure if context.info_name == "map" else pictures.scene_figure
     save_figure(out, figure(loaded, shown))

@@ -89,9 +89,13 @@ class Shown:
 
 
 def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int, ...]:
-    """Return the best set of a table with at most so many members, wherever the robot is."""
+    """Return the best set of a table with at most so many members, wherever the robot is.
+
+    Raises:
+        SelectionError: If the file holds no sets of so many.
+    """
     sets = file.tables[table].sets
-    if max_members is None or len(sets.best) <= max_members:
+    if max_members is None or len(sets.best) <= max_members <= sets.max_members:
         return sets.best
     if max_members == 1:
         return sets.best_single

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tcs.errors import OutputError, SelectionError
+from tcs.space import Axis
 from tcs.tables import InitialConfiguration
 
 
@@ -59,6 +60,30 @@ def settings(given: Sequence[str], option: str) -> dict[str, float]:
         if axis in found:
             raise SelectionError(f"{option} sets '{axis}' twice. Give it once.")
         found[axis] = math.radians(value) if name.endswith("_deg") else value
+    return found
+
+
+def observed_settings(given: Sequence[str], axes: Sequence[Axis]) -> dict[str, float]:
+    """Return how the person is found, given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
+
+    Args:
+        given: What stood on the command line.
+        axes: The observed axes of the score file; names that are none of them pass.
+
+    Raises:
+        SelectionError: If one is not of that form or in the other unit, or an axis is set twice.
+
+    >>> observed_settings(["person_y=0.05"], [Axis("person_y", "m", -0.1, 0.05, 5)])
+    {'person_y': 0.05}
+    """
+    found = settings(given, "--observed")
+    written = [name for name, _ in axis_values(given, "--observed")]
+    for axis in axes:
+        right = f"{axis.name}_deg" if axis.unit == "deg" else axis.name
+        if axis.name in found and right not in written:
+            raise SelectionError(
+                f"--observed: '{axis.name}' is scored in {axis.unit}. Write {right}=VALUE."
+            )
     return found
 
 

@@ -193,6 +193,7 @@ def test_the_observed_shift_is_told(tcs_command, tmp_path):
         (("--observed", "person_y=0.2"), "scored are only -0.05 to 0.05 m"),
         (("--observed", "person_y"), "NAME=NUMBER"),
         (("--observed", "person_y=0", "--observed", "person_y=1"), "twice"),
+        (("--observed", "person_y_deg=2"), "scored in m. Write person_y=VALUE"),
         (("--seen", "head=1,2,x"), "FRAME=X,Y,Z"),
     ],
 )
@@ -203,6 +204,17 @@ def test_a_shift_that_was_not_scored_is_told(process, tmp_path, words, said):
     assert ran.code == 1
     assert said in ran.err
     assert ran.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["map", "picture"])
+def test_a_set_larger_than_the_file_holds_is_not_drawn(process, tmp_path, command):
+    path, out = tmp_path / "pairs.tcs", tmp_path / "drawn.png"
+    tcs.save(path, score_file())
+    ran = process(command, path, "--out", out, "--max-members", 3)
+    assert ran.code == 1
+    assert "holds sets of 1 and 2 only" in ran.err
+    assert ran.err.count("\n") == 1
+    assert not out.exists()
 
 
 def test_travel_around_the_furniture(tcs_command, tmp_path):
