@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.reasons import Explanation, explain
-    from tcs.scoring import Verification, score, summary, verify
+    from tcs.scene import Observation
+    from tcs.scoring import LiveScorer, Verification, score, score_observed, summary, verify
     from tcs.select import Choice, TravelWeights, UtilityWeights, select
     from tcs.store import ScoreFile
     from tcs.store import load_scores as load
@@ -31,6 +32,8 @@ __all__ = [
     "Choice",
     "Explanation",
     "InitialConfiguration",
+    "LiveScorer",
+    "Observation",
     "ScoreFile",
     "TcsError",
     "TravelWeights",
@@ -41,6 +44,7 @@ __all__ = [
     "load",
     "save",
     "score",
+    "score_observed",
     "select",
     "summary",
     "verify",
@@ -50,6 +54,8 @@ _HOMES = {
     "Choice": ("tcs.select", "Choice"),
     "Explanation": ("tcs.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.tables", "InitialConfiguration"),
+    "LiveScorer": ("tcs.scoring", "LiveScorer"),
+    "Observation": ("tcs.scene", "Observation"),
     "ScoreFile": ("tcs.store", "ScoreFile"),
     "TcsError": ("tcs.errors", "TcsError"),
     "TravelWeights": ("tcs.select", "TravelWeights"),
@@ -59,6 +65,7 @@ _HOMES = {
     "load": ("tcs.store", "load_scores"),
     "save": ("tcs.store", "save_scores"),
     "score": ("tcs.scoring", "score"),
+    "score_observed": ("tcs.scoring", "score_observed"),
     "summary": ("tcs.scoring", "summary"),
     "verify": ("tcs.scoring", "verify"),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -114,20 +114,50 @@ def score(
     max_members: Annotated[
         int, typer.Option(min=1, max=3, help="Most members of a set; 3 takes seconds more.")
     ] = 2,
+    observed: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=VALUE",
+            help="Score the room as it is found now, e.g. person_x=0.025 (m; JOINT_deg=VALUE).",
+        ),
+    ] = None,
+    seen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FRAME=X,Y,Z",
+            help="The same from where a part of the body or the furniture is seen, in the "
+            "environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
+        ),
+    ] = None,
+    at: _At = None,
     as_json: _Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to choose from."""
     if (task is None) != everything:
         raise typer.BadParameter("name a task, or give --all for every one.", param_hint="TASK")
+    if task is None and (observed or seen):
+        raise typer.BadParameter("needs one task, not --all.", param_hint="--observed")
+    if at and not seen:
+        raise typer.BadParameter("tells how the room was set for --seen.", param_hint="--at")
 
-    from tcs.cli import rows
+    from tcs.cli import live, rows
 
-    kept = {"rule": rules, "same_environment": same_environment, "max_members": max_members}
+    kept: dict[str, Any] = {
+        "rule": rules,
+        "same_environment": same_environment,
+        "max_members": max_members,
+    }
     if task is None:
         results = rows.score_all(environment, robot, out or Path(), jobs=jobs, **kept)
         talk.print_result({"rows": results}, reports.report_rows, as_json=as_json)
         return
     environment = environment or "wheelchair"
+    if observed or seen:
+        path = out or live.live_path(task, environment, robot)
+        found = {"observed": observed or (), "seen": seen or (), "at": at or ()}
+        result = live.score_found(task, environment, robot, path, jobs=jobs, **found, **kept)
+        talk.print_result(result, live.report_found, as_json=as_json)
+        return
     path = out or rows.default_path(task, environment, robot)
     result = rows.score_one(task, environment, robot, path, jobs=jobs, **kept)
     talk.print_result(result, reports.report_scores, as_json=as_json)

@@ -12,6 +12,7 @@ from tcs.scene.environment import (
 )
 from tcs.scene.frames import body_frame_places
 from tcs.scene.lowering import LoweredScene, arm_chain, goal_poses, lower
+from tcs.scene.observation import Found, Observation, find_joints
 from tcs.scene.posture import Posture
 from tcs.scene.scene import Contact, Scene
 from tcs.scene.spec import SceneSpec
@@ -19,9 +20,11 @@ from tcs.scene.spec import SceneSpec
 __all__ = [
     "Contact",
     "EnvironmentFile",
+    "Found",
     "JointError",
     "LoweredScene",
     "ModelEntry",
+    "Observation",
     "Obstacle",
     "Posture",
     "Scene",
@@ -29,6 +32,7 @@ __all__ = [
     "arm_chain",
     "body_frame_places",
     "environment_names",
+    "find_joints",
     "goal_poses",
     "load_environment",
     "lower",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tcs.scoring.job import Job, load_job, score, summary
+from tcs.scoring.live import LiveScorer, score_observed
 from tcs.scoring.reopen import reopen
 from tcs.scoring.rows import all_rows
 from tcs.scoring.sets import build_sets
@@ -11,6 +12,7 @@ from tcs.scoring.verify import Verification, verify
 
 __all__ = [
     "Job",
+    "LiveScorer",
     "Sweep",
     "Verification",
     "all_rows",
@@ -18,6 +20,7 @@ __all__ = [
     "load_job",
     "reopen",
     "score",
+    "score_observed",
     "summary",
     "sweep",
     "verify",

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -28,6 +28,7 @@ from tcs.scoring.sets import build_sets, check_set_options
 from tcs.scoring.sweep import sweep
 from tcs.space import Axis, Grid
 from tcs.store import Scored, ScoreFile, shown_state
+from tcs.tables import ScoreTable, SetTable
 from tcs.tasks import Task, load_task
 
 MEASURE = "isotropy"
@@ -134,8 +135,56 @@ def score(
     begun = time.perf_counter()
     check_set_options(rule, max_members, min_distance)
     job = load_job(task, environment, robot)
-    scene = job.scene()
+
+    def sets_of(scores: ScoreTable) -> SetTable:
+        return build_sets(
+            scores,
+            job.grid,
+            rule=rule,
+            same_environment=same_environment,
+            max_members=max_members,
+            min_distance=min_distance,
+            jobs=jobs,
+        )
+
+    return score_scene(
+        job,
+        job.scene(),
+        sets_of,
+        named=references(job, task, environment, robot),
+        begun=begun,
+        jobs=jobs,
+        on_progress=on_progress,
+        on_compile=on_compile,
+    )
+
+
+def score_scene(
+    job: Job,
+    scene: Scene,
+    sets_of: Callable[[ScoreTable], SetTable],
+    *,
+    named: Mapping[str, Any],
+    begun: float,
+    jobs: int,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> ScoreFile:
+    """Score a job in a scene that is built already.
+
+    Args:
+        job: What is scored.
+        scene: A scene of the job; its state is left as it was.
+        sets_of: Builds the sets of a table of scores.
+        named: Entries of the metadata: how task, environment and robot are found again, and
+            whatever else there is to say.
+        begun: When the work began, by `time.perf_counter` [s].
+        jobs: Number of threads.
+        on_progress: Called with configurations scored and in all.
+        on_compile: Called before the kernel compiles, when it has to.
+    """
     lowered = job.lowered(scene)
+    digest = lowered.digest()
     swept = sweep(
         lowered,
         job.task.weights,
@@ -145,32 +194,16 @@ def score(
         on_compile=on_compile,
     )
     sets_begun = time.perf_counter()
-    tables = tuple(
-        Scored.of(
-            scores,
-            build_sets(
-                scores,
-                job.grid,
-                rule=rule,
-                same_environment=same_environment,
-                max_members=max_members,
-                min_distance=min_distance,
-                jobs=jobs,
-            ),
-        )
-        for scores in swept.tables
-    )
+    tables = tuple(Scored.of(scores, sets_of(scores)) for scores in swept.tables)
     done = time.perf_counter()
     return ScoreFile(
         metadata={
             "program_version": version("tcs"),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "task": _reference(task, job.task.name),
-            "environment": _reference(environment, job.spec.environment.name),
-            "robot": _reference(robot, job.spec.robot.name),
-            "scene_digest": lowered.digest(),
+            **named,
+            "scene_digest": digest,
             "measure": MEASURE,
-            "hashes": {"scene": lowered.digest()},
+            "hashes": {"scene": digest},
             "timings": {
                 "compile_seconds": swept.compile_seconds,
                 "scoring_seconds": swept.scoring_seconds,
@@ -186,6 +219,15 @@ def score(
         body_frames=body_frame_places(scene, job.scored_grid),
         tables=tables,
     )
+
+
+def references(job: Job, task: object, environment: object, robot: object) -> dict[str, str]:
+    """Return how the data files of a job are found again, from what it was loaded by."""
+    return {
+        "task": _reference(task, job.task.name),
+        "environment": _reference(environment, job.spec.environment.name),
+        "robot": _reference(robot, job.spec.robot.name),
+    }
 
 
 def _reference(given: object, name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from tcs.scene import LoweredScene, Scene
 from tcs.scoring.job import Job, load_job
 from tcs.store import ScoreFile, check_scene
@@ -16,6 +18,8 @@ def reopen(file: ScoreFile) -> tuple[Job, Scene, LoweredScene]:
         StoreMismatchError: If the models are not those the file was made from.
     """
     job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
+    # The file knows for which states it was scored: a scene scored as it was observed has its own.
+    job = dataclasses.replace(job, observed=file.observed_axes)
     scene = job.scene()
     lowered = job.lowered(scene)
     check_scene(file, lowered.digest())

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import tcs
+
+CORNER = """
+based_on: wheelchair
+name: corner
+title: A few places beside the wheelchair
+grid:
+  base_x: {unit: m, start: 0.95, step: 0.1, count: 2}
+  base_y: {unit: m, start: -0.7, step: 0.7, count: 2}
+  base_yaw: {unit: deg, start: 90, step: 90, count: 1}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
+"""
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory) -> Path:
+    """An environment file of the user's own, with eight configurations."""
+    path = tmp_path_factory.mktemp("corner") / "corner.yaml"
+    path.write_text(CORNER)
+    return path
+
+
+def test_the_room_is_scored_as_it_is_found(tcs_command, corner, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = (
+        "--environment",
+        corner,
+        "--observed",
+        "person_x=0.025",
+        "--observed",
+        "head_tilt_deg=3",
+    )
+    ran = tcs_command("score", "shaving", *words, "--json")
+    assert ran.code == 0
+    assert ran.json["tables"][0]["observed"] == {"person_x": 0.025, "head_tilt_deg": 3.0}
+    # Not the name of the file that is scored offline.
+    path = Path(ran.json["file"])
+    assert path == Path("shaving-corner-pr2-live.tcs")
+    expected = tcs.score_observed(
+        "shaving", "pr2", {"person_x": 0.025, "head_tilt": math.radians(3.0)}, environment=corner
+    )
+    assert (tcs.load(path).nominal.scores.isotropy == expected.nominal.scores.isotropy).all()
+    assert tcs_command("verify", path, "--pairs", 5, "--dense", 0).code == 0
+    assert tcs_command("map", path, "--out", tmp_path / "map.png").code == 0
+
+
+def test_what_is_seen_is_told_with_what_is_left_over(tcs_command, corner, tmp_path):
+    # The head belongs at (0.451, 0, 1.232); nothing lifts it by 20 mm.
+    words = ("--seen", "head=0.451,0,1.252", "--out", tmp_path / "live.tcs")
+    ran = tcs_command("score", "shaving", "--environment", corner, *words)
+    assert ran.code == 0
+    assert ran.out.splitlines()[:2] == [
+        "scored as found: everything in its place",
+        "frames seen fit to 0.0200 m",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("--observed", "head_tilt=3"), 1, "Write head_tilt_deg=VALUE"),
+        (("--observed", "persn_x=0.1"), 1, "Did you mean 'person_x'"),
+        (("--seen", "head=0,0"), 1, "three finite numbers"),
+        (("--seen", "head=0.451,0,1.5"), 1, "0.268 m from the nearest"),
+        (("--at", "bed_height=0.1"), 2, "--at"),
+    ],
+)
+def test_what_cannot_be_is_told(tcs_command, corner, tmp_path, words, code, said):
+    path = tmp_path / "live.tcs"
+    ran = tcs_command("score", "shaving", "--environment", corner, "--out", path, *words)
+    assert ran.code == code
+    assert said in ran.err
+    assert not path.exists()
+
+
+def test_all_rows_are_not_scored_as_found(tcs_command):
+    ran = tcs_command("score", "--all", "--observed", "person_x=0.1")
+    assert ran.code == 2
+    assert "needs one task" in ran.err
