@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.reasons import Explanation, explain
+    from tcs.robustness import Evaluation, evaluate
     from tcs.scene import Observation
     from tcs.scoring import LiveScorer, Verification, score, score_observed, summary, verify
     from tcs.select import Choice, TravelWeights, UtilityWeights, select
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Choice",
+    "Evaluation",
     "Explanation",
     "InitialConfiguration",
     "LiveScorer",
@@ -40,6 +42,7 @@ __all__ = [
     "UtilityWeights",
     "Verification",
     "__version__",
+    "evaluate",
     "explain",
     "load",
     "save",
@@ -52,6 +55,7 @@ __all__ = [
 
 _HOMES = {
     "Choice": ("tcs.select", "Choice"),
+    "Evaluation": ("tcs.robustness", "Evaluation"),
     "Explanation": ("tcs.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.tables", "InitialConfiguration"),
     "LiveScorer": ("tcs.scoring", "LiveScorer"),
@@ -61,6 +65,7 @@ _HOMES = {
     "TravelWeights": ("tcs.select", "TravelWeights"),
     "UtilityWeights": ("tcs.select", "UtilityWeights"),
     "Verification": ("tcs.scoring", "Verification"),
+    "evaluate": ("tcs.robustness", "evaluate"),
     "explain": ("tcs.reasons", "explain"),
     "load": ("tcs.store", "load_scores"),
     "save": ("tcs.store", "save_scores"),

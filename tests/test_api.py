@@ -9,6 +9,7 @@ from tests.store.example import score_file
 
 PROMISED = [
     "Choice",
+    "Evaluation",
     "Explanation",
     "InitialConfiguration",
     "LiveScorer",
@@ -19,6 +20,7 @@ PROMISED = [
     "UtilityWeights",
     "Verification",
     "__version__",
+    "evaluate",
     "explain",
     "load",
     "save",

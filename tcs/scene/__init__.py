@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from tcs.scene.environment import (
     EnvironmentFile,
-    JointError,
     ModelEntry,
     Obstacle,
     environment_names,
     load_environment,
 )
 from tcs.scene.frames import body_frame_places
-from tcs.scene.lowering import LoweredScene, arm_chain, goal_poses, lower
+from tcs.scene.joint_error import JointError
+from tcs.scene.lowering import LoweredScene, arm_chain, environment_at, goal_poses, lower
 from tcs.scene.observation import Found, Observation, find_joints
 from tcs.scene.posture import Posture
 from tcs.scene.scene import Contact, Scene
@@ -31,6 +31,7 @@ __all__ = [
     "SceneSpec",
     "arm_chain",
     "body_frame_places",
+    "environment_at",
     "environment_names",
     "find_joints",
     "goal_poses",

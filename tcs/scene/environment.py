@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -20,6 +19,7 @@ from tcs.documents import (
 )
 from tcs.errors import EnvironmentFileError, GridError
 from tcs.paths import data_folder, named_file, shipped_files
+from tcs.scene.joint_error import JointError
 from tcs.scene.posture import Posture
 from tcs.space import Axis, Grid
 
@@ -64,27 +64,6 @@ class Obstacle(_NamedPlace):
 
 
 E = TypeVar("E", ModelEntry, Obstacle)
-
-
-class JointError(Document):
-    """How far one joint of the environment may be from where the robot believes it is."""
-
-    distribution: Literal["normal"]
-    std: Length | None = None
-    """Standard deviation of a sliding joint [m]."""
-    std_deg: Length | None = None
-    """Standard deviation of a turning joint [deg]."""
-
-    @model_validator(mode="after")
-    def _has_one_unit(self) -> Self:
-        if (self.std is None) == (self.std_deg is None):
-            raise ValueError("give either 'std' [m] or 'std_deg' [deg]")
-        return self
-
-    @property
-    def standard_deviation(self) -> float:
-        """Standard deviation [m or rad]."""
-        return math.radians(self.std_deg) if self.std_deg is not None else float(self.std or 0.0)
 
 
 class EnvironmentFile(Document):

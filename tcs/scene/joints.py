@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pydrake.multibody.tree import Joint
 
 from tcs.errors import EnvironmentFileError, GridError, TcsError, UnknownNameError
+from tcs.scene.joint_error import JointError
 from tcs.scene.posture import Posture
 from tcs.space import Axis
 
@@ -89,6 +90,21 @@ class RoomJoints:
             )
         for value in (axis.values[0], axis.values[-1]):
             self._check_position(axis.name, float(value), f"{where}, axis '{axis.name}'", GridError)
+
+    def check_error(self, name: str, error: JointError, *, where: str) -> None:
+        """Refuse an error of a joint that cannot have it.
+
+        Raises:
+            UnknownNameError: If there is no such joint.
+            EnvironmentFileError: If the joint follows another one, or the error's unit is another.
+        """
+        self._check_free(name, where, EnvironmentFileError)
+        if self.turns(name) != error.turns:
+            right = error.width_key[self.turns(name)]
+            raise EnvironmentFileError(
+                f"{where}, joint '{name}': it is {self.by_name[name].type_name()}, so give "
+                f"'{right}'."
+            )
 
     def check_posture(self, *, where: str) -> None:
         """Refuse a posture that names joints there are not, or asks them to go too far.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -106,7 +106,9 @@ def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
     torso_levels = grid.axis("torso").values
     chain, X_AL = arm_chain(scene)
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
-    room_poses, goal_poses = _environment_states(scene, room, task, grid, where)
+    for axis in grid.environment_axes:
+        built.room_joints.check_axis(axis, where=where)
+    room_poses, goal_poses = _environment_states(scene, room, task, _states_of(grid))
 
     arrays = SceneArrays(
         chain=chain,
@@ -192,17 +194,53 @@ def _torso_states(
     return arm_base, poses
 
 
+def environment_at(
+    lowered: LoweredScene, scene: Scene, task: Task, states: Iterable[Mapping[str, float]]
+) -> SceneArrays:
+    """Return the arrays of a lowered scene with its environment in other states than the grid's.
+
+    Args:
+        lowered: The scene as arrays.
+        scene: The scene itself; its state is left as it was.
+        task: The goals.
+        states: Positions of the environment's joints by name [m or rad]; what one state does not
+            name stays as the state before has left it.
+
+    Returns:
+        Arrays of as many environment states; a state of the grid gives the very numbers that
+        lowering the grid gives.
+
+    Raises:
+        UnknownNameError: If there is no such joint.
+        TcsError: If a joint follows another one, or does not go that far.
+    """
+    before = scene.positions()
+    room = [part for part in scene.built.parts if part.group is Group.ROOM]
+    try:
+        room_poses, poses_of_goals = _environment_states(scene, room, task, states)
+    finally:
+        scene.restore(before)
+    moved = lowered.arrays.room._replace(R=_rotations(room_poses), p=_origins(room_poses))
+    return lowered.arrays._replace(
+        room=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
+    )
+
+
+def _states_of(grid: Grid) -> Iterator[dict[str, float]]:
+    """Yield the states of the environment in a grid, in its order."""
+    names = [axis.name for axis in grid.environment_axes]
+    for state in itertools.product(*(axis.values for axis in grid.environment_axes)):
+        yield {name: float(value) for name, value in zip(names, state, strict=True)}
+
+
 def _environment_states(
-    scene: Scene, parts: list[Part], task: Task, grid: Grid, where: str
+    scene: Scene, parts: list[Part], task: Task, states: Iterable[Mapping[str, float]]
 ) -> tuple[list[list[RigidTransform]], list[list[RigidTransform]]]:
     """Return the poses in W of the room's shapes and of the goals, for each environment state."""
-    axes = grid.environment_axes
-    for axis in axes:
-        scene.built.room_joints.check_axis(axis, where=where)
     rooms, goals = [], []
-    for state in itertools.product(*(axis.values for axis in axes)):
-        for axis, value in zip(axes, state, strict=True):
-            scene.set_joint(axis.name, float(value))
+    for state in states:
+        for name, value in state.items():
+            scene.set_joint(name, value)
         query = scene.query_object()
         # Drake hands out its cached pose, which the next state overwrites: keep a copy.
         rooms.append([RigidTransform(query.GetPoseInWorld(part.geometry)) for part in parts])

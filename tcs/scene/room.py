@@ -209,18 +209,11 @@ def _check_names(
     for frame, link in environment.body_frames.items():
         if link not in links:
             raise UnknownNameError("link", link, links, where=f"{where}, body frame '{frame}'")
-    for field in ("joints", "errors"):
-        for joint in getattr(environment, field):
-            if joint not in joints.by_name:
-                known = joints.by_name
-                raise UnknownNameError("joint", joint, known, where=f"{where}, field '{field}'")
+    for joint in environment.joints:
+        if joint not in joints.by_name:
+            raise UnknownNameError("joint", joint, joints.by_name, where=f"{where}, field 'joints'")
     for name, error in environment.errors.items():
-        if joints.turns(name) != (error.std_deg is not None):
-            unit = "std_deg" if joints.turns(name) else "std"
-            raise EnvironmentFileError(
-                f"{where}, field 'errors.{name}': the joint is "
-                f"{joints.by_name[name].type_name()}, so give '{unit}'."
-            )
+        joints.check_error(name, error, where=f"{where}, field 'errors'")
     joints.check_posture(where=where)
     for axis in environment.observed_axes:
         joints.check_axis(axis, where=f"{where}, field 'observed'")

@@ -300,7 +300,7 @@ def test_names_that_are_not_there_are_refused(spec):
     ):
         with pytest.raises(UnknownNameError, match=said):
             Scene(with_changes(spec, **changes))
-    with pytest.raises(EnvironmentFileError, match=r"errors\.person_x.*prismatic.*'std'"):
+    with pytest.raises(EnvironmentFileError, match=r"'errors', joint 'person_x'.*prismatic.*'std'"):
         Scene(with_changes(spec, errors=bends))
     twice = environment.models[0].model_copy(update={"name": "second chair"})
     with pytest.raises(EnvironmentFileError, match="'wheelchair_x' is there twice"):
