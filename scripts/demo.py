@@ -76,7 +76,7 @@ def run(folder: Path) -> int:
     for number, here in enumerate(PLACES, start=1):
         x, y, yaw_deg = here
         step(f"3.{number}  Choose for a robot at x {x} m, y {y} m, heading {yaw_deg:g} deg")
-        choices.append(choice_as_json(tcs.select(file, place(here))))
+        choices.append(choice_as_json(tcs.select(file, place(here)), file.metadata["measure"]))
         report_choice(choices[-1])
 
     step("4  Re-check random answers with Drake, and look for missed ones")

@@ -94,6 +94,13 @@ def score(
         ),
     ] = False,
     robot: Annotated[str, typer.Option(help="Name or YAML file of a robot.")] = "pr2",
+    measure: Annotated[
+        str,
+        typer.Option(
+            help="What the best arm posture is best in: isotropy or inverse-condition; with "
+            "-limited less near joint limits, with -limited-thesis as the ITCM thesis has it."
+        ),
+    ] = "isotropy",
     jobs: Annotated[int, typer.Option(min=1, help="Number of threads.")] = 2,
     out: Annotated[
         Path | None,
@@ -143,6 +150,7 @@ def score(
     from tcs.cli import live, rows
 
     kept: dict[str, Any] = {
+        "measure": measure,
         "rule": rules,
         "same_environment": same_environment,
         "max_members": max_members,
@@ -220,7 +228,7 @@ def select(
         observed=observed_settings(observed or (), loaded.observed_axes),
         seen=frame_places(seen or ()),
     )
-    result = reports.choice_as_json(choice)
+    result = reports.choice_as_json(choice, loaded.metadata["measure"])
     talk.print_result(result, reports.report_choice, as_json=as_json)
 
 
@@ -288,7 +296,8 @@ def explain(
         ),
         observed=observed_settings(observed or (), loaded.observed_axes),
     )
-    talk.print_result(explanation.to_json(), report_explanation, as_json=as_json)
+    result = {**explanation.to_json(), "measure": loaded.metadata["measure"]}
+    talk.print_result(result, report_explanation, as_json=as_json)
 
 
 @app.command()

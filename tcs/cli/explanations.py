@@ -41,7 +41,7 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
         off = ", ".join(_with_unit(axis, value) for axis, value in explained["off"].items())
         out.print(f"The nearest that was scored is {name}; the place is off by {off}.")
     if explained["reached"]:
-        out.print(f"It is reached from {name}, isotropy {explained['isotropy']:.3f}.")
+        out.print(f"It is reached from {name}, {result['measure']} {explained['isotropy']:.3f}.")
         return
     pair = ""
     if explained["pair"] is not None:

@@ -85,6 +85,7 @@ class Shown:
             return cls(None, (), (), table, "no goal is reached from anywhere")
         reachability, manipulability = sets.scores_of(tuple(sorted(indices)))
         said = f"reaches {reachability:.0%} of the goals, manipulability {manipulability:.3f}"
+        said += f" ({file.metadata['measure']})"
         return cls(here, members, indices, table, f"{what}: {said}")
 
 
@@ -121,6 +122,7 @@ def map_figure(file: ScoreFile, shown: Shown) -> Figure:
         here=Stand(shown.here, base) if shown.here is not None else None,
         title=_title(job),
         subtitle=shown.subtitle,
+        measure=file.metadata["measure"],
     )
 
 

@@ -64,7 +64,7 @@ def report_scores(result: Mapping[str, Any]) -> None:
             continue
         out.print(
             f"{what}: {best['reachability']:.1%} of the goals, "
-            f"manipulability {best['manipulability']:.3f}"
+            f"manipulability {best['manipulability']:.3f} ({result['measure']})"
         )
         out.print(members_table(best["members"]))
     out.print(f"wrote {result['file']}")
@@ -91,9 +91,15 @@ def report_rows(result: Mapping[str, Any]) -> None:
     paper(_ROWS_WIDTH).print(table)
 
 
-def choice_as_json(choice: Choice) -> dict[str, Any]:
-    """Return a choice as plain containers, its members in the order of the tour."""
+def choice_as_json(choice: Choice, measure: str) -> dict[str, Any]:
+    """Return a choice as plain containers, its members in the order of the tour.
+
+    Args:
+        choice: What was chosen.
+        measure: Name of the dexterity measure behind its manipulability.
+    """
     return {
+        "measure": measure,
         "members": [choice.members[i].to_json() for i in choice.order],
         # Seven sevenths add up to 1 only after rounding.
         "reachability": round(choice.reachability, 12),
@@ -124,8 +130,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
     out.print(members_table(result["members"]))
     out.print(
         f"{result['reachability']:.1%} of the goals, manipulability "
-        f"{result['manipulability']:.3f}, travel cost {result['cost']:.2f}, utility "
-        f"{result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
+        f"{result['manipulability']:.3f} ({result['measure']}), travel cost {result['cost']:.2f}, "
+        f"utility {result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
     )
     if result["cut_off"]:
         out.print(
@@ -148,12 +154,12 @@ def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
         ("  joints beyond their limits", f"{found['limit_violations']:,}"),
         ("  tool off its goal, at most", f"{found['max_position_error']:.1e} m"),
         ("  tool turned off its goal, at most", f"{found['max_rotation_error']:.1e} rad"),
-        ("  isotropy off, at most", f"{found['max_isotropy_error']:.1e}"),
+        (f"  {found['measure']} off, at most", f"{found['max_isotropy_error']:.1e}"),
         ("unreached pairs scanned densely", f"{found['dense_checked']:,}"),
         ("  of them reachable after all", f"{found['missed']:,}"),
         ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
         ("recall", f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"),
-        ("mean isotropy left behind", f"{found['mean_shortfall']:.1e}"),
+        (f"mean {found['measure']} left behind", f"{found['mean_shortfall']:.1e}"),
         ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
     )
     table = new_table("check", ">found")

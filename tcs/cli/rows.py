@@ -28,7 +28,7 @@ def score_one(
         robot: Name or path of a robot.
         path: File to write.
         jobs: Number of threads.
-        **sets: Options of `tcs.score` that say which sets are kept.
+        **sets: Options of `tcs.score`: the measure, and which sets are kept.
 
     Raises:
         OutputError: If the file cannot be written, before anything is scored.
@@ -67,7 +67,7 @@ def score_all(
         robot: Name or path of a robot.
         folder: Where the files go; made if it is not there.
         jobs: Number of threads.
-        **sets: Options of `tcs.score` that say which sets are kept.
+        **sets: Options of `tcs.score`: the measure, and which sets are kept.
 
     Raises:
         OutputError: If the folder cannot be made or written.

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from tcs.draw.places import FloatArray, PlaceMap
 from tcs.draw.solids import Kind, Solid
+from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.tables import InitialConfiguration
 
 _MEMBER = "#d7263d"
@@ -55,6 +56,7 @@ def draw_map(
     here: Stand | None = None,
     title: str,
     subtitle: str = "",
+    measure: str = DEFAULT_MEASURE,
 ) -> Figure:
     """Return a picture of the best scores per base place, beside each other: P_R and P_M.
 
@@ -65,13 +67,14 @@ def draw_map(
         here: Where the robot is now.
         title: First line, for a person.
         subtitle: Second line, e.g. the scores of the chosen set.
+        measure: Name of the dexterity measure behind P_M.
     """
     figure = Figure(figsize=(12.4, 7.0), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     top = float(places.manipulability.max(initial=0.0))
     panels = (
         (left, 100.0 * places.reachability, 100.0, "goals reached, P_R [%]"),
-        (right, places.manipulability, top or 1.0, "manipulability, P_M [0 to 1]"),
+        (right, places.manipulability, top or 1.0, f"manipulability, P_M ({measure}) [0 to 1]"),
     )
     for axes, values, most, label in panels:
         _draw_scores(figure, axes, places, values, most, label)

@@ -17,7 +17,8 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.ik import lane_joints, wrist_goal
 from tcs.kernel.lanes import solve_lanes
-from tcs.kernel.measure import isotropy_at
+from tcs.kernel.measure import measure_at
+from tcs.kernel.pairs import lanes_measure, measure_of
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import MAX_LANES, Search, fill_lanes, new_search
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
@@ -29,7 +30,7 @@ DENSE_SAMPLES = 11_520
 def dense_scan(
     problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
 ) -> float:
-    """Return the best isotropy of any collision-free solution, or -1 when there is none.
+    """Return the best measure of any collision-free solution, or -1 when there is none.
 
     Every sample of the free joint is tried on every branch; nothing is skipped and nothing
     refined. The base is not checked: ask only for configurations whose base is free.
@@ -86,11 +87,13 @@ def _dense_scan(
                 if search.slack[i] >= 0.0:
                     angles[found], branches[found] = search.angle[i], b
                     measures[found] = search.measure[i]
+                    if not lanes_measure(problem):
+                        measures[found] = measure_of(problem, search, b, search.angle[i])
                     found += 1
     for i in np.argsort(-measures[:found], kind="mergesort"):
         lane_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             joints[:] = search.q
-            return isotropy_at(problem.chain_R, problem.chain_p, joints)
+            return measure_at(problem, joints)
     return -1.0

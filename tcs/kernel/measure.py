@@ -1,4 +1,4 @@
-"""Kinematic isotropy at given joint angles, from the Jacobian itself."""
+"""The dexterity measures at given joint angles, from the Jacobian itself."""
 
 from __future__ import annotations
 
@@ -7,6 +7,18 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import place_links
+from tcs.kernel.dexterity import INVERSE_CONDITION, THESIS, UNLIMITED
+from tcs.kernel.problem import Problem
+
+THESIS_SCALE = 1e6
+"""k of the ITCM thesis, eq. (21), chosen there for seven limited joints."""
+MIDDLE = 0.25
+"""Greatest factor of a joint in eq. (21): in the middle of its limits."""
+JOINTS = 7
+NEWTON_STEPS = 200
+"""More than any eigenvalue takes: some 4 to 8, and where all six coincide each step leaves 5/6."""
+CLOSE_ENOUGH = 1e-13
+"""Relative step of an eigenvalue that ends the search; the next would be far below rounding."""
 
 
 @jit
@@ -33,6 +45,20 @@ def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatAr
 
 
 @jit
+def gram(J: FloatArray, G: FloatArray) -> float:
+    """Fill the lower triangle of G = J J^T, shape (6, 6), and return its trace."""
+    trace = 0.0
+    for i in range(6):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(7):
+                total += J[i, k] * J[j, k]
+            G[i, j] = total
+        trace += G[i, i]
+    return trace
+
+
+@jit
 def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
     """Return how evenly the arm can move its tool in every direction, at joint angles q.
 
@@ -48,17 +74,9 @@ def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> floa
         TCS eq. (2), det(J J^T)^(1/6) / (trace(J J^T)/6). The print shows a square root; only the
         sixth root keeps the measure below 1. Rows mix units: compare within one robot only.
     """
-    J = np.empty((6, 7))
+    J, G = np.empty((6, 7)), np.empty((6, 6))
     jacobian(chain_R, chain_p, q, J)
-    G = np.empty((6, 6))
-    trace = 0.0
-    for i in range(6):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(7):
-                total += J[i, k] * J[j, k]
-            G[i, j] = total
-        trace += G[i, i]
+    trace = gram(J, G)
     # det of a Gram matrix by its Cholesky factor, in place.
     det = 1.0
     for j in range(6):
@@ -75,6 +93,163 @@ def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> floa
                 total -= G[i, k] * G[j, k]
             G[i, j] = total / root
     return det ** (1.0 / 6.0) / (trace / 6.0)
+
+
+@jit
+def inverse_condition(J: FloatArray) -> float:
+    """Return the least over the greatest singular value of a Jacobian.
+
+    Args:
+        J: Shape (6, 7), rows [angular; linear] [rad/rad; m/rad].
+
+    Returns:
+        Inverse condition number in [0, 1]; below 1e-7, the root of rounding, at a singularity.
+
+    Source:
+        ITCM thesis eq. (20), sigma_min / sigma_max. Rows mix units: compare within one robot only.
+    """
+    G = np.empty((6, 6))
+    gram(J, G)
+    for i in range(6):
+        for j in range(i):
+            G[j, i] = G[i, j]
+    diagonal, square = np.empty(6), np.empty(6)
+    tridiagonalise(G, diagonal, square)
+    total = diagonal[0] * diagonal[0]
+    for i in range(1, 6):
+        total += diagonal[i] * diagonal[i] + 2.0 * square[i]
+    # No eigenvalue is below 0, as G is a Gram matrix, nor above its Frobenius norm.
+    most = eigenvalue_from(diagonal, square, np.sqrt(total))
+    least = eigenvalue_from(diagonal, square, 0.0)
+    return np.sqrt(max(least, 0.0) / most)
+
+
+@jit
+def inverse_condition_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
+    """Return `inverse_condition` of the Jacobian at joint angles q.
+
+    Args:
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
+        q: Joint angles [rad], shape (7,).
+    """
+    J = np.empty((6, 7))
+    jacobian(chain_R, chain_p, q, J)
+    return inverse_condition(J)
+
+
+@jit
+def tridiagonalise(G: FloatArray, diagonal: FloatArray, square: FloatArray) -> None:
+    """Fill the diagonal and the squared off-diagonal of a tridiagonal matrix similar to G.
+
+    Args:
+        G: Symmetric, overwritten, shape (6, 6).
+        diagonal: Filled, shape (6,).
+        square: Filled, shape (6,): entry i belongs to rows i - 1 and i, entry 0 is 0.
+    """
+    v, w = np.empty(6), np.empty(6)
+    square[0] = 0.0
+    for k in range(4):
+        # A Householder reflection I - 2 v v^T / (v^T v) leaves one entry below the diagonal.
+        below = 0.0
+        for i in range(k + 1, 6):
+            v[i] = G[i, k]
+            below += v[i] * v[i]
+        square[k + 1] = below
+        if below == 0.0:
+            continue
+        root = np.sqrt(below)
+        v[k + 1] += root if v[k + 1] >= 0.0 else -root
+        beta = 1.0 / (root * abs(v[k + 1]))
+        half = 0.0
+        for i in range(k + 1, 6):
+            total = 0.0
+            for j in range(k + 1, 6):
+                total += G[i, j] * v[j]
+            w[i] = beta * total
+            half += w[i] * v[i]
+        half *= 0.5 * beta
+        for i in range(k + 1, 6):
+            w[i] -= half * v[i]
+        for i in range(k + 1, 6):
+            for j in range(k + 1, 6):
+                G[i, j] -= v[i] * w[j] + w[i] * v[j]
+    square[5] = G[5, 4] * G[5, 4]
+    for i in range(6):
+        diagonal[i] = G[i, i]
+
+
+@jit
+def eigenvalue_from(diagonal: FloatArray, square: FloatArray, start: float) -> float:
+    """Return the eigenvalue of a tridiagonal matrix next to `start`, beyond all of them.
+
+    Newton's method on the characteristic polynomial p comes in from outside without ever passing
+    the eigenvalue. p'/p is added up over the pivots of T - x I.
+    """
+    x = start
+    for _ in range(NEWTON_STEPS):
+        pivot = diagonal[0] - x
+        slope = -1.0
+        ratio = slope / pivot
+        for i in range(1, 6):
+            share = square[i] / pivot
+            slope = share * slope / pivot - 1.0
+            pivot = diagonal[i] - x - share
+            ratio += slope / pivot
+        step = -1.0 / ratio
+        # Of the wrong sign, or not a number, once rounding decides: x is the eigenvalue.
+        if not (step > 0.0 if start == 0.0 else step < 0.0):
+            return x
+        x += step
+        if abs(step) <= CLOSE_ENOUGH * x:
+            return x
+    return x
+
+
+@jit
+def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: int) -> float:
+    """Return how far joint angles q are from the joint limits: 0 at a limit, 1 well away.
+
+    Args:
+        q: Joint angles [rad], shape (7,).
+        lower: Lower limits [rad], shape (7,); infinite where continuous.
+        upper: Upper limits [rad], shape (7,).
+        penalty: UNLIMITED (always 1), NORMALISED or THESIS.
+
+    Returns:
+        P in [0, 1].
+
+    Source:
+        ITCM thesis eq. (21), P = 1 - exp(-k prod (q - lower)(upper - q) / (upper - lower)^2), with
+        k = 1e6. A continuous joint has no factor. THESIS leaves it out and k as it is; NORMALISED
+        gives it 1/4, what a joint has in the middle of its limits, and the limit of the factor
+        as limits grow wide. With seven limited joints the two are the same.
+    """
+    if penalty == UNLIMITED:
+        return 1.0
+    product = THESIS_SCALE
+    for i in range(JOINTS):
+        if np.isfinite(lower[i]) and np.isfinite(upper[i]):
+            width = upper[i] - lower[i]
+            product *= (q[i] - lower[i]) * (upper[i] - q[i]) / (width * width)
+        elif penalty != THESIS:
+            product *= MIDDLE
+    return -np.expm1(-product)
+
+
+@jit
+def measure_at(problem: Problem, q: FloatArray) -> float:
+    """Return the problem's dexterity measure at joint angles q [rad], shape (7,).
+
+    Source:
+        TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in its eq. (22).
+    """
+    if problem.measure.of == INVERSE_CONDITION:
+        value = inverse_condition_at(problem.chain_R, problem.chain_p, q)
+    else:
+        value = isotropy_at(problem.chain_R, problem.chain_p, q)
+    arm = problem.arm
+    return value * limit_penalty(q, arm.lower, arm.upper, problem.measure.penalty)
 
 
 @jit

@@ -14,8 +14,10 @@ from tcs.kernel.contacts import (
     pair_touches,
     place_links,
 )
+from tcs.kernel.dexterity import ISOTROPY, UNLIMITED
 from tcs.kernel.ik import lane_joints
 from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import Search, best_of, fill_lanes, find_candidates
 from tcs.kernel.solver import ArmSolver
@@ -30,6 +32,19 @@ SQUEEZES = 8
 """Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
 SQUEEZE_PARTS = 16.0
 """How finely the neighbourhood of an angle found by halving is refined."""
+
+
+@jit
+def lanes_measure(problem: Problem) -> bool:
+    """Return whether what the lanes are filled with, isotropy, is the measure that counts."""
+    return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
+
+
+@jit
+def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
+    """Return the measure that counts at an angle of the free joint on branch b; fills `q`."""
+    lane_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
+    return measure_at(problem, search.q)
 
 
 @jit
@@ -90,6 +105,8 @@ def squeeze(
                 if np.isfinite(angle):
                     search.found_angle[n] = angle
                     search.found_measure[n] = search.measure[0]
+                    if not lanes_measure(problem):
+                        search.found_measure[n] = measure_of(problem, search, b, angle)
                     search.found_step[n] = abs(width) / SQUEEZE_PARTS
                     return n
         partner, i, j = work.last[0], work.last[1], work.last[2]
@@ -171,6 +188,9 @@ def refine(
         for i in range(REFINE_LANES):
             if search.slack[i] < 0.0:
                 search.measure[i] = -1.0
+            elif not lanes_measure(problem):
+                b, angle = search.found_branch[winner], search.angle[i]
+                search.measure[i] = measure_of(problem, search, b, angle)
         for _ in range(REFINE_LANES):
             i = best_of(search.measure, REFINE_LANES)
             if search.measure[i] <= value:
@@ -204,6 +224,10 @@ def score_pair(
     found = find_candidates(problem.arm, search, arcs)
     if found == 0:
         return JOINT_LIMITS, NO_CONTACT
+    if not lanes_measure(problem):
+        for n in range(found):
+            b, angle = search.found_branch[n], search.found_angle[n]
+            search.found_measure[n] = measure_of(problem, search, b, angle)
     winner, contact = best_free(problem, work, body_A, search, found)
     if winner < 0:
         winner = squeeze(problem, work, body_A, search, found)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray, SceneArrays, Shapes
 from tcs.kernel.collide import BALL, CENTRE, pack
+from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.solver import ArmSolver, arm_solver
 
 UNCHECKED = -1.0
@@ -20,6 +21,8 @@ TOUCH = 1e-9
 class Problem(NamedTuple):
     """One scene, its goals and its grid."""
 
+    measure: Dexterity
+    """What makes one solution better than another."""
     arm: ArmSolver
     """How the arm is solved, in reverse maybe; what follows is the arm itself."""
     chain_R: FloatArray
@@ -78,11 +81,12 @@ class Problem(NamedTuple):
     environment_states: int
 
 
-def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
-    """Return `scene` and `grid` arranged for the kernel.
+def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_MEASURE) -> Problem:
+    """Return `scene` and `grid` arranged for the kernel, to be scored by a measure.
 
     Raises:
         ArmClassError: If the closed form cannot solve the arm.
+        UnknownNameError: If there is no measure of that name.
     """
     order = np.argsort(-scene.arm.frame.astype(np.int64), kind="stable")
     R_AB = np.swapaxes(scene.arm_base_R, 1, 2)
@@ -94,6 +98,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays) -> Problem:
     pads = scene.arm.pad[order], scene.body.pad, scene.room.pad
     margin = scene.margin
     return Problem(
+        measure=dexterity(measure),
         arm=arm_solver(scene.chain),
         chain_R=_own(scene.chain.R),
         chain_p=_own(scene.chain.p),

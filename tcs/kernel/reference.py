@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
+from tcs.kernel.dexterity import ISOTROPY, NORMALISED, UNLIMITED, dexterity
 
 MEETING_TOLERANCE = 1e-9
 """Link origins closer than this [m] are one point, up to rounding."""
@@ -59,6 +60,36 @@ def isotropy(J: FloatArray) -> float:
     """Return TCS eq. (2) with the sixth root: det(J J^T)^(1/6) / (trace(J J^T)/6)."""
     G = J @ J.T
     return max(float(np.linalg.det(G)), 0.0) ** (1 / 6) / (float(np.trace(G)) / 6)
+
+
+def inverse_condition(J: FloatArray) -> float:
+    """Return ITCM thesis eq. (20): the least over the greatest singular value."""
+    sigma = np.linalg.svd(J, compute_uv=False)
+    return float(sigma.min() / sigma.max())
+
+
+def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: int) -> float:
+    """Return ITCM thesis eq. (21) over the joints that have limits, k = 1e6.
+
+    Normalised, four times every factor is taken, 1 in the middle of the limits, and k is 1e6 / 4^7:
+    the same with seven limited joints.
+    """
+    if penalty == UNLIMITED:
+        return 1.0
+    limited = np.isfinite(lower) & np.isfinite(upper)
+    factors = (q - lower)[limited] * (upper - q)[limited] / (upper - lower)[limited] ** 2
+    if penalty == NORMALISED:
+        return 1.0 - math.exp(-(1e6 / 4**7) * float(np.prod(4 * factors)))
+    return 1.0 - math.exp(-1e6 * float(np.prod(factors)))
+
+
+def measured(
+    J: FloatArray, q: FloatArray, lower: FloatArray, upper: FloatArray, measure: str
+) -> float:
+    """Return the dexterity measure of that name, ITCM thesis eq. (22) where it has a penalty."""
+    of, penalty = dexterity(measure)
+    value = isotropy(J) if of == ISOTROPY else inverse_condition(J)
+    return value * limit_penalty(q, lower, upper, penalty)
 
 
 # --- inverse kinematics -----------------------------------------------------------------------

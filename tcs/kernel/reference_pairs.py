@@ -9,12 +9,14 @@ out: where every angle touches something, the kernel halves its way between two 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tcs.kernel.arcs import INSET, PEAK_SLOPE
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
+from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
@@ -34,9 +36,9 @@ from tcs.kernel.reference import (
     free_joint,
     inverse,
     is_mirrored,
-    isotropy,
     jacobian,
     link_poses,
+    measured,
     shapes_of,
     solutions,
     turn,
@@ -52,6 +54,7 @@ class Verdict:
 
     reason: int
     isotropy: float = 0.0
+    """The measure, isotropy if no other was asked for."""
     q: FloatArray | None = None
     clearance: float = math.inf
     """How far the nearest pair that decided is from deciding otherwise [m]; for tests."""
@@ -149,8 +152,10 @@ def stand_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> tuple[S
     return stand, blocked
 
 
-def score(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> Verdict:
-    """Return what the kernel should say about configuration h and one goal."""
+def score(
+    scene: SceneArrays, grid: GridArrays, h: int, goal: int, measure: str = DEFAULT_MEASURE
+) -> Verdict:
+    """Return what the kernel should say about configuration h and one goal, by a measure."""
     stand, blocked = stand_at(scene, grid, h, goal)
 
     def verdict(reason: int, value: float = 0.0, q: FloatArray | None = None) -> Verdict:
@@ -169,10 +174,15 @@ def score(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> Verdict:
     candidates = find_candidates(chain, stand.X_AG, arcs)
     if not candidates:
         return verdict(JOINT_LIMITS)
-    for candidate in sorted(candidates, key=lambda c: -c.value):
+
+    def value(candidate: Candidate) -> float:
+        q = candidate.q
+        return measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
+
+    for candidate in sorted(candidates, key=value, reverse=True):
         if not stand.arm_touches(candidate.q):
-            best = climb(stand, candidate)
-            return verdict(REACHED, best.value, best.q)
+            best = climb(stand, candidate, value)
+            return verdict(REACHED, value(best), best.q)
     return verdict(ARM_BLOCKED)
 
 
@@ -181,7 +191,6 @@ class Candidate:
     """A solution that keeps all limits."""
 
     q: FloatArray
-    value: float
     branch: Branch
     step: float
 
@@ -322,8 +331,7 @@ def candidates_at(
     for angle in angles:
         solution = solutions(chain, X_AG, angle)[branch]
         if solution.slack >= 0:
-            value = isotropy(jacobian(chain, solution.q))
-            found.append(Candidate(solution.q, value, branch, step))
+            found.append(Candidate(solution.q, branch, step))
     return found
 
 
@@ -338,8 +346,14 @@ def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatAr
     return at_goal and within and not (blocked or gripper or stand.arm_touches(q))
 
 
-def climb(stand: Stand, best: Candidate) -> Candidate:
-    """Return the best solution near a collision-free one, as the kernel refines it."""
+def climb(stand: Stand, best: Candidate, value: Callable[[Candidate], float]) -> Candidate:
+    """Return the best solution near a collision-free one, as the kernel refines it.
+
+    Args:
+        stand: The scene.
+        best: Where to start.
+        value: The measure of a solution.
+    """
     chain, step = stand.scene.chain, best.step
     for _ in range(REFINEMENTS):
         fine = 2 * step / (REFINE_LANES - 1)
@@ -347,9 +361,8 @@ def climb(stand: Stand, best: Candidate) -> Candidate:
         for i in range(REFINE_LANES):
             solution = solutions(chain, stand.X_AG, angle - step + i * fine)[best.branch]
             if solution.slack >= 0:
-                value = isotropy(jacobian(chain, solution.q))
-                near.append(Candidate(solution.q, value, best.branch, fine))
-        better = [c for c in sorted(near, key=lambda c: -c.value) if c.value > best.value]
+                near.append(Candidate(solution.q, best.branch, fine))
+        better = [c for c in sorted(near, key=value, reverse=True) if value(c) > value(best)]
         best = next((c for c in better if not stand.arm_touches(c.q)), best)
         step = fine
     return best

@@ -51,7 +51,8 @@ class Search(NamedTuple):
     found_step: FloatArray
     """Spacing [rad] of the lanes it was found with."""
     found_measure: FloatArray
-    """Its isotropy to the sixth power; -1 once it was found to collide."""
+    """Its isotropy to the sixth power, or another measure if one was asked for; -1 once it was
+    found to collide."""
     found_branch: IntArray
     """Row of its branch in `arm.branches`."""
     q: FloatArray

@@ -20,7 +20,7 @@ from tcs.kernel.contacts import (
     new_workspace,
 )
 from tcs.kernel.ik import wrist_goal
-from tcs.kernel.measure import isotropy_at, rounded_inward
+from tcs.kernel.measure import measure_at, rounded_inward
 from tcs.kernel.pairs import (
     BODY_BLOCKED,
     GRIPPER_BLOCKED,
@@ -42,7 +42,7 @@ class Scores(NamedTuple):
     contact: NDArray[np.int32]
     """Contact code or NO_CONTACT, shape (n, goals)."""
     isotropy: NDArray[np.float32]
-    """0 where not reached, shape (n, goals)."""
+    """The measure, isotropy if no other was asked for; 0 where not reached, shape (n, goals)."""
     joints: NDArray[np.float32]
     """Winning joints [rad], 0 where not reached, shape (n, goals, 7)."""
 
@@ -140,8 +140,8 @@ def _score_slice(
 def _keep(
     problem: Problem, search: Search, rounded: NDArray[np.float64], scores: Scores, row: int, g: int
 ) -> None:
-    """Write the winner. Its isotropy is that of the rounded joints, as anyone can recompute."""
+    """Write the winner. Its measure is that of the rounded joints, as anyone can recompute."""
     rounded_inward(search.best, problem.arm.lower, problem.arm.upper, rounded)
     for i in range(7):
         scores.joints[row, g, i] = rounded[i]
-    scores.isotropy[row, g] = isotropy_at(problem.chain_R, problem.chain_p, rounded)
+    scores.isotropy[row, g] = measure_at(problem, rounded)

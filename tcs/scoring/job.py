@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tcs.errors import TaskError
+from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.robots import RobotFile, load_robot
 from tcs.scene import (
     EnvironmentFile,
@@ -30,9 +31,6 @@ from tcs.space import Axis, Grid
 from tcs.store import Scored, ScoreFile, shown_state
 from tcs.tables import ScoreTable, SetTable
 from tcs.tasks import Task, load_task
-
-MEASURE = "isotropy"
-"""Name of the dexterity measure: kinematic isotropy, TCS eq. (2)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,6 +98,7 @@ def score(
     environment: str | Path | EnvironmentFile = "wheelchair",
     robot: str | Path | RobotFile = "pr2",
     *,
+    measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
     rule: str = "paper",
     same_environment: bool = False,
@@ -114,6 +113,9 @@ def score(
         task: Name of a task, path of a task file, or a task.
         environment: Name, path or environment.
         robot: Name, path or robot.
+        measure: What the best solution at a goal is the best in: "isotropy",
+            "inverse-condition", or one of them lowered near joint limits, "-limited" or
+            "-limited-thesis". Equations: docs/method.md.
         jobs: Number of threads; the result does not depend on it.
         rule: Which sets are kept: "paper" or "code2015", see `tcs.scoring.build_sets`.
         same_environment: Whether the members of a set must share the state of the environment.
@@ -126,13 +128,15 @@ def score(
         Scores and sets, ready for `tcs.save` and `tcs.select`.
 
     Raises:
-        UnknownNameError: If a task, environment, robot or frame of that name does not exist.
+        UnknownNameError: If a task, environment, robot, frame or measure of that name does not
+            exist.
         DataFileError: If a file cannot be used.
         GridError: If the grid is empty or enormous.
         ArmClassError: If the closed form cannot solve the arm.
         TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
+    dexterity(measure)
     check_set_options(rule, max_members, min_distance)
     job = load_job(task, environment, robot)
 
@@ -152,6 +156,7 @@ def score(
         job.scene(),
         sets_of,
         named=references(job, task, environment, robot),
+        measure=measure,
         begun=begun,
         jobs=jobs,
         on_progress=on_progress,
@@ -165,6 +170,7 @@ def score_scene(
     sets_of: Callable[[ScoreTable], SetTable],
     *,
     named: Mapping[str, Any],
+    measure: str,
     begun: float,
     jobs: int,
     on_progress: Callable[[int, int], None] | None = None,
@@ -178,6 +184,7 @@ def score_scene(
         sets_of: Builds the sets of a table of scores.
         named: Entries of the metadata: how task, environment and robot are found again, and
             whatever else there is to say.
+        measure: Name of the dexterity measure.
         begun: When the work began, by `time.perf_counter` [s].
         jobs: Number of threads.
         on_progress: Called with configurations scored and in all.
@@ -189,6 +196,7 @@ def score_scene(
         lowered,
         job.task.weights,
         tables=job.tables,
+        measure=measure,
         jobs=jobs,
         on_progress=on_progress,
         on_compile=on_compile,
@@ -202,7 +210,7 @@ def score_scene(
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             **named,
             "scene_digest": digest,
-            "measure": MEASURE,
+            "measure": measure,
             "hashes": {"scene": digest},
             "timings": {
                 "compile_seconds": swept.compile_seconds,
@@ -272,6 +280,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
     pairs = sum(reasons.values())
     goals = file.nominal.sets.weights.size
     return {
+        "measure": file.metadata["measure"],
         "configurations": pairs // goals,
         "goals": goals,
         "pairs": pairs,

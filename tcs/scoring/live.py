@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
 from tcs.robots import RobotFile
 from tcs.scene import EnvironmentFile, Observation, find_joints
@@ -36,6 +37,7 @@ class LiveScorer:
         robot: str | Path | RobotFile = "pr2",
         *,
         environment: str | Path | EnvironmentFile = "wheelchair",
+        measure: str = DEFAULT_MEASURE,
         jobs: int = 2,
         rule: str = "paper",
         same_environment: bool = False,
@@ -49,6 +51,7 @@ class LiveScorer:
             task: Name of a task, path of a task file, or a task.
             robot: Name, path or robot.
             environment: Name, path or environment.
+            measure: Name of the dexterity measure, see `tcs.score`.
             jobs: Number of threads; the result does not depend on it.
             rule: Which sets are kept, see `tcs.scoring.build_sets`.
             same_environment: Whether the members of a set must share the environment's state.
@@ -57,7 +60,8 @@ class LiveScorer:
             on_compile: Called before the kernel compiles, when it has to.
 
         Raises:
-            UnknownNameError: If a task, environment, robot or frame of that name does not exist.
+            UnknownNameError: If a task, environment, robot, frame or measure of that name does not
+                exist.
             DataFileError: If a file cannot be used.
             GridError: If the grid is empty or enormous.
             ArmClassError: If the closed form cannot solve the arm.
@@ -67,13 +71,14 @@ class LiveScorer:
         self._job = load_job(task, environment, robot)
         self._named = references(self._job, task, environment, robot)
         self._scene = self._job.scene()
+        self._measure = measure
         self._jobs = jobs
         self._rule = rule
         self._same_environment = same_environment
         self._max_members = max_members
         self._min_distance = min_distance
         lowered = self._job_at({}).lowered(self._scene)
-        warm_up(build_problem(lowered.arrays, lowered.grid), on_compile)
+        warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
 
     @property
     def job(self) -> Job:
@@ -113,6 +118,7 @@ class LiveScorer:
             self._scene,
             self._sets_of,
             named={**self._named, "observation": told},
+            measure=self._measure,
             begun=begun,
             jobs=self._jobs,
         )
@@ -145,6 +151,7 @@ def score_observed(
     observation: Seen | None = None,
     *,
     environment: str | Path | EnvironmentFile = "wheelchair",
+    measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
     rule: str = "paper",
     same_environment: bool = False,
@@ -160,6 +167,7 @@ def score_observed(
         robot: Name, path or robot.
         observation: How the room is found: an `Observation`, or values of its joints [m or rad].
         environment: Name, path or environment.
+        measure: Name of the dexterity measure, see `tcs.score`.
         jobs: Number of threads; the result does not depend on it.
         rule: Which sets are kept, see `tcs.scoring.build_sets`.
         same_environment: Whether the members of a set must share the environment's state.
@@ -176,6 +184,7 @@ def score_observed(
         task,
         robot,
         environment=environment,
+        measure=measure,
         jobs=jobs,
         rule=rule,
         same_environment=same_environment,

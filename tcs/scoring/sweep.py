@@ -11,6 +11,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.kernel.cache import is_compiled
+from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tcs.scene import LoweredScene
@@ -38,6 +39,7 @@ def sweep(
     weights: NDArray[np.float64],
     *,
     tables: int = 1,
+    measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
@@ -49,6 +51,7 @@ def sweep(
         weights: Weights of the goals, sum 1, shape (goals,).
         tables: How many equal parts to cut the scores into, e.g. one for each observed state
             when the observed axes are the outermost of the grid.
+        measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
         jobs: Number of threads; the scores do not depend on it.
         on_progress: Called with configurations done and in all.
         on_compile: Called first, when no earlier run has left machine code on this machine.
@@ -58,8 +61,9 @@ def sweep(
 
     Raises:
         ArmClassError: If the closed form cannot solve the arm.
+        UnknownNameError: If there is no measure of that name.
     """
-    problem = build_problem(lowered.arrays, lowered.grid)
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
     compile_seconds = warm_up(problem, on_compile)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()

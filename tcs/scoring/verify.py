@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.reference import isotropy
+from tcs.kernel.reference import measured
 from tcs.scene import Scene, goal_poses
 from tcs.scoring.job import Job
 from tcs.scoring.reopen import reopen
@@ -27,7 +27,8 @@ ROTATION_BAR = 2e-6
 """Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
 8.4e-7, and reading an angle off a rotation matrix near the identity loses as much again."""
 ISOTROPY_BAR = 1e-6
-"""Greatest difference of a stored isotropy from that of Drake's Jacobian; float32 keeps 6e-8."""
+"""Greatest difference of a stored measure from that of Drake's Jacobian. Float32 keeps 6e-8; a
+least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
 CLEARANCE_ROUNDING = 2e-6
 """How much closer than required a pair may be [m] when Drake measures it: rounding of the joints
 moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is good to 1e-6 m."""
@@ -40,6 +41,8 @@ CONFIDENCE = 0.95
 class Verification:
     """What re-checking a score file found."""
 
+    measure: str
+    """Name of the dexterity measure the file was made with."""
     checked: int
     """Reached pairs re-checked with Drake."""
     false_reached: int
@@ -49,7 +52,8 @@ class Verification:
     max_rotation_error: float
     """Greatest rotation of the tool from its goal [rad]."""
     max_isotropy_error: float
-    """Greatest difference of the isotropy from that of Drake's Jacobian."""
+    """Greatest difference of the file's measure, isotropy or another, from that of Drake's
+    Jacobian."""
     limit_violations: int
     """Joints beyond their limits."""
     dense_checked: int
@@ -65,7 +69,7 @@ class Verification:
     shortfall_checked: int
     """Reached pairs scanned densely."""
     mean_shortfall: float
-    """How much more isotropy the dense scan finds there, on average."""
+    """How much more of the file's measure the dense scan finds there, on average."""
 
     @property
     def is_sound(self) -> bool:
@@ -95,10 +99,10 @@ def verify(
     """Check answers of a score file against Drake and against a dense scan.
 
     Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
-    every checked contact, isotropy. Random unreached pairs, stratified over those whose base and
-    gripper are free and whose goal is within reach, are scanned with 11,520 values of the free
-    joint, and so are random reached pairs, for the isotropy the search left behind. Drake has to
-    confirm every solution the scan finds where none is stored.
+    every checked contact, the dexterity measure the file was made with. Random unreached pairs,
+    stratified over those whose base and gripper are free and whose goal is within reach, are
+    scanned with 11,520 values of the free joint, and so are random reached pairs, for the dexterity
+    the search left behind. Drake has to confirm every solution the scan finds where none is stored.
 
     Args:
         file: A score file.
@@ -126,8 +130,9 @@ def verify(
         if on_progress is not None:
             on_progress(next(count), total)
 
-    problem = build_problem(lowered.arrays, lowered.grid)
-    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene))
+    measure = file.metadata["measure"]
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
     findings = check.stored(reached, step)
     hits = [check.hits(part, step) for part in unreached]
     shortfall = check.shortfall(again, step)
@@ -137,6 +142,7 @@ def verify(
         int(np.count_nonzero(reason == Reason.REACHED)), sizes, scanned, missed
     )
     return Verification(
+        measure=measure,
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
         max_position_error=max((finding.position_error for finding in findings), default=0.0),
@@ -168,7 +174,7 @@ class _Check:
     judge: _Judge
 
     def isotropy(self, h: int, g: int) -> float:
-        """Return the stored isotropy."""
+        """Return the stored measure."""
         table, row = divmod(h, self.size)
         return float(self.tables[table].scores.isotropy[row, g])
 
@@ -193,7 +199,7 @@ class _Check:
         return found
 
     def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
-        """Return how much better the dense scan's isotropy is at reached pairs."""
+        """Return how much better the dense scan's measure is at reached pairs."""
         short, q = [], np.empty(7)
         for h, g in pairs:
             value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
@@ -289,8 +295,8 @@ class Finding:
 class _Judge:
     """Drake's verdict on solutions of one job."""
 
-    def __init__(self, job: Job, scene: Scene) -> None:
-        self._job, self._scene = job, scene
+    def __init__(self, job: Job, scene: Scene, measure: str) -> None:
+        self._job, self._scene, self._measure = job, scene, measure
         self._lower, self._upper = scene.arm_limits
         self._grid = job.scored_grid
         self._axes = [axis.name for axis in self._grid.environment_axes]
@@ -312,10 +318,11 @@ class _Judge:
             for first, second, distance in scene.violations()
             if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
         ]
+        exact = measured(scene.tool_jacobian(), q, self._lower, self._upper, self._measure)
         return Finding(
             position_error=float(np.linalg.norm(X_TG.translation())),
             rotation_error=float(rotation),
-            isotropy_error=abs(isotropy(scene.tool_jacobian()) - float(value)),
+            isotropy_error=abs(exact - float(value)),
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
             contacts=len(contacts),
         )

@@ -176,6 +176,11 @@ def test_pictures_have_a_known_format_and_a_place(tcs_command, small_file, tmp_p
             ("shaving", "--environment", "wheelchiar"), "Did you mean 'wheelchair'", id="room"
         ),
         pytest.param(("shaving", "--robot", "pr3"), "unknown robot 'pr3'", id="robot"),
+        pytest.param(
+            ("shaving", "--measure", "isotropy-limitd"),
+            "unknown measure 'isotropy-limitd'.*Did you mean 'isotropy-limited'",
+            id="measure",
+        ),
         pytest.param(("none.yaml",), "task file 'none.yaml' cannot be read", id="no file"),
     ],
 )
@@ -245,6 +250,26 @@ def test_file_is_named_after_its_content(tcs_command, tmp_path, stand_in, monkey
     ((arguments, options),) = stand_in
     assert arguments == ("my/shave.yaml", "hall.yaml", "pr2")
     assert options["jobs"] == 2
+
+
+def test_the_measure_is_handed_on_and_named(tcs_command, tmp_path, monkeypatch):
+    measures = []
+
+    def score(*_arguments, measure, **_options):
+        measures.append(measure)
+        file = example()
+        return dataclasses.replace(file, metadata={**file.metadata, "measure": measure})
+
+    monkeypatch.setattr(tcs, "score", score)
+    path = tmp_path / "o.tcs"
+    words = ("score", "shaving", "--measure", "inverse-condition", "--out", path)
+    assert "(inverse-condition)" in tcs_command(*words).out
+    assert tcs_command(*words, "--json").json["measure"] == "inverse-condition"
+    select = ("select", path, "--here", 1, -1, 0)
+    assert "(inverse-condition)" in tcs_command(*select).out
+    assert tcs_command(*select, "--json").json["measure"] == "inverse-condition"
+    assert tcs_command("score", "shaving", "--out", path, "--json").json["measure"] == "isotropy"
+    assert measures == ["inverse-condition", "inverse-condition", "isotropy"]
 
 
 def test_score_for_a_person(tcs_command, tmp_path, stand_in):

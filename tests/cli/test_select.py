@@ -24,7 +24,8 @@ def test_select_prints_the_choice(tcs_command, small_file):
     assert (ran.code, ran.err) == (0, "")
     result = ran.json
     assert set(result) == {
-        "members", "reachability", "manipulability", "cost", "utility", "seconds", "gap", "cut_off",
+        "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds", "gap",
+        "cut_off",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     # The order of the tour, which is not that of the indices.

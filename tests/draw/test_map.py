@@ -52,6 +52,12 @@ def test_map_says_what_it_shows(places, chair):
     assert "person" not in said
 
 
+def test_map_names_the_measure(places):
+    said = words(draw_map(places, [], [], title="t", measure="inverse-condition"))
+    assert "manipulability, P_M (inverse-condition)" in said
+    assert "P_M (isotropy)" in words(draw_map(places, [], [], title="t"))
+
+
 def test_panels_hold_the_scores(places, chair):
     figure = draw_map(places, [chair], [], title="t")
     left, right = figure.axes[:2]

@@ -35,10 +35,10 @@ def is_true(scene, grid, h, g, q):
     return reference_pairs.confirms(eased, grid, int(h), int(g), q.astype(np.float64))
 
 
-def compare(scene, grid, scores, pairs):
+def compare(scene, grid, scores, pairs, measure="isotropy"):
     """Hold the kernel's answers against the twin's, away from contact."""
     for h, g in pairs:
-        twin = reference_pairs.score(scene, grid, int(h), int(g))
+        twin = reference_pairs.score(scene, grid, int(h), int(g), measure)
         reason = int(scores.reason[h, g])
         if reason == REACHED and twin.reason == ARM_BLOCKED:
             # The kernel looks between two contacts as well; the twin can judge what it found.

@@ -137,9 +137,9 @@ def size_of(grid):
     return grid.environment_states * places * grid.torso_levels
 
 
-def scores_of(scene, grid, cuts=None):
+def scores_of(scene, grid, cuts=None, measure="isotropy"):
     """Return the kernel's scores of the whole grid, in one slice or cut at `cuts`."""
-    problem = build_problem(scene, grid)
+    problem = build_problem(scene, grid, measure)
     size, goals = size_of(grid), scene.goal_p.shape[1]
     scores = Scores(
         # Values that no score has: whatever is left unfilled shows.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import StoreMismatchError, TcsError
-from tcs.scoring import build_sets, load_job, verify
+from tcs.scoring import build_sets, load_job, score, summary, verify
 from tcs.scoring.verify import estimated_recall
 from tcs.space import Grid
 from tcs.store import Scored
@@ -23,6 +23,29 @@ def test_stored_answers_are_true(small_file):
     assert found.max_isotropy_error <= 1e-6
     assert found.shortfall_checked == 20
     assert set(found.to_json()) >= {"checked", "false_reached", "recall", "recall_ci95"}
+
+
+@pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited"])
+def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_room, measure):
+    file = score("shaving", small_room, measure=measure)
+    assert file.metadata["measure"] == summary(file)["measure"] == measure
+    found = verify(file, pairs=40, dense=10)
+    assert found.is_sound
+    assert found.measure == found.to_json()["measure"] == measure
+    # Refinement leaves next to nothing, by this measure too.
+    assert found.mean_shortfall < 1e-3
+    # The same answers, but by another measure: every number is off.
+    forged = dataclasses.replace(file, metadata={**file.metadata, "measure": "isotropy"})
+    wrong = verify(forged, pairs=40, dense=0)
+    assert wrong.false_reached == 0
+    assert wrong.max_isotropy_error > 1e-3
+    assert not wrong.is_sound
+    # Which goals are reached does not depend on the measure; how well they are, does.
+    np.testing.assert_array_equal(file.nominal.scores.reason, small_file.nominal.scores.reason)
+    reached = file.nominal.scores.reached
+    assert np.any(
+        file.nominal.scores.isotropy[reached] < small_file.nominal.scores.isotropy[reached]
+    )
 
 
 def with_joints(file, change):

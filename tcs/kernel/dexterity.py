@@ -1,0 +1,48 @@
+"""The dexterity measures by name: how well the arm can move its tool in every direction.
+
+Which function computes what stands in `measure`; here are only names and codes, so that a name can
+be checked without the compiler.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tcs.errors import UnknownNameError
+
+ISOTROPY, INVERSE_CONDITION = 0, 1
+"""What is measured of the Jacobian."""
+UNLIMITED, NORMALISED, THESIS = 0, 1, 2
+"""Whether nearness to joint limits lowers it, and by which of the two penalties."""
+
+
+class Dexterity(NamedTuple):
+    """One measure, as the compiled code is told of it."""
+
+    of: int
+    """ISOTROPY or INVERSE_CONDITION."""
+    penalty: int
+    """UNLIMITED, NORMALISED or THESIS."""
+
+
+DEFAULT_MEASURE = "isotropy"
+MEASURES = {
+    DEFAULT_MEASURE: Dexterity(ISOTROPY, UNLIMITED),
+    "inverse-condition": Dexterity(INVERSE_CONDITION, UNLIMITED),
+    "isotropy-limited": Dexterity(ISOTROPY, NORMALISED),
+    "inverse-condition-limited": Dexterity(INVERSE_CONDITION, NORMALISED),
+    "isotropy-limited-thesis": Dexterity(ISOTROPY, THESIS),
+    "inverse-condition-limited-thesis": Dexterity(INVERSE_CONDITION, THESIS),
+}
+"""Every measure; docs/method.md has the equations."""
+
+
+def dexterity(measure: str) -> Dexterity:
+    """Return the measure of that name.
+
+    Raises:
+        UnknownNameError: If there is none.
+    """
+    if measure not in MEASURES:
+        raise UnknownNameError("measure", measure, MEASURES)
+    return MEASURES[measure]
