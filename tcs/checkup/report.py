@@ -71,7 +71,7 @@ class RobotCheck:
         arm: Its arm's class.
         limits: Limits of the arm's joints, and of the torso if there is one, last.
         bodies: How the primitives enclose each body with a surface.
-        rest: Where the arm was for self-collision, by joint [rad]: at 0, or at the nearest limit.
+        rest: Where the arm was for self-collision, by joint [rad]: at rest, as the file says.
         margin: Contacts closer than this count [m].
         lowest: Height of the lowest point of any surface above the root, the arm at rest [m].
         contacts: Pairs that scoring checks and that are closer than that at rest.
@@ -214,7 +214,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
     scene = Scene(SceneSpec(robot, _NOWHERE))
     scene.set_arm(np.zeros(len(robot.arm_joints)))
     arm = arm_class(arm_chain(scene)[0])
-    positions = robot.with_mimics(robot.joint_positions())
+    positions = robot.with_mimics({**robot.joint_positions(), **robot.rest})
     rest = {name: positions[name] for name in robot.arm_joints}
     scene.set_arm(list(rest.values()))
     contacts = scene.violations()

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.robots.robot_file import RobotFile
-from tcs.robots.urdf import Urdf
+from tcs.robots.urdf import Joint, Urdf
 
 
 def check_robot(robot: RobotFile, where: str) -> None:
@@ -31,6 +31,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
             raise RobotError(
                 f"{where}, torso_joint: '{torso.name}' is {torso.type}, but must be prismatic."
             )
+    _check_rest(robot, model, f"{where}, rest")
     for field, choices in (("postures", robot.postures), ("grippers", robot.grippers)):
         for name, positions in choices.items():
             _check_positions(robot, model, positions, f"{where}, {field}.{name}")
@@ -111,11 +112,23 @@ def _check_positions(
             raise RobotError(f"{where}: '{name}' is scored, so a posture cannot hold it.")
         if not joint.is_movable:
             raise RobotError(f"{where}: '{name}' is fixed and has no position.")
-        lower, upper = joint.hard
-        if not lower <= value <= upper:
-            raise RobotError(
-                f"{where}: '{name}' is {value:g}, but must be in [{lower:g}, {upper:g}]."
-            )
+        _check_within(joint, value, where)
+
+
+def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
+    """Refuse a place of rest that names another joint than the arm's, or breaks hard limits."""
+    for name, value in robot.rest.items():
+        if name not in robot.arm_joints:
+            raise UnknownNameError("joint of the arm", name, robot.arm_joints, where=where)
+        _check_within(model.joints[name], value, where)
+
+
+def _check_within(joint: Joint, value: float, where: str) -> None:
+    lower, upper = joint.hard
+    if not lower <= value <= upper:
+        raise RobotError(
+            f"{where}: '{joint.name}' is {value:g}, but must be in [{lower:g}, {upper:g}]."
+        )
 
 
 def _check_known(name: str, known: Iterable[str], where: str) -> None:

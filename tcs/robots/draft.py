@@ -21,6 +21,7 @@ from tcs.robots.packages import resolve_uri
 from tcs.robots.pose import pose_in_root
 from tcs.robots.primitives import Primitive, write_primitives
 from tcs.robots.robot_file import RobotFile
+from tcs.robots.self_collision import DRAWS, free_posture
 from tcs.robots.urdf import Joint, Urdf, read_urdf
 from tcs.writing import whole_file
 
@@ -120,6 +121,10 @@ def draft_robot(
         primitives = tuple(shape for found in fits for shape in found.fit.primitives)
         write_primitives(shapes, primitives)
         robot = robot.model_copy(update={"disabled_groups": propose_disabled_pairs(robot)})
+        rest = free_posture(robot)
+        if rest is None:
+            remarks.append(f"rest: none of {DRAWS} postures of the arm is free of self-collision")
+        robot = robot.model_copy(update={"rest": rest or {}})
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks += [
         f"shapes: {len(primitives)}, of which '{worst.body}' exceeds its hull most, "

@@ -71,6 +71,9 @@ class RobotFile(Document):
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
     """The scored arm's seven joints, from A outward."""
+    rest: Mapping[Name, Number] = {}
+    """Where the scored arm's joints are while it rests [rad]; a joint not named is at 0, or at the
+    nearest position its limits allow."""
     tool_frame: Name
     """T: what has to come to a goal; a link of the URDF, or an extra frame or body."""
     torso_joint: Name | None = None

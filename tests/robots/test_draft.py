@@ -42,6 +42,29 @@ def test_other_joints_stand_at_zero_or_mid_range(drafted):
     assert robot.grippers == {"drafted": {"grip": 0.02}}
 
 
+def test_a_posture_of_rest_is_found_where_zero_will_not_do(tmp_path):
+    """A wall in front of the mast, in which the arm would stand at zero."""
+    wall = (
+        '<link name="wall"><visual><geometry><box size="0.2 0.4 0.4"/></geometry></visual></link>'
+    )
+    carried = (
+        '<joint name="wall_joint" type="fixed"><parent link="mast"/><child link="wall"/>'
+        '<origin xyz="0.1 0 1.3"/></joint>'
+    )
+    file = tmp_path / "walled.urdf"
+    file.write_text(urdf().replace("</robot>", f"{wall}{carried}</robot>"))
+    robot = draft_robot(file, "tool").robot
+    assert set(robot.rest) == set(robot.arm_joints)
+    write_draft(draft_robot(file, "tool"), tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    still = robot.with_mimics(robot.joint_positions())
+    judge = SelfCollision(robot)
+    met = [{frozenset(p) for p in judge.touching(still | arm)} - off for arm in ({}, robot.rest)]
+    assert any("wall" in pair for pair in met[0])
+    assert not any("wall" in pair for pair in met[1])
+
+
 def test_written_file_says_the_same(drafted):
     draft, file = drafted
     robot = load_robot(file)

@@ -153,6 +153,14 @@ WRONG = {
         put("postures", "wild", {"r_elbow_flex_joint": "bent"}),
         r"field 'postures\.wild\.r_elbow_flex_joint' is 'bent', but must be a valid number",
     ),
+    "rest of another joint": (
+        change("rest", {"r_elbow_flex_joint": -1.0}),
+        "rest: unknown joint of the arm 'r_elbow_flex_joint'.*Did you mean 'l_elbow_flex_joint'",
+    ),
+    "rest beyond its limits": (
+        change("rest", {"l_elbow_flex_joint": 0.3}),
+        r"rest: 'l_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
+    ),
     "unknown posture": (change("posture", "tuckd"), "unknown posture 'tuckd'.*Did you mean"),
     "unknown gripper": (change("gripper", "ajar"), "unknown gripper 'ajar'"),
     "limits of another kind": (
