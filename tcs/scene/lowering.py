@@ -11,7 +11,9 @@ from typing import TypeVar
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.tree import Frame
 
+from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.scene.chain import Axis, link_frames
 from tcs.scene.contacts import ContactRule, Group, Part, shape_of
@@ -108,28 +110,28 @@ def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
     for axis in grid.environment_axes:
         built.room_joints.check_axis(axis, where=where)
-    room_poses, goal_poses = _environment_states(scene, room, task, _states_of(grid))
+    room_poses, poses_of_goals = _environment_states(scene, room, task, _states_of(grid))
 
     arrays = SceneArrays(
         chain=chain,
-        arm_base_R=_rotations([arm_base])[0],
-        arm_base_p=_origins([arm_base])[0],
-        arm=_shapes(scene, arm, robot_bodies, [_arm_poses(scene, arm, X_AL)]),
-        body=_shapes(scene, body, robot_bodies, body_poses),
+        arm_base_R=_rotations(_matrices([arm_base]))[0],
+        arm_base_p=_origins(_matrices([arm_base]))[0],
+        arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
+        body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
         room=_shapes(scene, room, room_bodies, room_poses),
         arm_vs_arm=_checked(rule, arm, arm),
         arm_vs_body=_checked(rule, arm, body),
         arm_vs_room=_checked(rule, arm, room),
         body_vs_room=_checked(rule, body, room),
         margin=scene.spec.environment.contact_margin,
-        goal_R=_rotations(goal_poses),
-        goal_p=_origins(goal_poses),
+        goal_R=_rotations(poses_of_goals),
+        goal_p=_origins(poses_of_goals),
     )
     return LoweredScene(
         arrays=_read_only(arrays),
         grid=_read_only(
             GridArrays(
-                environment_states=len(goal_poses),
+                environment_states=len(poses_of_goals),
                 base_x=grid.axis("base_x").values,
                 base_y=grid.axis("base_y").values,
                 base_yaw=grid.axis("base_yaw").values,
@@ -160,8 +162,8 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
     frames = [RigidTransform(), *X_AL, X_AT]
     steps = [before.inverse() @ after for before, after in itertools.pairwise(frames)]
     chain = Chain(
-        R=_rotations([steps])[0],
-        p=_origins([steps])[0],
+        R=_rotations(_matrices([steps]))[0],
+        p=_origins(_matrices([steps]))[0],
         lower=built.arm_lower,
         upper=built.arm_upper,
     )
@@ -235,17 +237,26 @@ def _states_of(grid: Grid) -> Iterator[dict[str, float]]:
 
 def _environment_states(
     scene: Scene, parts: list[Part], task: Task, states: Iterable[Mapping[str, float]]
-) -> tuple[list[list[RigidTransform]], list[list[RigidTransform]]]:
-    """Return the poses in W of the room's shapes and of the goals, for each environment state."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return the poses in W of the room's shapes and of the goals, for each environment state.
+
+    Returns:
+        Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
+    """
+    riding = _riding_goals(scene, task)
     rooms, goals = [], []
     for state in states:
         for name, value in state.items():
             scene.set_joint(name, value)
         query = scene.query_object()
-        # Drake hands out its cached pose, which the next state overwrites: keep a copy.
-        rooms.append([RigidTransform(query.GetPoseInWorld(part.geometry)) for part in parts])
-        goals.append(goal_poses(scene, task))
-    return rooms, goals
+        rooms.append([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
+        goals.append(
+            [
+                (frame.CalcPoseInWorld(scene.plant_context) @ X_HG).GetAsMatrix34()
+                for frame, X_HG in riding
+            ]
+        )
+    return _stacked(rooms, len(parts)), _stacked(goals, len(riding))
 
 
 def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
@@ -254,13 +265,27 @@ def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
     Raises:
         UnknownNameError: If a goal rides on a body frame that the environment does not have.
     """
-    poses = []
+    return [
+        frame.CalcPoseInWorld(scene.plant_context) @ X_HG
+        for frame, X_HG in _riding_goals(scene, task)
+    ]
+
+
+def _riding_goals(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]]:
+    """Return the body frame H that each goal rides on, and its pose X_HG there.
+
+    Raises:
+        UnknownNameError: If the environment has no such body frame.
+    """
+    frames = scene.built.body_frames
+    found = []
     for i, goal in enumerate(task.goals):
-        where = f"task '{task.name}', goal {i}, environment '{scene.spec.environment.name}'"
-        X_WH = scene.body_frame_pose(goal.body_frame, where=where)
+        if goal.body_frame not in frames:
+            where = f"task '{task.name}', goal {i}, environment '{scene.spec.environment.name}'"
+            raise UnknownNameError("frame", goal.body_frame, frames, where=where)
         X_HG = RigidTransform(Quaternion(goal.quaternion), goal.position)
-        poses.append(X_WH @ X_HG)
-    return poses
+        found.append((frames[goal.body_frame], X_HG))
+    return found
 
 
 def _names(parts: list[Part]) -> tuple[str, ...]:
@@ -268,9 +293,8 @@ def _names(parts: list[Part]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(part.name for part in parts))
 
 
-def _shapes(
-    scene: Scene, parts: list[Part], names: tuple[str, ...], states: list[list[RigidTransform]]
-) -> Shapes:
+def _shapes(scene: Scene, parts: list[Part], names: tuple[str, ...], states: FloatArray) -> Shapes:
+    """Return shapes at poses of shape (states, parts, 3, 4)."""
     inspector = scene.built.scene_graph.model_inspector()
     kinds_and_sizes = [shape_of(inspector, part) for part in parts]
     index = {name: i for i, name in enumerate(names)}
@@ -291,16 +315,24 @@ def _checked(rule: ContactRule, first: list[Part], second: list[Part]) -> BoolAr
     return np.array(checked, dtype=np.bool_).reshape(len(first), len(second))
 
 
-def _rotations(states: list[list[RigidTransform]]) -> FloatArray:
+def _matrices(states: list[list[RigidTransform]]) -> FloatArray:
+    """Return poses as matrices, shape (states, poses, 3, 4)."""
+    count = len(states[0]) if states else 0
+    return _stacked([[X.GetAsMatrix34() for X in poses] for poses in states], count)
+
+
+def _stacked(states: list[list[FloatArray]], count: int) -> FloatArray:
+    return np.array(states, dtype=np.float64).reshape(len(states), count, 3, 4)
+
+
+def _rotations(poses: FloatArray) -> FloatArray:
     """Return the rotations of poses, shape (states, poses, 3, 3)."""
-    matrices = [[X.rotation().matrix() for X in poses] for poses in states]
-    return np.array(matrices, dtype=np.float64).reshape(len(states), -1, 3, 3)
+    return np.ascontiguousarray(poses[..., :3])
 
 
-def _origins(states: list[list[RigidTransform]]) -> FloatArray:
+def _origins(poses: FloatArray) -> FloatArray:
     """Return the origins of poses, shape (states, poses, 3)."""
-    points = [[X.translation() for X in poses] for poses in states]
-    return np.array(points, dtype=np.float64).reshape(len(states), -1, 3)
+    return np.ascontiguousarray(poses[..., 3])
 
 
 def _transform(R: FloatArray, p: FloatArray) -> RigidTransform:
