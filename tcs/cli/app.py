@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import reports, robots, talk
+from tcs.cli import reports, robots, robustness, talk
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -389,3 +389,6 @@ def export(
     talk.print_result(
         result, lambda _: typer.echo(f"wrote {out}: {len(frame):,} rows"), as_json=as_json
     )
+
+
+app.command()(robustness.evaluate)

@@ -88,7 +88,9 @@ class Trials:
                 f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
             )
         model = ErrorModel.of(scene, errors)
-        seconds = warm_up(build_problem(lowered.arrays, lowered.grid), on_compile)
+        measure = str(file.metadata["measure"])
+        problem = build_problem(lowered.arrays, lowered.grid, measure)
+        seconds = warm_up(problem, on_compile)
         return cls(file, chosen, model, check_base, job, scene, lowered, seconds)
 
     def at_table(self, table: int) -> Trials:
@@ -196,6 +198,28 @@ class Trials:
                     step(1)
         return out
 
+    def solutions(
+        self, member: int, offsets: Offsets
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+        """Return which goals a configuration reaches in each sample, and the arm's joints there.
+
+        Args:
+            member: Flat configuration index.
+            offsets: By how much joints are off, shapes (samples,).
+
+        Returns:
+            Whether a solution was found, shape (samples, goals), and the best one's joints [rad],
+            0 where there is none, shape (samples, goals, 7).
+
+        Raises:
+            GridError: If there is no such configuration.
+        """
+        stands = self._stands([member])
+        columns = np.arange(samples_of(offsets))
+        world = self._world(int(stands.state[0]), offsets, columns)
+        scores = _scored(world, stands, _Run(0, 0, columns.size))
+        return scores.reason == Reason.REACHED, scores.joints
+
     def clipped(self, members: NDArray[np.integer[Any]], offsets: Offsets) -> int:
         """Return in how many samples an error would take a joint beyond its limits.
 
@@ -263,7 +287,7 @@ class Trials:
         torso_levels = len(arrays.arm_base_p)
         origin = np.zeros(1)
         grid = GridArrays(columns.size, origin, origin, origin, torso_levels)
-        problem = build_problem(arrays, grid)
+        problem = build_problem(arrays, grid, str(self.file.metadata["measure"]))
         return _World(problem, gripper_contacts(problem))
 
 
@@ -360,16 +384,18 @@ def _tried(
 
 
 def _try(world: _World, stands: _Stands, runs: list[_Run]) -> list[NDArray[np.bool_]]:
-    found = []
-    for run in runs:
-        problem = world.from_place(stands, run.row)
-        shape = (run.stop - run.start, problem.goal_p.shape[1])
-        scores = Scores(
-            reason=np.empty(shape, np.uint8),
-            contact=np.empty(shape, np.int32),
-            isotropy=np.zeros(shape, np.float32),
-            joints=np.zeros((*shape, 7), np.float32),
-        )
-        score_slice(problem, world.grippers, run.start, run.stop, scores)
-        found.append(scores.reason == Reason.REACHED)
-    return found
+    return [_scored(world, stands, run).reason == Reason.REACHED for run in runs]
+
+
+def _scored(world: _World, stands: _Stands, run: _Run) -> Scores:
+    """Return the kernel's scores of one run, by the very code that scores a grid."""
+    problem = world.from_place(stands, run.row)
+    shape = (run.stop - run.start, problem.goal_p.shape[1])
+    scores = Scores(
+        reason=np.empty(shape, np.uint8),
+        contact=np.empty(shape, np.int32),
+        isotropy=np.zeros(shape, np.float32),
+        joints=np.zeros((*shape, 7), np.float32),
+    )
+    score_slice(problem, world.grippers, run.start, run.stop, scores)
+    return scores
