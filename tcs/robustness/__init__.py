@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from tcs.robustness.comparison import CELLS, Contrast, MethodTable, cell_name, compare_methods
 from tcs.robustness.error_model import ErrorFile, ErrorModel
 from tcs.robustness.evaluation import SELECTIONS, Evaluation, evaluate
 from tcs.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
 from tcs.robustness.trials import Trials
 
 __all__ = [
+    "CELLS",
     "SELECTIONS",
+    "Contrast",
     "Difference",
     "ErrorFile",
     "ErrorModel",
     "Evaluation",
     "Mean",
+    "MethodTable",
     "Trials",
+    "cell_name",
+    "compare_methods",
     "evaluate",
     "mean_of",
     "rank_sum",
