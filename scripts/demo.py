@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import tcs
-from tcs.cli.pictures import Shown, map_figure, scene_figure
 from tcs.cli.places import place
 from tcs.cli.reports import choice_as_json, report_choice, report_scores, report_verification
 from tcs.cli.talk import progress_bar
 from tcs.draw import save_figure
+from tcs.report.pictures import Shown, map_figure, scene_figure
 from tcs.scoring import load_job
 
 TASK, ENVIRONMENT, ROBOT = "shaving", "wheelchair", "pr2"

@@ -355,7 +355,7 @@ def draw(
     check_writable(out)
     loaded = tcs.load(file)
 
-    from tcs.cli import pictures
+    from tcs.report import pictures
 
     found = observed_settings(observed or (), loaded.observed_axes)
     shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members, found)

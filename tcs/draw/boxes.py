@@ -1,0 +1,113 @@
+"""Box plots: how samples of several methods are spread, group by group."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
+"""Blue, orange, green, purple of Okabe and Ito: told apart by who is colour-blind, and in grey."""
+_INK = "#222222"
+_HEIGHT = 0.26
+"""Height of a box in inches."""
+_GAP = 0.6
+"""Room between two groups, in boxes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The samples of one method."""
+
+    series: int
+    """Which of the figure's series: colour and name."""
+    samples: NDArray[np.float64]
+    """Shape (n,)."""
+    reference: tuple[float, float] | None = None
+    """Mean and standard deviation that somebody else has published."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Boxes that belong together, one below the other."""
+
+    name: str
+    boxes: Sequence[Box]
+
+
+def draw_boxes(
+    groups: Sequence[Group], series: Sequence[str], *, label: str, reference: str = ""
+) -> Figure:
+    """Return box plots of groups of samples, lying, the first group on top.
+
+    A box spans the middle half of the samples, its line is the median, whiskers reach the 5th and
+    95th percentile and the dot is the mean. The outermost samples are small rings.
+
+    Args:
+        groups: What to draw.
+        series: Names of the methods, by number.
+        label: What the samples are, with their unit.
+        reference: What to call the published figures.
+    """
+    rows = sum(len(group.boxes) + _GAP for group in groups)
+    figure = Figure(figsize=(8.2, 1.3 + _HEIGHT * rows), layout="constrained")
+    axes = figure.subplots()
+    top, ticks = 0.0, []
+    for group in groups:
+        for i, box in enumerate(group.boxes):
+            _draw(axes, top + i, box)
+        ticks.append(top + (len(group.boxes) - 1) / 2.0)
+        top += len(group.boxes) + _GAP
+        axes.axhline(top - 0.5 - _GAP / 2.0, color="#d5dae0", lw=0.8, zorder=0)
+    axes.set_yticks(ticks, [group.name for group in groups], fontsize=9)
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(top - _GAP / 2.0 - 0.5, -0.5 - _GAP / 2.0)
+    axes.set_xlabel(label)
+    axes.grid(axis="x", color="#e6e9ed", lw=0.8)
+    axes.set_axisbelow(True)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    used = sorted({box.series for group in groups for box in group.boxes})
+    handles: list[Artist] = [Patch(facecolor=COLOURS[i], label=series[i]) for i in used]
+    handles.append(_mark("o", "mean", "white"))
+    if any(box.reference for group in groups for box in group.boxes):
+        handles.append(_mark("D", f"{reference}: mean, one std to each side", "#F0E442"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=3, frameon=False, fontsize=9)
+    return figure
+
+
+def _draw(axes: Axes, y: float, box: Box) -> None:
+    low, first, median, third, high = np.percentile(box.samples, (5, 25, 50, 75, 95))
+    outer = np.unique(box.samples[(box.samples < low) | (box.samples > high)])
+    spread = {"med": median, "q1": first, "q3": third, "whislo": low, "whishi": high}
+    axes.bxp(
+        [{**spread, "fliers": outer, "mean": box.samples.mean()}],
+        positions=[y],
+        orientation="horizontal",
+        widths=0.62,
+        patch_artist=True,
+        manage_ticks=False,
+        showmeans=True,
+        boxprops={"facecolor": COLOURS[box.series], "edgecolor": _INK, "lw": 0.8},
+        medianprops={"color": _INK, "lw": 1.6},
+        whiskerprops={"color": _INK, "lw": 0.8},
+        capprops={"color": _INK, "lw": 0.8},
+        meanprops={"marker": "o", "mfc": "white", "mec": _INK, "ms": 4.5},
+        flierprops={"marker": "o", "mfc": "none", "mec": "#8a939c", "ms": 2.5, "mew": 0.6},
+    )
+    if box.reference is not None:
+        mean, std = box.reference
+        ends = np.clip([mean - std, mean + std], 0.0, 100.0)
+        axes.plot(ends, [y + 0.4] * 2, color=_INK, lw=1.0, zorder=5)
+        axes.plot([mean], [y + 0.4], "D", mfc="#F0E442", mec=_INK, ms=4.5, mew=0.8, zorder=6)
+
+
+def _mark(marker: str, label: str, colour: str) -> Line2D:
+    return Line2D([], [], ls="none", marker=marker, mfc=colour, mec=_INK, ms=5, label=label)
