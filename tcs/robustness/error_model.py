@@ -84,9 +84,14 @@ class ErrorModel:
             stream: Another text gives independent numbers.
 
         Raises:
-            TcsError: If there are no samples or too many, or the seed is none.
+            TcsError: If there are no samples or too many, the seed is none, or no joint is off.
         """
         check_draws(samples, seed)
+        if not self.errors:
+            raise TcsError(
+                "No joint is said to be off, so there is nothing to try. Name joints in an error "
+                "file (--errors), or in the environment file under 'errors'."
+            )
         return {
             name: error.draw(named_generator(seed, f"{stream}/{name}"), samples)
             for name, error in self.errors.items()

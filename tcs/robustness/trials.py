@@ -198,18 +198,8 @@ class Trials:
                     step(1)
         return out
 
-    def solutions(
-        self, member: int, offsets: Offsets
-    ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-        """Return which goals a configuration reaches in each sample, and the arm's joints there.
-
-        Args:
-            member: Flat configuration index.
-            offsets: By how much joints are off, shapes (samples,).
-
-        Returns:
-            Whether a solution was found, shape (samples, goals), and the best one's joints [rad],
-            0 where there is none, shape (samples, goals, 7).
+    def outcome(self, member: int, offsets: Offsets) -> Scores:
+        """Return all the kernel finds for a flat configuration index, a row for each sample.
 
         Raises:
             GridError: If there is no such configuration.
@@ -217,8 +207,17 @@ class Trials:
         stands = self._stands([member])
         columns = np.arange(samples_of(offsets))
         world = self._world(int(stands.state[0]), offsets, columns)
-        scores = _scored(world, stands, _Run(0, 0, columns.size))
-        return scores.reason == Reason.REACHED, scores.joints
+        return _scored(world, stands, _Run(0, 0, columns.size))
+
+    def solutions(
+        self, member: int, offsets: Offsets
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+        """Return which goals a configuration reaches in each sample, and the arm's joints there.
+
+        Shapes are (samples, goals) and (samples, goals, 7) [rad], 0 where there is none.
+        """
+        found = self.outcome(member, offsets)
+        return found.reason == Reason.REACHED, found.joints
 
     def clipped(self, members: NDArray[np.integer[Any]], offsets: Offsets) -> int:
         """Return in how many samples an error would take a joint beyond its limits.
@@ -345,8 +344,7 @@ def samples_of(offsets: Offsets) -> int:
     sizes = {len(values) for values in offsets.values()}
     if len(sizes) != 1:
         raise TcsError(
-            "Errors of the joints must be as many for each joint, and of one joint at least; an "
-            "environment without 'errors' needs an error file."
+            "Errors must be as many for each joint, and there must be some for one joint at least."
         )
     return sizes.pop()
 

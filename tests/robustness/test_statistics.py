@@ -1,0 +1,77 @@
+"""Means, intervals and tests, against closed forms and scipy on known samples."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tcs.robustness import mean_of, rank_sum, signed_rank
+
+
+def test_mean_std_and_interval_by_hand():
+    found = mean_of([0.25, 0.5, 0.5, 0.75])
+    assert found.mean == 0.5
+    assert found.std == pytest.approx(math.sqrt(0.125 / 3))
+    # Student's t at 97.5 % of 3 degrees of freedom, from a printed table.
+    half = 3.1824 * math.sqrt(0.125 / 3) / 2
+    assert found.ci95 == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
+
+
+def test_the_interval_stays_within_what_is_possible():
+    assert mean_of([0.0, 1.0, 1.0]).ci95 == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
+def test_equal_samples_claim_no_certainty(value):
+    low, high = mean_of(np.full(1000, value)).ci95
+    # Something never seen in 1000 samples happens in fewer than 1 - 0.025^(1/1000) of them.
+    unseen = -math.log(0.025) / 1000
+    # The logarithm leaves out a term of second order, unseen^2 / 2.
+    expected = (value - unseen * value, value + unseen * (1.0 - value))
+    assert (low, high) == pytest.approx(expected, abs=unseen**2)
+    assert mean_of([value]).std == 0.0
+
+
+def test_the_interval_covers_the_mean_as_often_as_it_says(rng):
+    # Shares of eight goals, each reached with probability 0.8.
+    covered = 0
+    for _ in range(400):
+        low, high = mean_of(rng.binomial(8, 0.8, 50) / 8).ci95
+        covered += low <= 0.8 <= high
+    # Four standard errors of a share of 0.95 in 400.
+    assert abs(covered / 400 - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 400)
+
+
+def test_rank_sum_is_scipys_with_ties_corrected(rng):
+    first, second = rng.binomial(8, 0.8, 200) / 8, rng.binomial(8, 0.7, 250) / 8
+    found = rank_sum(first, second)
+    assert found.test == "rank sum"
+    assert found.mean == pytest.approx(first.mean() - second.mean())
+    assert found.p == stats.mannwhitneyu(first, second, method="asymptotic").pvalue
+    # Without ties it is the rank sum of textbooks, but for the correction for continuity.
+    one, other = rng.normal(size=60), rng.normal(0.3, size=60)
+    assert rank_sum(one, other).p == pytest.approx(stats.ranksums(one, other).pvalue, rel=0.02)
+
+
+def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
+    luck = rng.normal(size=100)
+    first, second = luck + 0.05, luck + rng.normal(0, 0.05, 100)
+    assert signed_rank(first, second).p < 1e-6
+    assert rank_sum(first, second).p > 0.1
+    low, high = signed_rank(first, second).ci95
+    assert low < 0.05 < high
+
+
+def test_equal_samples_do_not_differ():
+    ones = np.ones(10)
+    assert rank_sum(ones, ones).p == signed_rank(ones, ones).p == 1.0
+    assert signed_rank(ones, ones).ci95 == (0.0, 0.0)
+
+
+def test_p_is_even_where_nothing_differs(rng):
+    found = [signed_rank(*rng.binomial(8, 0.8, (2, 80)) / 8).p < 0.05 for _ in range(400)]
+    # Four standard errors of a share of 0.05 in 400.
+    assert abs(np.mean(found) - 0.05) < 4 * math.sqrt(0.05 * 0.95 / 400)
