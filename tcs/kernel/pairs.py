@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -19,8 +19,7 @@ from tcs.kernel.ik import lane_joints
 from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import Search, best_of, fill_lanes, find_candidates
-from tcs.kernel.solver import ArmSolver
+from tcs.kernel.search import MAX_CANDIDATES, Search, best_of, fill_lanes, find_candidates
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED, GRIPPER_BLOCKED, ARM_BLOCKED = 0, 1, 2, 3, 4, 5
 """Reasons, the numbers of `tcs.tables.Reason`."""
@@ -32,6 +31,11 @@ SQUEEZES = 8
 """Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
 SQUEEZE_PARTS = 16.0
 """How finely the neighbourhood of an angle found by halving is refined."""
+END_HALVINGS = 12
+"""Halvings towards the end of a feasible stretch: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
+SAME_STRETCH = 1.01
+"""Candidates within this many of their spacings have nothing infeasible between them that was
+seen; the hundredth is for rounding."""
 
 
 @jit
@@ -80,37 +84,96 @@ def best_free(
 def squeeze(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> int:
-    """Look for a free angle between neighbouring candidates that all touch something.
+    """Look for a free angle where every candidate touches something.
 
     A free stretch narrower than the spacing lies where one contact has ended and another not
-    begun. So the candidates are walked in order; where the pair in contact changes, halving finds
-    whether there is room between the two.
+    begun, or where a contact has ended and a joint limit is about to be passed. So the very ends
+    of the feasible stretches join the candidates, all are walked in the order of their angles, and
+    where the pair in contact changes, halving finds whether there is room between the two.
 
     Returns:
         Index of the candidate that now holds a free angle, or -1.
     """
     arm = problem.arm
+    found = _add_ends(problem, search, found)
+    order = _in_order(search, found)
     work.last[0] = -1
     partner, i, j = -1, -1, -1
-    for n in range(found):
+    for rank in range(found):
+        n = order[rank]
         b = search.found_branch[n]
         lane_joints(arm, search.goal, arm.branches[b], search.found_angle[n], search.q)
-        arm_contact(problem, work, body_A, search.q)
+        contact = arm_contact(problem, work, body_A, search.q)
+        if contact == NO_CONTACT and at_goal(problem, work):
+            return n
         changed = work.last[0] != partner or work.last[1] != i or work.last[2] != j
-        if n and changed and b == search.found_branch[n - 1]:
-            width = search.found_angle[n] - search.found_angle[n - 1]
-            if abs(width) < 1.5 * search.found_step[n]:
-                first = search.found_angle[n - 1]
-                angle = _between(problem, work, body_A, search, b, first, width, partner, i, j)
-                if np.isfinite(angle):
-                    search.found_angle[n] = angle
-                    search.found_measure[n] = search.measure[0]
-                    if not lanes_measure(problem):
-                        search.found_measure[n] = measure_of(problem, search, b, angle)
-                    search.found_step[n] = abs(width) / SQUEEZE_PARTS
-                    return n
+        if rank and changed and _are_neighbours(search, order[rank - 1], n):
+            first = search.found_angle[order[rank - 1]]
+            width = search.found_angle[n] - first
+            angle = _between(problem, work, body_A, search, b, first, width, partner, i, j)
+            if np.isfinite(angle):
+                search.found_angle[n] = angle
+                search.found_measure[n] = _measure_if_feasible(problem, search, b, angle)
+                search.found_step[n] = width / SQUEEZE_PARTS
+                return n
         partner, i, j = work.last[0], work.last[1], work.last[2]
     return -1
+
+
+@jit
+def _in_order(search: Search, found: int) -> IntArray:
+    """Return the candidates branch by branch, in the order of their angles."""
+    # No angle of the free joint is anywhere near this far from zero.
+    return np.argsort(
+        search.found_angle[:found] + 1e4 * search.found_branch[:found], kind="mergesort"
+    )
+
+
+@jit
+def _are_neighbours(search: Search, m: int, n: int) -> bool:
+    """Return whether nothing infeasible was seen between two candidates that follow each other."""
+    width = search.found_angle[n] - search.found_angle[m]
+    spacing = max(search.found_step[m], search.found_step[n])
+    return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
+
+
+@jit
+def _add_ends(problem: Problem, search: Search, found: int) -> int:
+    """Append the last angle that keeps all limits at each end of the feasible stretches.
+
+    Returns:
+        How many candidates there are now.
+    """
+    order, before = _in_order(search, found), found
+    for rank in range(before):
+        n = order[rank]
+        for side in (-1, 1):
+            if 0 <= rank + side < before:
+                m = order[rank + side]
+                left, right = (m, n) if side < 0 else (n, m)
+                if _are_neighbours(search, left, right):
+                    continue
+            found = _add_end(problem, search, n, side, found)
+    return found
+
+
+@jit
+def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) -> int:
+    """Append where the stretch ends that candidate n is the outermost of, to one side."""
+    b, angle = search.found_branch[n], search.found_angle[n]
+    inside, outside, value = 0.0, search.found_step[n], -1.0
+    for _ in range(END_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        measure = _measure_if_feasible(problem, search, b, angle + side * middle)
+        if measure >= 0.0:
+            inside, value = middle, measure
+        else:
+            outside = middle
+    if inside == 0.0 or found == MAX_CANDIDATES:
+        return found
+    search.found_branch[found], search.found_angle[found] = b, angle + side * inside
+    search.found_step[found], search.found_measure[found] = inside, value
+    return found + 1
 
 
 @jit
@@ -144,7 +207,7 @@ def _between(
         elif pair_touches(problem, work, body_A, other, k, m):
             high = middle
         else:
-            if _is_feasible(arm, search, b, angle) and (
+            if _measure_if_feasible(problem, search, b, angle) >= 0.0 and (
                 arm_contact(problem, work, body_A, search.q) == NO_CONTACT
                 and at_goal(problem, work)
             ):
@@ -155,14 +218,17 @@ def _between(
 
 
 @jit
-def _is_feasible(arm: ArmSolver, search: Search, b: int, angle: float) -> bool:
-    """Return whether branch b exists at this angle and keeps all limits; fills measure[0]."""
+def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float) -> float:
+    """Return what a candidate at this angle on branch b is worth, or -1 if it is none."""
+    arm = problem.arm
     search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
     solve_lanes(
         arm, search.goal, arm.branches[b], search.cosine, search.sine, 1,
         search.slack, search.measure,
     )  # fmt: skip
-    return search.slack[0] >= 0.0
+    if search.slack[0] < 0.0:
+        return -1.0
+    return search.measure[0] if lanes_measure(problem) else measure_of(problem, search, b, angle)
 
 
 @jit

@@ -1,4 +1,4 @@
-"""Windows of the free joint that two limits leave open between them, on the real bed."""
+"""Narrow windows of the free joint that limits and contacts leave open, in the real rooms."""
 
 from __future__ import annotations
 
@@ -13,18 +13,44 @@ from tcs.scoring import load_job
 
 # Configuration and goal of scratching the right thigh. The PR2's shoulder lift leaves its lower
 # limit just before the wrist flex meets its own: windows of 4e-4 to 2.5e-3 rad.
-NARROW = [(663388, 1), (1126360, 1), (320451, 1), (419797, 1), (621037, 1), (680582, 0)]
+BETWEEN_LIMITS = [
+    (663388, 1), (1126360, 1), (320451, 1), (419797, 1), (621037, 1), (680582, 0),
+]  # fmt: skip
+# Of feeding. Every lane but those next to a limit touches something.
+NEXT_TO_A_LIMIT = [
+    (86787, 3), (64777, 1), (64071, 5), (73541, 5), (80859, 5), (58945, 2), (61873, 1), (63310, 2),
+    (79465, 5),
+]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def problem():
-    job = load_job("scratching_thigh_right", "bed", "pr2")
+def problem_of(task, environment):
+    job = load_job(task, environment, "pr2")
     lowered = job.lowered(job.scene())
     return build_problem(lowered.arrays, lowered.grid)
 
 
-@pytest.mark.parametrize(("h", "g"), NARROW, ids=str)
-def test_a_window_between_two_limits_is_found(problem, h, g):
+@pytest.fixture(scope="module")
+def scratching():
+    return problem_of("scratching_thigh_right", "bed")
+
+
+@pytest.fixture(scope="module")
+def feeding():
+    return problem_of("feeding", "wheelchair")
+
+
+@pytest.mark.parametrize(("h", "g"), BETWEEN_LIMITS, ids=str)
+def test_a_window_between_two_limits_is_found(scratching, h, g):
+    check(scratching, h, g)
+
+
+@pytest.mark.parametrize(("h", "g"), NEXT_TO_A_LIMIT, ids=str)
+def test_room_between_a_contact_and_a_limit_is_found(feeding, h, g):
+    check(feeding, h, g)
+
+
+def check(problem, h, g):
+    """Score one pair, and hold it to the dense scan."""
     goals = problem.goal_p.shape[1]
     scores = Scores(
         reason=np.empty((1, goals), np.uint8),
