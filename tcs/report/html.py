@@ -95,7 +95,7 @@ def _(block: Table) -> str:
         f'<th scope="col"{_number(column)}>{escape(column.title)}</th>' for column in block.columns
     )
     rows = [
-        "<tr>" + "".join(map(_cell, row, block.columns, strict=True)) + "</tr>"
+        "<tr>" + "".join(_cell(*both) for both in zip(row, block.columns, strict=True)) + "</tr>"
         for row in block.rows
     ]
     return (
@@ -130,10 +130,7 @@ def _number(column: Column) -> str:
 
 def _cell(cell: Cell | str, column: Column) -> str:
     cell = Cell(cell) if isinstance(cell, str) else cell
-    classes = [name for name in ("number" if column.is_number else "", cell.tone) if name]
-    shown = " ".join(name for name in classes if name != "plain")
-    return (
-        f'<td class="{shown}">{escape(cell.text)}</td>'
-        if shown
-        else f"<td>{escape(cell.text)}</td>"
-    )
+    classes = ["number"] if column.is_number else []
+    classes += [cell.tone] if cell.tone != "plain" else []
+    shown = f' class="{" ".join(classes)}"' if classes else ""
+    return f"<td{shown}>{escape(cell.text)}</td>"

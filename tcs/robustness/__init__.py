@@ -5,6 +5,7 @@ from __future__ import annotations
 from tcs.robustness.comparison import CELLS, Contrast, MethodTable, cell_name, compare_methods
 from tcs.robustness.error_model import ErrorFile, ErrorModel
 from tcs.robustness.evaluation import SELECTIONS, Evaluation, evaluate
+from tcs.robustness.losses import Loss, losses
 from tcs.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
 from tcs.robustness.trials import Trials
 
@@ -16,12 +17,14 @@ __all__ = [
     "ErrorFile",
     "ErrorModel",
     "Evaluation",
+    "Loss",
     "Mean",
     "MethodTable",
     "Trials",
     "cell_name",
     "compare_methods",
     "evaluate",
+    "losses",
     "mean_of",
     "rank_sum",
     "signed_rank",
