@@ -53,6 +53,8 @@ class MethodTable:
 
     cells: dict[Cell, Evaluation]
     """On the same samples for all."""
+    independent: dict[Cell, Evaluation]
+    """On samples drawn for each by itself."""
     contrasts: tuple[Contrast, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -138,4 +140,4 @@ def compare_methods(
         for first, second in CONTRASTS
         if first in paired and second in paired
     )
-    return MethodTable(paired, contrasts)
+    return MethodTable(paired, alone, contrasts)

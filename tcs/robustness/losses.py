@@ -51,8 +51,23 @@ class Loss:
         }
 
 
-def losses(trials: Trials, evaluation: Evaluation) -> tuple[Loss, ...]:
-    """Return the goals that a set does not reach in every sample, the worst first.
+@dataclass(frozen=True)
+class Losses:
+    """What a set loses when the room is off."""
+
+    goals: tuple[Loss, ...]
+    """The goals that are not reached in every sample, the worst first."""
+    ceiling: float
+    """The greatest mean share of goals that any set could reach with the room set as this one
+    sets it: the gripper at the other goals touches something, wherever the robot stands."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain containers."""
+        return {"ceiling": self.ceiling, "goals": [loss.to_json() for loss in self.goals]}
+
+
+def losses(trials: Trials, evaluation: Evaluation) -> Losses:
+    """Return the goals that a set does not reach in every sample, and why.
 
     Args:
         trials: What the set was evaluated with.
@@ -60,10 +75,11 @@ def losses(trials: Trials, evaluation: Evaluation) -> tuple[Loss, ...]:
     """
     lost = ~evaluation.reached
     if not lost.any():
-        return ()
+        return Losses((), 1.0)
     offsets = evaluation.offsets
     outcomes = [trials.outcome(int(h), offsets) for h in evaluation.sets[0]]
     reached = np.array([found.reason == Reason.REACHED for found in outcomes])
+    barred = np.all([found.reason == Reason.GRIPPER_BLOCKED for found in outcomes], axis=0)
     robot, room = trials.lowered.robot_bodies, trials.lowered.room_bodies
     others = (*room, *robot)
     found = []
@@ -93,4 +109,5 @@ def losses(trials: Trials, evaluation: Evaluation) -> tuple[Loss, ...]:
                 tilt=tilts.get(joint, 0.0),
             )
         )
-    return tuple(sorted(found, key=lambda loss: loss.success))
+    found.sort(key=lambda loss: loss.success)
+    return Losses(tuple(found), float(np.mean(~barred @ evaluation.weights)))

@@ -12,7 +12,7 @@ from tcs.tables import Reason
 @pytest.fixture(scope="module")
 def found(trials):
     evaluation = evaluate(trials, samples=150)
-    return evaluation, losses(trials, evaluation)
+    return evaluation, losses(trials, evaluation).goals
 
 
 def test_every_goal_that_is_lost_is_told_with_its_success(found):
@@ -24,6 +24,13 @@ def test_every_goal_that_is_lost_is_told_with_its_success(found):
         if share < 1.0
     }
     assert [loss.success for loss in told] == sorted(lost.values())
+
+
+def test_no_set_reaches_more_than_the_ceiling(trials):
+    evaluation = evaluate(trials, samples=150)
+    ceiling = losses(trials, evaluation).ceiling
+    # Means of the same samples: exact but for the order of adding up.
+    assert evaluation.summary.mean <= ceiling + 1e-12 <= 1.0 + 2e-12
 
 
 def test_reasons_are_those_of_losses_alone(found):

@@ -1,0 +1,103 @@
+"""Measure scoring a room as it is observed: its time, and what it gains over stored shifts.
+
+Usage: python benchmarks/live.py [--repeats 5] [--rows shaving/bed ...] [--between 0.025]
+
+Times are of the wheelchair tasks, scene and machine code at hand. The gain is that of the bed: the
+person lies between two stored shifts; the best set of the nearest table and the best set scored
+live are both judged in the room as it is. Nothing here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+from table import header, row, spread
+
+from tcs.scoring import LiveScorer, all_rows, score
+from tcs.select import nearest_table
+from tcs.store import ScoreFile
+
+WHEELCHAIR = "wheelchair"
+
+
+def main() -> None:
+    """Measure and print everything."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5, help="observations of each task")
+    parser.add_argument("--rows", nargs="*", metavar="TASK/ROOM", help="only these rows")
+    parser.add_argument(
+        "--between", type=float, default=0.025, help="how far from a stored shift [m]"
+    )
+    options = parser.parse_args()
+    header()
+    rows = [one for one in all_rows() if not options.rows or "/".join(one) in options.rows]
+    for task, room in rows:
+        if room == WHEELCHAIR:
+            times(task, options.repeats)
+    print()
+    for task, room in rows:
+        if room != WHEELCHAIR:
+            gains(task, room, options.between)
+
+
+def times(task: str, repeats: int) -> None:
+    """Measure how long one observation takes, by the wall and by the processor."""
+    begun = time.perf_counter()
+    scorer = LiveScorer(task)
+    row(f"{task}: scene and machine code", f"{time.perf_counter() - begun:.2f} s, once")
+    rng = np.random.default_rng(0)
+    wall, cpu, scoring, sets = [], [], [], []
+    for _ in range(repeats):
+        x, y = rng.normal(0.0, 0.05, 2)
+        begun, busy = time.perf_counter(), time.process_time()
+        file = scorer.score({"person_x": float(x), "person_y": float(y)})
+        wall.append(time.perf_counter() - begun)
+        cpu.append(time.process_time() - busy)
+        scoring.append(file.metadata["timings"]["scoring_seconds"])
+        sets.append(file.metadata["timings"]["sets_seconds"])
+    row(f"{task}: one observation", spread(wall))
+    row("  of it scoring the grid", spread(scoring))
+    row("  of it building the sets", spread(sets))
+    row("  processor time, two threads", spread(cpu))
+
+
+def gains(task: str, room: str, between: float) -> None:
+    """Print what the set chosen live has over the one of the nearest stored shift."""
+    stored = score(task, room)
+    scorer = LiveScorer(task, environment=room)
+    steps = stored.observed_axes[0].values
+    places = [float(y) + between for y in steps[:-1]]
+    differences = []
+    for x in (0.0, 0.05):
+        found = []
+        for y in places:
+            live = scorer.score({"person_y": y, "person_x": x})
+            near = stored.tables[nearest_table(stored, observed={"person_y": y}).index].sets.best
+            found.append(np.subtract(judged(live, live.nominal.sets.best), judged(live, near)))
+        differences.append(np.array(found))
+    for x, found in zip((0.0, 0.05), differences, strict=True):
+        name = f"{task}, {room}" if x == 0.0 else f"  and {100 * x:.0f} cm towards the feet"
+        reach, sums = found[:, 0], found.sum(axis=1)
+        row(
+            name,
+            f"P_R {reach.mean():+.3f} (most {reach.max():+.3f}), "
+            f"P_M {found[:, 1].mean():+.4f}, P_R + P_M {sums.mean():+.4f} "
+            f"({sums.min():+.4f} .. {sums.max():+.4f}), better in "
+            f"{np.count_nonzero(sums > 1e-9)} of {len(sums)}",
+        )
+
+
+def judged(live: ScoreFile, members: tuple[int, ...]) -> tuple[float, float]:
+    """Return P_R and P_M of a set in the room as it is."""
+    scores = live.nominal.scores
+    rows = list(members)
+    reached = scores.reached[rows].any(axis=0)
+    return float(reached @ scores.weights), float(
+        scores.isotropy[rows].max(axis=0).astype(np.float64) @ scores.weights
+    )
+
+
+if __name__ == "__main__":
+    main()
