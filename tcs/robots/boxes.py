@@ -20,6 +20,11 @@ _STEP = 10.0**-_DECIMALS
 _QUATERNION_DECIMALS = 9
 # Thinner than any part that matters; a flat part still needs a box with some thickness.
 _THINNEST = 1e-4
+_FACETS = 32
+"""So many facets of a hull at most are looked at closely: those of a rounded part go into the
+thousands, and all but a few can be told to be worse by a glance."""
+_GLANCES = np.linspace(0.0, np.pi / 2, 6, endpoint=False)
+"""Angles about a facet's normal at which a box is tried at a glance [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +48,11 @@ def corner_points(triangles: FloatArray) -> FloatArray:
     Args:
         triangles: Corners [m], shape (n, 3, 3).
     """
-    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    return hull_corners(np.unique(triangles.reshape(-1, 3), axis=0))
+
+
+def hull_corners(points: FloatArray) -> FloatArray:
+    """Return which of some points are the corners of their convex hull, shape (m, 3)."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except QhullError:
@@ -78,8 +87,9 @@ def tightest_orientation(points: FloatArray) -> FloatArray:
     except QhullError:
         return np.eye(3)
     best, best_volume = np.eye(3), math.inf
-    for normal in np.unique(np.round(hull.equations[:, :3], 6), axis=0):
-        frame = _frame_with_z(normal / np.linalg.norm(normal))
+    normals = np.unique(np.round(hull.equations[:, :3], 6), axis=0)
+    frames = np.stack([_frame_with_z(normal / np.linalg.norm(normal)) for normal in normals])
+    for frame in _promising(points[hull.vertices], frames):
         seen = points @ frame
         angle, area = _tightest_rectangle(seen[:, :2])
         volume = area * float(np.ptp(seen[:, 2]))
@@ -175,6 +185,26 @@ def _frame_with_z(z: FloatArray) -> FloatArray:
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:
+    """Return the frames whose z a small box around points may well have, shape (k, 3, 3)."""
+    if len(frames) <= _FACETS:
+        return frames
+    x, y, z = np.moveaxis(frames, 2, 0)
+
+    def widths(directions: FloatArray) -> FloatArray:
+        return np.asarray(np.ptp(directions @ points.T, axis=1))
+
+    areas = [
+        widths(math.cos(angle) * x + math.sin(angle) * y)
+        * widths(math.cos(angle) * y - math.sin(angle) * x)
+        for angle in _GLANCES
+    ]
+    volumes = np.min(areas, axis=0) * widths(z)
+    # In the order of the facets, so that a tie goes to the same one as ever.
+    chosen = np.sort(np.argsort(volumes, kind="stable")[:_FACETS])
+    return np.asarray(frames[chosen])
 
 
 def _tightest_rectangle(points: FloatArray) -> tuple[float, float]:

@@ -33,6 +33,8 @@ _MEETING = CLEAR * _FINER
 further."""
 _FAR = 0.05
 """Distances beyond this [m] are not told apart."""
+_NEAR = 2 * CLEAR
+"""Surfaces farther apart than this [m] as seen from points 5 mm apart are looked at no closer."""
 _MOST_JOINTS = 3
 """Up to so many joints between two bodies, the closest approach is searched for."""
 _POINT_SEED = 0
@@ -73,7 +75,8 @@ def propose_disabled_pairs(
     sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
     moved, hand = (_moved_by(model, robot.arm_joints[i]) for i in (0, -1))
-    surfaces, fine = Surfaces(model), Surfaces(model, scale=_FINER)
+    surfaces = Surfaces(model)
+    fine = Surfaces(model, scale=_FINER, rough=surfaces)
     found = _Found()
     for pair, count in sorted(counts.items()):
         if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
@@ -136,14 +139,16 @@ class _Found:
 class Surfaces:
     """The bodies' original surfaces as points, and how close two of them can come."""
 
-    def __init__(self, model: Urdf, scale: float = 1.0) -> None:
+    def __init__(self, model: Urdf, scale: float = 1.0, rough: Surfaces | None = None) -> None:
         """Read the surfaces; points are spread when a body is first asked for.
 
         Args:
             model: The robot.
             scale: How many times smaller than usual distances are looked at.
+            rough: The same surfaces at the usual scale, which say where a closer look is due.
         """
         self._model = model
+        self._rough = rough
         self._spacing = SPACING * scale
         self._clear = CLEAR * scale
         self._triangles = body_triangles(self._model)
@@ -208,15 +213,24 @@ class Surfaces:
             pair: Names of the bodies.
             positions: Every joint between them [rad or m].
         """
+        far = _FAR
+        if self._rough is not None:
+            rough = self._rough.distance(pair, positions)
+            if rough > _NEAR:
+                return rough
+            # Points at a fifth of the spacing lie within it of those that are this close.
+            far = rough + SPACING
         # The tree takes the body of many points; each point of the other costs a query.
         many, few = sorted(pair, key=lambda body: -len(self._of(body)))
         if many not in self._trees:
             self._trees[many] = cKDTree(self._of(many))
+        tree = self._trees[many]
         R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
         seen = self._of(few) @ R_AB.T + p_AB
         # Far points take the tree longest, and nobody asks how far they are.
-        near, _ = self._trees[many].query(seen, distance_upper_bound=_FAR)
-        return min(float(near.min()), _FAR)
+        seen = seen[((seen > tree.mins - far) & (seen < tree.maxes + far)).all(axis=1)]
+        near, _ = tree.query(seen, distance_upper_bound=far)
+        return min(float(near.min(initial=far)), far)
 
     def _of(self, body: str) -> FloatArray:
         """Return points on a body's surface in its frame [m], shape (n, 3): corners included."""
@@ -231,7 +245,8 @@ class Surfaces:
             # The half of the square beyond its diagonal folds back onto the triangle.
             uv = np.where(uv.sum(axis=1, keepdims=True) > 1, 1 - uv, uv)
             inner = triangles[chosen, 0] + np.einsum("ni,nij->nj", uv, edges[chosen])
-            self._points[body] = np.concatenate([inner, triangles.reshape(-1, 3)])
+            corners = np.unique(triangles.reshape(-1, 3), axis=0)
+            self._points[body] = np.concatenate([inner, corners])
         return self._points[body]
 
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from tcs.robots.boxes import (
     best_candidate,
-    corner_points,
     enclose,
+    hull_corners,
     hull_volume,
     tightest_orientation,
 )
@@ -20,6 +20,7 @@ from tcs.robots.primitives import Primitive, union_volume
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 _BEAM = 6
 """Divisions that are pursued side by side."""
@@ -80,13 +81,13 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
         target: When to stop.
     """
     hull = hull_volume(triangles)
-    search = _Search(triangles)
+    search = _Search(body, triangles)
     best: Fit | None = None
     beam: Beam = [(search.volume(search.everything), (search.everything,))]
     for count in range(1, target.max_shapes + 1):
         if count > 1:
             beam = search.divide(beam)
-        fits = [_finish(body, triangles, parts, search, hull) for _, parts in beam]
+        fits = [_finish(parts, search, hull) for _, parts in beam]
         found = min(fits, key=lambda fit: fit.union)
         if best is None or found.excess < best.excess - _ENOUGH * (count - len(best.primitives)):
             best = found
@@ -106,19 +107,25 @@ class _Search:
     A part is a set of units: a triangle each, or several small ones that lie side by side.
     """
 
-    def __init__(self, triangles: FloatArray) -> None:
+    def __init__(self, body: str, triangles: FloatArray) -> None:
+        self._body = body
+        # A corner of a mesh is shared by half a dozen triangles: each counts once from here on.
+        corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        self._corners, self._index = corners, index.reshape(-1, 3)
+        self._shapes: dict[bytes, Primitive] = {}
         units = _units(triangles)
         self._order = np.argsort(units, kind="stable")
         starts = np.flatnonzero(np.diff(units[self._order], prepend=-1))
         self._starts = np.append(starts, len(triangles))
         self.everything: IntArray = np.arange(len(starts), dtype=np.int64)
-        self.orientations = _orientations(corner_points(triangles))
+        self.orientations = _orientations(hull_corners(corners))
         # Along each axis of each frame every unit spans an interval; a box around several units is
         # the span of their intervals.
         ordered = triangles[self._order]
         seen = [ordered @ R for R in self.orientations]
-        self._low = np.stack([np.minimum.reduceat(s.min(axis=1), starts) for s in seen])
-        self._high = np.stack([np.maximum.reduceat(s.max(axis=1), starts) for s in seen])
+        # Units last, side by side in memory: (frames, 3, units).
+        self._low = np.stack([np.minimum.reduceat(s.min(axis=1), starts).T for s in seen])
+        self._high = np.stack([np.maximum.reduceat(s.max(axis=1), starts).T for s in seen])
         self._splits: dict[bytes, list[tuple[float, IntArray, IntArray]]] = {}
 
     def triangles_of(self, part: IntArray) -> IntArray:
@@ -126,9 +133,25 @@ class _Search:
         pieces = [self._order[self._starts[unit] : self._starts[unit + 1]] for unit in part]
         return np.sort(np.concatenate(pieces))
 
+    def tightest(self, triangles: IntArray) -> Primitive:
+        """Return the smallest shape around some triangles."""
+        used = np.zeros(len(self._corners), dtype=np.bool_)
+        used[self._index[triangles]] = True
+        # Rivals share most of their parts.
+        key = np.packbits(used).tobytes()
+        if key not in self._shapes:
+            points = hull_corners(self._corners[used])
+            found = best_candidate(points, self.orientations)
+            self._shapes[key] = enclose(self._body, points, found.kind, found.R)
+        return self._shapes[key]
+
+    def within(self, shape: Primitive) -> BoolArray:
+        """Return which triangles lie wholly in a shape: it is convex, so corners decide."""
+        return np.asarray(shape.contains(self._corners)[self._index].all(axis=1))
+
     def volume(self, part: IntArray) -> float:
         """Return the volume of the smallest box around a part in the set frames [m^3]."""
-        size = self._high[:, part].max(axis=1) - self._low[:, part].min(axis=1)
+        size = self._high[..., part].max(axis=2) - self._low[..., part].min(axis=2)
         return float(size.prod(axis=1).min())
 
     def divide(self, beam: Beam) -> Beam:
@@ -155,15 +178,16 @@ class _Search:
         """Return the best splits of a part by planes across the axes of the set frames."""
         if len(part) < 2:
             return []
-        low, high = self._low[:, part], self._high[:, part]
+        low, high = self._low[..., part], self._high[..., part]
         found: list[tuple[float, IntArray, IntArray]] = []
         for frame, axis in itertools.product(range(len(self.orientations)), range(3)):
-            starts, ends = low[frame, :, axis], high[frame, :, axis]
+            starts, ends = low[frame, axis], high[frame, axis]
             # A triangle that the plane cuts goes to the far side, the near side, or by its middle.
             for position in (ends, starts, starts + ends):
                 order = np.argsort(position, kind="stable")
-                near = _running_volumes(low[:, order], high[:, order])
-                far = _running_volumes(low[:, order[::-1]], high[:, order[::-1]])[::-1]
+                ordered = low[..., order], high[..., order]
+                near = _running_volumes(*ordered)
+                far = _running_volumes(*(bound[..., ::-1] for bound in ordered))[::-1]
                 total = near[:-1] + far[1:]
                 i = int(np.argmin(total))
                 first, second = np.sort(part[order[: i + 1]]), np.sort(part[order[i + 1 :]])
@@ -196,8 +220,8 @@ def _units(triangles: FloatArray) -> IntArray:
 
 def _running_volumes(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the smallest box volume around the first 1, 2, ... triangles, shape (n,)."""
-    size = np.maximum.accumulate(high, axis=1) - np.minimum.accumulate(low, axis=1)
-    return np.asarray(size.prod(axis=2).min(axis=0))
+    size = np.maximum.accumulate(high, axis=2) - np.minimum.accumulate(low, axis=2)
+    return np.asarray((size[:, 0] * size[:, 1] * size[:, 2]).min(axis=0))
 
 
 def _orientations(points: FloatArray) -> FloatArray:
@@ -210,9 +234,9 @@ def _orientations(points: FloatArray) -> FloatArray:
     return np.stack([np.eye(3), tightest_orientation(points), *turned])
 
 
-def _finish(body: str, triangles: FloatArray, parts: Parts, search: _Search, hull: float) -> Fit:
+def _finish(parts: Parts, search: _Search, hull: float) -> Fit:
     """Return the tightest primitives for a division, each freed of what others enclose."""
-    shapes = [_tightest(body, triangles[search.triangles_of(part)], search) for part in parts]
+    shapes = [search.tightest(search.triangles_of(part)) for part in parts]
     best: Fit | None = None
     # Who is freed first matters; with many shapes the rotations of the order must do.
     orders: list[tuple[int, ...]] = [
@@ -221,7 +245,7 @@ def _finish(body: str, triangles: FloatArray, parts: Parts, search: _Search, hul
     if len(shapes) <= 3:
         orders = list(itertools.permutations(range(len(shapes))))
     for order in orders:
-        freed = _freed(body, triangles, shapes, order, search)
+        freed = _freed(shapes, order, search)
         union = union_volume(freed)
         if best is None or union < best.union:
             best = Fit(primitives=freed, hull=hull, union=union)
@@ -230,24 +254,15 @@ def _finish(body: str, triangles: FloatArray, parts: Parts, search: _Search, hul
 
 
 def _freed(
-    body: str,
-    triangles: FloatArray,
-    shapes: list[Primitive],
-    order: tuple[int, ...],
-    search: _Search,
+    shapes: list[Primitive], order: tuple[int, ...], search: _Search
 ) -> tuple[Primitive, ...]:
     """Return the shapes after each in turn was fitted anew to what only it encloses."""
     current: list[Primitive | None] = list(shapes)
+    within = [search.within(shape) for shape in shapes]
     for i in order:
-        others = [shape for j, shape in enumerate(current) if j != i and shape is not None]
-        alone = np.ones(len(triangles), dtype=np.bool_)
-        for other in others:
-            alone &= ~other.contains_triangles(triangles)
-        current[i] = _tightest(body, triangles[alone], search) if alone.any() else None
+        others = [w for j, w in enumerate(within) if j != i and current[j] is not None]
+        alone = np.flatnonzero(~np.any(others, axis=0)) if others else np.arange(len(within[i]))
+        current[i] = fitted = search.tightest(alone) if len(alone) else None
+        if fitted is not None:
+            within[i] = search.within(fitted)
     return tuple(shape for shape in current if shape is not None)
-
-
-def _tightest(body: str, triangles: FloatArray, search: _Search) -> Primitive:
-    points = corner_points(triangles)
-    candidate = best_candidate(points, search.orientations)
-    return enclose(body, points, candidate.kind, candidate.R)

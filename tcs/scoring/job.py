@@ -90,6 +90,9 @@ def load_job(
     changes = task.grid_changes(environment.name)
     if changes:
         grid = grid.overridden(changes, where=f"task '{task.name}'")
+    if robot.torso_joint is None:
+        # Every level would be the same configuration again, scored and stored anew.
+        grid = grid.overridden({"torso": {"start": 0.0, "count": 1}}, where=f"robot '{robot.name}'")
     return Job(task, SceneSpec(robot, environment), grid, environment.observed_axes)
 
 
