@@ -65,12 +65,12 @@ class LoweredScene:
         return sha.hexdigest()
 
 
-def lower(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
+def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     """Return the arrays of a scene for a task, read off its Drake plant and scene graph.
 
     Args:
         scene: The scene; its state is left as it was.
-        task: The goals, and the contacts the task allows.
+        task: The goals, and the contacts the task allows; None for arrays that have no goals yet.
         grid: The configurations; axes besides the robot's move the environment's joints of the
             same name.
 
@@ -87,14 +87,16 @@ def lower(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
         scene.restore(before)
 
 
-def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
+def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     built = scene.built
     environment = scene.spec.environment.name
-    where = f"task '{task.name}', environment '{environment}'"
+    where = f"environment '{environment}'"
+    if task is not None:
+        where = f"task '{task.name}', {where}"
     rule = ContactRule.of(
         built.parts,
         scene.spec.robot.disabled_pairs,
-        task.allowed_contacts,
+        () if task is None else task.allowed_contacts,
         where=f"{where}, allowed contacts",
     )
     arm = [part for part in built.parts if part.group is Group.ARM]
@@ -140,7 +142,7 @@ def _lowered(scene: Scene, task: Task, grid: Grid) -> LoweredScene:
         ),
         robot_bodies=robot_bodies,
         room_bodies=room_bodies,
-        goals=tuple(f"{task.name} {i}" for i in range(len(task.goals))),
+        goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
     )
 
 
@@ -236,14 +238,14 @@ def _states_of(grid: Grid) -> Iterator[dict[str, float]]:
 
 
 def _environment_states(
-    scene: Scene, parts: list[Part], task: Task, states: Iterable[Mapping[str, float]]
+    scene: Scene, parts: list[Part], task: Task | None, states: Iterable[Mapping[str, float]]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the poses in W of the room's shapes and of the goals, for each environment state.
 
     Returns:
         Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
     """
-    riding = _riding_goals(scene, task)
+    riding = [] if task is None else _riding_goals(scene, task)
     rooms, goals = [], []
     for state in states:
         for name, value in state.items():

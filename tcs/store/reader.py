@@ -41,6 +41,9 @@ MAX_DIMENSIONS = 4
 
 AGAIN = "Make it again with `tcs score`."
 
+SCORE_FILE = "Score file"
+"""What messages call a file when the caller gives it no other name."""
+
 _PLAIN_OPERATIONS = (
     *(pickle.PROTO, pickle.FRAME, pickle.STOP, pickle.MARK),
     *(pickle.NONE, pickle.NEWTRUE, pickle.NEWFALSE, pickle.BINFLOAT),
@@ -191,83 +194,87 @@ class _Reader(pickle._Unpickler):
     """What each operation does; an operation that is not listed does not exist."""
 
 
-def read_joblib(path: Path) -> object:
+def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> object:
     """Return what a joblib file holds: plain containers and arrays of numbers.
 
     Args:
         path: A file written by `joblib.dump`, compressed by zlib or not at all.
+        what: What to call it in a message.
+        again: How such a file is made, for a message.
 
     Raises:
         StoreError: If it cannot be read.
         StoreFormatError: If it is truncated, foreign, or unfolds to more than 2 GB.
         UnsafeStoreError: If it names anything outside the allow-list.
     """
-    reader = _Reader(_unfolded(path, _bytes_of(path)))
-    return explained(path, reader.load)
+    name = f"{what} '{path}'"
+    reader = _Reader(_unfolded(name, _bytes_of(path, name, again), again))
+    return explained(path, reader.load, what, again)
 
 
-def explained(path: Path, read: Callable[[], Value]) -> Value:
+def explained(
+    path: Path, read: Callable[[], Value], what: str = SCORE_FILE, again: str = AGAIN
+) -> Value:
     """Return what `read` does, and turn whatever it raises into one line about the file."""
     try:
         return read()
     except UnsafeStoreError as error:
         raise UnsafeStoreError(
-            f"Score file '{path}' {error}. It was not written by tcs: do not open it with any "
+            f"{what} '{path}' {error}. It was not written by tcs: do not open it with any "
             "other program either."
         ) from None
     except TcsError as error:
         # One line, whatever names a file brings along.
         said = " ".join(str(error).split()).rstrip(".")
-        raise StoreFormatError(f"Score file '{path}': {said}. {AGAIN}") from None
+        raise StoreFormatError(f"{what} '{path}': {said}. {again}") from None
     except Exception as error:
         # Bytes that are no pickle can break its reader in about any way, from KeyError (no such
         # operation) to OverflowError; none of them says more than this.
         raise StoreFormatError(
-            f"Score file '{path}' is truncated or was not written by tcs "
-            f"({type(error).__name__} while reading). {AGAIN}"
+            f"{what} '{path}' is truncated or was not written by tcs "
+            f"({type(error).__name__} while reading). {again}"
         ) from None
 
 
-def _bytes_of(path: Path) -> bytes:
+def _bytes_of(path: Path, name: str, again: str) -> bytes:
     """Return the bytes of a regular file of bearable size."""
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            raise StoreError(f"Score file '{path}' is no regular file. Name one that is.")
+            raise StoreError(f"{name} is no regular file. Name one that is.")
         if status.st_size > MAX_BYTES:
             raise StoreFormatError(
-                f"Score file '{path}' has {status.st_size} bytes; at most {MAX_BYTES} are read."
+                f"{name} has {status.st_size} bytes; at most {MAX_BYTES} are read."
             )
         return path.read_bytes()
     except OSError as error:
         raise StoreError(
-            f"Score file '{path}' cannot be read: {error.strerror}. Check the path, or make the "
-            "file with `tcs score`."
+            f"{name} cannot be read: {error.strerror}. Check the path. {again}"
         ) from None
 
 
-def _unfolded(path: Path, data: bytes) -> bytes:
+def _unfolded(name: str, data: bytes, again: str) -> bytes:
     """Return the decompressed bytes, at most MAX_BYTES of them."""
     if data[:1] == pickle.PROTO:
         return data
     # The low half of the first byte names the method; 8 is the only one in use.
     if not data or data[0] & 0x0F != 8:
         raise StoreFormatError(
-            f"Score file '{path}' is {'empty' if not data else 'no joblib file of tcs'}. {AGAIN}"
+            f"{name} is {'empty' if not data else 'no joblib file of tcs'}. {again}"
         )
     decompressor = zlib.decompressobj()
     try:
         unfolded = decompressor.decompress(data, MAX_BYTES + 1)
     except (zlib.error, MemoryError) as error:
-        raise StoreFormatError(f"Score file '{path}' is damaged ({error}). {AGAIN}") from None
+        raise StoreFormatError(f"{name} is damaged ({error}). {again}") from None
     if len(unfolded) > MAX_BYTES:
         raise StoreFormatError(
-            f"Score file '{path}' unfolds to more than {MAX_BYTES} bytes. It is damaged or made to "
-            f"fill the memory. {AGAIN}"
+            f"{name} unfolds to more than {MAX_BYTES} bytes. It is damaged or made to "
+            f"fill the memory. {again}"
         )
     if not decompressor.eof or decompressor.unused_data:
         what = "goes on after its end" if decompressor.eof else "is truncated"
-        raise StoreFormatError(f"Score file '{path}' {what}. {AGAIN}")
+        raise StoreFormatError(f"{name} {what}. {again}")
     return unfolded
 
 
