@@ -1,0 +1,170 @@
+"""Maps from inverse kinematics: every cell around the tool is solved for (ICM and IHCM)."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.capability.grid import CellArray, MapGrid, yaw_rotation
+from tcs.capability.head import head_names, head_view
+from tcs.capability.map import ICM, IHCM, CapabilityMap
+from tcs.capability.reach import OnProgress, Reach
+from tcs.capability.visibility import CORRECTED, visibility
+from tcs.errors import GridError
+from tcs.kernel.arrays import FloatArray
+
+RADIUS = 0.9
+"""How far from the shoulder the tool is looked for [m], as in the ITCM thesis, Appendix B."""
+MAX_CELLS = 60_000_000
+"""More would take hours and more memory than a common machine has."""
+
+_SCALE_POSTURES = 1 << 15
+"""Random postures among which the arm's best is looked for."""
+
+
+def map_from_ik(
+    reach: Reach,
+    grid: MapGrid,
+    *,
+    kind: str = IHCM,
+    radius: float = RADIUS,
+    view_rule: str = CORRECTED,
+    jobs: int = 2,
+    on_progress: OnProgress | None = None,
+) -> CapabilityMap:
+    """Return the map of all cells whose base pose reaches the tool.
+
+    Args:
+        reach: The robot.
+        grid: The cells.
+        kind: "ICM", or "IHCM" to count visibility as well.
+        radius: Farthest that the tool may be from the shoulder [m].
+        view_rule: How visibility is scored.
+        jobs: Number of threads.
+        on_progress: Called with cells done and in all.
+
+    Raises:
+        UnknownNameError: If the robot has no head file and an IHCM is asked for.
+        GridError: If there are far too many cells.
+
+    Source:
+        ITCM thesis, Appendix B. There TRAC-IK solves for the cells; here it is the closed form,
+        which does not miss solutions at random.
+    """
+    cells = cells_around(grid, reach.shoulder, radius)
+    R_BT, p_BT = grid.tool_in_base(cells)
+    solved = reach.solve(R_BT, p_BT, jobs=jobs, on_progress=on_progress)
+    rows = np.flatnonzero(solved.reached)
+    joints = solved.joints[rows]
+    return finished_map(
+        reach, grid, kind, cells[rows], p_BT[rows], solved.manipulability[rows], joints,
+        view_rule, {"radius": float(radius), "cells_asked": len(cells)},
+    )  # fmt: skip
+
+
+def finished_map(
+    reach: Reach,
+    grid: MapGrid,
+    kind: str,
+    cells: CellArray,
+    p_BT: FloatArray,
+    manipulability: NDArray[np.float32] | FloatArray,
+    joints: NDArray[np.float32] | FloatArray,
+    view_rule: str,
+    metadata: dict[str, Any],
+) -> CapabilityMap:
+    """Return a map of cells whose postures are known, in any order.
+
+    Args:
+        reach: The robot.
+        grid: The cells' grid.
+        kind: Kind of map.
+        cells: Each once, shape (n, 5).
+        p_BT: Tool positions in B at the map's lift [m], shape (n, 3).
+        manipulability: Shape (n,).
+        joints: Arm joints [rad], shape (n, 7).
+        view_rule: How visibility is scored.
+        metadata: What else is to be remembered.
+
+    Raises:
+        UnknownNameError: If the robot has no head file and the kind counts visibility.
+    """
+    order = np.argsort(grid.keys(cells))
+    seen = np.zeros(len(cells))
+    if kind != ICM or reach.robot.name in head_names():
+        seen = visibility(head_view(reach.scene, reach.lift), p_BT, view_rule)
+    if len(reach.lifts) > 32:
+        raise GridError(
+            f"the lift has {len(reach.lifts)} levels of {grid.step:g} m; a map holds 32 at most. "
+            "Take a larger step."
+        )
+    return CapabilityMap(
+        kind=kind,
+        grid=grid,
+        cells=cells[order],
+        manipulability=manipulability[order].astype(np.float32),
+        visibility=seen[order].astype(np.float32),
+        lifts=np.array(reach.lifts, dtype=np.float64),
+        lift=float(reach.lift),
+        free_lifts=reach.free_lifts(np.asarray(joints[order], dtype=np.float64)),
+        manipulability_scale=manipulability_scale(reach),
+        metadata={
+            "robot": reach.robot.name,
+            "tool": reach.robot.tool_frame,
+            "arm_joints": list(reach.robot.arm_joints),
+            "measure": reach.measure,
+            "view_rule": view_rule,
+            "scene_digest": reach.lowered.digest(),
+            "program_version": version("tcs"),
+            **metadata,
+        },
+        joints=joints[order].astype(np.float32),
+    )
+
+
+def manipulability_scale(reach: Reach) -> float:
+    """Return the best measure among random postures of the arm, the same in every run."""
+    lower, upper = reach.limits
+    first = np.where(np.isfinite(lower), lower, -np.pi)
+    last = np.where(np.isfinite(upper), upper, np.pi)
+    postures = np.random.default_rng(0).uniform(first, last, size=(_SCALE_POSTURES, len(first)))
+    return float(reach.manipulability(postures).max())
+
+
+def cells_around(grid: MapGrid, shoulder: FloatArray, radius: float) -> CellArray:
+    """Return the cells whose base has its shoulder within a radius of the tool, shape (n, 5).
+
+    Args:
+        grid: The grid.
+        shoulder: The shoulder in B [m], shape (3,).
+        radius: [m].
+
+    Raises:
+        GridError: If there are none, or far too many.
+    """
+    ball = 4.0 / 3.0 * np.pi * (radius / grid.step) ** 3 * grid.turns * len(grid.tilts)
+    if not 1.0 <= ball <= MAX_CELLS:
+        raise GridError(
+            f"a radius of {radius:g} m at steps of {grid.step:g} m, {grid.turns} headings and "
+            f"{len(grid.tilts)} tilts has {ball:.3g} cells; must be 1 to {MAX_CELLS:,}."
+        )
+    far = int(np.ceil((radius + np.linalg.norm(shoulder)) / grid.step))
+    line = np.arange(-far, far + 1, dtype=np.int32)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    z = line * grid.step + shoulder[2]
+    found = []
+    for yaw in range(grid.turns):
+        across = yaw_rotation(np.array([yaw * grid.turn]))[0] @ shoulder
+        square = (x * grid.step + across[0]) ** 2 + (y * grid.step + across[1]) ** 2
+        inside = square[..., None] + z**2 <= radius**2
+        i, j, k = np.nonzero(inside)
+        rows = np.empty((len(i), 5), np.int32)
+        rows[:, 1], rows[:, 2], rows[:, 3], rows[:, 4] = line[i], line[j], line[k], yaw
+        found.append(rows)
+    one = np.concatenate(found)
+    cells = np.tile(one, (len(grid.tilts), 1))
+    cells[:, 0] = np.repeat(np.arange(len(grid.tilts)), len(one))
+    return cells

@@ -1,0 +1,130 @@
+"""Head files: the camera an operator looks through, and where it can look."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from tcs.documents import Document, PositiveNumber, checked, read_mapping
+from tcs.errors import RobotError, UnknownNameError
+from tcs.kernel.arrays import FloatArray
+from tcs.paths import shipped_files
+from tcs.robots import RobotFile
+from tcs.scene import Scene
+
+
+class HeadFile(Document):
+    """A head as its file says it."""
+
+    camera_frame: str = Field(min_length=1)
+    """Frame of the URDF at the camera, x along its view while the head is at zero."""
+    pan_joint: str
+    tilt_joint: str
+    horizontal_fov_deg: PositiveNumber
+    vertical_fov_deg: PositiveNumber
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Where a head camera is and which directions it can see.
+
+    Directions are seen from the camera with the head at zero: that turning the head also moves
+    the camera is left out, as in the ITCM thesis, Appendix B.2.
+    """
+
+    p_BoCo_B: tuple[float, float, float]
+    """The camera in the base at the lift in hand [m]."""
+    yaw: tuple[float, float]
+    """Lowest and highest yaw in view, left positive [rad]."""
+    pitch: tuple[float, float]
+    """Lowest and highest pitch in view, up positive [rad]."""
+
+
+def head_names() -> tuple[str, ...]:
+    """Return the names of the robots whose heads ship with `tcs`, sorted."""
+    return tuple(shipped_files("models/heads/*.yaml"))
+
+
+def load_head(robot: RobotFile) -> HeadFile:
+    """Return the head of a robot.
+
+    Raises:
+        UnknownNameError: If no head of that robot ships, or its file names an unknown key.
+        RobotError: If the file cannot be used, or names what the robot does not have.
+    """
+    files = shipped_files("models/heads/*.yaml")
+    if robot.name not in files:
+        raise UnknownNameError("head", robot.name, files, where=f"robot '{robot.name}'")
+    path = files[robot.name]
+    where = f"head file '{path}'"
+    content = read_mapping(path, where, RobotError, known=HeadFile.model_fields)
+    head = checked(content, HeadFile, where, RobotError)
+    model = robot.model()
+    for kind, name, known in (
+        ("link", head.camera_frame, model.links),
+        ("joint", head.pan_joint, model.joints),
+        ("joint", head.tilt_joint, model.joints),
+    ):
+        if name not in known:
+            raise UnknownNameError(kind, name, known, where=where)
+    return head
+
+
+def head_view(scene: Scene, lift: float) -> View:
+    """Return what the head camera of a scene's robot sees.
+
+    Args:
+        scene: The robot; its state is left as it was.
+        lift: Height of the torso [m].
+
+    Raises:
+        UnknownNameError: If no head of that robot ships.
+        RobotError: If the head file cannot be used.
+
+    Source:
+        ITCM thesis eqs. (10) and (11): limits of the joints, hard ones as there, and half the field
+        of view beyond.
+    """
+    robot = scene.spec.robot
+    head = load_head(robot)
+    joints = robot.model().joints
+    before = scene.positions()
+    try:
+        scene.set_torso(lift)
+        p_BC, _ = _camera(scene, head, 0.0, 0.0)
+        # Which way a joint turns the view is read off the model, in a tenth of a radian.
+        pan_sign = np.sign(_angles(_camera(scene, head, 0.1, 0.0)[1])[0])
+        tilt_sign = np.sign(_angles(_camera(scene, head, 0.0, 0.1)[1])[1])
+    finally:
+        scene.restore(before)
+    x, y, z = map(float, p_BC)
+    return View(
+        (x, y, z),
+        _range(joints[head.pan_joint].hard, float(pan_sign), head.horizontal_fov_deg),
+        _range(joints[head.tilt_joint].hard, float(tilt_sign), head.vertical_fov_deg),
+    )
+
+
+def _camera(scene: Scene, head: HeadFile, pan: float, tilt: float) -> tuple[FloatArray, FloatArray]:
+    """Return where the camera is and which way it looks, in B."""
+    plant, state = scene.built.plant, scene.plant_context
+    plant.GetJointByName(head.pan_joint).set_angle(state, pan)
+    plant.GetJointByName(head.tilt_joint).set_angle(state, tilt)
+    frame = plant.GetFrameByName(head.camera_frame)
+    X_BC = frame.CalcPose(state, scene.built.base_frame)
+    return np.array(X_BC.translation()), np.array(X_BC.rotation().matrix()[:, 0])
+
+
+def _angles(direction: FloatArray) -> tuple[float, float]:
+    x, y, z = direction
+    return math.atan2(y, x), math.atan2(z, math.hypot(x, y))
+
+
+def _range(limits: tuple[float, float], sign: float, fov_deg: float) -> tuple[float, float]:
+    half = 0.5 * math.radians(fov_deg)
+    low, high = sorted(sign * limit for limit in limits)
+    return low - half, high + half

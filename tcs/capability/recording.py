@@ -1,0 +1,181 @@
+"""Recorded arm configurations: joint states by name, matched to the robot's arm and checked."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tcs.errors import DataFileError
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.robots import RobotFile
+from tcs.writing import whole_file
+
+LIMIT_SLACK = 2e-3
+"""How far past a limit an encoder may read [rad or m]: some times the resolution of a cheap one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Joint states in the order of the robot's arm."""
+
+    joints: FloatArray
+    """Arm joints [rad], within the limits in force, shape (n, 7)."""
+    lift: FloatArray | None
+    """Torso lift [m], shape (n,); None where it was not recorded."""
+    dropped: int = 0
+    """Samples that were left out as unusable."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (self.joints, self.lift):
+            if array is not None:
+                array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+
+def recording_of(
+    names: Sequence[str],
+    positions: ArrayLike,
+    robot: RobotFile,
+    *,
+    where: str = "recording",
+    drop_bad: bool = False,
+) -> Recording:
+    """Return joint states, checked, in the order of a robot's arm.
+
+    Args:
+        names: Names of the columns, in any order; those that are no joint of arm or torso do not
+            count.
+        positions: Joint positions [rad or m], shape (samples, names).
+        robot: The robot.
+        where: What to call it in a message.
+        drop_bad: Leave samples out that are not finite or beyond the limits; else refuse them.
+
+    Raises:
+        DataFileError: If a joint of the arm is missing or there twice, or a sample is not usable.
+    """
+    array = np.asarray(positions, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != len(names):
+        raise DataFileError(
+            f"{where}: positions have shape {array.shape}, but there are {len(names)} names."
+        )
+    check_names(names, robot, where)
+    wanted = list(robot.arm_joints)
+    torso = robot.torso_joint
+    if torso is not None and torso in names:
+        wanted.append(torso)
+    column = list(names)
+    values = array[:, [column.index(name) for name in wanted]]
+    bad = _first_bad(values, wanted, robot, where, drop_bad)
+    kept = values[~bad]
+    if not len(kept):
+        raise DataFileError(f"{where} has no usable sample.")
+    limits = np.array([robot.joint_limits()[name] for name in wanted])
+    kept = np.clip(kept, limits[:, 0], limits[:, 1])
+    arm = len(robot.arm_joints)
+    lift = kept[:, arm].copy() if len(wanted) > arm else None
+    return Recording(kept[:, :arm].copy(), lift, int(bad.sum()))
+
+
+def check_names(names: Sequence[str], robot: RobotFile, where: str) -> None:
+    """Refuse names among which a joint of the arm is missing or there twice.
+
+    Raises:
+        DataFileError: As said.
+    """
+    missing = [name for name in robot.arm_joints if name not in names]
+    if missing:
+        held = ", ".join(names[:20]) or "none"
+        raise DataFileError(
+            f"{where}: joint names do not match robot '{robot.name}': {', '.join(missing)} "
+            f"missing. It holds: {held}."
+        )
+    for name in robot.arm_joints:
+        if list(names).count(name) > 1:
+            raise DataFileError(f"{where}: joint '{name}' is there twice.")
+
+
+def _first_bad(
+    values: FloatArray, names: Sequence[str], robot: RobotFile, where: str, drop_bad: bool
+) -> BoolArray:
+    """Return which samples cannot be used; refuse the first one unless they may be dropped."""
+    limits = robot.joint_limits()
+    low, high = (np.array([limits[name][side] for name in names]) for side in (0, 1))
+    finite = np.isfinite(values)
+    inside = (values >= low - LIMIT_SLACK) & (values <= high + LIMIT_SLACK)
+    bad: BoolArray = np.asarray(~(finite & inside).all(axis=1))
+    if drop_bad or not bad.any():
+        return bad
+    i = int(np.argmax(bad))
+    j = int(np.argmax(~(finite[i] & inside[i])))
+    others = f" {int(bad.sum()) - 1} more samples are like it." if bad.sum() > 1 else ""
+    place = f"{where}, sample {i}, joint '{names[j]}'"
+    if not finite[i, j]:
+        raise DataFileError(f"{place} is {values[i, j]}.{others} Drop them with --drop-bad.")
+    raise DataFileError(
+        f"{place} is {values[i, j]:.4f}, out of its {robot.limits} limits {low[j]:.4f} to "
+        f"{high[j]:.4f}.{others} Angles must be radians; drop such samples with --drop-bad."
+    )
+
+
+def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recording:
+    """Return the recording in a CSV file: a row of names, then a row per sample.
+
+    Args:
+        path: The file; columns that are no joint of arm or torso, such as time, do not count.
+        robot: The robot.
+        drop_bad: As in `recording_of`.
+
+    Raises:
+        DataFileError: If it cannot be read or used.
+    """
+    where = f"recording '{path}'"
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except OSError as error:
+        raise DataFileError(f"{where} cannot be read: {error.strerror}.") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise DataFileError(f"{where} is no CSV file in UTF-8.") from None
+    if not rows:
+        raise DataFileError(f"{where} is empty; its first row must name the joints.")
+    names = [name.strip() for name in rows[0]]
+    check_names(names, robot, where)
+    joints = {*robot.arm_joints, robot.torso_joint}
+    columns = [i for i, name in enumerate(names) if name in joints]
+    numbers = np.empty((len(rows) - 1, len(columns)))
+    for i, row in enumerate(rows[1:]):
+        try:
+            if len(row) != len(names):
+                raise ValueError
+            numbers[i] = [float(row[column]) for column in columns]
+        except ValueError:
+            raise DataFileError(
+                f"{where}, line {i + 2}: must be {len(names)} numbers, as there are names."
+            ) from None
+    chosen = [names[column] for column in columns]
+    return recording_of(chosen, numbers, robot, where=where, drop_bad=drop_bad)
+
+
+def write_csv(path: Path, robot: RobotFile, recording: Recording) -> None:
+    """Write a recording as `read_csv` reads it.
+
+    Raises:
+        OutputError: If it cannot be written there.
+    """
+    names, columns = list(robot.arm_joints), [recording.joints]
+    if recording.lift is not None and robot.torso_joint is not None:
+        names.append(robot.torso_joint)
+        columns.append(recording.lift[:, None])
+    table: NDArray[np.float64] = np.hstack(columns)
+    with whole_file(path, "Recording") as stream:
+        # Eight decimals: 1e-8 rad is far below any encoder.
+        header = ",".join(names)
+        np.savetxt(stream, table, fmt="%.8f", delimiter=",", header=header, comments="")

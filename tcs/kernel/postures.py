@@ -1,0 +1,97 @@
+"""Postures that are given: where they hold the tool, how dexterous they are, what they touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    gripper_body_contact,
+    gripper_room_contact,
+    place_links,
+)
+from tcs.kernel.measure import measure_at
+from tcs.kernel.problem import Problem
+from tcs.kernel.stand import room_in_arm_base, stand
+
+
+@jit
+def tool_pose(
+    chain_R: FloatArray,
+    chain_p: FloatArray,
+    q: FloatArray,
+    link_R: FloatArray,
+    link_p: FloatArray,
+    R_AT: FloatArray,
+    p_AT: FloatArray,
+) -> None:
+    """Fill the tool pose at joint angles q, and the poses of the links on the way.
+
+    Args:
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
+        q: Joint angles [rad], shape (7,).
+        link_R: Filled with the orientations of A, L1..L7 in A, shape (8, 3, 3).
+        link_p: Filled with their origins [m], shape (8, 3).
+        R_AT: Filled, shape (3, 3).
+        p_AT: Filled [m], shape (3,).
+    """
+    place_links(chain_R, chain_p, q, link_R, link_p)
+    R, F, f = link_R[7], chain_R[7], chain_p[7]
+    for r in range(3):
+        p_AT[r] = link_p[7, r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
+        for c in range(3):
+            R_AT[r, c] = R[r, 0] * F[0, c] + R[r, 1] * F[1, c] + R[r, 2] * F[2, c]
+
+
+@jit
+def tool_poses(
+    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, R_AT: FloatArray, p_AT: FloatArray
+) -> None:
+    """Fill the tool poses of many postures: q of shape (n, 7), R_AT (n, 3, 3), p_AT (n, 3)."""
+    link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
+    for i in range(len(q)):
+        tool_pose(chain_R, chain_p, q[i], link_R, link_p, R_AT[i], p_AT[i])
+
+
+@jit
+def measures(problem: Problem, q: FloatArray, value: FloatArray) -> None:
+    """Fill the problem's dexterity measure of many postures: q of shape (n, 7), value (n,)."""
+    for i in range(len(q)):
+        value[i] = measure_at(problem, q[i])
+
+
+@jit
+def free_postures(
+    problem: Problem, work: Workspace, torso: int, q: FloatArray, free: BoolArray
+) -> None:
+    """Fill whether postures touch nothing: neither the room nor the robot itself.
+
+    The base stands at place 0 of the problem's grid. Goal i of environment state 0 must be the
+    pose at which posture i holds the tool.
+
+    Args:
+        problem: Robot and room.
+        work: Scratch.
+        torso: Torso level.
+        q: Joint angles [rad], shape (n, 7).
+        free: Filled, shape (n,).
+    """
+    stand(problem, work, 0)
+    room_in_arm_base(problem, work, torso)
+    body_A = problem.body_A[torso]
+    work.last[0] = -1
+    for i in range(len(q)):
+        free[i] = False
+        if gripper_room_contact(problem, work, 0, i) != NO_CONTACT:
+            continue
+        tool_pose(
+            problem.chain_R, problem.chain_p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG
+        )
+        if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
+            continue
+        free[i] = arm_contact(problem, work, body_A, q[i]) == NO_CONTACT

@@ -1,0 +1,124 @@
+import pickle
+import zlib
+
+import joblib
+import numpy as np
+import pytest
+
+from tcs.capability import MapGrid, export_text, import_text, load_map, save_map
+from tcs.errors import DataFileError, OutputError, StoreError, StoreFormatError, UnsafeStoreError
+
+ARRAYS = ("cells", "manipulability", "visibility", "free_lifts", "joints", "lifts")
+
+
+@pytest.fixture
+def stored(ihcm, tmp_path):
+    path = tmp_path / "map.tcm"
+    save_map(path, ihcm)
+    return path
+
+
+def test_what_is_loaded_is_what_was_saved(ihcm, stored):
+    back = load_map(stored)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(back, name), getattr(ihcm, name))
+    assert (back.grid, back.kind, back.lift) == (ihcm.grid, ihcm.kind, ihcm.lift)
+    assert back.metadata == ihcm.metadata
+    assert back.manipulability_scale == ihcm.manipulability_scale
+
+
+def test_a_truncated_map_is_refused(stored):
+    stored.write_bytes(stored.read_bytes()[:-100])
+    with pytest.raises(StoreFormatError, match=r"Capability map .* truncated.*from-ik"):
+        load_map(stored)
+
+
+def test_a_file_of_scores_is_no_map(tmp_path):
+    path = tmp_path / "scores.tcs"
+    joblib.dump({"format": "tcs scores", "format_version": 1}, path)
+    with pytest.raises(StoreFormatError, match="no capability map"):
+        load_map(path)
+
+
+@pytest.mark.parametrize("name", ["kind", "step", "tilts", "key_step", "joints", "metadata"])
+def test_a_map_without_a_part_is_refused(stored, name):
+    content = joblib.load(stored)
+    del content[name]
+    joblib.dump(content, stored)
+    with pytest.raises(StoreFormatError, match="Capability map"):
+        load_map(stored)
+
+
+def test_a_pickle_that_calls_something_is_refused(tmp_path):
+    path = tmp_path / "evil.tcm"
+    path.write_bytes(zlib.compress(pickle.dumps(print)))
+    with pytest.raises(UnsafeStoreError, match=r"builtins\.print"):
+        load_map(path)
+
+
+def test_a_map_that_is_not_there(tmp_path):
+    with pytest.raises(StoreError, match="cannot be read"):
+        load_map(tmp_path / "none.tcm")
+
+
+def test_a_map_cannot_be_written_into_a_folder_that_is_not_there(ihcm, tmp_path):
+    for write in (save_map, export_text):
+        with pytest.raises(OutputError, match="cannot be written"):
+            write(tmp_path / "none" / "map", ihcm)
+
+
+def test_text_holds_the_base_as_the_tool_sees_it(ihcm, tmp_path):
+    path = tmp_path / "map.txt"
+    export_text(path, ihcm)
+    table = np.loadtxt(path)
+    R_TB, p_TB = ihcm.grid.base_in_tool(ihcm.cells)
+    np.testing.assert_allclose(table[:, 0], ihcm.manipulability, rtol=1e-6)
+    # Nine digits are written.
+    np.testing.assert_allclose(table[:, 1:4], p_TB, atol=1e-8)
+    np.testing.assert_allclose(table[:, 4:], R_TB.reshape(-1, 9), atol=1e-8)
+
+
+def test_a_map_survives_the_way_through_text(ihcm, reach, tmp_path):
+    path = tmp_path / "map.txt"
+    export_text(path, ihcm)
+    back = import_text(path, reach, ihcm.grid, kind="IHCM")
+    np.testing.assert_array_equal(back.cells, ihcm.cells)
+    np.testing.assert_allclose(back.manipulability, ihcm.manipulability, rtol=1e-6)
+    np.testing.assert_allclose(back.visibility, ihcm.visibility, atol=1e-6)
+    assert len(back.joints) == 0
+
+
+def test_of_two_equal_poses_the_better_score_counts(ihcm, reach, tmp_path):
+    path = tmp_path / "map.txt"
+    export_text(path, ihcm)
+    line = path.read_text().splitlines()[0]
+    rest = line.split(" ", 1)[1]
+    path.write_text(f"0.01 {rest}\n0.07 {rest}\n0.03 {rest}\n")
+    back = import_text(path, reach, ihcm.grid)
+    assert back.manipulability.tolist() == pytest.approx([0.07])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "empty"),
+        ("0.1 0 0\n", "line 1: must be 13"),
+        ("0.1 0 0 0 1 0 0 0 1 0 0 0 nan\n", "line 1: must be 13"),
+        ("0.1 0 0 0 1 0 0 0 1 0 0 0 one\n", "line 1: must be 13"),
+        ("0.1 0 0 0 1 0 0 0 2 0 0 0 1\n", "no rotation"),
+        ("0.1 0.02 0 0 1 0 0 0 1 0 0 0 1\n", "no pose of a grid"),
+        ("1.5 0.1 0 0 1 0 0 0 1 0 0 0 1\n", "outside 0 to 1"),
+    ],
+)
+def test_lines_that_cannot_be_used(text, words, reach, coarse, tmp_path):
+    path = tmp_path / "map.txt"
+    path.write_text(text)
+    with pytest.raises(DataFileError, match=words):
+        import_text(path, reach, coarse)
+
+
+def test_a_text_file_of_another_grid_is_refused(ihcm, reach, tmp_path):
+    path = tmp_path / "map.txt"
+    export_text(path, ihcm)
+    with pytest.raises(DataFileError, match="no pose of a grid"):
+        import_text(path, reach, MapGrid.of(0.03, 8))

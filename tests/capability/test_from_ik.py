@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+
+from tcs.capability import MapGrid, Reach, map_from_ik
+from tcs.capability.from_ik import cells_around, manipulability_scale
+from tcs.errors import GridError, UnknownNameError
+from tcs.kernel.dexterity import MEASURES
+from tcs.robots import load_robot
+
+
+def test_a_reached_cell_is_confirmed_by_drake(ihcm, reach, rng):
+    """Forward kinematics, limits and clearances by Drake for postures of random cells."""
+    scene = reach.scene
+    rows = rng.choice(len(ihcm.cells), 60, replace=False)
+    R_BT, p_BT = ihcm.grid.tool_in_base(ihcm.cells[rows])
+    before = scene.positions()
+    lower, upper = scene.arm_limits
+    try:
+        scene.place_base(0.0, 0.0, 0.0)
+        scene.set_torso(ihcm.lift)
+        for row, R, p in zip(rows, R_BT, p_BT, strict=True):
+            q = ihcm.joints[row].astype(float)
+            scene.set_arm(q)
+            assert np.all((q >= lower) & (q <= upper))
+            X_BT = scene.tool_pose()
+            # Joints are kept in single precision: 1e-7 rad at a metre.
+            np.testing.assert_allclose(X_BT.translation(), p, atol=1e-6)
+            np.testing.assert_allclose(X_BT.rotation().matrix(), R, atol=1e-6)
+            assert scene.violations() == ()
+    finally:
+        scene.restore(before)
+
+
+def test_free_lifts_are_those_at_which_drake_finds_nothing(ihcm, reach, rng):
+    scene, before = reach.scene, reach.scene.positions()
+    rows = rng.choice(len(ihcm.cells), 40, replace=False)
+    some_blocked = False
+    try:
+        for row in rows:
+            scene.set_arm(ihcm.joints[row].astype(float))
+            for bit, lift in enumerate(ihcm.lifts):
+                scene.set_torso(float(lift))
+                free = bool(int(ihcm.free_lifts[row]) >> bit & 1)
+                some_blocked |= not free
+                assert free == (scene.violations() == ())
+    finally:
+        scene.restore(before)
+    # Else the test has seen one answer only; other cells of this map are blocked at other lifts.
+    assert some_blocked or np.all(ihcm.free_lifts[rows] == ihcm.free_lifts.max())
+    assert len(np.unique(ihcm.free_lifts)) > 1
+
+
+def test_every_cell_is_free_at_the_lift_the_map_was_made_at(ihcm):
+    level = int(np.flatnonzero(ihcm.lifts == ihcm.lift)[0])
+    assert np.all(ihcm.free_lifts >> np.uint32(level) & 1)
+
+
+def test_a_cell_that_is_not_held_is_not_reached(ihcm, tiago):
+    at = Reach(tiago, lift=ihcm.lift, step=0.1)
+    cells = cells_around(ihcm.grid, at.shoulder, 0.9)
+    gone = cells[ihcm.rows_of(cells) < 0][::97]
+    assert not at.solve(*ihcm.grid.tool_in_base(gone)).reached.any()
+
+
+def test_manipulability_is_that_of_the_joints(ihcm, reach):
+    again = reach.manipulability(ihcm.joints.astype(float))
+    np.testing.assert_allclose(ihcm.manipulability, again, rtol=1e-6)
+
+
+def test_cells_around_are_those_whose_shoulder_is_near(reach):
+    grid = MapGrid.of(0.1, 4, "side")
+    cells = cells_around(grid, reach.shoulder, 0.5)
+    _, p_BT = grid.tool_in_base(cells)
+    # Rounding may put a cell on the sphere itself to either side.
+    assert np.linalg.norm(p_BT - reach.shoulder, axis=1).max() <= 0.5 + 1e-12
+    line = np.arange(-30, 31)
+    every = np.stack(np.meshgrid([0], line, line, line, np.arange(4)), -1).reshape(-1, 5)
+    _, p = grid.tool_in_base(every)
+    inside = np.linalg.norm(p - reach.shoulder, axis=1) <= 0.5 - 1e-12
+    assert set(map(tuple, every[inside])) <= set(map(tuple, cells.tolist()))
+
+
+def test_threads_do_not_change_the_map(tiago):
+    at = Reach(tiago, lift=0.15, step=0.2)
+    grid = MapGrid.of(0.2, 4, "side")
+    one, two = (map_from_ik(at, grid, jobs=jobs) for jobs in (1, 2))
+    np.testing.assert_array_equal(one.cells, two.cells)
+    np.testing.assert_array_equal(one.joints, two.joints)
+
+
+def test_another_measure_is_kept_by_name(tiago):
+    at = Reach(tiago, lift=0.15, step=0.2, measure="isotropy")
+    found = map_from_ik(at, MapGrid.of(0.2, 4, "side"), kind="ICM")
+    assert found.metadata["measure"] == "isotropy"
+    assert found.metadata["measure"] in MEASURES
+    assert 0.0 < manipulability_scale(at) <= 1.0
+
+
+def test_a_robot_without_a_head_makes_an_icm_but_no_ihcm():
+    at = Reach(load_robot("iiwa7"), step=0.2)
+    grid = MapGrid.of(0.2, 4, "side")
+    found = map_from_ik(at, grid, kind="ICM")
+    assert len(found.cells)
+    assert not found.visibility.any()
+    with pytest.raises(UnknownNameError, match="head"):
+        map_from_ik(at, grid, kind="IHCM")
+
+
+@pytest.mark.parametrize(("lift", "words"), [(0.5, "out of range"), (-0.1, "out of range")])
+def test_a_lift_out_of_range_is_refused(tiago, lift, words):
+    with pytest.raises(GridError, match=words):
+        Reach(tiago, lift=lift)
+
+
+def test_far_too_many_cells_are_refused(reach):
+    with pytest.raises(GridError, match="cells"):
+        cells_around(MapGrid.of(0.01, 32, "all"), reach.shoulder, 0.9)

@@ -1,0 +1,98 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.capability import MapGrid
+from tcs.capability.map import CapabilityMap
+from tcs.errors import StoreError, UnknownNameError
+
+
+def small_map(cells, manipulability, visibility, kind="IHCM", grid=None, **changes):
+    """Return a map of a few cells at one of three lifts."""
+    cells = np.array(cells, np.int32).reshape(-1, 5)
+    count = len(cells)
+    made = {
+        "kind": kind,
+        "grid": grid or MapGrid.of(0.05, 16, "side+top"),
+        "cells": cells,
+        "manipulability": np.array(manipulability, np.float32),
+        "visibility": np.array(visibility, np.float32),
+        "lifts": np.array([0.05, 0.10, 0.15]),
+        "lift": 0.10,
+        "free_lifts": np.full(count, 7, np.uint32),
+        "manipulability_scale": 0.1,
+        "metadata": {"robot": "made up"},
+        "joints": np.empty((0, 7), np.float32),
+    }
+    return CapabilityMap(**(made | changes))
+
+
+CELLS = [[0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [1, 0, 0, 0, 3]]
+
+
+def test_fixed_scores_count_manipulability_by_the_arms_best():
+    found = small_map(CELLS, [0.05, 0.1, 0.2], [1.0, 0.5, 0.0])
+    np.testing.assert_allclose(found.score(), [0.75, 0.75, 0.5], rtol=1e-6)
+    np.testing.assert_allclose(found.of_kind("ICM").score(), [0.5, 1.0, 1.0], rtol=1e-6)
+
+
+def test_the_thesis_stretches_both_within_the_map():
+    found = small_map(CELLS, [0.05, 0.1, 0.15], [1.0, 0.5, 0.5])
+    np.testing.assert_allclose(found.score("thesis"), [0.5, 0.25, 0.5], rtol=1e-5)
+
+
+def test_a_map_of_equal_scores_can_be_stretched():
+    found = small_map(CELLS, [0.1] * 3, [0.5] * 3)
+    np.testing.assert_array_equal(found.score("thesis"), [1.0, 1.0, 1.0])
+
+
+def test_rows_of_cells():
+    found = small_map(CELLS, [0.1] * 3, [0.5] * 3)
+    asked = np.array([CELLS[2], [0, 0, 0, 0, 1], CELLS[0]])
+    assert found.rows_of(asked).tolist() == [2, -1, 0]
+    assert small_map([], [], []).rows_of(asked).tolist() == [-1, -1, -1]
+
+
+def test_look_up_takes_the_nearest_cell(ihcm, rng):
+    rows = rng.integers(0, len(ihcm.cells), 200)
+    R_BT, p_BT = ihcm.grid.tool_in_base(ihcm.cells[rows])
+    # Less than half a step of 0.1 m along every axis of E.
+    moved = p_BT + rng.uniform(-0.028, 0.028, p_BT.shape)
+    np.testing.assert_array_equal(ihcm.look_up(R_BT, moved), rows)
+    assert np.all(ihcm.look_up(R_BT, p_BT + 9.0) == -1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"cells": np.array(CELLS[::-1], np.int32)}, "not sorted"),
+        ({"cells": np.array(CELLS + CELLS, np.int32)[[0, 0, 1]]}, "not sorted"),
+        ({"cells": np.array([*CELLS[:2], [2, 0, 0, 0, 0]], np.int32)}, "outside"),
+        ({"cells": np.array([*CELLS[:2], [1, 0, 0, 0, 16]], np.int32)}, "outside"),
+        ({"manipulability": np.array([0.1, np.nan, 0.1], np.float32)}, "manipulability"),
+        ({"visibility": np.array([0.1, 1.1, 0.1], np.float32)}, "visibility"),
+        ({"free_lifts": np.array([1], np.uint32)}, "free_lifts"),
+        ({"lift": 0.12}, "lift"),
+        ({"manipulability_scale": 0.0}, "scale"),
+        ({"joints": np.zeros((2, 7), np.float32)}, "joints"),
+    ],
+)
+def test_contradictions_are_refused(changes, words):
+    with pytest.raises(StoreError, match=words):
+        dataclasses.replace(small_map(CELLS, [0.1] * 3, [0.5] * 3), **changes)
+
+
+def test_names_are_checked():
+    with pytest.raises(UnknownNameError, match="ITCM"):
+        small_map(CELLS, [0.1] * 3, [0.5] * 3, kind="TCM")
+    with pytest.raises(UnknownNameError, match="scale"):
+        small_map(CELLS, [0.1] * 3, [0.5] * 3).score("max")
+
+
+def test_maps_cannot_be_written_to():
+    found = small_map(CELLS, [0.1] * 3, [0.5] * 3)
+    with pytest.raises(ValueError, match="read-only"):
+        found.cells[0, 0] = 1
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.lift = 0.2

@@ -1,0 +1,120 @@
+import math
+
+import numpy as np
+import pytest
+
+from tcs.capability import (
+    Grasp,
+    GraspPosition,
+    GraspTask,
+    curved_task,
+    linear_task,
+    pick_and_place_task,
+)
+from tcs.errors import TaskError, UnknownNameError
+
+
+def places(task):
+    return [(round(p.x, 9), round(p.y, 9)) for p in task.positions]
+
+
+def headings(position):
+    return sorted(round(math.degrees(grasp.heading)) for grasp in position.grasps)
+
+
+@pytest.mark.parametrize(
+    ("length", "samples", "found"),
+    [
+        (0.15, 3, [0.0, 0.05, 0.10, 0.15]),
+        (0.20, 3, [0.0, 0.10, 0.20]),
+        (0.60, 4, [0.0, 0.20, 0.40, 0.60]),
+        (0.35, 2, [0.0, 0.35]),
+    ],
+)
+def test_lines_as_in_figures_16_27_and_28(length, samples, found):
+    assert places(linear_task(length, samples, 0.8)) == [(0.0, y) for y in found]
+
+
+def test_a_line_goes_the_way_asked_for():
+    assert places(linear_task(0.1, 2, 0.8, direction=2)) == [(0.0, 0.0), (-0.1, 0.0)]
+
+
+def test_pick_and_place_has_two_positions_and_three_grasps():
+    task = pick_and_place_task(0.15, 0.41, pre_grasps=(0.05,))
+    assert places(task) == [(0.0, 0.0), (0.0, 0.15)]
+    assert headings(task.positions[0]) == [-90, 0, 90]
+    assert {p.height for p in task.positions} == {0.41}
+
+
+@pytest.mark.parametrize("radius", [0.2, 0.3, 0.4, 0.5])
+def test_an_arc_stays_near_its_radius_and_on_the_grid(radius):
+    task = curved_task(radius, 0.0, math.pi / 2, 4, 1.0)
+    xy = np.array(places(task))
+    assert np.abs(np.hypot(*xy.T) - radius).max() <= 0.05
+    np.testing.assert_allclose(xy / 0.05, np.round(xy / 0.05), atol=1e-9)
+    # Nearest first: no other place of the quarter is nearer than the farthest one taken.
+    line = np.arange(0, 13) * 0.05
+    other = np.abs(np.hypot(*np.meshgrid(line, line)) - radius).ravel()
+    assert np.sort(other)[3] == pytest.approx(np.abs(np.hypot(*xy.T) - radius).max(), abs=1e-9)
+    # In the order in which the door opens.
+    assert np.all(np.diff(np.arctan2(xy[:, 1], xy[:, 0])) >= 0.0)
+
+
+def test_the_gripper_keeps_off_the_door():
+    # Closed along x and opening towards +y: the hand is on the +y side (heading -90) or beyond the
+    # free edge at +x (heading 180), never behind the door nor on its way to the hinge.
+    task = curved_task(0.4, 0.0, math.pi / 2, 2, 1.0)
+    assert headings(task.positions[0]) == [-90, 180]
+    # Open along y: what was before is now left of it, at -x.
+    assert headings(task.positions[-1]) == [-90, 0]
+
+
+def test_a_door_that_opens_the_other_way_mirrors_the_grasps():
+    one = curved_task(0.4, 0.0, math.pi / 2, 3, 1.0)
+    two = curved_task(0.4, 0.0, -math.pi / 2, 3, 1.0)
+    mirrored = [(x, -y) for x, y in places(one)]
+    assert places(two) == mirrored
+    for a, b in zip(one.positions, two.positions, strict=True):
+        assert headings(b) == sorted(-h if h != 180 else 180 for h in headings(a))
+
+
+@pytest.mark.parametrize("degrees", range(0, 360, 15))
+def test_every_position_of_any_door_has_a_grasp(degrees):
+    start = math.radians(degrees)
+    for task in (
+        curved_task(0.4, start, start + 1.5, 3, 1.0),
+        curved_task(0.4, start, start - 1.5, 3, 1.0),
+    ):
+        assert all(position.grasps for position in task.positions)
+
+
+def test_grasps_point_where_they_say():
+    np.testing.assert_allclose(Grasp(math.pi / 2).R_FT[:, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(Grasp(1.0, "top").R_FT[:, 0], [0, 0, -1], atol=1e-15)
+    tilted = Grasp(0.0, (math.radians(30), 0.0)).R_FT[:, 0]
+    np.testing.assert_allclose(tilted, [math.cos(math.radians(30)), 0, -0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: linear_task(0.01, 2, 0.8), "at least one step"),
+        (lambda: linear_task(0.5, 1, 0.8), "2 samples"),
+        (lambda: linear_task(math.nan, 2, 0.8), "at least one step"),
+        (lambda: linear_task(0.5, 2, math.inf), "not finite"),
+        (lambda: linear_task(0.5, 2, 0.8, headings=()), "no grasp"),
+        (lambda: curved_task(0.01, 0, 1, 3, 0.8), "radius"),
+        (lambda: curved_task(0.3, 1, 1, 3, 0.8), "arc"),
+        (lambda: curved_task(0.05, 0, 0.1, 9, 0.8), "fewer samples"),
+        (lambda: GraspTask("none", ()), "0 positions"),
+    ],
+)
+def test_tasks_with_nothing_to_do_are_refused(make, words):
+    with pytest.raises(TaskError, match=words):
+        make()
+
+
+def test_an_unknown_approach_is_refused():
+    position = GraspPosition(0, 0, 0.5, (Grasp(0.0, "above"),))
+    with pytest.raises(UnknownNameError, match="'above'"):
+        GraspTask("lift", (position,))

@@ -1,0 +1,86 @@
+import math
+
+import numpy as np
+import pytest
+
+from tcs.capability.head import View, head_names, head_view, load_head
+from tcs.capability.visibility import CORRECTED, THESIS, visibility
+from tcs.errors import UnknownNameError
+from tcs.robots import load_robot
+
+TIAGO = View((0.0, 0.0, 0.0), tuple(np.radians([-104.0, 104.0])), tuple(np.radians([-82.5, 67.5])))
+
+
+def looking(yaw_deg, pitch_deg):
+    """Return a point that is seen under these angles."""
+    yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
+    flat = math.cos(pitch)
+    return np.array([[flat * math.cos(yaw), flat * math.sin(yaw), math.sin(pitch)]])
+
+
+# Worked by hand from eqs. (13) to (15): halves of 1 - |yaw| / 104 and 1 - |pitch + 45| / 112.5.
+@pytest.mark.parametrize(
+    ("yaw", "pitch", "score"),
+    [
+        (0, -45, 1.0),
+        (52, -45, 0.75),
+        (0, 11.25, 0.75),
+        (0, -82.5, 0.5 * (1 + 1 - 37.5 / 112.5)),
+        (0, 80, 0.5),
+        (180, -45, 1.0),
+    ],
+)
+def test_as_printed(yaw, pitch, score):
+    assert visibility(TIAGO, looking(yaw, pitch), THESIS)[0] == pytest.approx(score, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("yaw", "pitch", "score"),
+    [
+        (0, -45, 1.0),
+        (52, -45, 0.75),
+        (-52, -45, 0.75),
+        (0, 11.25, 0.75),
+        (0, -63.75, 0.75),
+        (0, -82.4999, 0.5),
+        (0, 80, 0.0),
+        (180, -45, 0.0),
+        (110, -45, 0.0),
+    ],
+)
+def test_corrected(yaw, pitch, score):
+    # A tenth of a millionth of a degree short of the bound costs 1e-6.
+    assert visibility(TIAGO, looking(yaw, pitch), CORRECTED)[0] == pytest.approx(score, abs=3e-6)
+
+
+def test_straight_to_the_side_is_no_division_by_zero():
+    points = np.array([[0.0, 1.0, -1.0], [0.0, 0.0, -1.0]])
+    assert np.all(np.isfinite(visibility(TIAGO, points, THESIS)))
+
+
+def test_tiago_sees_what_the_thesis_says(reach):
+    view = head_view(reach.scene, reach.lift)
+    np.testing.assert_allclose(np.degrees(view.yaw), [-104.0, 104.0], atol=1e-6)
+    np.testing.assert_allclose(np.degrees(view.pitch), [-82.5, 67.5], atol=1e-6)
+
+
+def test_the_camera_rides_on_the_torso_and_the_scene_is_left_alone(reach):
+    before = reach.scene.positions()
+    low, high = (head_view(reach.scene, lift).p_BoCo_B for lift in (0.0, 0.3))
+    np.testing.assert_allclose(np.subtract(high, low), [0, 0, 0.3], atol=1e-12)
+    np.testing.assert_array_equal(reach.scene.positions(), before)
+
+
+def test_the_shipped_heads_fit_their_robots():
+    for name in head_names():
+        assert load_head(load_robot(name)).source
+
+
+def test_a_robot_without_a_head_file_is_told_so():
+    with pytest.raises(UnknownNameError, match="unknown head 'iiwa7'"):
+        load_head(load_robot("iiwa7"))
+
+
+def test_unknown_rule():
+    with pytest.raises(UnknownNameError, match="visibility 'best'"):
+        visibility(TIAGO, np.zeros((1, 3)), "best")
