@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.reasons import Explanation, explain
-    from tcs.robustness import Evaluation, evaluate
+    from tcs.robustness import Evaluation, evaluate, robustify
     from tcs.scene import Observation
     from tcs.scoring import LiveScorer, Verification, score, score_observed, summary, verify
     from tcs.select import Choice, TravelWeights, UtilityWeights, select
@@ -45,6 +45,7 @@ __all__ = [
     "evaluate",
     "explain",
     "load",
+    "robustify",
     "save",
     "score",
     "score_observed",
@@ -68,6 +69,7 @@ _HOMES = {
     "evaluate": ("tcs.robustness", "evaluate"),
     "explain": ("tcs.reasons", "explain"),
     "load": ("tcs.store", "load_scores"),
+    "robustify": ("tcs.robustness", "robustify"),
     "save": ("tcs.store", "save_scores"),
     "score": ("tcs.scoring", "score"),
     "score_observed": ("tcs.scoring", "score_observed"),

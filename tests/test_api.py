@@ -23,6 +23,7 @@ PROMISED = [
     "evaluate",
     "explain",
     "load",
+    "robustify",
     "save",
     "score",
     "score_observed",

@@ -180,6 +180,7 @@ def select(
     alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
     beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
     gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
+    delta: robustness.Delta = 0.0,
     metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
     turn_weight: Annotated[float, typer.Option(help="Cost of a radian of turning.")] = 0.0,
     torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso lift.")] = 0.0,
@@ -216,7 +217,9 @@ def select(
     choice = tcs.select(
         loaded,
         place(here, torso, at or ()),
-        weights=tcs.UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma),
+        weights=tcs.UtilityWeights(
+            reachability=alpha, manipulability=beta, travel=gamma, success=delta
+        ),
         travel=tcs.TravelWeights(
             metre=metre_weight,
             turn=turn_weight,
@@ -392,3 +395,4 @@ def export(
 
 
 app.command()(robustness.evaluate)
+app.command()(robustness.robustify)

@@ -109,8 +109,16 @@ def choice_as_json(choice: Choice, measure: str) -> dict[str, Any]:
         "gap": choice.gap,
         "cut_off": choice.cut_off,
         "seconds": choice.seconds,
+        **_success_as_json(choice),
         **_match_as_json(choice.match),
     }
+
+
+def _success_as_json(choice: Choice) -> dict[str, Any]:
+    """Return the estimated success under error, where there is an estimate."""
+    if choice.success is None or choice.success_ci95 is None:
+        return {}
+    return {"success": choice.success, "success_ci95": list(choice.success_ci95)}
 
 
 def _match_as_json(match: Match | None) -> dict[str, Any]:
@@ -133,6 +141,12 @@ def report_choice(result: Mapping[str, Any]) -> None:
         f"{result['manipulability']:.3f} ({result['measure']}), travel cost {result['cost']:.2f}, "
         f"utility {result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
     )
+    if "success" in result:
+        low, high = result["success_ci95"]
+        out.print(
+            f"under error {result['success']:.1%} of the goals (95 % between {low:.1%} and "
+            f"{high:.1%})"
+        )
     if result["cut_off"]:
         out.print(
             f"left out: {result['cut_off']:,} configurations to which there is no way from here"

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from tcs.robustness.comparison import CELLS, Contrast, MethodTable, cell_name, compare_methods
+from tcs.robustness.comparison import (
+    CELLS,
+    Contrast,
+    MethodTable,
+    cell_name,
+    compare_methods,
+)
 from tcs.robustness.error_model import ErrorFile, ErrorModel
+from tcs.robustness.estimation import robustify, success_of, success_summary
 from tcs.robustness.evaluation import SELECTIONS, Evaluation, evaluate
 from tcs.robustness.losses import Loss, losses
 from tcs.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
@@ -27,5 +34,8 @@ __all__ = [
     "losses",
     "mean_of",
     "rank_sum",
+    "robustify",
     "signed_rank",
+    "success_of",
+    "success_summary",
 ]

@@ -16,13 +16,14 @@ from tcs.robustness.error_model import ErrorModel, Offsets, check_draws
 from tcs.robustness.kept import uniform_sets
 from tcs.robustness.statistics import Mean, mean_of
 from tcs.robustness.trials import Errors, Progress, Trials
-from tcs.store import ScoreFile, shown_state
-from tcs.tables import SetTable, tc_reachability
+from tcs.store import Scored, ScoreFile, shown_state
+from tcs.tables import tc_reachability
 
-SELECTIONS = ("best", "single", "uniform")
-"""Which sets to evaluate: the set with the best scores; the best single configuration; or, as the
-paper's "without TC-manipulability", another set in every sample, drawn uniformly from those whose
-P_R is at least 0.98 of the greatest."""
+SELECTIONS = ("best", "single", "robust", "uniform")
+"""Which sets to evaluate: the set with the best scores; the best single configuration; the set
+with the greatest estimated success, where `robustify` has estimated it; or, as the paper's
+"without TC-manipulability", another set in every sample, drawn uniformly from those whose P_R is
+at least 0.98 of the greatest."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,7 +175,7 @@ def evaluate(
         )
         compiling = trials.compile_seconds
     offsets = trials.errors.draw(samples, seed, stream=stream)
-    sets, choices = _chosen(trials.scored.sets, select, members, samples, seed)
+    sets, choices = _chosen(trials.scored, select, members, samples, seed)
     is_drawn = select == "uniform"
     if is_drawn:
         # Every member of every set meets the one sample that is the set's.
@@ -214,9 +215,10 @@ def evaluate(
 
 
 def _chosen(
-    sets: SetTable, select: str | Sequence[int], members: int, samples: int, seed: int
+    scored: Scored, select: str | Sequence[int], members: int, samples: int, seed: int
 ) -> tuple[NDArray[np.int64], int]:
     """Return the sets to evaluate, shape (1, m) or (samples, m), and how many there were."""
+    sets = scored.sets
     if not len(sets.candidates):
         raise SelectionError(
             "Nothing to evaluate: no goal is reached from any initial configuration. Look at the "
@@ -231,5 +233,11 @@ def _chosen(
         return uniform_sets(sets, members, samples, seed)
     if select not in SELECTIONS:
         raise UnknownNameError("selection", select, SELECTIONS, where="evaluate")
-    chosen = sets.best if select == "best" else sets.best_single
+    if select == "robust" and scored.success is None:
+        raise SelectionError(
+            "No success under error was estimated for this table. Estimate it first: "
+            "tcs robustify FILE."
+        )
+    robust = scored.success.best if scored.success is not None else ()
+    chosen = {"best": sets.best, "single": sets.best_single, "robust": robust}[select]
     return np.array(chosen, dtype=np.int64)[None], 1

@@ -30,25 +30,46 @@ def mean_of(samples: ArrayLike) -> Mean:
         samples: Shape (n,), n >= 1.
 
     Returns:
-        The interval is Student's t, cut to [0, 1]. Where all samples are equal t has no width and
-        would claim certainty: there the interval takes in a share of other samples of up to
-        1 - 0.025^(1/n), the exact binomial limit for something never seen in n samples.
+        The interval is that of `intervals_of`.
 
     >>> mean_of([0.5, 1.0, 1.0]).mean
     0.8333333333333334
     """
     values = np.asarray(samples, dtype=np.float64)
-    n, mean = values.size, float(np.mean(values))
-    std = float(np.std(values, ddof=1)) if n > 1 else 0.0
-    tail = (1.0 - CONFIDENCE) / 2.0
-    if np.all(values == values[0]):
-        unseen = 1.0 - tail ** (1.0 / n)
-        return Mean(mean, std, (mean - unseen * mean, mean + unseen * (1.0 - mean)))
-    # Imported where it is needed: it takes a second, and most of this room does without.
-    from scipy.stats import t
+    mean, low, high = (float(found[0]) for found in intervals_of(values[None]))
+    std = float(np.std(values, ddof=1)) if values.size > 1 else 0.0
+    return Mean(mean, std, (low, high))
 
-    half = float(t.ppf(1.0 - tail, n - 1)) * std / math.sqrt(n)
-    return Mean(mean, std, (max(0.0, mean - half), min(1.0, mean + half)))
+
+def intervals_of(
+    samples: NDArray[np.float64] | NDArray[np.float32],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return means of samples between 0 and 1, and both ends of their 95 % intervals.
+
+    Args:
+        samples: Shape (k, n), n >= 1.
+
+    Returns:
+        Shapes (k,). The intervals are Student's t, cut to [0, 1]. Where all samples are equal t
+        has no width and would claim certainty: there the interval takes in a share of other
+        samples of up to 1 - 0.025^(1/n), the exact binomial limit for something never seen in n
+        samples.
+    """
+    # Imported where it is needed: much of this room does without.
+    from scipy.special import stdtrit
+
+    values = samples.astype(np.float64)
+    n = values.shape[1]
+    mean = np.clip(values.mean(axis=1), values.min(axis=1), values.max(axis=1))
+    tail = (1.0 - CONFIDENCE) / 2.0
+    unseen = 1.0 - tail ** (1.0 / n)
+    low, high = mean - unseen * mean, mean + unseen * (1.0 - mean)
+    differ = np.any(values != values[:, :1], axis=1)
+    if np.any(differ):
+        half = float(stdtrit(n - 1, 1.0 - tail)) / math.sqrt(n) * values[differ].std(axis=1, ddof=1)
+        low[differ] = np.maximum(mean[differ] - half, 0.0)
+        high[differ] = np.minimum(mean[differ] + half, 1.0)
+    return mean, low, np.minimum(high, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import SelectionError, TcsError
 from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
@@ -114,7 +114,7 @@ class Trials:
 
     def reached(
         self,
-        members: Sequence[int] | IntArray,
+        members: ArrayLike,
         offsets: Offsets,
         *,
         jobs: int = 2,
@@ -158,7 +158,7 @@ class Trials:
 
     def reached_each(
         self,
-        members: Sequence[int] | IntArray,
+        members: ArrayLike,
         offsets: Offsets,
         *,
         jobs: int = 2,
@@ -234,7 +234,7 @@ class Trials:
             beyond |= self._positions(int(number), offsets)[1] & (state == number).any(axis=1)
         return int(np.count_nonzero(beyond))
 
-    def _stands(self, members: Sequence[int] | IntArray) -> _Stands:
+    def _stands(self, members: ArrayLike) -> _Stands:
         grid = self.job.grid
         flat = np.asarray(members, dtype=np.int64)
         at = grid.values(flat)

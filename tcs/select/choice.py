@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from tcs.errors import SelectionError
+from tcs.select.estimated import best_estimated
 from tcs.select.index import SetIndex
 from tcs.select.observed import Match, nearest_table
 from tcs.select.search import best_set
@@ -17,7 +18,7 @@ from tcs.select.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.select.utility import UtilityWeights, utility
 from tcs.space import Grid
 from tcs.store import ScoreFile
-from tcs.tables import InitialConfiguration, SetTable
+from tcs.tables import InitialConfiguration, SetTable, SuccessTable
 from tcs.tables.sets import MOST_MEMBERS
 
 _DEFAULT_WEIGHTS = UtilityWeights()
@@ -36,12 +37,14 @@ class SelectionTables:
     """The kept sets."""
     grid: Grid
     """The grid of initial configurations."""
+    success: SuccessTable | None = None
+    """Estimated success under error of some of the sets."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
         """Return one of the tables of a loaded score file, the nominal one by default."""
         chosen = file.nominal if table is None else file.tables[table]
-        return cls(chosen.sets, Grid.from_dict(file.grid))
+        return cls(chosen.sets, Grid.from_dict(file.grid), chosen.success)
 
     @cached_property
     def index(self) -> SetIndex:
@@ -66,7 +69,11 @@ class Choice:
     cost: float
     """D of the set from the current state."""
     utility: float
-    """alpha P_R + beta P_M - gamma D, TCS eq. (5)."""
+    """alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where delta is not 0."""
+    success: float | None
+    """P_S, the estimated success of the set under error; None where it was not estimated."""
+    success_ci95: tuple[float, float] | None
+    """Its 95 % interval."""
     cut_off: int
     """How many candidates were left out because there is no way to them from here."""
     gap: float
@@ -89,13 +96,14 @@ def select(
 ) -> Choice:
     """Return the stored set with the greatest utility from where the robot is.
 
-    The result equals a search through all stored sets. Of sets with the same utility the first
-    wins: singles by configuration index, then pairs and then triples in lexicographic order.
+    The result equals a search through all stored sets; where delta is above 0, through all sets
+    whose success under error was estimated (`tcs.robustness`). Of sets with the same utility the
+    first wins: singles by configuration index, then pairs and then triples in lexicographic order.
 
     Args:
         source: A loaded score file; or its tables, which is faster when choosing repeatedly.
         here: The current state of robot and environment, h_0, in the environment frame.
-        weights: alpha, beta, gamma.
+        weights: alpha, beta, gamma, delta.
         travel: What each kind of motion costs.
         max_members: 1 to choose a single configuration, 2 to allow a pair, 3 a triple; by default
             whatever is stored.
@@ -105,8 +113,8 @@ def select(
 
     Raises:
         SelectionError: If no goal is reached from anywhere, the current state is not finite or
-            lacks an axis that costs something, `max_members` is not stored, or there is no way
-            around the furniture to anywhere.
+            lacks an axis that costs something, `max_members` is not stored, there is no way
+            around the furniture to anywhere, or delta is above 0 and no set has an estimate.
         UnknownNameError: If an environment axis has no such name.
 
     Source:
@@ -140,6 +148,9 @@ def select(
             f"From ({here.base_x:.2f}, {here.base_y:.2f}) m there is no way around the furniture "
             "to any place worth standing at. Check the place, or take straight lines."
         )
+    if weights.success > 0.0:
+        chosen = best_estimated(sets, tables.success, legs, weights, max_members)
+        return _choice(tables, legs, weights, chosen, start, match)
     singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)
     singles[~legs.reachable[sets.cell]] = -np.inf
     single = int(np.argmax(singles))
@@ -182,6 +193,11 @@ def _choice(
     cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
     indices = tuple(int(h) for h in tables.sets.candidates[member])
     reachability, manipulability = tables.sets.scores_of(indices)
+    row = tables.success.row_of(indices) if tables.success is not None else None
+    success, interval = None, None
+    if tables.success is not None and row is not None:
+        success = float(tables.success.success[row])
+        interval = (float(tables.success.low[row]), float(tables.success.high[row]))
     return Choice(
         members=tuple(tables.grid.configuration(h) for h in indices),
         indices=indices,
@@ -189,7 +205,9 @@ def _choice(
         reachability=reachability,
         manipulability=manipulability,
         cost=cost,
-        utility=utility(reachability, manipulability, cost, weights),
+        utility=utility(reachability, manipulability, cost, weights, success),
+        success=success,
+        success_ci95=interval,
         cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
         gap=0.0,
         seconds=time.perf_counter() - start,

@@ -27,6 +27,9 @@ class UtilityWeights:
     """beta, the weight of TC-manipulability P_M."""
     travel: float = 0.05
     """gamma, the weight of the travel cost D."""
+    success: float = 0.0
+    """delta, the weight of the success under error P_S, where that was estimated. Above 0, only
+    sets with an estimate can be chosen."""
 
     def __post_init__(self) -> None:
         """Refuse weights that are negative or not finite.
@@ -37,12 +40,17 @@ class UtilityWeights:
         check_weight("alpha (reachability)", self.reachability)
         check_weight("beta (manipulability)", self.manipulability)
         check_weight("gamma (travel)", self.travel)
+        check_weight("delta (success)", self.success)
 
 
 def utility(
-    reachability: Number, manipulability: Number, cost: Number, weights: UtilityWeights
+    reachability: Number,
+    manipulability: Number,
+    cost: Number,
+    weights: UtilityWeights,
+    success: Number | None = None,
 ) -> Number:
-    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5).
+    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where that is given.
 
     The order of the operations is part of the contract: the search bounds the
     utility by the same operations on greater scores and smaller costs, and
@@ -52,11 +60,13 @@ def utility(
         reachability: P_R of the sets.
         manipulability: P_M of the sets.
         cost: D of the sets.
-        weights: alpha, beta, gamma.
+        weights: alpha, beta, gamma, delta.
+        success: P_S of the sets, what they reach under error.
 
     >>> utility(1.0, 0.5, 2.0, UtilityWeights())
     1.4
     """
-    return (
+    without_error = (
         float(weights.reachability) * reachability + float(weights.manipulability) * manipulability
     ) - float(weights.travel) * cost
+    return without_error if success is None else without_error + float(weights.success) * success

@@ -11,6 +11,7 @@ from tcs.errors import StoreFormatError
 from tcs.store.folding import fold, small, unfolded
 from tcs.store.score_file import DESCRIPTIONS, Scored, ScoreFile
 from tcs.store.set_packing import packed_sets, unpacked_sets
+from tcs.store.success_packing import packed_success, unpacked_success
 from tcs.tables import Reason, ScoreTable, SetTable
 
 FORMAT = "tcs scores"
@@ -31,7 +32,11 @@ def pack(file: ScoreFile) -> dict[str, Any]:
         **{name: getattr(file, name) for name in DESCRIPTIONS},
         "observed": file.observed,
         "tables": [
-            {"sets": packed_sets(table.sets), "scores": _packed_scores(table.scores, table.sets)}
+            {
+                "sets": packed_sets(table.sets),
+                "scores": _packed_scores(table.scores, table.sets),
+                "success": packed_success(table.success),
+            }
             for table in file.tables
         ],
     }
@@ -83,7 +88,8 @@ def _unpacked_table(packed: dict[str, Any], explain: Explain) -> Scored:
         Scored(sets, lambda: table).check(table)
         return table
 
-    return Scored(sets, lambda: explain(unfold))
+    success = unpacked_success(packed.get("success"))
+    return Scored(sets, lambda: explain(unfold), success)
 
 
 def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:

@@ -14,9 +14,10 @@ import numpy as np
 from tcs.errors import StoreError, StoreMismatchError
 from tcs.space import Axis, Grid
 from tcs.store.plain import plain
-from tcs.tables import ScoreTable, SetTable
+from tcs.tables import ScoreTable, SetTable, SuccessTable
 from tcs.tables.rules import candidates_of
 from tcs.tables.sets import DISTANCE_TOLERANCE
+from tcs.tables.success import NOBODY
 
 REQUIRED_METADATA: dict[str, type] = {
     "program_version": str,
@@ -50,6 +51,8 @@ class Scored:
     """The sets to choose from."""
     unfold: Callable[[], ScoreTable]
     """Returns the scores of every configuration at every goal."""
+    success: SuccessTable | None = None
+    """Estimated success of some of the sets under error, where that was asked for."""
 
     @classmethod
     def of(cls, scores: ScoreTable, sets: SetTable) -> Self:
@@ -149,6 +152,7 @@ class ScoreFile:
                 raise StoreError(f"sets of more configurations than the grid has, {grid.size}.")
             if sets.state_size * math.prod(grid.environment_shape) != grid.size:
                 raise StoreError("sets have another number of environment states than the grid.")
+            _check_success(table.success, sets)
             places = grid.values(sets.candidates)
             for column, name in enumerate(("base_x", "base_y")):
                 gap = np.abs(sets.cell_xy[sets.cell, column] - places[name])
@@ -186,6 +190,15 @@ class ScoreFile:
         """Number of the nominal table."""
         norms = [sum(value**2 for value in state.values()) for state in self.observed_states]
         return int(np.argmin(norms))
+
+
+def _check_success(success: SuccessTable | None, sets: SetTable) -> None:
+    """Refuse estimates of sets that the table cannot hold."""
+    if success is None:
+        return
+    named = success.members[success.members != NOBODY]
+    if success.members.shape[1] > sets.max_members or not np.all(np.isin(named, sets.candidates)):
+        raise StoreError("estimates of success of sets that are not held.")
 
 
 def _are_numbers(values: object, count: int) -> bool:

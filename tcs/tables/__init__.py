@@ -7,6 +7,7 @@ from tcs.tables.equations import tc_manipulability, tc_reachability
 from tcs.tables.floor import Floor
 from tcs.tables.scores import Reason, ScoreTable
 from tcs.tables.sets import SetTable
+from tcs.tables.success import SuccessTable
 
 __all__ = [
     "Floor",
@@ -14,6 +15,7 @@ __all__ = [
     "Reason",
     "ScoreTable",
     "SetTable",
+    "SuccessTable",
     "tc_manipulability",
     "tc_reachability",
 ]
