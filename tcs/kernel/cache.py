@@ -18,6 +18,7 @@ from typing import Any, TypeVar, cast
 
 import llvmlite.binding as llvm
 import numba
+import numpy as np
 
 from tcs.errors import OutputError
 from tcs.paths import cache_folder
@@ -59,6 +60,14 @@ def is_compiled() -> bool:
     """Return whether an earlier run has left machine code for the whole scoring kernel."""
     folder = jit_folder()
     return folder is not None and any(folder.rglob("sweep._score_slice*.nbc"))
+
+
+def whole(number: int) -> int:
+    """Return a constant to hand to kernel functions, whose type says nothing of its value.
+
+    Numba compiles a function anew for every literal, and every plain constant, it is handed.
+    """
+    return cast(int, np.int64(number))
 
 
 def jit(function: _Function) -> _Function:

@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.collide import BALL, CENTRE, balls_meet, closer, move
 from tcs.kernel.problem import Problem
 
 NO_CONTACT = -1
-ROOM, BODY, ARM = 0, 1, 2
+ROOM, BODY, ARM = whole(0), whole(1), whole(2)
 """What the arm touched."""
+STAYS, RIDES = whole(0), whole(1)
+"""Body shapes that stay where they are, or ride on the torso; the former at any torso level."""
 AT_GOAL = 1e-7
 """How far off [m, and as entries of a rotation] a solution may be. The closed form is good to 1e-12
 except within 1e-7 rad of a singularity."""
@@ -52,7 +54,6 @@ class Workspace(NamedTuple):
     """Position of the goal in A [m], shape (3,)."""
 
 
-@jit
 def new_workspace(problem: Problem) -> Workspace:
     """Return scratch memory for one worker."""
     return Workspace(

@@ -64,11 +64,8 @@ def lane_joints(
         q: Filled in the real arm's order, shape (7,). Where a joint has no limits, in (-pi, pi].
     """
     R = arm.R
-    v = np.empty(3)
-    z = goal[1].copy()
-    x = goal[2].copy()
+    v, z, x = goal[0].copy(), goal[1].copy(), goal[2].copy()
     q[0] = q1
-    v[:] = goal[0]
     _unturn(q1, v)
     _unturn(q1, z)
     _unturn(q1, x)

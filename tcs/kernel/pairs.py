@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -19,14 +19,23 @@ from tcs.kernel.ik import lane_joints
 from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import MAX_CANDIDATES, Search, best_of, fill_lanes, find_candidates
+from tcs.kernel.search import (
+    MAX_CANDIDATES,
+    Search,
+    best_of,
+    fill_lanes,
+    find_candidates,
+    put_in_order,
+)
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED, GRIPPER_BLOCKED, ARM_BLOCKED = 0, 1, 2, 3, 4, 5
 """Reasons, the numbers of `tcs.tables.Reason`."""
 
+ONE_LANE, NOTHING = whole(1), whole(-1)
+
 REFINEMENTS = 3
 """Rounds in which the neighbourhood of the best solution is divided by REFINE_LANES / 2."""
-REFINE_LANES = 8
+REFINE_LANES = whole(8)
 SQUEEZES = 8
 """Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
 SQUEEZE_PARTS = 16.0
@@ -64,12 +73,13 @@ def best_free(
     """
     first_contact = NO_CONTACT
     top = best_of(search.found_measure, found)
-    order = np.empty(0, np.int64)
     for rank in range(found):
         if rank == 1:
-            order = np.argsort(-search.found_measure[:found], kind="mergesort")
+            for n in range(found):
+                search.key[n] = -search.found_measure[n]
+            put_in_order(search, found)
         if rank:
-            top = order[rank]
+            top = search.order[rank]
         branch = problem.arm.branches[search.found_branch[top]]
         lane_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
@@ -96,9 +106,10 @@ def squeeze(
     """
     arm = problem.arm
     found = _add_ends(problem, search, found)
-    order = _in_order(search, found)
+    _by_angle(search, found)
+    order = search.order
     work.last[0] = -1
-    partner, i, j = -1, -1, -1
+    partner, i, j = NOTHING, NOTHING, NOTHING
     for rank in range(found):
         n = order[rank]
         b = search.found_branch[n]
@@ -121,12 +132,12 @@ def squeeze(
 
 
 @jit
-def _in_order(search: Search, found: int) -> IntArray:
-    """Return the candidates branch by branch, in the order of their angles."""
-    # No angle of the free joint is anywhere near this far from zero.
-    return np.argsort(
-        search.found_angle[:found] + 1e4 * search.found_branch[:found], kind="mergesort"
-    )
+def _by_angle(search: Search, found: int) -> None:
+    """Put the candidates in order: branch by branch, by their angles."""
+    for n in range(found):
+        # No angle of the free joint is anywhere near this far from zero.
+        search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
+    put_in_order(search, found)
 
 
 @jit
@@ -144,7 +155,8 @@ def _add_ends(problem: Problem, search: Search, found: int) -> int:
     Returns:
         How many candidates there are now.
     """
-    order, before = _in_order(search, found), found
+    _by_angle(search, found)
+    order, before = search.order, found
     for rank in range(before):
         n = order[rank]
         for side in (-1, 1):
@@ -223,7 +235,7 @@ def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float)
     arm = problem.arm
     search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
     solve_lanes(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, 1,
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, ONE_LANE,
         search.slack, search.measure,
     )  # fmt: skip
     if search.slack[0] < 0.0:
@@ -265,7 +277,8 @@ def refine(
             contact = arm_contact(problem, work, body_A, search.q)
             if contact == NO_CONTACT and at_goal(problem, work):
                 centre, value = search.angle[i], search.measure[i]
-                search.best[:] = search.q
+                for k in range(7):
+                    search.best[k] = search.q[k]
                 break
             search.measure[i] = -1.0
         step = fine

@@ -7,7 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray, SceneArrays, Shapes
+from tcs.kernel.arrays import (
+    BoolArray,
+    Chain,
+    FloatArray,
+    GridArrays,
+    IntArray,
+    SceneArrays,
+    Shapes,
+)
 from tcs.kernel.collide import BALL, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 from tcs.kernel.solver import ArmSolver, arm_solver
@@ -70,6 +78,8 @@ class Problem(NamedTuple):
     """The same for body and room shapes, shape (n_body, n_room)."""
     widest_gap: float
     """The greatest of all these distances [m]."""
+    arm_radius: float
+    """Distance from the origin of A beyond which nothing touches the arm [m]."""
     goal_R: FloatArray
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray
@@ -97,12 +107,14 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     frame = scene.arm.frame[order].astype(np.int64)
     pads = scene.arm.pad[order], scene.body.pad, scene.room.pad
     margin = scene.margin
+    widest = max(margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
+    links = pack(scene.arm, order)[0]
     return Problem(
         measure=dexterity(measure),
         arm=arm_solver(scene.chain),
         chain_R=_own(scene.chain.R),
         chain_p=_own(scene.chain.p),
-        links=pack(scene.arm, order)[0],
+        links=links,
         link_frame=frame,
         link_body=scene.arm.body[order].astype(np.int64),
         grippers=int(np.sum(frame == 7)),
@@ -121,7 +133,8 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], margin),
         gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], margin),
         gap_base=_gaps(scene.body_vs_room, pads[1], pads[2], margin),
-        widest_gap=max(margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads)),
+        widest_gap=widest,
+        arm_radius=_arm_radius(scene.chain, links, frame) + widest,
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
         base_x=_own(grid.base_x),
@@ -130,6 +143,13 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         torso_levels=grid.torso_levels,
         environment_states=grid.environment_states,
     )
+
+
+def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
+    """Return how far from the origin of A the arm's shapes can get [m]."""
+    reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain.p[:7], axis=1))])
+    out = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1) + links[:, BALL]
+    return float(np.max(reach[frame] + out, initial=0.0))
 
 
 def _balls(bodies: FloatArray, rides: NDArray[np.int8]) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.kernel.arcs import MAX_ARCS, PEAK_SLOPE, is_peak, windows_of
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.solver import ArmSolver
 
@@ -17,14 +17,15 @@ FIRST_LANES = 48
 FINE_STEP = 0.0125
 """Spacing [rad] of the second look inside the windows. Chosen by measurement: recall against a
 dense scan of 11,520 samples (benchmarks/)."""
-LEAST_LANES = 8
+LEAST_LANES = whole(8)
 """Lanes that even the smallest window or arc gets: one vector of the processor."""
-FINEST_LANES = 8
+FINEST_LANES = whole(8)
 """Lanes at each end of a feasible stretch, and about a peak that is closed in on."""
 PEAK_LOOKS = 4
 """How often lanes close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
 rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
 as the two happen to let them be."""
+NONE = whole(0)
 MAX_LANES = 512
 MAX_WINDOWS = 32
 MAX_CANDIDATES = 4096
@@ -55,13 +56,18 @@ class Search(NamedTuple):
     found to collide."""
     found_branch: IntArray
     """Row of its branch in `arm.branches`."""
+    key: FloatArray
+    """What the candidates are put in order by."""
+    order: IntArray
+    """Indices of the candidates in that order."""
+    spare: IntArray
+    """Room to sort in."""
     q: FloatArray
     """Joint angles in hand, shape (7,)."""
     best: FloatArray
     """Joint angles of the best solution so far, shape (7,)."""
 
 
-@jit
 def new_search() -> Search:
     """Return scratch memory for one worker."""
     return Search(
@@ -78,6 +84,9 @@ def new_search() -> Search:
         np.empty(MAX_CANDIDATES),
         np.empty(MAX_CANDIDATES),
         np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES, np.int64),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES, np.int64),
         np.empty(MAX_CANDIDATES, np.int64),
         np.empty(7),
         np.empty(7),
@@ -112,6 +121,32 @@ def best_of(measure: FloatArray, count: int) -> int:
 
 
 @jit
+def put_in_order(search: Search, count: int) -> None:
+    """Fill `order` with the first candidates by ascending `key`, equal ones as they come.
+
+    A merge sort of our own: numpy's costs the compiler three seconds.
+    """
+    key, order, spare = search.key, search.order, search.spare
+    for i in range(count):
+        order[i] = i
+    width = 1
+    while width < count:
+        for first in range(0, count, 2 * width):
+            middle, last = min(first + width, count), min(first + 2 * width, count)
+            i, j = first, middle
+            for k in range(first, last):
+                if j == last or (i < middle and key[order[i]] <= key[order[j]]):
+                    spare[k] = order[i]
+                    i += 1
+                else:
+                    spare[k] = order[j]
+                    j += 1
+        for k in range(count):
+            order[k] = spare[k]
+        width *= 2
+
+
+@jit
 def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     """Collect angles of the free joint, on every branch, at which all joints keep their limits.
 
@@ -126,7 +161,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     length = 0.0
     for k in range(arcs):
         length += search.arcs[k, 1] - search.arcs[k, 0]
-    found = 0
+    found = NONE
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
         share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0

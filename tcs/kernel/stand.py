@@ -66,7 +66,6 @@ def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
     """Move the room from B to A and list the shapes that the arm could touch at all."""
     A, a = problem.base_R[torso], problem.base_p[torso]
     room_B, room_A = work.room_B, work.room_A
-    far = arm_radius(problem)
     count = 0
     for j in range(len(room_B)):
         square = 0.0
@@ -76,7 +75,7 @@ def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
                 along += A[m, r] * (room_B[j, CENTRE + m] - a[m])
             room_A[j, CENTRE + r] = along
             square += along * along
-        reach = far + room_B[j, BALL]
+        reach = problem.arm_radius + room_B[j, BALL]
         if square > reach * reach:
             continue
         work.near[count] = j
@@ -90,17 +89,3 @@ def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
                     total += A[m, r] * room_B[j, TURN + 3 * m + c]
                 room_A[j, TURN + 3 * r + c] = total
     work.near_count[0] = count
-
-
-@jit
-def arm_radius(problem: Problem) -> float:
-    """Return a distance from the origin of A beyond which nothing touches the arm [m]."""
-    reach = np.zeros(8)
-    for i in range(7):
-        reach[i + 1] = reach[i] + np.sqrt(np.sum(problem.chain_p[i] * problem.chain_p[i]))
-    radius = 0.0
-    for i in range(len(problem.links)):
-        centre = problem.links[i, CENTRE : CENTRE + 3]
-        out = np.sqrt(np.sum(centre * centre)) + problem.links[i, BALL]
-        radius = max(radius, reach[problem.link_frame[i]] + out)
-    return radius + problem.widest_gap

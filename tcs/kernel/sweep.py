@@ -13,6 +13,8 @@ from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
+    RIDES,
+    STAYS,
     Workspace,
     base_contact,
     gripper_body_contact,
@@ -47,19 +49,22 @@ class Scores(NamedTuple):
     """Winning joints [rad], 0 where not reached, shape (n, goals, 7)."""
 
 
-@jit
 def gripper_contacts(problem: Problem) -> IntArray:
     """Return the gripper's contact with the room at every goal, shape (states, goals).
 
     It does not depend on where the robot stands.
     """
-    work = new_workspace(problem)
-    states, goals = problem.goal_p.shape[0], problem.goal_p.shape[1]
-    codes = np.empty((states, goals), np.int64)
-    for s in range(states):
-        for g in range(goals):
-            codes[s, g] = gripper_room_contact(problem, work, s, g)
+    codes = np.empty(problem.goal_p.shape[:2], np.int64)
+    _gripper_contacts(problem, new_workspace(problem), codes)
     return codes
+
+
+@jit
+def _gripper_contacts(owned_problem: Problem, owned_work: Workspace, codes: IntArray) -> None:
+    problem, work = borrowed(owned_problem), borrowed(owned_work)
+    for s in range(codes.shape[0]):
+        for g in range(codes.shape[1]):
+            codes[s, g] = gripper_room_contact(problem, work, s, g)
 
 
 def score_slice(
@@ -97,10 +102,10 @@ def _score_slice(
         if h // problem.torso_levels != place:
             place = h // problem.torso_levels
             state = stand(problem, work, place)
-            base_code = base_contact(problem, work, 0, 0)
+            base_code = base_contact(problem, work, STAYS, STAYS)
         code = base_code
         if code == NO_CONTACT:
-            code = base_contact(problem, work, torso, 1)
+            code = base_contact(problem, work, torso, RIDES)
         if code != NO_CONTACT:
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code
