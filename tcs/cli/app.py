@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import reports, robots, robustness, talk
+from tcs.cli import capability, reports, robots, robustness, talk
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -17,6 +17,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(robots.app, name="robot")
+app.add_typer(capability.app, name="capability")
 
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -396,3 +397,4 @@ def export(
 
 app.command()(robustness.evaluate)
 app.command()(robustness.robustify)
+app.command("map-check")(capability.map_check)

@@ -1,0 +1,187 @@
+"""The commands on capability maps, as a user calls them."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from tcs.capability import load_map
+
+COARSE = ("--step", 0.1, "--turns", 8, "--lift", 0.15)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A map made on the command line, and what that said."""
+    from typer.testing import CliRunner
+
+    from tcs.cli.app import app
+
+    path = tmp_path_factory.mktemp("maps") / "ihcm.tcm"
+    words = ["capability", "from-ik", "--out", path, "--text", path.with_suffix(".txt"), *COARSE]
+    result = CliRunner().invoke(app, [*map(str, words)])
+    assert result.exit_code == 0
+    return path, result.stdout
+
+
+def test_from_ik_writes_a_map_and_its_text(made):
+    path, said = made
+    capability = load_map(path)
+    assert f"{len(capability.cells):,} cells" in said
+    lines = path.with_suffix(".txt").read_text().splitlines()
+    assert len(lines) == len(capability.cells)
+    assert len(lines[0].split()) == 13
+
+
+def test_merge_tells_best_and_worst_and_writes_every_base_pose(made, tcs_command, tmp_path):
+    table = tmp_path / "poses.csv"
+    ran = tcs_command(
+        "capability", "merge", made[0], "--task", "pick-and-place", "--height", 0.65,
+        "--length", 0.2, "--pre-grasp", 0.1, "--out", table, "--json",
+    )  # fmt: skip
+    result = ran.json
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == result["base_poses"] > 0
+    scores = [float(row["score"]) for row in rows]
+    assert result["best"]["score"] == pytest.approx(max(scores))
+    assert result["worst"]["score"] == pytest.approx(min(scores))
+    best = rows[int(np.argmax(scores))]
+    assert float(best["yaw_deg"]) == pytest.approx(result["best"]["yaw_deg"])
+    assert result["off_cell_m"] == 0.0
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "html"])
+def test_merge_draws(made, tcs_command, tmp_path, ending):
+    picture = tmp_path / f"task.{ending}"
+    ran = tcs_command(
+        "capability", "merge", made[0], "--task", "curved", "--length", 0.3, "--samples", 2,
+        "--height", 0.85, "--picture", picture,
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert picture.stat().st_size > 10_000
+    assert "best" in ran.out
+
+
+@pytest.mark.parametrize("ending", ["png", "html"])
+def test_show_draws_a_layer(made, tcs_command, tmp_path, ending):
+    picture = tmp_path / f"map.{ending}"
+    assert tcs_command("capability", "show", made[0], "--out", picture).code == 0
+    assert picture.stat().st_size > 10_000
+    ran = tcs_command("capability", "show", made[0], "--out", picture, "--height", 3.0)
+    assert ran.code == 1
+    assert "no base pose for a tool at 3 m; it holds heights from" in ran.err
+    assert (
+        "unknown tilt '7'"
+        in tcs_command("capability", "show", made[0], "--out", picture, "--tilt", 7).err
+    )
+
+
+def test_split_gives_stops_in_order(made, tcs_command):
+    ran = tcs_command(
+        "capability", "merge", made[0], "--task", "linear", "--length", 2.0, "--samples", 5,
+        "--height", 0.65, "--split", "--json",
+    )  # fmt: skip
+    stops = ran.json["stops"]
+    assert [i for stop in stops for i in stop["positions"]] == [0, 1, 2, 3, 4]
+    assert len(stops) > 1
+
+
+def test_no_base_pose_for_all_is_one_line_and_exit_code_1(made, tcs_command):
+    ran = tcs_command(
+        "capability", "merge", made[0], "--task", "linear", "--length", 2.0, "--samples", 5,
+        "--height", 0.65,
+    )  # fmt: skip
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "no base pose reaches all 5 positions; best subset:" in ran.err
+
+
+def test_record_from_a_simulated_operator_and_from_its_csv(tcs_command, tmp_path):
+    arm = tmp_path / "arm.csv"
+    options = ("--lift", 0.15, "--height", 0.6)
+    one, two = tmp_path / "one.tcm", tmp_path / "two.tcm"
+    first = tcs_command(
+        "capability", "record", "--out", one, *options, "--seconds", 30, "--save-csv", arm,
+        "--seed", 3, "--json",
+    ).json  # fmt: skip
+    second = tcs_command("capability", "record", arm, "--out", two, *options, "--json").json
+    assert first["samples"] == second["samples"] == 1500
+    assert first["cells"] == second["cells"] > 5
+    np.testing.assert_array_equal(load_map(one).cells, load_map(two).cells)
+    said = tcs_command("capability", "record", arm, "--out", two, *options).out
+    assert "yaw " in said
+    assert "1,500 samples" in said
+
+
+def test_a_csv_of_another_robot_is_one_line(tcs_command, tmp_path):
+    arm = tmp_path / "arm.csv"
+    arm.write_text("elbow,wrist\n0,0\n")
+    ran = tcs_command("capability", "record", arm, "--out", tmp_path / "m.tcm")
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert "joint names do not match robot 'tiago'" in ran.err
+    assert not (tmp_path / "m.tcm").exists()
+
+
+def test_from_bag(tcs_command, tmp_path):
+    pytest.importorskip("rosbags")
+    from tests.capability.test_bags import write_bag
+    from tests.capability.test_recording import LISTING, NAMES
+
+    bag = write_bag(tmp_path / "arm.bag", [(NAMES, LISTING)])
+    out = tmp_path / "m.tcm"
+    ran = tcs_command("capability", "from-bag", bag, "--out", out, "--grasps", "all", "--json")
+    assert ran.json["cells"] == 1
+    ran = tcs_command("capability", "from-bag", bag, "--out", out, "--topic", "/none")
+    assert ran.code == 1
+    assert "holds no joint states on topic '/none'" in ran.err
+
+
+def test_map_check_of_a_map_and_of_one_to_be_made(made, tcs_command):
+    ran = tcs_command("map-check", made[0], "--queries", 2000, "--json")
+    stored = ran.json["grasps"]
+    assert set(stored) == {"side", "top"}
+    planned = tcs_command(
+        "map-check", *COARSE, "--grasps", "side", "--queries", 2000, "--json"
+    ).json["grasps"]
+    assert planned["side"] == stored["side"]
+    assert "accuracy" in tcs_command("map-check", made[0], "--queries", 200).out
+
+
+def test_map_check_refuses_what_was_recorded(tcs_command, tmp_path):
+    path = tmp_path / "itcm.tcm"
+    recorded = ("--seconds", 10, "--lift", 0.15, "--height", 0.6)
+    assert tcs_command("capability", "record", "--out", path, *recorded).code == 0
+    ran = tcs_command("map-check", path)
+    assert ran.code == 1
+    assert "holds what was recorded" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("from-ik", "--kind", "ITCM"), "unknown kind of map 'ITCM'"),
+        (("from-ik", "--grasps", "left"), "unknown choice of grasps 'left'"),
+        (("from-ik", "--tool", "hand"), "unknown tool frame 'hand'"),
+        (("from-ik", "--lift", 2), "lift 2 m is out of range"),
+        (("from-ik", "--step", 0), "step is 0.0 m"),
+        (("record", "--seconds", 0), "at least 0.02 s"),
+    ],
+)
+def test_what_cannot_be_is_one_line(words, said, tcs_command, tmp_path):
+    ran = tcs_command("capability", *words, "--out", tmp_path / "m.tcm")
+    assert ran.code == 1
+    assert ran.err.count("\n") == 1
+    assert said in ran.err
+
+
+def test_an_unknown_task_or_file_is_one_line(made, tcs_command, tmp_path):
+    ran = tcs_command("capability", "merge", made[0], "--task", "pour", "--height", 0.5)
+    assert (ran.code, ran.err.count("\n")) == (1, 1)
+    assert "unknown task 'pour'. Known: curved, linear, pick-and-place." in ran.err
+    ran = tcs_command("capability", "show", tmp_path / "none.tcm", "--out", tmp_path / "a.png")
+    assert ran.code == 1
+    assert "Capability map" in ran.err
