@@ -76,7 +76,7 @@ def draw_boxes(
         axes.spines[side].set_visible(False)
     used = sorted({box.series for group in groups for box in group.boxes})
     handles: list[Artist] = [Patch(facecolor=COLOURS[i], label=series[i]) for i in used]
-    handles.append(_mark("o", "mean", "white"))
+    handles.append(_mark("o", "mean", "#c9ced4"))
     if any(box.reference for group in groups for box in group.boxes):
         handles.append(_mark("D", f"{reference}: mean, one std to each side", "#F0E442"))
     figure.legend(handles=handles, loc="outside upper left", ncols=3, frameon=False, fontsize=9)
@@ -99,7 +99,8 @@ def _draw(axes: Axes, y: float, box: Box) -> None:
         medianprops={"color": _INK, "lw": 1.6},
         whiskerprops={"color": _INK, "lw": 0.8},
         capprops={"color": _INK, "lw": 0.8},
-        meanprops={"marker": "o", "mfc": "white", "mec": _INK, "ms": 4.5},
+        # In the series' colour: where all samples are alike, the dot is all there is of a box.
+        meanprops={"marker": "o", "mfc": COLOURS[box.series], "mec": _INK, "ms": 6.0},
         flierprops={"marker": "o", "mfc": "none", "mec": "#8a939c", "ms": 2.5, "mew": 0.6},
     )
     if box.reference is not None:

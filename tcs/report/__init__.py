@@ -1,3 +1,27 @@
 """Reports: pages of text, tables and pictures about what was scored and how well it holds up."""
 
 from __future__ import annotations
+
+from tcs.report.blocks import Page, Section
+from tcs.report.html import as_html
+from tcs.report.markdown import as_markdown
+from tcs.report.paper import Paper, load_paper
+from tcs.report.robustness import robustness_page
+from tcs.report.study import Plan, RowStudy, study_row, study_rows
+from tcs.report.write import make_folder, write_report
+
+__all__ = [
+    "Page",
+    "Paper",
+    "Plan",
+    "RowStudy",
+    "Section",
+    "as_html",
+    "as_markdown",
+    "load_paper",
+    "make_folder",
+    "robustness_page",
+    "study_row",
+    "study_rows",
+    "write_report",
+]

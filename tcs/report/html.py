@@ -98,9 +98,12 @@ def _(block: Table) -> str:
         "<tr>" + "".join(_cell(*both) for both in zip(row, block.columns, strict=True)) + "</tr>"
         for row in block.rows
     ]
+    # The caption stays in place when a wide table is scrolled on a phone.
     return (
-        f'<div class="scroll"><table>\n<caption>{escape(block.caption)}</caption>\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n" + "\n".join(rows) + "\n</tbody></table></div>"
+        f'<figure class="table">\n<figcaption>{escape(block.caption)}</figcaption>\n'
+        f'<div class="scroll"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n'
+        + "\n".join(rows)
+        + "\n</tbody></table></div>\n</figure>"
     )
 
 

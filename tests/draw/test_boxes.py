@@ -43,9 +43,16 @@ def test_the_legend_names_what_is_drawn(groups):
 
 @pytest.mark.parametrize("count", [1, 4, 5])
 def test_each_cloud_has_a_panel(count, rng):
-    clouds = [Cloud(f"c{i}", rng.random(9), rng.random(9), (0.5, 50.0)) for i in range(count)]
-    figure = draw_clouds(clouds, x_label="P_M", y_label="%", x_span=(0.0, 1.0))
-    assert [axes.get_title() for axes in figure.axes if axes.axison] == [c.title for c in clouds]
+    points = [(rng.random(9), rng.random(9)) for _ in range(2)]
+    clouds = [Cloud(f"c{i}", points, (0.5, 50.0)) for i in range(count)]
+    figure = draw_clouds(clouds, ("one", "two"), x_label="P_M", y_label="%")
+    drawn = [axes for axes in figure.axes if axes.axison]
+    assert [axes.get_title() for axes in drawn] == [cloud.title for cloud in clouds]
+    for axes in drawn:
+        for (x, y), dots in zip(points, axes.collections, strict=True):
+            np.testing.assert_array_equal(dots.get_offsets(), np.column_stack([x, y]))
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["one", "two", "best set"]
 
 
 def test_pictures_as_bytes_are_the_same_again(groups):

@@ -1,0 +1,87 @@
+"""Tables I and III of the TCS paper on our scenes, as a page, as Markdown and sample by sample.
+
+    python scripts/robustness_report.py --out out/robustness
+
+Score files are taken from the folder named by --scores; rows that are not there are scored first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+import time
+from pathlib import Path
+
+import tcs
+from tcs.cli import talk
+from tcs.cli.rows import default_path, score_one
+from tcs.report import Plan, load_paper, make_folder, study_rows, write_report
+
+ROBOT = "pr2"
+
+
+def main() -> int:
+    """Run the study and write the report; return the exit code."""
+    options = parse()
+    try:
+        return run(options)
+    except tcs.TcsError as error:
+        talk.say(str(error))
+    except KeyboardInterrupt:
+        talk.say("interrupted; no half-written file is left.")
+        return 130
+    return 1
+
+
+def parse() -> argparse.Namespace:
+    """Return the command line's options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("out/robustness"), help="folder to write")
+    parser.add_argument("--scores", type=Path, default=Path("out/scores"), help="score files")
+    parser.add_argument("--rows", nargs="+", metavar="TASK/ROOM", help="only these rows of Table I")
+    parser.add_argument("--samples", type=int, default=1000, help="samples of each method")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all samples")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    return parser.parse_args()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Score what is missing, try every row, write the report."""
+    rows = chosen(options.rows)
+    make_folder(options.out)
+    make_folder(options.scores)
+    paths = [options.scores / default_path(*row, ROBOT) for row in rows]
+    for (task, environment), path in zip(rows, paths, strict=True):
+        if not path.exists():
+            score_one(task, environment, ROBOT, path, jobs=options.jobs)
+    plan = Plan(samples=options.samples, seed=options.seed)
+    begun = time.perf_counter()
+    with talk.progress_bar("rows tried") as on_progress:
+        found = study_rows(
+            paths, plan, jobs=options.jobs, on_progress=on_progress, on_compile=compiling
+        )
+    seconds = time.perf_counter() - begun
+    command = shlex.join(["python", *sys.argv])
+    for path in write_report(options.out, found, plan, seconds=seconds, command=command):
+        print(f"wrote {path}: {path.stat().st_size:,} bytes")
+    return 0
+
+
+def compiling() -> None:
+    """Say why nothing moves for a while."""
+    talk.say("compiling for this machine, up to a minute; later runs do without.")
+
+
+def chosen(names: list[str] | None) -> list[tuple[str, str]]:
+    """Return task and room of the rows that are asked for, in the paper's order."""
+    rows = list(load_paper().rows())
+    known = {f"{task}/{environment}": (task, environment) for task, environment in rows}
+    for name in names or ():
+        if name not in known:
+            raise tcs.errors.UnknownNameError("row", name, known, where="--rows")
+    return [known[name] for name in known if names is None or name in names]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,219 @@
+"""The study behind the robustness report: every row tried with the room a little off."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.draw import as_png
+from tcs.kernel.cache import is_compiled
+from tcs.report.paper import load_paper
+from tcs.report.pictures import Shown, map_figure, scene_figure
+from tcs.robustness import (
+    Difference,
+    Evaluation,
+    MethodTable,
+    Trials,
+    compare_methods,
+    evaluate,
+    losses,
+    signed_rank,
+)
+from tcs.robustness.kept import uniform_sets
+from tcs.robustness.losses import Losses
+from tcs.store import load_scores
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How much is tried."""
+
+    samples: int = 1000
+    """Samples of each method."""
+    seed: int = 0
+    sets: int = 120
+    """How many random sets to try, to see how well P_M predicts success."""
+    set_samples: int = 50
+    """Samples of each of them, the same for all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """How well P_M without error predicts the success with it, among sets of equal reach."""
+
+    members: int
+    """How many configurations the sets have."""
+    manipulability: NDArray[np.float64]
+    """P_M of each set, shape (n,)."""
+    success: NDArray[np.float64]
+    """Mean share of goals reached by each, shape (n,)."""
+    rank_correlation: float
+    """Spearman's; 0 where one of the two does not vary."""
+    p: float
+    """Two-sided; 1 where one of the two does not vary."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RowStudy:
+    """All that was found about one row."""
+
+    task: str
+    environment: str
+    robot: str
+    titles: tuple[str, str, str]
+    """Of task, environment and robot, for a person."""
+    made_by: dict[str, str]
+    """Program version, date and scene of the score file, and the file's own hash."""
+    best: Evaluation
+    """The set with the best scores."""
+    single: Evaluation
+    """The best single configuration."""
+    methods: MethodTable | None
+    """One or two, with and without TC-manipulability; None where not asked for."""
+    robust: Evaluation | None
+    """The set with the greatest estimated success, on samples that had no part in the estimate;
+    None where the file holds no estimates."""
+    gain: Difference | None
+    """What it has over the best set, on the same samples."""
+    losses: Losses
+    """What the best set loses, and why."""
+    single_losses: Losses | None
+    """The same of the best single; None where it is not compared."""
+    predictions: tuple[Prediction, ...]
+    """Among sets of one, and of two where there are any."""
+    map: bytes
+    """The chosen set from above, PNG."""
+    scene: bytes
+    """The chosen set in space, PNG."""
+    seconds: float
+    """Wall clock [s]."""
+    cpu_seconds: float
+
+    @property
+    def name(self) -> str:
+        """Task and environment in words."""
+        return f"{self.task.replace('_', ' ')}, {self.environment}"
+
+
+def study_row(path: Path, plan: Plan, jobs: int = 1) -> RowStudy:
+    """Return what a score file is worth when the room is off.
+
+    Args:
+        path: A score file.
+        plan: How much to try.
+        jobs: Number of threads; the result does not depend on it.
+
+    Raises:
+        StoreError: If the file cannot be used, or is not of today's models.
+        SelectionError: If it holds no set.
+    """
+    begun, cpu = time.perf_counter(), time.process_time()
+    file = load_scores(path)
+    trials = Trials.of(file)
+    names = (trials.job.task.name, trials.job.spec.environment.name, trials.job.spec.robot.name)
+    tries: dict[str, Any] = {"samples": plan.samples, "seed": plan.seed, "jobs": jobs}
+    methods = None
+    if names[:2] in load_paper().compared_rows():
+        methods = compare_methods(trials, **tries)
+    known = methods.cells if methods is not None else {}
+    best = known.get((2, True)) or evaluate(trials, select="best", **tries)
+    single = known.get((1, True)) or evaluate(trials, select="single", **tries)
+    success = trials.scored.success
+    robust = evaluate(trials, select=success.best, **tries) if success is not None else None
+    shown = Shown.of(file, None)
+    pictures = [as_png(figure(file, shown)) for figure in (map_figure, scene_figure)]
+    return RowStudy(
+        task=names[0],
+        environment=names[1],
+        robot=names[2],
+        titles=(
+            trials.job.task.title,
+            trials.job.spec.environment.title,
+            trials.job.spec.robot.title,
+        ),
+        made_by={
+            "version": file.metadata["program_version"],
+            "created": file.metadata["created"],
+            "scene": file.metadata["scene_digest"],
+            "measure": file.metadata["measure"],
+            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        },
+        best=best,
+        single=single,
+        methods=methods,
+        robust=robust,
+        gain=signed_rank(robust.shares, best.shares) if robust is not None else None,
+        losses=losses(trials, best),
+        single_losses=losses(trials, single) if methods is not None else None,
+        predictions=tuple(
+            predicted(trials, plan, members, jobs)
+            for members in range(1, min(len(trials.scored.sets.best), 2) + 1)
+        ),
+        map=pictures[0],
+        scene=pictures[1],
+        seconds=time.perf_counter() - begun,
+        cpu_seconds=time.process_time() - cpu,
+    )
+
+
+def predicted(trials: Trials, plan: Plan, members: int, jobs: int = 1) -> Prediction:
+    """Return how P_M and success go together among random sets that reach as much as the best.
+
+    The sets, of one or two, are those that the paper's "without TC-manipulability" draws from.
+    """
+    from scipy import stats
+
+    sets = trials.scored.sets
+    drawn = np.unique(uniform_sets(sets, members, plan.sets, plan.seed)[0], axis=0)
+    offsets = trials.errors.draw(plan.set_samples, plan.seed, stream="prediction")
+    tried, rows = np.unique(drawn, return_inverse=True)
+    reached = trials.reached(tried, offsets, jobs=jobs)
+    together = reached[rows.reshape(drawn.shape)].any(axis=1)
+    success = (together @ trials.weights).mean(axis=1)
+    scores = np.array([sets.scores_of(tuple(row)) for row in drawn.tolist()])
+    rho, p = 0.0, 1.0
+    if len(drawn) > 2 and np.ptp(success) > 0.0 and np.ptp(scores[:, 1]) > 0.0:
+        found = stats.spearmanr(scores[:, 1], success)
+        rho, p = float(found.statistic), float(found.pvalue)
+    return Prediction(members, scores[:, 1], success, rho, p)
+
+
+def study_rows(
+    paths: Sequence[Path],
+    plan: Plan,
+    *,
+    jobs: int = 2,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> tuple[RowStudy, ...]:
+    """Return the studies of several score files, in their order.
+
+    Args:
+        paths: The score files.
+        plan: How much to try.
+        jobs: Number of processes; the result does not depend on it.
+        on_progress: Called with rows done and in all.
+        on_compile: Called first, when the kernel has to be compiled.
+
+    Raises:
+        TcsError: Whatever `study_row` raises.
+    """
+    if not is_compiled():
+        # Once, and not by every process for itself.
+        Trials.of(load_scores(paths[0]), on_compile=on_compile)
+    done = []
+    # Processes: a good part of the work is Python's and Drake's own, which threads share badly.
+    work = Parallel(n_jobs=min(jobs, len(paths)), return_as="generator")
+    for row in work(delayed(study_row)(path, plan) for path in paths):
+        done.append(row)
+        if on_progress is not None:
+            on_progress(len(done), len(paths))
+    return tuple(done)

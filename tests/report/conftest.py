@@ -1,0 +1,67 @@
+"""A real but small study: shaving beside the wheelchair, from a few places."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from tcs.report import Paper, Plan, load_paper, study_row
+from tcs.scoring import score
+from tcs.store import save_scores
+
+SMALL_ROOM = """
+based_on: wheelchair
+name: small-room
+title: The wheelchair, seen from a few places
+grid:
+  base_x: {unit: m, start: 0.5, step: 0.1, count: 8}
+  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
+  base_yaw: {unit: deg, start: 90, step: 45, count: 4}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
+"""
+PLAN = Plan(samples=60, sets=12, set_samples=6)
+
+
+@pytest.fixture(scope="session")
+def plan():
+    return PLAN
+
+
+@pytest.fixture(scope="session")
+def score_path(tmp_path_factory):
+    """A score file."""
+    folder = tmp_path_factory.mktemp("study")
+    room = folder / "small-room.yaml"
+    room.write_text(SMALL_ROOM)
+    path = folder / "shaving-small-room-pr2.tcs"
+    save_scores(path, score("shaving", room))
+    return path
+
+
+@pytest.fixture(scope="session")
+def paper():
+    """The paper, as if its wheelchair were the small room."""
+    plain = load_paper().model_dump(by_alias=True)
+    for table in ("table_1", "table_3"):
+        for row in plain[table]:
+            if row["environment"] == "wheelchair":
+                row["environment"] = "small-room"
+    return Paper.model_validate(plain)
+
+
+@pytest.fixture(scope="session")
+def study(score_path, paper):
+    """The study of that file, with the comparison of Table III."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tcs.report.study.load_paper", lambda: paper)
+        return study_row(score_path, PLAN)
+
+
+@pytest.fixture(scope="session")
+def lossless(study):
+    """The same row, had everything been reached in every sample."""
+    best = dataclasses.replace(study.best, reached=study.best.reached | True)
+    return dataclasses.replace(
+        study, task="brushing", best=best, losses=dataclasses.replace(study.losses, goals=())
+    )
