@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint format benchmark benchmark-peers clean
+.PHONY: help demo test test-all lint format benchmark benchmark-robots benchmark-peers clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -42,6 +42,9 @@ benchmark: $(STAMP)  ## Print the measured numbers with machine, versions and sp
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/rows.py --out $(OUT)/rows
 	$(BIN)/python benchmarks/selection.py $(OUT)/rows/bathing-bed-pr2.tcs $(OUT)/rows/shaving-wheelchair-pr2.tcs
+
+benchmark-robots: $(STAMP)  ## Measure every robot at the same tasks, and what its search misses
+	$(BIN)/python benchmarks/robots.py
 
 benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the same problems
 	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[benchmarks]' || \

@@ -198,8 +198,11 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
         raise RobotError(f"{where}: tool frame '{tool}' does not hang on base '{base}'.")
     movable = [joint for joint in chain if joint.is_movable]
     arm: list[Joint] = []
+    end = ""
     for joint in reversed(movable):
-        if joint.type == "prismatic" or joint.mimic is not None or len(arm) == ARM_JOINTS:
+        if joint.type == "prismatic" or joint.mimic is not None:
+            end = f"; '{joint.name}' before them {'mimics another' if joint.mimic else 'slides'}"
+        if end or len(arm) == ARM_JOINTS:
             break
         arm.insert(0, joint)
     if len(arm) < ARM_JOINTS:
@@ -207,7 +210,7 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
         raise RobotError(
             f"{where}: an arm of seven turning joints is needed, but from "
             f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
-            f"({found}). Name another tool frame or base."
+            f"({found}{end}). Name another tool frame or base."
         )
     exact = base is not None and movable == arm
     arm_base = str(base) if exact else arm[0].parent

@@ -43,7 +43,7 @@ def _package_folder(package: str, beside: Path, uri: str) -> Path:
     if installed is None:
         raise RobotError(
             f"'{uri}': package '{package}' is neither installed nor a folder above '{beside}'. "
-            f"Install it, e.g. with `pip install {package}`."
+            "Put the file that names it into that package's folder, or name a path from there."
         )
     return installed
 

@@ -17,6 +17,8 @@ Vector = tuple[float, float, float]
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 """Joint types with one degree of freedom; every other joint but `fixed` is refused."""
+_XACRO = "{http://www.ros.org/wiki/xacro}"
+"""The namespace of macros that a URDF is generated from."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +132,10 @@ def read_urdf(path: Path) -> Urdf:
         raise RobotError(f"URDF '{path}' is no sound XML: {error}.") from error
     if root.tag != "robot":
         raise RobotError(f"URDF '{path}': the root element is '{root.tag}', but must be 'robot'.")
+    if any(element.tag.startswith(_XACRO) for element in root.iter()):
+        raise RobotError(
+            f"URDF '{path}' holds xacro macros. Expand them first: xacro {path.name} > robot.urdf"
+        )
     colours = {
         element.get("name", ""): colour
         for element in root.findall("material")

@@ -110,7 +110,8 @@ def test_arm_base_may_be_named(path):
 def test_too_few_joints_are_one_clear_line(tmp_path):
     file = tmp_path / "short.urdf"
     file.write_text(urdf(joints=5))
-    with pytest.raises(RobotError, match=r"only 5 in a row lead there \(a1, a2, a3, a4, a5\)") as e:
+    found = r"only 5 in a row lead there \(a1, a2, a3, a4, a5; 'lift' before them slides\)"
+    with pytest.raises(RobotError, match=found) as e:
         draft_robot(file, "tool")
     assert "\n" not in str(e.value)
 
@@ -120,6 +121,27 @@ def test_unknown_tool_names_the_nearest(path):
         draft_robot(path, "toool")
     with pytest.raises(UnknownNameError, match="Did you mean 'mast'"):
         draft_robot(path, "tool", base="maast")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "revolute",
+            "prismatic",
+            r"only 3 in a row lead there \(a5, a6, a7; 'a4' before them slides",
+        ),
+        ("revolute", "revolute", r"\(a5, a6, a7; 'a4' before them mimics another\)"),
+    ],
+    ids=["slides", "mimics"],
+)
+def test_a_joint_that_ends_the_arm_too_soon_is_named(tmp_path, old, new, message):
+    mimic = '<mimic joint="a3"/>' if old == new else ""
+    file = tmp_path / "short.urdf"
+    joint = '<joint name="a4" type="{}">'
+    file.write_text(urdf().replace(joint.format(old), joint.format(new) + mimic))
+    with pytest.raises(RobotError, match=message):
+        draft_robot(file, "tool")
 
 
 def test_missing_meshes_are_named(tmp_path):

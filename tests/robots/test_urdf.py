@@ -64,11 +64,22 @@ def test_broken_models_get_one_clear_line(changes, message, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["<robot", "<sdf/>"])
-def test_what_is_no_urdf_is_refused(text, tmp_path):
+XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot", "is no sound XML"),
+        ("<sdf/>", "the root element is 'sdf', but must be 'robot'"),
+        (XACRO, r"holds xacro macros\. Expand them first: xacro no\.urdf"),
+    ],
+    ids=["no XML", "another format", "macros"],
+)
+def test_what_is_no_urdf_is_refused(text, message, tmp_path):
     path = tmp_path / "no.urdf"
     path.write_text(text)
-    with pytest.raises(RobotError, match=r"no\.urdf"):
+    with pytest.raises(RobotError, match=rf"no\.urdf.*{message}"):
         read_urdf(path)
 
 

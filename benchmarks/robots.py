@@ -1,0 +1,91 @@
+"""Measure every robot that ships at the same tasks: time, what it reaches, and what it missed.
+
+Usage: python benchmarks/robots.py [--robots pr2,panda] [--tasks shaving,feeding] [--repeats 5]
+                                   [--pairs 500] [--dense 1000]
+
+Each robot does each task in the wheelchair on the paper's grid; a robot without a lift has a third
+of the configurations. The robots take turns, so that a busy moment hits none of them alone. Nothing
+here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+import time
+
+from table import header, row, spread
+
+from tcs.robots import robot_names
+from tcs.scoring import load_job, score, sweep, verify
+
+ENVIRONMENT = "wheelchair"
+RECALL = 0.998
+"""What every arm is meant to come up to."""
+
+
+def main() -> int:
+    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", default=",".join(robot_names()))
+    parser.add_argument("--tasks", default="shaving,feeding")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--pairs", type=int, default=500)
+    parser.add_argument("--dense", type=int, default=1000)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    header()
+    row("seed, threads", f"{options.seed}, {options.jobs}")
+    works = list(itertools.product(options.tasks.split(","), options.robots.split(",")))
+    times(works, options.repeats, options.jobs)
+    # A list, so that one false answer does not keep the others from being looked for.
+    return 0 if all([verification(*work, options) for work in works]) else 1
+
+
+def times(works: list[tuple[str, str]], repeats: int, jobs: int) -> None:
+    """Measure the scoring of every task with every robot, and print what it found."""
+    lowered = {}
+    for task, robot in works:
+        job = load_job(task, ENVIRONMENT, robot)
+        lowered[task, robot] = job.lowered(job.scene()), job.task.weights
+    taken: dict[tuple[str, str], list[float]] = {work: [] for work in works}
+    reasons = {}
+    for _ in range(repeats):
+        for work in works:
+            swept = sweep(*lowered[work], jobs=jobs)
+            taken[work].append(swept.scoring_seconds)
+            (reasons[work],) = swept.tables
+    for (task, robot), seconds in taken.items():
+        scores = reasons[task, robot]
+        counts = ", ".join(f"{name} {n}" for name, n in scores.reason_counts().items())
+        row(f"{task}, {robot}: scoring_seconds", spread(seconds))
+        row("", f"{scores.configurations} x {scores.goals}: {counts}")
+
+
+def verification(task: str, robot: str, options: argparse.Namespace) -> bool:
+    """Re-check one task with Drake and the dense scan; return whether all answers are true."""
+    begun = time.perf_counter()
+    found = verify(
+        score(task, ENVIRONMENT, robot, jobs=options.jobs),
+        pairs=options.pairs,
+        dense=options.dense,
+        seed=options.seed,
+    )
+    low, high = found.recall_ci95
+    row(
+        f"verify {task}, {robot}",
+        f"checked {found.checked}, false {found.false_reached}, "
+        f"position {found.max_position_error:.1e} m, rotation {found.max_rotation_error:.1e}, "
+        f"measure {found.max_isotropy_error:.1e}, missed {found.missed} of {found.dense_checked}, "
+        f"recall {found.recall:.5f} ({low:.4f} .. {high:.4f}), "
+        f"shortfall {found.mean_shortfall:.1e}, {time.perf_counter() - begun:.0f} s",
+    )
+    if found.recall < RECALL:
+        row("", f"recall is below {RECALL}")
+    return found.is_sound
+
+
+if __name__ == "__main__":
+    sys.exit(main())
