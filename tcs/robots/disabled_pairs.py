@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
+from tcs.robots.enclosure import surfaces_to_enclose
 from tcs.robots.extras import model_with_extras
 from tcs.robots.geometry import body_triangles, welded_top
 from tcs.robots.pose import pose_in_root
@@ -75,8 +76,9 @@ def propose_disabled_pairs(
     sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
     moved, hand = (_moved_by(model, robot.arm_joints[i]) for i in (0, -1))
-    surfaces = Surfaces(model)
-    fine = Surfaces(model, scale=_FINER, rough=surfaces)
+    triangles = _carried_triangles(robot, model)
+    surfaces = Surfaces(model, triangles)
+    fine = Surfaces(model, triangles, scale=_FINER, rough=surfaces)
     found = _Found()
     for pair, count in sorted(counts.items()):
         if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
@@ -139,11 +141,18 @@ class _Found:
 class Surfaces:
     """The bodies' original surfaces as points, and how close two of them can come."""
 
-    def __init__(self, model: Urdf, scale: float = 1.0, rough: Surfaces | None = None) -> None:
-        """Read the surfaces; points are spread when a body is first asked for.
+    def __init__(
+        self,
+        model: Urdf,
+        triangles: Mapping[str, FloatArray],
+        scale: float = 1.0,
+        rough: Surfaces | None = None,
+    ) -> None:
+        """Take the surfaces; points are spread when a body is first asked for.
 
         Args:
             model: The robot.
+            triangles: Its bodies' surfaces, each in its body's frame [m], shapes (n, 3, 3).
             scale: How many times smaller than usual distances are looked at.
             rough: The same surfaces at the usual scale, which say where a closer look is due.
         """
@@ -151,7 +160,7 @@ class Surfaces:
         self._rough = rough
         self._spacing = SPACING * scale
         self._clear = CLEAR * scale
-        self._triangles = body_triangles(self._model)
+        self._triangles = triangles
         self._points: dict[str, FloatArray] = {}
         self._trees: dict[str, cKDTree] = {}
 
@@ -248,6 +257,16 @@ class Surfaces:
             corners = np.unique(triangles.reshape(-1, 3), axis=0)
             self._points[body] = np.concatenate([inner, corners])
         return self._points[body]
+
+
+def _carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
+    """Return the surface that each body's primitives stand for, in its frame [m].
+
+    Those of a base stand for all that is welded to it as well: a column, a torso.
+    """
+    carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
+    added = body_triangles(model)
+    return carried | {body.name: added[body.name] for body in robot.bodies}
 
 
 def _moved_by(model: Urdf, joint: str) -> set[str]:

@@ -10,8 +10,10 @@ from tcs.robots.disabled_pairs import (
     joints_between,
     propose_disabled_pairs,
 )
-from tcs.robots.geometry import welded_top
+from tcs.robots.draft import draft_robot
+from tcs.robots.geometry import body_triangles, welded_top
 from tcs.robots.self_collision import SelfCollision, sample_positions
+from tests.robots.made_up import urdf
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +87,7 @@ def test_primitives_rarely_see_contact_that_hulls_do_not(pr2, judge, arm_bodies)
 def test_contact_of_hulls_that_primitives_miss_is_no_contact_of_surfaces(pr2, judge, arm_bodies):
     """A hull fills hollows, above all that over the low front of the base; the surface does not."""
     hulls = SelfCollision(pr2, hulls=True)
-    surfaces = Surfaces(pr2.model())
+    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
     seen = 0
     for q in postures(pr2, 0.15, 150, seed=4):
         # The base's primitives enclose its wheels, too.
@@ -130,15 +132,30 @@ def test_disabled_pairs_lie_few_joints_apart(pr2):
 
 def test_surfaces_that_meet_are_found_to(pr2):
     # Guards the evidence: a search that found everything apart would prove nothing.
-    surfaces = Surfaces(pr2.model())
+    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
     assert surfaces.closest_approach(("l_forearm_link", "l_gripper_palm_link"), pr2, 0) < CLEAR
 
 
 def test_pairs_that_cannot_meet_do_not(pr2):
-    surfaces = Surfaces(pr2.model())
+    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
     pair = ("l_forearm_link", "l_upper_arm_link")
     assert pair in pr2.disabled_pairs
     assert surfaces.closest_approach(pair, pr2, seed=7) >= CLEAR
+
+
+def test_what_is_welded_to_the_base_is_looked_at_with_it(tmp_path):
+    """The base's primitives stand for a wall on it, too, into which the arm can swing."""
+    wall = (
+        '<link name="wall"><visual><geometry><box size="0.1 0.4 0.6"/></geometry></visual></link>'
+        '<joint name="wall_joint" type="fixed"><parent link="base"/><child link="wall"/>'
+        '<origin xyz="0.25 0 1.1"/></joint>'
+    )
+    (tmp_path / "walled.urdf").write_text(urdf().replace("</robot>", f"{wall}</robot>"))
+    draft = draft_robot(tmp_path / "walled.urdf", "tool")
+    assert {shape.body for shape in draft.primitives} >= {"base", "arm2"}
+    off = {frozenset(pair) for pair in draft.robot.disabled_pairs}
+    assert frozenset(("base", "arm2")) not in off
+    assert frozenset(("arm1", "arm2")) in off
 
 
 @pytest.mark.slow
