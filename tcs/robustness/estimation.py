@@ -116,7 +116,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
         for size in (1, 2):
             rows = success.of_size(size)
             if rows.size:
-                row = int(rows[np.argmax(success.success[rows])])
+                row = success.surest(rows)
                 best.append(
                     {
                         "members": [grid.configuration(h).to_json() for h in success.set_at(row)],

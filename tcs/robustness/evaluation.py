@@ -21,7 +21,7 @@ from tcs.tables import tc_reachability
 
 SELECTIONS = ("best", "single", "robust", "uniform")
 """Which sets to evaluate: the set with the best scores; the best single configuration; the set
-with the greatest estimated success, where `robustify` has estimated it; or, as the paper's
+with the surest success under error, where `robustify` has estimated it; or, as the paper's
 "without TC-manipulability", another set in every sample, drawn uniformly from those whose P_R is
 at least 0.98 of the greatest."""
 

@@ -69,9 +69,10 @@ class Choice:
     cost: float
     """D of the set from the current state."""
     utility: float
-    """alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where delta is not 0."""
+    """alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where delta is not 0; P_S is
+    the lower end of `success_ci95`."""
     success: float | None
-    """P_S, the estimated success of the set under error; None where it was not estimated."""
+    """Estimated success of the set under error; None where it was not estimated."""
     success_ci95: tuple[float, float] | None
     """Its 95 % interval."""
     cut_off: int
@@ -194,10 +195,11 @@ def _choice(
     indices = tuple(int(h) for h in tables.sets.candidates[member])
     reachability, manipulability = tables.sets.scores_of(indices)
     row = tables.success.row_of(indices) if tables.success is not None else None
-    success, interval = None, None
+    success, interval, sure = None, None, None
     if tables.success is not None and row is not None:
         success = float(tables.success.success[row])
         interval = (float(tables.success.low[row]), float(tables.success.high[row]))
+        sure = interval[0]
     return Choice(
         members=tuple(tables.grid.configuration(h) for h in indices),
         indices=indices,
@@ -205,7 +207,7 @@ def _choice(
         reachability=reachability,
         manipulability=manipulability,
         cost=cost,
-        utility=utility(reachability, manipulability, cost, weights, success),
+        utility=utility(reachability, manipulability, cost, weights, sure),
         success=success,
         success_ci95=interval,
         cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),

@@ -48,7 +48,7 @@ def best_estimated(
         rows, members = rows[able], members[able]
         if not rows.size:
             continue
-        found = _utilities(sets, success.success[rows], legs, weights, members)
+        found = _utilities(sets, success.low[rows], legs, weights, members)
         first = int(np.argmax(found))
         # The table is in the order that breaks ties.
         if found[first] > most:

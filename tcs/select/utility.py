@@ -28,7 +28,8 @@ class UtilityWeights:
     travel: float = 0.05
     """gamma, the weight of the travel cost D."""
     success: float = 0.0
-    """delta, the weight of the success under error P_S, where that was estimated. Above 0, only
+    """delta, the weight of the success under error P_S: the lower end of the 95 % interval of its
+    estimate, so that a lucky set of few samples is not ahead of a good one of many. Above 0, only
     sets with an estimate can be chosen."""
 
     def __post_init__(self) -> None:

@@ -95,8 +95,16 @@ class SuccessTable:
 
     @property
     def best(self) -> tuple[int, ...]:
-        """Configuration indices of the set with the greatest estimate; () of an empty table."""
-        return self.set_at(int(np.argmax(self.success))) if len(self.success) else ()
+        """Configuration indices of the surest set, the first among equals; () of an empty table.
+
+        The surest has the greatest lower end of its interval: by its mean alone a lucky set of a
+        few samples would be ahead of a good one of many.
+        """
+        return self.set_at(self.surest(np.arange(len(self.low)))) if len(self.low) else ()
+
+    def surest(self, rows: NDArray[np.int64]) -> int:
+        """Return which of some rows has the greatest lower end, the first among equals."""
+        return int(rows[np.argmax(self.low[rows])])
 
     def set_at(self, row: int) -> tuple[int, ...]:
         """Return the configuration indices of a set."""

@@ -70,7 +70,7 @@ def costs(file, here, travel):
 def by_hand(file, cost, weights, max_members):
     """Utility and members of the first set with the greatest utility, one set after the other."""
     table, best = file.nominal, None
-    for row, success in enumerate(table.success.success.tolist()):
+    for row, success in enumerate(table.success.low.tolist()):
         members = table.success.set_at(row)
         if len(members) > max_members:
             continue
