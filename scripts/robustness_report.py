@@ -17,8 +17,10 @@ from pathlib import Path
 import tcs
 from tcs.cli import talk
 from tcs.cli.rows import default_path, score_one
+from tcs.errors import UnknownNameError
 from tcs.report import Plan, load_paper, make_folder, study_rows, write_report
 from tcs.robustness import robustify
+from tcs.robustness.error_model import check_draws
 
 ROBOT = "pr2"
 RACED_SETS, RACE_SAMPLES = 200, 256
@@ -54,6 +56,9 @@ def parse() -> argparse.Namespace:
 def run(options: argparse.Namespace) -> int:
     """Score what is missing, try every row, write the report."""
     rows = chosen(options.rows)
+    check_draws(options.samples, options.seed)
+    if options.jobs < 1:
+        raise tcs.TcsError(f"--jobs is {options.jobs}; must be at least 1.")
     make_folder(options.out)
     make_folder(options.scores)
     paths = [options.scores / default_path(*row, ROBOT) for row in rows]
@@ -104,7 +109,7 @@ def chosen(names: list[str] | None) -> list[tuple[str, str]]:
     known = {f"{task}/{environment}": (task, environment) for task, environment in rows}
     for name in names or ():
         if name not in known:
-            raise tcs.errors.UnknownNameError("row", name, known, where="--rows")
+            raise UnknownNameError("row", name, known, where="--rows")
     return [known[name] for name in known if names is None or name in names]
 
 

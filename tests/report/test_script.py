@@ -1,0 +1,45 @@
+"""The script that makes the robustness report."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "robustness_report.py"
+
+
+def run(*words, cwd):
+    command = [sys.executable, str(SCRIPT), *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--rows", "shavin/bed"), "unknown row 'shavin/bed'"),
+        (("--samples", 0, "--rows", "shaving/bed"), "samples is 0"),
+        (("--jobs", 0), "--jobs is 0"),
+    ],
+)
+def test_what_cannot_be_is_told_in_a_line_before_the_work(tmp_path, words, said):
+    done = run(*words, cwd=tmp_path)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_row_from_scratch(tmp_path):
+    words = ("--rows", "scratching_chest/bed", "--samples", 20, "--out", "o", "--scores", "s")
+    done = run(*words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    # No bar in a pipe.
+    assert "\x1b" not in done.stderr
+    written = ["robustness.html", "robustness.md", "samples.csv"]
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == written
+    assert "scratching chest, bed" in (tmp_path / "o" / "robustness.md").read_text()
+    assert len(list((tmp_path / "s").iterdir())) == 1
