@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -20,7 +21,7 @@ from tcs.kernel.contacts import (
     gripper_room_contact,
 )
 from tcs.kernel.measure import jacobian
-from tcs.kernel.postures import tool_pose
+from tcs.kernel.postures import HERE, tool_pose
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import room_in_arm_base, stand
 
@@ -68,10 +69,10 @@ class Hand(NamedTuple):
 
 @jit
 def follow(
-    problem: Problem,
-    work: Workspace,
-    control: Control,
-    hand: Hand,
+    owned_problem: Problem,
+    owned_work: Workspace,
+    owned_control: Control,
+    owned_hand: Hand,
     start: FloatArray,
     joints: FloatArray,
     commands: FloatArray,
@@ -82,18 +83,20 @@ def follow(
     The problem has one torso level, one place of the base and one goal, which is overwritten.
 
     Args:
-        problem: Robot and room.
-        work: Scratch.
-        control: How the slave is controlled.
-        hand: What the hand does; it starts where the tool is.
+        owned_problem: Robot and room.
+        owned_work: Scratch.
+        owned_control: How the slave is controlled.
+        owned_hand: What the hand does; it starts where the tool is.
         start: Joint angles before the first sample, collision-free [rad], shape (7,).
         joints: Filled [rad], shape (n, 7).
         commands: Filled with x, y [m] and heading [rad] in B, shape (n, 3).
         held: Filled, whether the arm would have touched something on its way to the command,
             shape (n,).
     """
-    stand(problem, work, 0)
-    room_in_arm_base(problem, work, 0)
+    problem, work = borrowed(owned_problem), borrowed(owned_work)
+    control, hand = borrowed(owned_control), borrowed(owned_hand)
+    stand(problem, work, HERE)
+    room_in_arm_base(problem, work, HERE)
     R_BA, p_BA = problem.base_R[0], problem.base_p[0]
     q, following, rate = start.copy(), np.empty(7), np.empty(7)
     J, twist = np.empty((6, 7)), np.empty(6)
@@ -283,7 +286,7 @@ def is_free(problem: Problem, work: Workspace, q: FloatArray) -> bool:
             goal_R[r, c] = 0.0
             for m in range(3):
                 goal_R[r, c] += R[r, m] * work.R_AG[m, c]
-    if gripper_room_contact(problem, work, 0, 0) != NO_CONTACT:
+    if gripper_room_contact(problem, work, HERE, HERE) != NO_CONTACT:
         return False
     body_A = problem.body_A[0]
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:

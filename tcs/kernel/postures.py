@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.cache import jit
+from tcs.kernel.borrow import borrowed
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -17,6 +18,9 @@ from tcs.kernel.contacts import (
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import room_in_arm_base, stand
+
+HERE = whole(0)
+"""The one place, environment state or goal of a problem that has no more."""
 
 
 @jit
@@ -59,15 +63,16 @@ def tool_poses(
 
 
 @jit
-def measures(problem: Problem, q: FloatArray, value: FloatArray) -> None:
+def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
     """Fill the problem's dexterity measure of many postures: q of shape (n, 7), value (n,)."""
+    problem = borrowed(owned_problem)
     for i in range(len(q)):
         value[i] = measure_at(problem, q[i])
 
 
 @jit
 def free_postures(
-    problem: Problem, work: Workspace, torso: int, q: FloatArray, free: BoolArray
+    owned_problem: Problem, owned_work: Workspace, torso: int, q: FloatArray, free: BoolArray
 ) -> None:
     """Fill whether postures touch nothing: neither the room nor the robot itself.
 
@@ -75,19 +80,20 @@ def free_postures(
     pose at which posture i holds the tool.
 
     Args:
-        problem: Robot and room.
-        work: Scratch.
+        owned_problem: Robot and room.
+        owned_work: Scratch.
         torso: Torso level.
         q: Joint angles [rad], shape (n, 7).
         free: Filled, shape (n,).
     """
-    stand(problem, work, 0)
+    problem, work = borrowed(owned_problem), borrowed(owned_work)
+    stand(problem, work, HERE)
     room_in_arm_base(problem, work, torso)
     body_A = problem.body_A[torso]
     work.last[0] = -1
     for i in range(len(q)):
         free[i] = False
-        if gripper_room_contact(problem, work, 0, i) != NO_CONTACT:
+        if gripper_room_contact(problem, work, HERE, i) != NO_CONTACT:
             continue
         tool_pose(
             problem.chain_R, problem.chain_p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG
