@@ -56,10 +56,14 @@ def jit_folder() -> Path | None:
     return folder
 
 
-def is_compiled() -> bool:
-    """Return whether an earlier run has left machine code for the whole scoring kernel."""
+def is_compiled(entry: str = "sweep._score_slice") -> bool:
+    """Return whether an earlier run has left machine code for the whole scoring kernel.
+
+    Args:
+        entry: Module and function that all the rest is compiled into.
+    """
     folder = jit_folder()
-    return folder is not None and any(folder.rglob("sweep._score_slice*.nbc"))
+    return folder is not None and any(folder.rglob(f"{entry}*.nbc"))
 
 
 def whole(number: int) -> int:

@@ -21,6 +21,7 @@ from tcs.kernel.measure import measure_at
 from tcs.kernel.pairs import lanes_measure, measure_of
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import MAX_LANES, Search, fill_lanes, new_search
+from tcs.kernel.solver import is_outside
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 DENSE_SAMPLES = 11_520
@@ -39,9 +40,15 @@ def dense_scan(
         problem: The scene, its goals and its grid.
         configuration: Flat index of the initial configuration.
         goal: Index of the goal, one whose gripper is free.
-        samples: How many angles, spread evenly over the limits of the free joint.
+        samples: How many angles, spread evenly over the limits of the free joint. An arm outside
+            the closed form has none: there it is `numeric_dense.STARTS` starts in any case.
         joints: Filled with the solution [rad] when there is one, shape (7,).
     """
+    if is_outside(problem.arm):
+        # Imported where it is needed: most arms have a closed form.
+        from tcs.kernel.numeric_dense import STARTS, numeric_dense_scan
+
+        return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
     # Made here, where they outlive the call: the compiled code only borrows them.
     work, search = new_workspace(problem), new_search()
     return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))

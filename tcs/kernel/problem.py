@@ -18,7 +18,7 @@ from tcs.kernel.arrays import (
 )
 from tcs.kernel.collide import BALL, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
-from tcs.kernel.solver import ArmSolver, arm_solver
+from tcs.kernel.solver import ArmSolver, any_solver
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is never checked."""
@@ -32,7 +32,8 @@ class Problem(NamedTuple):
     measure: Dexterity
     """What makes one solution better than another."""
     arm: ArmSolver
-    """How the arm is solved, in reverse maybe; what follows is the arm itself."""
+    """How the arm is solved, in reverse maybe, or that no closed form solves it (`is_outside`);
+    what follows is the arm itself."""
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
@@ -95,7 +96,6 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     """Return `scene` and `grid` arranged for the kernel, to be scored by a measure.
 
     Raises:
-        ArmClassError: If the closed form cannot solve the arm.
         UnknownNameError: If there is no measure of that name.
     """
     order = np.argsort(-scene.arm.frame.astype(np.int64), kind="stable")
@@ -111,7 +111,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     links = pack(scene.arm, order)[0]
     return Problem(
         measure=dexterity(measure),
-        arm=arm_solver(scene.chain),
+        arm=any_solver(scene.chain),
         chain_R=_own(scene.chain.R),
         chain_p=_own(scene.chain.p),
         links=links,

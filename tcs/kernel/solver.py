@@ -130,7 +130,7 @@ def arm_solver(chain: Chain) -> ArmSolver:
         uc=uc,
         us=us,
         reach=np.array([u0 @ u0 + uc @ uc, amplitude, phase]),
-        elbow_cos=_cos_range(lower[3] - phase, upper[3] - phase, bool(limited[3])),
+        elbow_cos=cos_range(lower[3] - phase, upper[3] - phase, bool(limited[3])),
         limit_cos=np.where(limited, np.cos(half), -1.0),
         middle_cos=np.where(limited, np.cos(middle), 0.0),
         middle_sin=np.where(limited, np.sin(middle), 0.0),
@@ -138,6 +138,43 @@ def arm_solver(chain: Chain) -> ArmSolver:
         upper=np.array(real.upper, dtype=np.float64),
         branches=np.array(branches, dtype=np.int64),
     )
+
+
+def outside_solver(chain: Chain) -> ArmSolver:
+    """Return what there is to say of an arm outside the classes: its limits.
+
+    It has no branches, and `is_outside` goes by that; every constant of the closed form is zero.
+    """
+    none = np.zeros(3)
+    return ArmSolver(
+        free=FIRST,
+        R=np.array(chain.R, order="C"),
+        p=np.array(chain.p, order="C"),
+        u0=none,
+        uc=none.copy(),
+        us=none.copy(),
+        reach=none.copy(),
+        elbow_cos=np.zeros(2),
+        limit_cos=np.zeros(7),
+        middle_cos=np.zeros(7),
+        middle_sin=np.zeros(7),
+        lower=np.array(chain.lower, dtype=np.float64),
+        upper=np.array(chain.upper, dtype=np.float64),
+        branches=np.zeros((0, 3), dtype=np.int64),
+    )
+
+
+def any_solver(chain: Chain) -> ArmSolver:
+    """Return the closed form's constants, or `outside_solver` where there is none."""
+    try:
+        return arm_solver(chain)
+    except ArmClassError:
+        return outside_solver(chain)
+
+
+def is_outside(arm: ArmSolver) -> bool:
+    """Return whether an arm is outside the classes of the closed form: numeric IK solves it."""
+    return len(arm.branches) == 0
 
 
 def reversed_chain(chain: Chain) -> Chain:
@@ -168,7 +205,7 @@ def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
     """
     found = []
     for axes in groups:
-        passes = [_closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
+        passes = [closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
         reasons = []
         for i, passing in zip(axes, passes, strict=False):
             if passing is None:
@@ -186,7 +223,7 @@ def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
     return found
 
 
-def _closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
+def closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
     """Return how the z axis of a frame passes that of another one at the pose (R, p) in it.
 
     Returns:
@@ -212,7 +249,7 @@ def _signs_within(lower: float, upper: float, limited: bool) -> list[int]:
     return [sign for sign, half in ((1, 0), (-1, 1)) if half in halves]
 
 
-def _cos_range(lower: float, upper: float, limited: bool) -> FloatArray:
+def cos_range(lower: float, upper: float, limited: bool) -> FloatArray:
     """Return the least and the greatest cosine on [lower, upper]."""
     if not limited:
         return np.array([-1.0, 1.0])

@@ -33,6 +33,7 @@ from tcs.kernel.pairs import (
 )
 from tcs.kernel.problem import Problem
 from tcs.kernel.search import Search, new_search
+from tcs.kernel.solver import is_outside
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 
@@ -79,6 +80,12 @@ def score_slice(
         stop: One after the last.
         scores: Filled; every array holds stop - start rows.
     """
+    if is_outside(problem.arm):
+        # Imported where it is needed: most arms have a closed form.
+        from tcs.kernel.numeric_sweep import score_numeric_slice
+
+        score_numeric_slice(problem, grippers, start, stop, scores)
+        return
     # Made here, where they outlive the call: the compiled code only borrows them.
     _score_slice(problem, new_workspace(problem), new_search(), grippers, start, stop, scores)
 

@@ -79,7 +79,6 @@ class Trials:
             DataFileError: If a file cannot be used.
             UnknownNameError: If something is named that is not there.
             SelectionError: If there is no such table.
-            ArmClassError: If the closed form cannot solve the arm.
         """
         job, scene, lowered = reopen(file)
         chosen = file.nominal_index if table is None else table

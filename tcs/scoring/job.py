@@ -26,7 +26,7 @@ from tcs.scene import (
     lower,
 )
 from tcs.scoring.sets import build_sets, check_set_options
-from tcs.scoring.sweep import sweep
+from tcs.scoring.sweep import ANALYTIC, sweep
 from tcs.space import Axis, Grid
 from tcs.store import Scored, ScoreFile, shown_state
 from tcs.tables import ScoreTable, SetTable
@@ -135,7 +135,6 @@ def score(
             exist.
         DataFileError: If a file cannot be used.
         GridError: If the grid is empty or enormous.
-        ArmClassError: If the closed form cannot solve the arm.
         TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
@@ -214,6 +213,7 @@ def score_scene(
             **named,
             "scene_digest": digest,
             "measure": measure,
+            "ik": swept.ik,
             "hashes": {"scene": digest},
             "timings": {
                 "compile_seconds": swept.compile_seconds,
@@ -284,6 +284,8 @@ def summary(file: ScoreFile) -> dict[str, Any]:
     goals = file.nominal.sets.weights.size
     return {
         "measure": file.metadata["measure"],
+        # Files of earlier versions do not tell: they knew the closed form only.
+        "ik": file.metadata.get("ik", ANALYTIC),
         "configurations": pairs // goals,
         "goals": goals,
         "pairs": pairs,

@@ -64,7 +64,6 @@ class LiveScorer:
                 exist.
             DataFileError: If a file cannot be used.
             GridError: If the grid is empty or enormous.
-            ArmClassError: If the closed form cannot solve the arm.
             TcsError: If an option of the sets is out of range.
         """
         check_set_options(rule, max_members, min_distance)

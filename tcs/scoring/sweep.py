@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.solver import is_outside
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tcs.scene import LoweredScene
 from tcs.tables import ScoreTable
@@ -20,6 +21,11 @@ from tcs.tables import ScoreTable
 SLICE = 1024
 """Configurations in a slice: some milliseconds of work, so that threads end together and a bar
 moves, and scratch memory that stays in the processor's cache."""
+
+ANALYTIC, NUMERIC = "analytic", "numeric"
+"""How inverse kinematics was solved: in closed form, or by Newton's method from many starts."""
+_ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "numeric_sweep._score_numeric_slice"}
+"""Modules and functions of the kernel that all the rest is compiled into."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,8 @@ class Sweep:
     """Compiling the kernel, or loading its machine code."""
     scoring_seconds: float
     """Scoring alone, machine code at hand."""
+    ik: str
+    """How the arm is solved: ANALYTIC or NUMERIC."""
 
 
 def sweep(
@@ -60,7 +68,6 @@ def sweep(
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
 
     Raises:
-        ArmClassError: If the closed form cannot solve the arm.
         UnknownNameError: If there is no measure of that name.
     """
     problem = build_problem(lowered.arrays, lowered.grid, measure)
@@ -100,12 +107,17 @@ def sweep(
         for i in range(tables)
         for rows in [slice(i * size // tables, (i + 1) * size // tables)]
     )
-    return Sweep(parts, compile_seconds, scoring_seconds)
+    return Sweep(parts, compile_seconds, scoring_seconds, ik_of(problem))
+
+
+def ik_of(problem: Problem) -> str:
+    """Return how the problem's arm is solved: ANALYTIC or NUMERIC."""
+    return NUMERIC if is_outside(problem.arm) else ANALYTIC
 
 
 def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> float:
     """Have the kernel's machine code at hand; return the seconds it took."""
-    if on_compile is not None and not is_compiled():
+    if on_compile is not None and not is_compiled(_ENTRIES[ik_of(problem)]):
         on_compile()
     begun = time.perf_counter()
     _slice(problem, gripper_contacts(problem), 0, 0)

@@ -17,6 +17,7 @@ from tcs.kernel.reference import measured
 from tcs.scene import Scene, goal_poses
 from tcs.scoring.job import Job
 from tcs.scoring.reopen import reopen
+from tcs.scoring.sweep import ik_of
 from tcs.store import Scored, ScoreFile
 from tcs.tables import Reason
 
@@ -43,6 +44,9 @@ class Verification:
 
     measure: str
     """Name of the dexterity measure the file was made with."""
+    ik: str
+    """How the arm is solved, "analytic" or "numeric", and with it what a dense scan is: 11,520
+    values of the free joint, or 400 starts from everywhere."""
     checked: int
     """Reached pairs re-checked with Drake."""
     false_reached: int
@@ -101,8 +105,9 @@ def verify(
     Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
     every checked contact, the dexterity measure the file was made with. Random unreached pairs,
     stratified over those whose base and gripper are free and whose goal is within reach, are
-    scanned with 11,520 values of the free joint, and so are random reached pairs, for the dexterity
-    the search left behind. Drake has to confirm every solution the scan finds where none is stored.
+    scanned densely, and so are random reached pairs, for the dexterity the search left behind: with
+    11,520 values of the free joint, or, for an arm that no closed form solves, from 400 starts all
+    over its limits. Drake has to confirm every solution the scan finds where none is stored.
 
     Args:
         file: A score file.
@@ -143,6 +148,7 @@ def verify(
     )
     return Verification(
         measure=measure,
+        ik=ik_of(problem),
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
         max_position_error=max((finding.position_error for finding in findings), default=0.0),

@@ -82,6 +82,12 @@ def random_arm(rng, *, mirrored=False):
     return Chain(R, p, lower, upper)
 
 
+def offset_arm(rng):
+    """Return a random arm outside the closed-form classes: no two of its axes meet."""
+    chain = random_arm(rng)
+    return chain._replace(p=rng.uniform(-0.25, 0.25, (8, 3)))
+
+
 def random_joints(rng, chain):
     """Return joint angles within the limits."""
     free = rng.uniform(-np.pi, np.pi, 7)

@@ -12,9 +12,9 @@ from tcs.kernel.reference import compose, elbow, free_joint, link_poses, turn
 from tcs.kernel.solver import (
     FIRST,
     LAST,
-    _cos_range,
     _signs_within,
     arm_solver,
+    cos_range,
     reversed_chain,
 )
 from tests.kernel.arms import drake_arm
@@ -165,7 +165,7 @@ def test_signs_within_are_no_more_than_needed(interval):
 @given(ends)
 def test_cosine_range_is_that_of_a_dense_sampling(interval):
     lower, upper = interval
-    least, most = _cos_range(lower, upper, True)
+    least, most = cos_range(lower, upper, True)
     inside = np.cos(np.linspace(lower, upper, 4001))
     # Spacing is at most 16/4000 = 0.004 rad: a cosine changes by 0.004^2/8 = 2e-6 around its
     # extremum between two samples, and is monotonic elsewhere.
@@ -177,7 +177,7 @@ def test_cosine_range_is_that_of_a_dense_sampling(interval):
 
 def test_a_joint_without_limits_has_both_signs_and_the_whole_range():
     assert _signs_within(-np.inf, np.inf, False) == [1, -1]
-    assert _cos_range(-np.inf, np.inf, False).tolist() == [-1.0, 1.0]
+    assert cos_range(-np.inf, np.inf, False).tolist() == [-1.0, 1.0]
 
 
 @pytest.mark.parametrize("seed", range(10))

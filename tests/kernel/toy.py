@@ -9,6 +9,7 @@ import numpy as np
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
 from tcs.kernel.reference import compose, inverse, link_poses, turn
+from tcs.kernel.solver import outside_solver
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 
@@ -137,9 +138,19 @@ def size_of(grid):
     return grid.environment_states * places * grid.torso_levels
 
 
-def scores_of(scene, grid, cuts=None, measure="isotropy"):
-    """Return the kernel's scores of the whole grid, in one slice or cut at `cuts`."""
+def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
+    """Return the kernel's scores of the whole grid, in one slice or cut at `cuts`.
+
+    Args:
+        scene: The scene.
+        grid: Its grid.
+        cuts: Where to cut.
+        measure: Name of the dexterity measure.
+        numeric: Whether to solve the arm as if it had no closed form.
+    """
     problem = build_problem(scene, grid, measure)
+    if numeric:
+        problem = problem._replace(arm=outside_solver(scene.chain))
     size, goals = size_of(grid), scene.goal_p.shape[1]
     scores = Scores(
         # Values that no score has: whatever is left unfilled shows.

@@ -1,0 +1,309 @@
+"""All solutions of one goal: the curves along which the arm moves while its tool stands still.
+
+With seven joints the solutions of a goal form curves. One solution on a curve leads to all of it:
+go a step along, come back to the goal, and so on. Between neighbouring points a cubic stands in.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.dexterity import ISOTROPY
+from tcs.kernel.measure import inverse_condition
+from tcs.kernel.newton import Look, converge, factorise, look_at, new_look, step_to_goal, way_along
+from tcs.kernel.numeric_arm import NumericArm
+
+TURN_BACK = 6.283185307179586
+LEAST_STRIDE = 1e-3
+"""Shortest stride along a curve [rad, as a norm of the joints]: where it would have to be shorter,
+next to a singularity, the curve is given up."""
+EASY_BEND = 0.2
+"""How far the direction may turn from point to point [rad] before strides become shorter."""
+HARD_BEND = 0.5
+"""Beyond this [rad] the stride is taken back."""
+LONG_WAY_BACK = 3e-3
+"""Longest step [rad, as a norm] after which the tool is at the goal within 1e-5."""
+OFF_GOAL = 3e-4
+"""Greatest error [rad and m] that may be left after one step."""
+LOST = 3e-2
+"""Error after a stride [rad and m] with which the stride is taken back."""
+SAME_CURVE = 0.04
+"""How far beside a known curve [rad, as a norm] a solution may lie and count as on it: points are
+up to a stride apart, and the curve bends away from their chord."""
+
+
+class Curves(NamedTuple):
+    """Curves of one goal, point by point; reused from pair to pair."""
+
+    q: FloatArray
+    """Joint angles [rad], not turned into limits: neighbours are near, shape (points, 7)."""
+    way: FloatArray
+    """Unit directions along the curve, shape (points, 7)."""
+    length: FloatArray
+    """From each point to the next one of its curve [rad, as a norm], shape (points,)."""
+    value: FloatArray
+    """Isotropy or inverse condition at each point, shape (points,)."""
+    slack: FloatArray
+    """How far the worst joint is from its limits [rad], negative beyond, shape (points,)."""
+    first: IntArray
+    """Where each curve begins, and where the last one ends, shape (curves + 1,)."""
+    look: Look
+    q_now: FloatArray
+    """Joints in hand, shape (7,)."""
+    way_now: FloatArray
+    trial: FloatArray
+
+
+@jit
+def new_curves(points: int, curves: int) -> Curves:
+    """Return memory for so many points and curves."""
+    return Curves(
+        np.empty((points, 7)),
+        np.empty((points, 7)),
+        np.zeros(points),
+        np.empty(points),
+        np.empty(points),
+        np.zeros(curves + 1, np.int64),
+        new_look(),
+        np.empty(7),
+        np.empty(7),
+        np.empty(7),
+    )
+
+
+@jit
+def slack_of(arm: NumericArm, q: FloatArray) -> float:
+    """Return how far the worst joint is from its limits [rad], negative beyond.
+
+    Joints are turned by full turns to where they are nearest to the middle of their limits.
+    """
+    worst = np.inf
+    for i in range(7):
+        off = q[i] - arm.middle[i]
+        off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+        worst = min(worst, arm.half[i] - abs(off))
+    return worst
+
+
+@jit
+def is_known(curves: Curves, count: int, q: FloatArray, beside: float) -> bool:
+    """Return whether joint angles q lie on one of the first `count` curves.
+
+    Args:
+        curves: The curves.
+        count: How many there are.
+        q: Joint angles [rad], shape (7,).
+        beside: How far beside a curve they may lie [rad, as a norm].
+    """
+    for k in range(count):
+        start, stop = curves.first[k], curves.first[k + 1]
+        for n in range(start, stop):
+            # To the middle of the strides on both sides.
+            reach = curves.length[n]
+            if n > start:
+                reach = max(reach, curves.length[n - 1])
+            reach = 0.6 * reach + beside
+            square = along = 0.0
+            for i in range(7):
+                off = q[i] - curves.q[n, i]
+                off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+                square += off * off
+                along += off * curves.way[n, i]
+                if square > reach * reach:
+                    break
+            if square <= reach * reach and square - along * along <= beside * beside:
+                return True
+    return False
+
+
+@jit
+def trace(
+    arm: NumericArm,
+    R_AG: FloatArray,
+    p_AG: FloatArray,
+    curves: Curves,
+    count: int,
+    beyond: float,
+    stride: float,
+    of: int,
+) -> int:
+    """Append the curve through the solution in `curves.q_now`, both ways from there.
+
+    Args:
+        arm: The arm.
+        R_AG: Goal orientation in A, shape (3, 3).
+        p_AG: Goal position in A [m], shape (3,).
+        curves: Filled.
+        count: How many curves there are.
+        beyond: How far beyond its limits a joint is followed [rad].
+        stride: Longest stride [rad, as a norm].
+        of: ISOTROPY or INVERSE_CONDITION, what to evaluate at each point.
+
+    Returns:
+        How many curves there are now.
+    """
+    room = len(curves.first) - 1
+    for side in range(2):
+        if count >= room:
+            return count
+        start = curves.first[count]
+        sense = 1.0 - 2.0 * side
+        stop, closed = _walk(arm, R_AG, p_AG, curves, start, sense, beyond, stride, of)
+        if stop - start >= 2 or (stop > start and side == 0):
+            count += 1
+            curves.first[count] = stop
+        if closed:
+            break
+    return count
+
+
+@jit
+def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int) -> float:
+    """Write the joints and the direction in hand as point n of a curve; return its slack."""
+    J = curves.look.J
+    if of == ISOTROPY:
+        total = 0.0
+        for i in range(6):
+            for k in range(7):
+                total += J[i, k] * J[i, k]
+        curves.value[n] = det ** (1.0 / 6.0) / (total / 6.0)
+    else:
+        curves.value[n] = inverse_condition(J)
+    square = 0.0
+    for i in range(7):
+        curves.q[n, i] = curves.q_now[i]
+        curves.way[n, i] = curves.way_now[i]
+        if n > start:
+            off = curves.q[n, i] - curves.q[n - 1, i]
+            square += off * off
+    curves.length[n] = 0.0
+    if n > start:
+        curves.length[n - 1] = np.sqrt(square)
+    curves.slack[n] = slack_of(arm, curves.q_now)
+    return curves.slack[n]
+
+
+@jit
+def _walk(
+    arm: NumericArm,
+    R_AG: FloatArray,
+    p_AG: FloatArray,
+    curves: Curves,
+    start: int,
+    side: float,
+    beyond: float,
+    stride: float,
+    of: int,
+) -> tuple[int, bool]:
+    """Walk one way from the solution in `q_now`; leave it there in the end.
+
+    Returns:
+        One after the last point, and whether the walk has come back to its start.
+    """
+    q, way, look = curves.q_now, curves.way_now, curves.look
+    if start >= len(curves.slack):
+        return start, False
+    look_at(arm, R_AG, p_AG, q, look)
+    det = factorise(look, 0.0)
+    # The joint that takes part in the motion most gives the walk its sense.
+    best = 0.0
+    for i in range(7):
+        curves.trial[:] = 0.0
+        curves.trial[i] = side
+        part = way_along(look, curves.trial, look.step)
+        if part > best:
+            best = part
+            way[:] = look.step
+    _keep(arm, curves, start, start, det, of)
+    n = start + 1
+    h = 0.5 * stride
+    travelled = 0.0
+    while n < len(curves.slack):
+        last = n - 1
+        # Predict to second order by how the direction has turned.
+        bend = 0.0
+        if last > start:
+            bend = 0.5 * h * h / curves.length[last - 1]
+        for i in range(7):
+            q[i] = curves.q[last, i] + h * curves.way[last, i]
+            if bend > 0.0:
+                q[i] += bend * (curves.way[last, i] - curves.way[last - 1, i])
+        worst = look_at(arm, R_AG, p_AG, q, look)
+        good = worst < LOST
+        if good:
+            det = factorise(look, 0.0)
+            if step_to_goal(look, q, h) > LONG_WAY_BACK:
+                worst = look_at(arm, R_AG, p_AG, q, look)
+                good = worst < OFF_GOAL
+                det = factorise(look, 0.0)
+                step_to_goal(look, q, h)
+        cosine = 0.0
+        if good:
+            for i in range(7):
+                curves.trial[i] = curves.way[last, i]
+            cosine = way_along(look, curves.trial, way)
+            good = cosine > np.cos(HARD_BEND)
+        if not good:
+            h *= 0.5
+            if h < LEAST_STRIDE:
+                break
+            continue
+        slack = _keep(arm, curves, n, start, det, of)
+        travelled += h
+        n += 1
+        if slack < -beyond:
+            break
+        if travelled > 2.0 * stride and _has_closed(curves, start, n - 1):
+            curves.q_now[:] = curves.q[start]
+            return n, True
+        angle = np.arccos(min(cosine, 1.0))
+        h = min(stride, h * min(max(EASY_BEND / max(angle, 1e-3), 0.5), 1.6))
+    curves.q_now[:] = curves.q[start]
+    return n, False
+
+
+@jit
+def _has_closed(curves: Curves, start: int, n: int) -> bool:
+    """Return whether the start lies between points n - 1 and n."""
+    before = after = apart = 0.0
+    for i in range(7):
+        off = curves.q[start, i] - curves.q[n, i]
+        off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+        step = curves.q[n, i] - curves.q[n - 1, i]
+        apart += off * off
+        after += off * step
+        before += (off + step) * step
+    length = curves.length[n - 1]
+    beside = apart - (after / length) ** 2
+    return after <= 0.0 <= before and beside <= SAME_CURVE * SAME_CURVE
+
+
+@jit
+def point_between(curves: Curves, n: int, share: float, q: FloatArray) -> None:
+    """Fill joint angles between points n and n + 1, as a cubic has them.
+
+    Args:
+        curves: The curves.
+        n: A point that is not the last of its curve.
+        share: How far on the way, 0 to 1.
+        q: Filled [rad], shape (7,).
+    """
+    length = curves.length[n]
+    u, v = share, 1.0 - share
+    a, b = v * v * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * v)
+    c, d = length * u * v * v, -length * u * u * v
+    for i in range(7):
+        q[i] = a * curves.q[n, i] + b * curves.q[n + 1, i]
+        q[i] += c * curves.way[n, i] + d * curves.way[n + 1, i]
+
+
+@jit
+def settle(
+    arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, curves: Curves, exact: float
+) -> bool:
+    """Bring `q_now`, close to the goal already, to it; return whether that succeeded."""
+    return converge(arm, R_AG, p_AG, curves.q_now, curves.look, 4, exact)

@@ -1,0 +1,202 @@
+"""What numeric inverse kinematics needs of an arm: how far it can reach, and where to start.
+
+A seven-joint arm that no closed form solves. Axis 1 and axis 7 still are simple. Joint 1 turns the
+whole arm about axis 1, and joint 7 moves no point of axis 7; so joints 2 to 6 alone decide how far
+axis 7 is from axis 1, how high, and at what angles. A table of random postures of these five, by
+these four figures, gives postures that all but hold the tool where it should be: joints 1 and 7
+follow in closed form, and Newton's method does the rest.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.cache import jit
+from tcs.kernel.problem import Problem
+from tcs.kernel.solver import closest, cos_range
+
+SAMPLES = 1 << 18
+"""Postures in the table."""
+ACROSS, UP, TILTS, TURNS = 14, 28, 8, 12
+"""Cells of the table: distance from axis 1, height along it, and tilt and turn of axis 7."""
+ROUNDING = 1e-9
+"""Taken off bounds of what is within reach [m], far above the rounding of a sum of lengths."""
+FULL_TURN = 1e3
+"""Half range [rad] of a joint that may turn all the way round: none of its angles is beyond it."""
+
+
+class NumericArm(NamedTuple):
+    """One arm's constants. L1..L7 as in `Chain`; F is the frame that joint 1 turns against."""
+
+    R: FloatArray
+    """Rotations of the chain, shape (8, 3, 3)."""
+    p: FloatArray
+    """Translations of the chain [m], shape (8, 3)."""
+    middle: FloatArray
+    """Middle of the joint limits [rad], 0 where continuous, shape (7,)."""
+    half: FloatArray
+    """Half their width [rad], FULL_TURN where the joint may turn all the way round, shape (7,)."""
+    ends: FloatArray
+    """Where on axis 1, from the origin of F, and on axis 7, from that of L7, points lie that both
+    stay at a distance within `span` [m], shape (2,)."""
+    span: FloatArray
+    """Least and greatest distance of the two [m], shape (2,)."""
+    cell: FloatArray
+    """Least value and size of a cell for each of the four figures, shape (4, 2)."""
+    first: IntArray
+    """Where each cell's postures begin, and where the last one's end, shape (cells + 1,)."""
+    postures: FloatArray
+    """Joints 2 to 6 [rad], sorted by cell, shape (SAMPLES, 5)."""
+    azimuth: FloatArray
+    """Direction of the point on axis 7 about axis 1, joint 1 at zero [rad], shape (SAMPLES,)."""
+
+
+def numeric_arm(chain: Chain) -> NumericArm:
+    """Return the constants of an arm; the table is made once for each arm.
+
+    Args:
+        chain: Any arm of seven revolute joints.
+    """
+    arrays = (chain.R, chain.p, chain.lower, chain.upper)
+    return _numeric_arm(*(np.ascontiguousarray(a, dtype=np.float64).tobytes() for a in arrays))
+
+
+def numeric_arm_of(problem: Problem) -> NumericArm:
+    """Return the constants of a problem's arm."""
+    arm = problem.arm
+    return numeric_arm(Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper))
+
+
+@cache
+def _numeric_arm(R_bytes: bytes, p_bytes: bytes, low_bytes: bytes, high_bytes: bytes) -> NumericArm:
+    R, p = np.frombuffer(R_bytes).reshape(8, 3, 3).copy(), np.frombuffer(p_bytes).reshape(8, 3)
+    lower, upper = np.frombuffer(low_bytes), np.frombuffer(high_bytes)
+    limited = upper - lower < 2.0 * np.pi
+    low, high = joint_ranges(lower, upper)
+    slides = _slides(R, p)
+    postures = low[1:6] + spread(SAMPLES, 5) * (high - low)[1:6]
+    figures, azimuth = np.empty((SAMPLES, 4)), np.empty(SAMPLES)
+    _figures_of(R, p.copy(), slides[6], postures, figures, azimuth)
+    least = np.array([0.0, figures[:, 1].min(), -1.0, -np.pi])
+    most = np.array([figures[:, 0].max(), figures[:, 1].max(), 1.0, np.pi])
+    cell = np.stack([least, (most - least) / (ACROSS, UP, TILTS, TURNS)], axis=1)
+    where = ((figures - cell[:, 0]) / cell[:, 1]).astype(np.int64)
+    where = np.clip(where, 0, np.array([ACROSS, UP, TILTS, TURNS]) - 1)
+    flat = np.ravel_multi_index(tuple(where.T), (ACROSS, UP, TILTS, TURNS))
+    order = np.argsort(flat, kind="stable")
+    return NumericArm(
+        R=R,
+        p=p.copy(),
+        middle=np.where(limited, (low + high) / 2.0, 0.0),
+        half=np.where(limited, (high - low) / 2.0, FULL_TURN),
+        ends=slides[[0, 6]],
+        span=_span(R, p, slides, float(lower[3]), float(upper[3])),
+        cell=cell,
+        first=np.searchsorted(flat[order], np.arange(ACROSS * UP * TILTS * TURNS + 1)),
+        postures=postures[order],
+        azimuth=azimuth[order],
+    )
+
+
+def joint_ranges(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the limits [rad], one full turn where a joint may turn all the way round."""
+    limited = upper - lower < 2.0 * np.pi
+    return np.where(limited, lower, -np.pi), np.where(limited, upper, np.pi)
+
+
+def spread(count: int, dimensions: int) -> FloatArray:
+    """Return points spread evenly over the unit cube, the same in every run.
+
+    Multiples of powers of the root of x^(d+1) = x + 1, modulo 1: Roberts' generalised golden ratio.
+    """
+    root = 2.0
+    for _ in range(64):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    steps = root ** -np.arange(1.0, dimensions + 1)
+    return np.remainder(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
+
+
+def _slides(R: FloatArray, p: FloatArray) -> FloatArray:
+    """Return a point on each axis, from the origin of L1..L7 [m], for bounds of how far they reach.
+
+    Any points would do. On axes 3 and 5, which joint 4 moves about, and at the ends those next to
+    the neighbour on the other side make the bounds sharp: at a shoulder or wrist, if there is one.
+    """
+    slides = np.zeros(7)
+    for i in (0, 5, 1, 4):
+        passing = closest(R[i + 1], p[i + 1])
+        if passing is not None:
+            slides[i], slides[i + 1] = passing[1:]
+    return slides
+
+
+def _span(
+    R: FloatArray, p: FloatArray, slides: FloatArray, lower: float, upper: float
+) -> FloatArray:
+    """Return bounds of the distance of the two end points [m], shape (2,).
+
+    A point on an axis is fixed to the links on both its sides, so each step from axis to axis has
+    one length. Joint 4 sets the distance of the points on axes 3 and 5, a cosine within its limits;
+    the other steps add up at most.
+    """
+    rest = 0.0
+    for i in (0, 1, 4, 5):
+        step = p[i + 1] + R[i + 1][:, 2] * slides[i + 1] - np.array([0.0, 0.0, slides[i]])
+        rest += float(np.linalg.norm(step))
+    b = p[4] + R[4][:, 2] * slides[4]
+    c = R[3].T @ (np.array([0.0, 0.0, slides[2]]) - p[3])
+    swing = float(np.hypot(b[0], b[1]) * np.hypot(c[0], c[1]))
+    phase = float(np.arctan2(c[1], c[0]) - np.arctan2(b[1], b[0]))
+    limited = upper - lower < 2.0 * np.pi
+    least, most = cos_range(lower - phase, upper - phase, limited)
+    steady = float(b @ b + c @ c - 2.0 * b[2] * c[2])
+    far = np.sqrt(max(steady - 2.0 * swing * least, 0.0)) + rest + ROUNDING
+    near = np.sqrt(max(steady - 2.0 * swing * most, 0.0)) - rest - ROUNDING
+    return np.array([near, far])
+
+
+@jit
+def _figures_of(
+    R: FloatArray,
+    p: FloatArray,
+    slide: float,
+    postures: FloatArray,
+    figures: FloatArray,
+    azimuth: FloatArray,
+) -> None:
+    """Fill the four figures of each posture of joints 2 to 6, and the azimuth, in F."""
+    S, T, o = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for n in range(len(postures)):
+        for r in range(3):
+            o[r] = 0.0
+            for c in range(3):
+                S[r, c] = 1.0 if r == c else 0.0
+        for i in range(1, 7):
+            cosine, sine = 1.0, 0.0
+            if i < 6:
+                cosine, sine = np.cos(postures[n, i - 1]), np.sin(postures[n, i - 1])
+            for r in range(3):
+                o[r] += S[r, 0] * p[i, 0] + S[r, 1] * p[i, 1] + S[r, 2] * p[i, 2]
+                x = S[r, 0] * R[i, 0, 0] + S[r, 1] * R[i, 1, 0] + S[r, 2] * R[i, 2, 0]
+                y = S[r, 0] * R[i, 0, 1] + S[r, 1] * R[i, 1, 1] + S[r, 2] * R[i, 2, 1]
+                T[r, 2] = S[r, 0] * R[i, 0, 2] + S[r, 1] * R[i, 1, 2] + S[r, 2] * R[i, 2, 2]
+                T[r, 0], T[r, 1] = cosine * x + sine * y, -sine * x + cosine * y
+            S[:] = T
+        x, y, z = o[0] + S[0, 2] * slide, o[1] + S[1, 2] * slide, o[2] + S[2, 2] * slide
+        azimuth[n] = figures_at(x, y, z, S[0, 2], S[1, 2], S[2, 2], figures[n])
+
+
+@jit
+def figures_at(
+    x: float, y: float, z: float, ax: float, ay: float, az: float, figures: FloatArray
+) -> float:
+    """Fill the four figures of a point and the direction of axis 7 in F; return the azimuth."""
+    turn = np.arctan2(y, x)
+    c, s = np.cos(turn), np.sin(turn)
+    figures[0], figures[1], figures[2] = np.hypot(x, y), z, az
+    figures[3] = np.arctan2(-s * ax + c * ay, c * ax + s * ay)
+    return turn

@@ -1,0 +1,236 @@
+"""One initial configuration against one goal, for an arm that no closed form solves."""
+
+from __future__ import annotations
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    at_goal,
+    pair_touches,
+    place_links,
+)
+from tcs.kernel.curves import point_between, settle, slack_of
+from tcs.kernel.measure import measure_at
+from tcs.kernel.numeric_arm import NumericArm
+from tcs.kernel.numeric_search import (
+    SPACING,
+    WHOLE,
+    Hunt,
+    find_candidates,
+    find_curves,
+    turn_into_limits,
+)
+from tcs.kernel.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
+from tcs.kernel.problem import Problem
+from tcs.kernel.search import best_of
+
+EXACT = 1e-9
+"""Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""
+FIRST_TRIES = 6
+"""Candidates tried before all are walked."""
+REFINEMENTS, REFINE_LANES = 3, 8
+"""As in `pairs`."""
+SQUEEZES = 8
+"""Halvings of the room between two contacts, down to SPACING / 256."""
+ROUGH, SOLVED = 0, 1
+"""Joints as the cubic has them; joints of a solution."""
+NO_SOLUTION = -2
+"""In place of a contact: there is no solution within the limits."""
+NOWHERE, TRIED = -1.0, -1.0
+"""No place on the curves; no measure."""
+NEIGHBOURS = 0.75
+"""Farthest that neighbouring candidates are apart, counted in points: a stride has two parts at
+least, and the limits may lie between."""
+
+
+@jit
+def solve_at(arm: NumericArm, work: Workspace, hunt: Hunt, at: float) -> bool:
+    """Fill `q_now` with the solution at a place on the curves; return whether it keeps limits."""
+    curves = hunt.curves
+    point_between(curves, int(at), at - int(at), curves.q_now)
+    arrived = settle(arm, work.R_AG, work.p_AG, curves, EXACT)
+    return arrived and slack_of(arm, curves.q_now) >= 0.0
+
+
+@jit
+def contact_at(
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
+    at: float, first: int, last: int, least: float,
+) -> int:  # fmt: skip
+    """Return the contact at a place on the curves, NO_CONTACT or NO_SOLUTION.
+
+    Args:
+        problem: The scene.
+        arm: Its arm.
+        work: Room, base, gripper and goal are placed.
+        body_A: The robot's other shapes in A.
+        hunt: `q_now` gets filled with the joint angles looked at last [rad].
+        at: The place.
+        first: ROUGH or SOLVED, what to look at first: the cubic's joints, 1e-5 rad off, or those
+            of a solution. What touches something roughly is not worth a solution.
+        last: What to look at last.
+        least: A solution whose measure is not above this counts as none.
+    """
+    q, contact = hunt.curves.q_now, NO_CONTACT
+    for look in range(first, last + 1):
+        if look == SOLVED:
+            if not solve_at(arm, work, hunt, at):
+                return NO_SOLUTION
+            turn_into_limits(problem, q)
+            if least >= 0.0 and measure_at(problem, q) <= least:
+                return NO_SOLUTION
+        else:
+            point_between(hunt.curves, int(at), at - int(at), q)
+        contact = arm_contact(problem, work, body_A, q)
+        if contact != NO_CONTACT:
+            return contact
+    if last == SOLVED and not at_goal(problem, work):
+        return NO_SOLUTION
+    return contact
+
+
+@jit
+def choose(
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
+) -> tuple[float, int]:
+    """Find the best collision-free candidate, or any free place between two of them.
+
+    The few of the highest measure are tried first. If all touch something, all candidates are
+    walked in order, where neighbours touch the same; of those that seem free the best is taken.
+
+    Returns:
+        The place or NOWHERE; the contact of the candidate of the highest measure, or NO_SOLUTION
+        where no candidate is a solution within the limits. `q_now` holds the solution.
+    """
+    first_contact, walked, tries = NO_SOLUTION, False, 0
+    while True:
+        if tries == FIRST_TRIES and not walked:
+            walked = True
+            for n in range(found):
+                work.last[0] = NO_CONTACT if n == 0 else work.last[0]
+                contact = contact_at(
+                    problem, arm, work, body_A, hunt, hunt.at[n], ROUGH, ROUGH, -1.0
+                )
+                hunt.pair[n] = work.last
+                if contact == NO_CONTACT:
+                    hunt.pair[n, 0] = -1
+                else:
+                    hunt.measure[n] = TRIED
+        tries += 1
+        top = best_of(hunt.measure, found)
+        if hunt.measure[top] == TRIED:
+            if walked:
+                break
+            continue
+        at = hunt.at[top]
+        contact = contact_at(problem, arm, work, body_A, hunt, at, ROUGH, SOLVED, -1.0)
+        if contact == NO_CONTACT:
+            return at, contact
+        if first_contact == NO_SOLUTION:
+            first_contact = contact
+        hunt.measure[top] = TRIED
+    return NOWHERE, first_contact
+
+
+@jit
+def squeeze(
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
+) -> float:
+    """Look for a free place between neighbouring candidates that all touch something.
+
+    As `pairs.squeeze`: where the pair in contact changes from one candidate to the next, halving
+    finds whether there is room between the two.
+
+    Returns:
+        The place or NOWHERE.
+    """
+    for n in range(1, found):
+        partner, i, j = hunt.pair[n - 1, 0], hunt.pair[n - 1, 1], hunt.pair[n - 1, 2]
+        other, k, m = hunt.pair[n, 0], hunt.pair[n, 1], hunt.pair[n, 2]
+        low, high = hunt.at[n - 1], hunt.at[n]
+        changed = other != partner or k != i or m != j
+        if not changed or partner < 0 or other < 0 or high - low > NEIGHBOURS:
+            continue
+        for _ in range(SQUEEZES):
+            middle = 0.5 * (low + high)
+            point = int(middle)
+            point_between(hunt.curves, point, middle - point, hunt.curves.q_now)
+            place_links(
+                problem.chain_R, problem.chain_p, hunt.curves.q_now, work.link_R, work.link_p
+            )
+            if pair_touches(problem, work, body_A, partner, i, j):
+                low = middle
+            elif pair_touches(problem, work, body_A, other, k, m):
+                high = middle
+            else:
+                contact = contact_at(problem, arm, work, body_A, hunt, middle, SOLVED, SOLVED, -1.0)
+                if contact == NO_CONTACT:
+                    return middle
+                break
+    return NOWHERE
+
+
+@jit
+def refine(
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
+    count: int, centre: float, spacing: float,
+) -> None:  # fmt: skip
+    """Climb from a collision-free place to the best one nearby; fills `hunt.best`.
+
+    Its solution is in `q_now`. Each round spreads places over one spacing to either side.
+    """
+    curves = hunt.curves
+    hunt.best[:] = curves.q_now
+    value = measure_at(problem, hunt.best)
+    point = int(centre)
+    low, high = 0.0, 0.0
+    for k in range(count):
+        if curves.first[k] <= point < curves.first[k + 1]:
+            low, high = float(curves.first[k]), curves.first[k + 1] - 2.0 + WHOLE
+    step = min(spacing / max(curves.length[point], spacing), 0.5)
+    for _ in range(REFINEMENTS):
+        fine = 2.0 * step / (REFINE_LANES - 1)
+        start, best_at = centre - step, centre
+        for lane in range(REFINE_LANES):
+            at = min(max(start + lane * fine, low), high)
+            contact = contact_at(problem, arm, work, body_A, hunt, at, SOLVED, SOLVED, value)
+            if contact == NO_CONTACT:
+                value, best_at = measure_at(problem, curves.q_now), at
+                hunt.best[:] = curves.q_now
+        centre, step = best_at, fine
+
+
+@jit
+def score_numeric_pair(
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt
+) -> tuple[int, int]:
+    """Score one goal within reach; base and gripper are free already.
+
+    Args:
+        problem: The scene.
+        arm: Its arm.
+        work: Room, base, gripper and goal are placed.
+        body_A: The robot's other shapes in A at the torso level in hand.
+        hunt: Scratch; `best` gets filled with joint angles [rad] when reached.
+
+    Returns:
+        Reason and contact code.
+    """
+    count = find_curves(arm, work.R_AG, work.p_AG, hunt, problem.measure.of)
+    if count == 0:
+        return JOINT_LIMITS, NO_CONTACT
+    found = find_candidates(problem, arm, hunt, count, SPACING)
+    if found == 0:
+        return JOINT_LIMITS, NO_CONTACT
+    at, contact = choose(problem, arm, work, body_A, hunt, found)
+    if at == NOWHERE and contact == NO_SOLUTION:
+        return JOINT_LIMITS, NO_CONTACT
+    if at == NOWHERE:
+        at = squeeze(problem, arm, work, body_A, hunt, found)
+    if at == NOWHERE:
+        return ARM_BLOCKED, contact
+    refine(problem, arm, work, body_A, hunt, count, at, SPACING)
+    return REACHED, NO_CONTACT

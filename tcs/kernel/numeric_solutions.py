@@ -1,0 +1,55 @@
+"""The solutions of one pose for an arm that no closed form solves, without a scene around it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.curves import settle
+from tcs.kernel.dexterity import ISOTROPY
+from tcs.kernel.ik import within
+from tcs.kernel.numeric_arm import numeric_arm
+from tcs.kernel.numeric_search import (
+    MOST_CANDIDATES,
+    MOST_CURVES,
+    MOST_POINTS,
+    find_curves,
+    is_within_span,
+    new_hunt,
+)
+
+ARRIVED = 1e-9
+"""Greatest error of a solution [rad and m]."""
+
+
+def numeric_solutions(chain: Chain, R_AG: FloatArray, p_AG: FloatArray) -> FloatArray:
+    """Return arm postures that hold the tool at a pose, one every 0.2 rad or less along each curve.
+
+    These are the solutions that scoring looks at; contacts are left out.
+
+    Args:
+        chain: Any arm of seven revolute joints.
+        R_AG: Orientation of the pose in the arm base A, shape (3, 3).
+        p_AG: Its position in A [m], shape (3,).
+
+    Returns:
+        Joint angles within the limits [rad], shape (n, 7); n is 0 where nothing was found.
+    """
+    arm, hunt = numeric_arm(chain), new_hunt(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
+    R, p = np.array(R_AG, dtype=np.float64, order="C"), np.array(p_AG, dtype=np.float64)
+    if not is_within_span(arm, R, p):
+        return np.empty((0, 7))
+    curves = hunt.curves
+    count = find_curves(arm, R, p, hunt, ISOTROPY)
+    found = []
+    for n in np.flatnonzero(curves.slack[: curves.first[count]] >= 0.0):
+        curves.q_now[:] = curves.q[n]
+        if not settle(arm, R, p, curves, ARRIVED):
+            continue
+        joints = zip(curves.q_now, chain.lower, chain.upper, strict=True)
+        turned = [within(*joint) for joint in joints]
+        # A point next to a limit may have settled beyond it, and `within` would cut that off.
+        off = np.asarray(turned) - curves.q_now
+        if np.abs(np.remainder(off + np.pi, 2.0 * np.pi) - np.pi).max() < ARRIVED:
+            found.append(turned)
+    return np.array(found).reshape(-1, 7)

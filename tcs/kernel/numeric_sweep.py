@@ -1,0 +1,106 @@
+"""The sweep for arms that no closed form solves: the same checks in the same order."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.arrays import IntArray
+from tcs.kernel.borrow import borrowed
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    base_contact,
+    gripper_body_contact,
+    new_workspace,
+)
+from tcs.kernel.measure import measure_at, rounded_inward
+from tcs.kernel.numeric_arm import NumericArm, numeric_arm_of
+from tcs.kernel.numeric_pairs import score_numeric_pair
+from tcs.kernel.numeric_search import (
+    MOST_CANDIDATES,
+    MOST_CURVES,
+    MOST_POINTS,
+    Hunt,
+    is_within_span,
+    new_hunt,
+)
+from tcs.kernel.pairs import BODY_BLOCKED, GRIPPER_BLOCKED, REACHED, TOO_FAR
+from tcs.kernel.problem import Problem
+from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
+from tcs.kernel.sweep import Scores
+
+
+def score_numeric_slice(
+    problem: Problem, grippers: IntArray, start: int, stop: int, scores: Scores
+) -> None:
+    """Score the configurations start <= h < stop, as `sweep.score_slice`."""
+    arm = numeric_arm_of(problem)
+    # Made here, where they outlive the call: the compiled code only borrows them.
+    work, hunt = new_workspace(problem), new_hunt(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
+    _score_numeric_slice(problem, arm, work, hunt, grippers, start, stop, scores)
+
+
+@jit
+def _score_numeric_slice(
+    owned_problem: Problem,
+    owned_arm: NumericArm,
+    owned_work: Workspace,
+    owned_hunt: Hunt,
+    grippers: IntArray,
+    start: int,
+    stop: int,
+    owned_scores: Scores,
+) -> None:
+    problem, arm = borrowed(owned_problem), borrowed(owned_arm)
+    work, hunt, scores = borrowed(owned_work), borrowed(owned_hunt), borrowed(owned_scores)
+    rounded = np.empty(7)
+    for h in range(start, stop):
+        row, torso = h - start, h % problem.torso_levels
+        state = stand(problem, work, h // problem.torso_levels)
+        code = base_contact(problem, work, 0, 0)
+        if code == NO_CONTACT:
+            code = base_contact(problem, work, torso, 1)
+        if code != NO_CONTACT:
+            scores.reason[row] = BODY_BLOCKED
+            scores.contact[row] = code
+            continue
+        body_A = problem.body_A[torso]
+        # What blocks here must not depend on what was scored before.
+        work.last[0] = -1
+        room_placed = False
+        for g in range(problem.goal_p.shape[1]):
+            scores.contact[row, g] = NO_CONTACT
+            if grippers[state, g] != NO_CONTACT:
+                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.contact[row, g] = grippers[state, g]
+                continue
+            goal_in_arm_base(problem, work, state, torso, g)
+            if not is_within_span(arm, work.R_AG, work.p_AG):
+                scores.reason[row, g] = TOO_FAR
+                continue
+            code = gripper_body_contact(problem, work, body_A)
+            if code != NO_CONTACT:
+                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.contact[row, g] = code
+                continue
+            if not room_placed:
+                room_in_arm_base(problem, work, torso)
+                room_placed = True
+            reason, code = score_numeric_pair(problem, arm, work, body_A, hunt)
+            scores.reason[row, g] = reason
+            scores.contact[row, g] = code
+            if reason == REACHED:
+                _keep(problem, hunt, rounded, scores, row, g)
+
+
+@jit
+def _keep(
+    problem: Problem, hunt: Hunt, rounded: NDArray[np.float64], scores: Scores, row: int, g: int
+) -> None:
+    """Write the winner, as `sweep._keep`."""
+    rounded_inward(hunt.best, problem.arm.lower, problem.arm.upper, rounded)
+    for i in range(7):
+        scores.joints[row, g, i] = rounded[i]
+    scores.isotropy[row, g] = measure_at(problem, rounded)

@@ -1,0 +1,225 @@
+"""Numeric IK below the scene: bounds, the table of starts, Newton's method, curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel import reference
+from tcs.kernel.curves import new_curves, point_between, slack_of, trace
+from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY
+from tcs.kernel.newton import (
+    FAR_TURN,
+    converge,
+    factorise,
+    look_at,
+    new_look,
+    step_to_goal,
+    way_along,
+)
+from tcs.kernel.numeric_arm import FULL_TURN, figures_at, numeric_arm
+from tcs.kernel.numeric_search import is_within_span
+from tcs.kernel.numeric_solutions import numeric_solutions
+from tcs.kernel.reference import link_poses
+from tests.kernel.arms import drake_arm
+from tests.kernel.shapes import around, offset_arm, random_joints, straight_arm, turned_by
+
+
+@pytest.fixture(params=["baxter", *range(5)], ids=str)
+def chain(request):
+    """Baxter's arm, and random arms none of whose axes meet."""
+    if request.param == "baxter":
+        return drake_arm("baxter").chain
+    return offset_arm(np.random.default_rng(request.param))
+
+
+def pose(chain, q):
+    R, p = link_poses(chain, q)[-1]
+    return np.ascontiguousarray(R), np.ascontiguousarray(p)
+
+
+def test_no_posture_is_beyond_the_span(chain, rng):
+    arm = numeric_arm(chain)
+    assert all(is_within_span(arm, *pose(chain, random_joints(rng, chain))) for _ in range(2000))
+
+
+def test_the_span_ends_where_a_straight_arm_does():
+    # Pedestal 0.34, upper arm 0.42, forearm 0.4, hand 0.126 m; axes 1, 2, 3 and 5, 6, 7 meet. Joint
+    # 4 is folded at zero and straight at half a turn.
+    arm = numeric_arm(straight_arm(np.full(7, np.pi), 0.0))
+    top = 0.34 + 0.42 + 0.4 + 0.126
+    assert is_within_span(arm, np.eye(3), np.array([0.0, 0.0, top - 1e-6]))
+    assert not is_within_span(arm, np.eye(3), np.array([0.0, 0.0, top + 1e-6]))
+
+
+def test_limits_of_the_elbow_narrow_the_span():
+    limits = np.full(7, 3.0)
+    limits[3] = 0.5
+    near, far = numeric_arm(straight_arm(limits, 0.0)).span
+    # The law of cosines, folded and 0.5 rad from it.
+    assert near == pytest.approx(0.02, abs=1e-6)
+    assert far == pytest.approx(np.sqrt(0.42**2 + 0.4**2 - 2 * 0.42 * 0.4 * np.cos(0.5)), abs=1e-6)
+
+
+def test_every_start_of_the_table_is_in_its_cell(chain, rng):
+    arm = numeric_arm(chain)
+    assert arm.first[0] == 0
+    assert arm.first[-1] == len(arm.postures)
+    assert np.all(np.diff(arm.first) >= 0)
+    limited = arm.half < FULL_TURN
+    off = np.abs(arm.postures - arm.middle[1:6])
+    assert np.all(off <= np.where(limited, arm.half, np.pi)[1:6] + 1e-12)
+    X_0 = (chain.R[0], chain.p[0])
+    for n in rng.choice(len(arm.postures), 200):
+        q = np.array([0.0, *arm.postures[n], 0.3])
+        R, p = reference.compose(reference.inverse(X_0), link_poses(chain, q)[6])
+        figures = np.empty(4)
+        point, axis = p + R[:, 2] * arm.ends[1], R[:, 2]
+        azimuth = figures_at(*point, *axis, figures)
+        assert around(azimuth - arm.azimuth[n]) == pytest.approx(0.0, abs=1e-12)
+        index = np.floor(
+            (figures - arm.cell[:, 0]) / arm.cell[:, 1] + 1e-9 * np.array([-1, 1, 1, 1])
+        )
+        index = np.clip(index.astype(int), 0, [13, 27, 7, 11])
+        flat = np.ravel_multi_index(index, (14, 28, 8, 12))
+        # A figure on the face between two cells may round to either side.
+        inside = arm.first[flat] <= n < arm.first[flat + 1]
+        place = (figures - arm.cell[:, 0]) / arm.cell[:, 1]
+        assert inside or np.any(np.abs(place - np.round(place)) < 1e-8)
+
+
+def test_a_look_sees_error_and_jacobian(chain, rng):
+    arm, look = numeric_arm(chain), new_look()
+    for _ in range(20):
+        q = random_joints(rng, chain)
+        R, p = pose(chain, q)
+        # A dozen products of rotations over an arm of about 1 m.
+        assert look_at(arm, R, p, q, look) < 1e-12
+        np.testing.assert_allclose(look.J, reference.jacobian(chain, q), atol=1e-12)
+        to = pose(chain, q + rng.normal(scale=1e-4, size=7))
+        look_at(arm, *to, q, look)
+        np.testing.assert_allclose(look.error[:3], turned_by(to[0] @ R.T), atol=1e-9)
+        np.testing.assert_allclose(look.error[3:], to[1] - p, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.3, 1.0, 2.0, 3.0])
+def test_a_large_turn_is_told_by_its_angle(angle):
+    chain = straight_arm(np.full(7, 3.0), 0.0)
+    arm, look = numeric_arm(chain), new_look()
+    R, p = pose(chain, np.zeros(7))
+    look_at(arm, R @ reference.turn(angle), p, np.zeros(7), look)
+    # A small one by its sine, which is all that Newton's method needs.
+    told = angle if np.cos(angle) < FAR_TURN else np.sin(angle)
+    np.testing.assert_allclose(look.error, [0, 0, told, 0, 0, 0], atol=1e-12)
+
+
+def test_factor_step_and_way_are_those_of_linear_algebra(chain, rng):
+    arm, look = numeric_arm(chain), new_look()
+    for _ in range(20):
+        q = random_joints(rng, chain)
+        to = pose(chain, q + rng.normal(scale=0.01, size=7))
+        look_at(arm, *to, q, look)
+        J = look.J.copy()
+        det = factorise(look, 0.0)
+        condition = np.linalg.cond(J) ** 2
+        assert det == pytest.approx(np.linalg.det(J @ J.T), rel=1e-14 * condition + 1e-9)
+        moved, before = q.copy(), np.eye(7)[rng.integers(7)]
+        step_to_goal(look, moved, 10.0)
+        shortest = np.linalg.pinv(J) @ look.error
+        np.testing.assert_allclose(moved - q, shortest, atol=1e-13 * condition + 1e-12)
+        way = np.empty(7)
+        cosine = way_along(look, before, way)
+        still = np.linalg.svd(J)[2][6]
+        assert cosine == pytest.approx(abs(still @ before), abs=1e-14 * condition + 1e-9)
+        if cosine > 0.1:
+            np.testing.assert_allclose(J @ way, 0.0, atol=1e-13 * condition + 1e-9)
+            assert way @ before > 0.0
+
+
+def test_newton_comes_back_to_the_goal(chain, rng):
+    arm, look, arrived = numeric_arm(chain), new_look(), 0
+    for _ in range(50):
+        q = random_joints(rng, chain)
+        start = q + rng.uniform(-0.2, 0.2, 7)
+        to = pose(chain, q)
+        if converge(arm, *to, start, look, 10, 1e-10):
+            arrived += 1
+            R, p = pose(chain, start)
+            np.testing.assert_allclose(R, to[0], atol=1e-9)
+            np.testing.assert_allclose(p, to[1], atol=1e-9)
+    # Next to a singularity a few do not.
+    assert arrived >= 45
+
+
+@pytest.mark.parametrize("of", [ISOTROPY, INVERSE_CONDITION], ids=["isotropy", "condition"])
+def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
+    arm, look, checked = numeric_arm(chain), new_look(), 0
+    exact = reference.isotropy if of == ISOTROPY else reference.inverse_condition
+    for _ in range(5):
+        q = random_joints(rng, chain)
+        to = pose(chain, q)
+        curves = new_curves(4096, 8)
+        curves.q_now[:] = q
+        count = trace(arm, *to, curves, 0, 0.35, 0.2, of)
+        # One way round, or to both ends.
+        assert count in (1, 2)
+        np.testing.assert_array_equal(curves.q[0], q)
+        for k in range(count):
+            for n in range(curves.first[k], curves.first[k + 1]):
+                at = curves.q[n].copy()
+                assert look_at(arm, *to, at, look) < 1e-5
+                # Of the posture before the last step, 3e-4 off.
+                assert curves.value[n] == pytest.approx(
+                    exact(reference.jacobian(chain, at)), abs=2e-3
+                )
+                if n + 1 == curves.first[k + 1]:
+                    continue
+                # Where nothing bends much, a cubic over 0.2 rad is good to about 1e-5.
+                point_between(curves, n, 0.5, at)
+                assert look_at(arm, *to, at, look) < 2e-4
+                assert curves.length[n] <= 0.25
+                # Each joint keeps its limits up to the last stride.
+                if n + 2 < curves.first[k + 1] and n > curves.first[k]:
+                    assert slack_of(arm, curves.q[n].copy()) >= -0.35
+                checked += 1
+    assert checked > 20
+
+
+def test_without_limits_a_curve_closes(rng):
+    chain = offset_arm(np.random.default_rng(1))
+    chain = chain._replace(lower=np.full(7, -np.inf), upper=np.full(7, np.inf))
+    arm, closed = numeric_arm(chain), 0
+    for _ in range(10):
+        q = random_joints(rng, chain)
+        curves = new_curves(4096, 8)
+        curves.q_now[:] = q
+        count = trace(arm, *pose(chain, q), curves, 0, 0.35, 0.2, ISOTROPY)
+        ends = curves.q[[0, curves.first[1] - 1]]
+        if count == 1:
+            assert np.linalg.norm(around(ends[1] - ends[0])) < 0.25
+            closed += 1
+    assert closed >= 9
+
+
+def test_solutions_hold_the_tool_in_drake_and_lie_near_the_posture_asked_for(rng):
+    arm = drake_arm("baxter")
+    found = 0
+    for _ in range(20):
+        q = random_joints(rng, arm.chain)
+        X_AT = arm.tool_pose(q)
+        solutions = numeric_solutions(arm.chain, *X_AT)
+        for solution in solutions:
+            R, p = arm.tool_pose(solution)
+            np.testing.assert_allclose(R, X_AT[0], atol=1e-8)
+            np.testing.assert_allclose(p, X_AT[1], atol=1e-8)
+            assert np.all((solution >= arm.chain.lower) & (solution <= arm.chain.upper))
+        if len(solutions):
+            off = np.linalg.norm(around(solutions - q), axis=1)
+            # Half a stride along the curve; at its ends a whole one may be beyond the limits.
+            found += off.min() < 0.2
+    assert found >= 19
+
+
+def test_far_away_there_are_no_solutions():
+    chain = drake_arm("baxter").chain
+    assert numeric_solutions(chain, np.eye(3), np.array([3.0, 0.0, 0.0])).shape == (0, 7)
