@@ -49,7 +49,7 @@ def robustness_page(
         sections.append(
             Section("Table III: TC-manipulability, one and two places", _table_3(compared, paper))
         )
-    if any(row.robust is not None for row in rows):
+    if any(row.gains for row in rows):
         sections.append(Section("What choosing by success gains", _gains(rows)))
     sections += [
         Section("How well P_M predicts success", _prediction(rows)),
@@ -98,11 +98,16 @@ def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
         )
         items += [_exception(one[0], one[1]) for one in tests if one not in sure]
     items += _gain_findings(rows, paper)
-    found = [one.rank_correlation for row in rows for one in row.predictions if np.ptp(one.success)]
+    found = [
+        one.rho
+        for row in rows
+        for one in row.predictions
+        if one.equal_reach and one.rho is not None
+    ]
     if found:
         items.append(
             "Among sets that reach as much without error, P_M goes with success in "
-            f"{sum(value > 0.0 for value in found)} of {len(found)} cases; the rank correlation is "
+            f"{sum(rho > 0.0 for rho in found)} of {len(found)} cases; the rank correlation is "
             f"{min(found):+.2f} to {max(found):+.2f}, {np.median(found):+.2f} in the middle."
         )
     return [Bullets(items)]
@@ -110,24 +115,25 @@ def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
 
 def _gain_findings(rows: Sequence[RowStudy], paper: Paper) -> list[str]:
     """Return what choosing by success gains, in a sentence or two; nothing where nobody did."""
-    gains = [(row, row.gain, row.robust) for row in rows]
-    told = [(row, gain, best) for row, gain, best in gains if gain and best]
+    told = [(row, row.gain) for row in rows if row.gain is not None]
     if not told:
         return []
-    gained = [row for row, gain, _ in told if gain.mean > 0.0 and gain.p < 0.01]
-    most, gain, _ = max(told, key=lambda one: one[1].mean)
+    gained = [row for row, gain in told if gain.paired.mean > 0.0 and gain.paired.p < 0.01]
+    most, greatest = max(told, key=lambda one: one[1].paired.mean)
     said = (
         f"Choosing by estimated success gains in {len(gained)} of {len(told)} rows (p < 0.01, "
-        f"signed rank), most in {most.name}: {signed(100.0 * gain.mean)} points."
+        f"signed rank), most in {most.name}: {signed(100.0 * greatest.paired.mean)} points."
     )
-    known = [(row, best) for row, _, best in told if paper.published(row.task, row.environment)]
+    known = [(row, gain) for row, gain in told if paper.published(row.task, row.environment)]
     below = [
-        row for row, best in known if 100.0 * best.summary.mean < _published_mean(row, paper) - NEAR
+        f"{row.name} ({percent(gain.robust.summary.mean)})"
+        for row, gain in known
+        if 100.0 * gain.robust.summary.mean < _published_mean(row, paper) - NEAR
     ]
     if known:
         said += f" With it {len(known) - len(below)} of {len(known)} are at or above the paper's."
     if below:
-        said += f" Below: {', '.join(row.name for row in below)}."
+        said += f" Below: {', '.join(below)}."
     return [said]
 
 
@@ -177,8 +183,8 @@ def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
             Box(1, 100.0 * row.single.shares),
             Box(0, 100.0 * row.best.shares, theirs),
         ]
-        if row.robust is not None:
-            boxes.append(Box(2, 100.0 * row.robust.shares))
+        if row.gain is not None:
+            boxes.append(Box(2, 100.0 * row.gain.robust.shares))
         groups.append(Group(row.name, boxes))
     figure = draw_boxes(groups, SERIES, label="goals reached [%]", reference="paper, Table I")
     return [
@@ -240,7 +246,11 @@ def _prediction(rows: Sequence[RowStudy]) -> list[Block]:
     clouds = [
         Cloud(
             f"{row.task.replace('_', ' ')}\n{row.environment}",
-            [(one.manipulability, 100.0 * one.success) for one in row.predictions],
+            [
+                (one.manipulability, 100.0 * one.success)
+                for one in row.predictions
+                if one.equal_reach
+            ],
             (row.best.manipulability, 100.0 * row.best.summary.mean),
         )
         for row in rows
@@ -295,11 +305,12 @@ def _reading(row: RowStudy) -> str:
     share = (1.0 - worst.success) * weights[worst.goal] / lost
     said = f"{row.name}. Of all that is lost, {percent(share, 0)} % is goal {worst.goal}. "
     said += lost_goal(worst)
-    if row.robust is not None and row.gain is not None and row.gain.mean > 0.0:
+    if row.gain is not None and row.gain.paired.mean > 0.0:
+        surest = row.gain.robust
         said += (
             " It need not be so: the set with the greatest estimated success reaches "
-            f"{mean_and_std(row.robust)} %, though its P_M is "
-            f"{row.best.manipulability - row.robust.manipulability:.3f} less."
+            f"{mean_and_std(surest)} %, though its P_M is "
+            f"{row.best.manipulability - surest.manipulability:.3f} less."
         )
     return said
 
@@ -349,7 +360,10 @@ def _made(
                 *machine(),
                 ("Seed", str(plan.seed)),
                 ("Samples", f"{plan.samples:,} of each method, the same errors for all"),
-                ("Sets for the prediction", f"{plan.sets} at {plan.set_samples} samples"),
+                (
+                    "Sets for the prediction",
+                    f"{plan.sets} of each kind, {plan.set_samples} samples",
+                ),
                 ("Time", f"{seconds:.0f} s, {cpu:.0f} s of processor time"),
                 (
                     "Slowest row",

@@ -9,25 +9,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from tcs.draw import as_png
 from tcs.kernel.cache import is_compiled
 from tcs.report.paper import load_paper
 from tcs.report.pictures import Shown, map_figure, scene_figure
 from tcs.robustness import (
-    Difference,
     Evaluation,
+    Gain,
     MethodTable,
+    Prediction,
     Trials,
     compare_methods,
     evaluate,
     losses,
-    signed_rank,
+    predictions,
+    robust_gains,
 )
-from tcs.robustness.kept import uniform_sets
 from tcs.robustness.losses import Losses
 from tcs.store import load_scores
 
@@ -39,26 +38,10 @@ class Plan:
     samples: int = 1000
     """Samples of each method."""
     seed: int = 0
-    sets: int = 120
-    """How many random sets to try, to see how well P_M predicts success."""
+    sets: int = 60
+    """How many sets of each size and kind to try, to see how well P_M predicts success."""
     set_samples: int = 50
     """Samples of each of them, the same for all."""
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """How well P_M without error predicts the success with it, among sets of equal reach."""
-
-    members: int
-    """How many configurations the sets have."""
-    manipulability: NDArray[np.float64]
-    """P_M of each set, shape (n,)."""
-    success: NDArray[np.float64]
-    """Mean share of goals reached by each, shape (n,)."""
-    rank_correlation: float
-    """Spearman's; 0 where one of the two does not vary."""
-    p: float
-    """Two-sided; 1 where one of the two does not vary."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,17 +61,15 @@ class RowStudy:
     """The best single configuration."""
     methods: MethodTable | None
     """One or two, with and without TC-manipulability; None where not asked for."""
-    robust: Evaluation | None
-    """The set with the greatest estimated success, on samples that had no part in the estimate;
-    None where the file holds no estimates."""
-    gain: Difference | None
-    """What it has over the best set, on the same samples."""
+    gains: tuple[Gain, ...]
+    """What choosing by estimated success gains, for sets of one and of up to two; () where the
+    file holds no estimates."""
     losses: Losses
     """What the best set loses, and why."""
     single_losses: Losses | None
     """The same of the best single; None where it is not compared."""
     predictions: tuple[Prediction, ...]
-    """Among sets of one, and of two where there are any."""
+    """How well P_M predicts success, among sets of one and two, of any and of equal reach."""
     map: bytes
     """The chosen set from above, PNG."""
     scene: bytes
@@ -96,6 +77,11 @@ class RowStudy:
     seconds: float
     """Wall clock [s]."""
     cpu_seconds: float
+
+    @property
+    def gain(self) -> Gain | None:
+        """What choosing by success gains among all sets; None where there are no estimates."""
+        return self.gains[-1] if self.gains else None
 
     @property
     def name(self) -> str:
@@ -126,8 +112,7 @@ def study_row(path: Path, plan: Plan, jobs: int = 1) -> RowStudy:
     known = methods.cells if methods is not None else {}
     best = known.get((2, True)) or evaluate(trials, select="best", **tries)
     single = known.get((1, True)) or evaluate(trials, select="single", **tries)
-    success = trials.scored.success
-    robust = evaluate(trials, select=success.best, **tries) if success is not None else None
+    gains = robust_gains(trials, **tries) if trials.scored.success is not None else ()
     shown = Shown.of(file, None)
     pictures = [as_png(figure(file, shown)) for figure in (map_figure, scene_figure)]
     return RowStudy(
@@ -149,41 +134,17 @@ def study_row(path: Path, plan: Plan, jobs: int = 1) -> RowStudy:
         best=best,
         single=single,
         methods=methods,
-        robust=robust,
-        gain=signed_rank(robust.shares, best.shares) if robust is not None else None,
+        gains=gains,
         losses=losses(trials, best),
         single_losses=losses(trials, single) if methods is not None else None,
-        predictions=tuple(
-            predicted(trials, plan, members, jobs)
-            for members in range(1, min(len(trials.scored.sets.best), 2) + 1)
+        predictions=predictions(
+            trials, sets=plan.sets, samples=plan.set_samples, seed=plan.seed, jobs=jobs
         ),
         map=pictures[0],
         scene=pictures[1],
         seconds=time.perf_counter() - begun,
         cpu_seconds=time.process_time() - cpu,
     )
-
-
-def predicted(trials: Trials, plan: Plan, members: int, jobs: int = 1) -> Prediction:
-    """Return how P_M and success go together among random sets that reach as much as the best.
-
-    The sets, of one or two, are those that the paper's "without TC-manipulability" draws from.
-    """
-    from scipy import stats
-
-    sets = trials.scored.sets
-    drawn = np.unique(uniform_sets(sets, members, plan.sets, plan.seed)[0], axis=0)
-    offsets = trials.errors.draw(plan.set_samples, plan.seed, stream="prediction")
-    tried, rows = np.unique(drawn, return_inverse=True)
-    reached = trials.reached(tried, offsets, jobs=jobs)
-    together = reached[rows.reshape(drawn.shape)].any(axis=1)
-    success = (together @ trials.weights).mean(axis=1)
-    scores = np.array([sets.scores_of(tuple(row)) for row in drawn.tolist()])
-    rho, p = 0.0, 1.0
-    if len(drawn) > 2 and np.ptp(success) > 0.0 and np.ptp(scores[:, 1]) > 0.0:
-        found = stats.spearmanr(scores[:, 1], success)
-        rho, p = float(found.statistic), float(found.pvalue)
-    return Prediction(members, scores[:, 1], success, rho, p)
 
 
 def study_rows(

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tcs.report.blocks import Cell, Column, Table
 from tcs.report.paper import Compared, Paper
 from tcs.report.study import RowStudy
 from tcs.report.words import goes_with, mean_and_std, p_value, percent, signed, stopped_by
-from tcs.robustness import Contrast, Evaluation
+from tcs.robustness import Contrast, Evaluation, Prediction
 
 NEAR = 0.05
 """Percentage points within which two printed means are the same: both are rounded to a tenth."""
@@ -117,36 +115,35 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
     """Return what choosing by estimated success gains over choosing by P_R + P_M."""
     columns = [
         Column("Task", is_number=False),
-        Column("By P_R + P_M: mean (std)"),
-        Column("By success: mean (std)"),
         Column("Places"),
+        Column("By P_R + P_M"),
+        Column("By success"),
         Column("Gain"),
-        Column("95 % interval"),
-        Column("p, signed rank"),
-        Column("All goals at once, before"),
-        Column("after"),
+        Column("95 %"),
+        Column("p"),
+        Column("All at once"),
         Column("P_M given up"),
     ]
     body: list[list[Cell | str]] = [
         [
             row.name,
-            mean_and_std(row.best),
-            mean_and_std(row.robust),
-            str(row.robust.sets.shape[1]),
-            _toned(100.0 * row.gain.mean),
-            " to ".join(signed(100.0 * end) for end in row.gain.ci95),
-            p_value(row.gain.p),
-            percent(row.best.complete),
-            percent(row.robust.complete),
-            f"{row.best.manipulability - row.robust.manipulability:.3f}",
+            "1" if gain.members == 1 else "1 or 2",
+            mean_and_std(gain.scored),
+            mean_and_std(gain.robust),
+            _toned(100.0 * gain.paired.mean),
+            " to ".join(signed(100.0 * end) for end in gain.paired.ci95),
+            p_value(gain.paired.p),
+            f"{percent(gain.scored.complete)} → {percent(gain.robust.complete)}",
+            f"{gain.scored.manipulability - gain.robust.manipulability:.3f}",
         ]
         for row in rows
-        if row.robust is not None and row.gain is not None
+        for gain in row.gains
     ]
     return Table(
         "The set with the greatest estimated success against the set with the greatest P_R + P_M: "
         "percentage of goals reached, on the same samples for both, none of which had a part in "
-        "the estimate. Gain in percentage points.",
+        "the estimate. Gain: in points, with its interval and the p of the signed rank test. All "
+        "at once: share of the samples in which nothing is lost, before and after.",
         columns,
         body,
     )
@@ -154,35 +151,45 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
 
 def prediction_table(rows: Sequence[RowStudy]) -> Table:
     """Return how well P_M predicts success, row by row."""
+    kinds = [(1, True), (2, True), (1, False), (2, False)]
     columns = [
         Column("Task", is_number=False),
-        Column("Places"),
-        Column("Sets tried"),
-        Column("Rank correlation"),
-        Column("p"),
-        Column("Worst set"),
-        Column("Best set"),
+        *(
+            Column(f"{places}, {'equal' if equal else 'any'} reach")
+            for places, equal in ((("one", "two")[m - 1], e) for m, e in kinds)
+        ),
     ]
     body = [
         [
             row.name,
-            str(found.members),
-            str(len(found.success)),
-            f"{found.rank_correlation:+.2f}" if np.ptp(found.success) > 0.0 else "–",
-            p_value(found.p) if np.ptp(found.success) > 0.0 else "–",
-            percent(found.success.min()),
-            percent(found.success.max()),
+            *(
+                next(
+                    (
+                        _correlation(found)
+                        for found in row.predictions
+                        if (found.members, found.equal_reach) == kind
+                    ),
+                    "–",
+                )
+                for kind in kinds
+            ),
         ]
         for row in rows
-        for found in row.predictions
     ]
     return Table(
-        "How well P_M, computed without error, predicts the mean share of goals reached with it "
-        "[%], among random sets whose P_R is at least 0.98 of the greatest: Spearman's rank "
-        "correlation; none where all sets do equally well.",
+        "How well P_M, computed without error, orders sets by the mean share of goals reached with "
+        "it: Spearman's rank correlation and its 95 % interval, among sets of one and two drawn "
+        "evenly over P_M. Equal reach: only sets whose P_R is at least 0.98 of the greatest, those "
+        "between which P_M decides. A dash where sets are too few or all do equally well.",
         columns,
         body,
     )
+
+
+def _correlation(found: Prediction) -> str:
+    if found.rho is None or found.ci95 is None:
+        return "–"
+    return f"{found.rho:+.2f} ({found.ci95[0]:+.2f} to {found.ci95[1]:+.2f})"
 
 
 def losses_table(row: RowStudy) -> Table:

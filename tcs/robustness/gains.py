@@ -42,7 +42,7 @@ class Gain:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """How well P_M orders sets by their success under error."""
 
@@ -59,6 +59,10 @@ class Prediction:
     ci95: tuple[float, float] | None
     """Its 95 % interval: Fisher's transformation, with the variance of Bonett and Wright."""
     p: float | None
+    manipulability: NDArray[np.float64]
+    """P_M of each set that was drawn, shape (sets,)."""
+    success: NDArray[np.float64]
+    """Its mean share of goals reached, shape (sets,)."""
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain containers."""
@@ -95,10 +99,9 @@ def robust_gains(
         raise SelectionError("No success was estimated for this table: see tcs robustify.")
     gains = []
     for members, scored in ((1, sets.best_single), (2, sets.best)):
-        rows = np.flatnonzero(success.sizes <= members)
-        if not rows.size or (members == 2 and not success.of_size(2).size):
+        robust = success.surest(sets, max_members=members)
+        if not robust or (members == 2 and not success.of_size(2).size):
             continue
-        robust = success.set_at(success.surest(rows))
         first, second = (
             evaluate(trials, select=chosen, samples=samples, seed=seed, jobs=jobs)
             for chosen in (robust, scored)
@@ -144,11 +147,12 @@ def predictions(
             drawn = _stratified(rng, pool, manipulability, sets)
             members, number = np.unique(rows[drawn], return_inverse=True)
             tried = trials.reached(table.candidates[members], offsets, jobs=jobs)
-            columns = number.reshape(drawn.size, -1).T
+            columns = number.reshape(drawn.size, rows.shape[1]).T
             reached = np.logical_or.reduce([tried[column] for column in columns], axis=0)
             success = tc_reachability(reached, trials.weights).mean(axis=1)
-            rho, interval, p = _rank_correlation(manipulability[drawn], success)
-            found.append(Prediction(rows.shape[1], equal, pool.size, drawn.size, rho, interval, p))
+            correlation = _rank_correlation(manipulability[drawn], success)
+            size = (rows.shape[1], equal, pool.size, drawn.size)
+            found.append(Prediction(*size, *correlation, manipulability[drawn], success))
     return tuple(found)
 
 

@@ -7,6 +7,7 @@ import dataclasses
 import pytest
 
 from tcs.report import Paper, Plan, load_paper, study_row
+from tcs.robustness import robustify
 from tcs.scoring import score
 from tcs.store import save_scores
 
@@ -35,7 +36,8 @@ def score_path(tmp_path_factory):
     room = folder / "small-room.yaml"
     room.write_text(SMALL_ROOM)
     path = folder / "shaving-small-room-pr2.tcs"
-    save_scores(path, score("shaving", room))
+    file = score("shaving", room)
+    save_scores(path, robustify(file, sets=12, samples=32))
     return path
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tcs.report.samples import evaluations, samples_csv
-from tcs.report.study import predicted, study_row, study_rows
-from tcs.robustness import Trials, evaluate
+from tcs.report.study import study_row, study_rows
+from tcs.robustness import evaluate
 from tcs.store import load_scores
 
 
@@ -40,45 +39,21 @@ def test_the_best_set_is_evaluated_as_anywhere_else(study, score_path, plan):
     np.testing.assert_array_equal(study.methods.cells[2, True].reached, found.reached)
 
 
-def test_predicted_success_is_that_of_each_set(score_path, plan):
-    trials = Trials.of(load_scores(score_path))
-    found = predicted(trials, replace(plan, sets=4), members=2)
-    assert found.members == 2
-    offsets = trials.errors.draw(plan.set_samples, plan.seed, stream="prediction")
-    sets = trials.scored.sets
-    for manipulability, success in zip(found.manipulability, found.success, strict=True):
-        tried = [
-            evaluate(trials, samples=plan.set_samples, stream="prediction", select=members)
-            for members in _sets_of(trials, manipulability)
-        ]
-        assert any(one.summary.mean == pytest.approx(success, abs=1e-12) for one in tried)
-    assert all(len(values) == plan.set_samples for values in offsets.values())
-    assert sets.max_members == 2
+def test_the_set_chosen_by_success_is_the_one_the_file_estimates_best(study, score_path):
+    success = load_scores(score_path).nominal.success
+    assert set(study.gain.robust.sets[0].tolist()) == set(success.best)
+    assert study.gain is study.gains[-1]
+    np.testing.assert_array_equal(study.gain.scored.reached, study.best.reached)
 
 
-def _sets_of(trials, manipulability):
-    """Return the kept pairs with that P_M."""
-    from tcs.robustness.kept import uniform_sets
-
-    drawn = np.unique(uniform_sets(trials.scored.sets, 2, 4, 0)[0], axis=0)
-    scores = [trials.scored.sets.scores_of(tuple(row))[1] for row in drawn.tolist()]
-    return [
-        row for row, score in zip(drawn.tolist(), scores, strict=True) if score == manipulability
-    ]
-
-
-def test_correlation_is_that_of_the_ranks(study):
+def test_points_of_a_prediction_are_those_it_ranks(study):
     from scipy.stats import rankdata
 
-    assert [found.members for found in study.predictions] == [1, 2]
     for found in study.predictions:
-        if len(found.success) < 3:
-            # Any two points rise or fall together: that says nothing.
-            assert (found.rank_correlation, found.p) == (0.0, 1.0)
-            continue
-        ranks = np.corrcoef(rankdata(found.manipulability), rankdata(found.success))
-        assert found.rank_correlation == pytest.approx(ranks[0, 1], abs=1e-12)
-        assert 0.0 <= found.p <= 1.0
+        assert len(found.manipulability) == len(found.success) == found.sets
+        if found.rho is not None:
+            ranks = np.corrcoef(rankdata(found.manipulability), rankdata(found.success))
+            assert found.rho == pytest.approx(ranks[0, 1], abs=1e-12)
 
 
 def test_every_sample_is_in_the_file(study, lossless, table, plan):
