@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ class Gain:
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Prediction:
     """How well P_M orders sets by their success under error."""
 
@@ -59,9 +59,9 @@ class Prediction:
     ci95: tuple[float, float] | None
     """Its 95 % interval: Fisher's transformation, with the variance of Bonett and Wright."""
     p: float | None
-    manipulability: NDArray[np.float64]
+    manipulability: NDArray[np.float64] = field(compare=False)
     """P_M of each set that was drawn, shape (sets,)."""
-    success: NDArray[np.float64]
+    success: NDArray[np.float64] = field(compare=False)
     """Its mean share of goals reached, shape (sets,)."""
 
     def to_json(self) -> dict[str, Any]:
