@@ -114,18 +114,19 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
             continue
         best = []
         for size in (1, 2):
-            rows = success.of_size(size)
-            if rows.size:
-                row = success.surest(rows)
-                best.append(
-                    {
-                        "members": [grid.configuration(h).to_json() for h in success.set_at(row)],
-                        "success": float(success.success[row]),
-                        "ci95": [float(success.low[row]), float(success.high[row])],
-                        "samples": int(success.samples[row]),
-                        "sets": int(rows.size),
-                    }
-                )
+            members = success.surest(scored.sets, max_members=size)
+            row = success.row_of(members)
+            if row is None or len(members) < size:
+                continue
+            best.append(
+                {
+                    "members": [grid.configuration(h).to_json() for h in members],
+                    "success": float(success.success[row]),
+                    "ci95": [float(success.low[row]), float(success.high[row])],
+                    "samples": int(success.samples[row]),
+                    "sets": int(success.of_size(size).size),
+                }
+            )
         tables.append({"observed": shown_state(file.observed_axes, state), "best": best})
     return {"tables": tables, "robustness": file.metadata.get("robustness")}
 

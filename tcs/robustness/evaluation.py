@@ -238,6 +238,6 @@ def _chosen(
             "No success under error was estimated for this table. Estimate it first: "
             "tcs robustify FILE."
         )
-    robust = scored.success.best if scored.success is not None else ()
+    robust = scored.success.surest(sets) if scored.success is not None else ()
     chosen = {"best": sets.best, "single": sets.best_single, "robust": robust}[select]
     return np.array(chosen, dtype=np.int64)[None], 1

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.tables.checks import read_only, require
-from tcs.tables.sets import MOST_MEMBERS
+from tcs.tables.sets import MOST_MEMBERS, SetTable
 
 NOBODY = -1
 """Stands where a set has fewer members than others in the table."""
@@ -93,18 +93,23 @@ class SuccessTable:
         """Return the rows of the sets with so many members."""
         return np.flatnonzero(self.sizes == members)
 
-    @property
-    def best(self) -> tuple[int, ...]:
-        """Configuration indices of the surest set, the first among equals; () of an empty table.
+    def surest(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
+        """Return the configuration indices of the surest set; () where there is none.
 
         The surest has the greatest lower end of its interval: by its mean alone a lucky set of a
-        few samples would be ahead of a good one of many.
-        """
-        return self.set_at(self.surest(np.arange(len(self.low)))) if len(self.low) else ()
+        few samples would be ahead of a good one of many. Of equals the one with the greatest
+        P_R + P_M counts, then the first.
 
-    def surest(self, rows: NDArray[np.int64]) -> int:
-        """Return which of some rows has the greatest lower end, the first among equals."""
-        return int(rows[np.argmax(self.low[rows])])
+        Args:
+            sets: The sets that these are estimates for.
+            max_members: Sets of at most so many members.
+        """
+        rows = np.flatnonzero(self.sizes <= max_members)
+        if not rows.size:
+            return ()
+        rows = rows[self.low[rows] == self.low[rows].max()]
+        scores = [sum(sets.scores_of(self.set_at(int(row)))) for row in rows]
+        return self.set_at(int(rows[np.argmax(scores)]))
 
     def set_at(self, row: int) -> tuple[int, ...]:
         """Return the configuration indices of a set."""

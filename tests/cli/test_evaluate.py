@@ -1,10 +1,16 @@
-"""`tcs evaluate`: what it prints, and what it refuses."""
+"""`tcs evaluate` and `tcs robustify`: what they print, write and refuse."""
 
 from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
 import tcs
+from tcs.robustness import success_summary
 from tests.store.example import score_file
 
 ROOM = """
@@ -96,3 +102,64 @@ def test_a_file_of_other_models_is_refused(tcs_command, tmp_path):
     ran = tcs_command("evaluate", path)
     assert ran.code == 1
     assert "were made by tcs 0.1.0 from other models" in ran.err
+
+
+def test_robustify_writes_estimates_that_select_weighs(tcs_command, stored, tmp_path):
+    out = tmp_path / "robust.tcs"
+    words = ("--samples", 70, "--sets", 20, "--out", out)
+    ran = tcs_command("robustify", stored, *words, "--json")
+    assert (ran.code, ran.err) == (0, "")
+    made = tcs.robustify(tcs.load(stored), samples=70, sets=20)
+    expected = success_summary(made)
+    assert ran.json == {"file": str(out), **expected}
+    here = ("--here", 1.4, -1.2, 180)
+    told = tcs_command("select", out, *here, "--delta", 100, "--json").json
+    assert told["success_ci95"][0] == made.nominal.success.low.max()
+    assert "under error" in tcs_command("select", out, *here, "--delta", 100).out
+    assert tcs.load(stored).nominal.success is None
+    robust = tcs_command("evaluate", out, "--select", "robust", "--samples", 5, "--json").json
+    best = expected["tables"][0]["best"][-1]["members"]
+    assert robust["members"] in (best, expected["tables"][0]["best"][0]["members"])
+
+
+def test_robustify_tells_a_person_the_best(tcs_command, stored, tmp_path):
+    out = tmp_path / "robust.tcs"
+    ran = tcs_command("robustify", stored, "--samples", 64, "--sets", 8, "--out", out)
+    assert ran.code == 0
+    assert "of 1" in ran.out
+    assert "weigh it with tcs select --delta" in " ".join(ran.out.split())
+
+
+def test_delta_and_robust_need_estimates(tcs_command, stored):
+    ran = tcs_command("select", stored, "--here", 1, 0, 0, "--delta", 1)
+    assert ran.code == 1
+    assert "Estimate it first: tcs robustify FILE." in ran.err
+    ran = tcs_command("evaluate", stored, "--select", "robust")
+    assert ran.code == 1
+    assert "Estimate it first: tcs robustify FILE." in ran.err
+
+
+def test_choosing_by_success_loads_nothing_heavy(process, tcs_command, stored, tmp_path):
+    out = tmp_path / "robust.tcs"
+    tcs_command("robustify", stored, "--samples", 64, "--sets", 8, "--out", out)
+    before = (
+        "import atexit; atexit.register(lambda: print([m for m in ('pydrake', 'numba', 'scipy', "
+        "'matplotlib', 'pandas', 'trimesh') if m in sys.modules], file=sys.stderr))"
+    )
+    ran = process("select", out, "--here", 1, 0, 0, "--delta", 1, before=before)
+    assert ran.code == 0
+    assert ran.err.strip() == "[]"
+
+
+def test_an_interrupt_ends_in_one_line_and_leaves_the_file(stored, tmp_path):
+    path = tmp_path / "robust.tcs"
+    path.write_bytes(stored.read_bytes())
+    words = [sys.executable, "-m", "tcs", "robustify", str(path), "--samples", "100000"]
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(6.0)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert (running.returncode, out) == (130, "")
+    assert err == "tcs: interrupted; no half-written file is left.\n"
+    assert path.read_bytes() == stored.read_bytes()
+    assert sorted(tmp_path.iterdir()) == [path]

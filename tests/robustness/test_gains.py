@@ -29,7 +29,7 @@ def test_gains_are_paired_and_on_samples_of_their_own(robust):
             assert np.array_equal(values, gain.scored.offsets[name])
             assert not np.intersect1d(values, unseen[name]).size
     success, sets = robust.scored.success, robust.scored.sets
-    assert tuple(gains[1].robust.sets[0]) == success.best
+    assert tuple(gains[1].robust.sets[0]) == success.surest(sets)
     assert tuple(gains[1].scored.sets[0]) == sets.best
     assert json.dumps([gain.to_json() for gain in gains])
 
@@ -53,7 +53,8 @@ def test_predictions_of_all_four_kinds(chair_trials):
     # Who reaches more goals has more of both: the law everybody would expect.
     assert found[0].rho > 0.5
     assert json.dumps([one.to_json() for one in found])
-    assert predictions(chair_trials, sets=20, samples=20, jobs=1) == found
+    again = predictions(chair_trials, sets=20, samples=20, jobs=1)
+    assert [one.to_json() for one in again] == [one.to_json() for one in found]
     with pytest.raises(TcsError, match="at least 10"):
         predictions(chair_trials, sets=9)
 

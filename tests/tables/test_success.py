@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
+from tcs.scoring.sets import build_sets
 from tcs.tables import SuccessTable
+from tests.tables.small import random_scores, small_grid
 
 PARTS = {
     "members": np.array([[3, -1], [9, -1], [1, 4], [3, 9]], dtype=np.int32),
@@ -21,9 +23,6 @@ def test_sets_by_size_and_by_members():
     table = SuccessTable(**PARTS)
     assert table.sizes.tolist() == [1, 1, 2, 2]
     assert table.of_size(2).tolist() == [2, 3]
-    # Not (1, 4), of which less is known.
-    assert table.best == (3, 9)
-    assert table.surest(table.of_size(1)) == 0
     assert [table.row_of(members) for members in ((3,), (9,), (1, 4), (3, 9))] == [0, 1, 2, 3]
     assert table.row_of((1,)) is None
     assert table.row_of((1, 4, 9)) is None
@@ -31,8 +30,21 @@ def test_sets_by_size_and_by_members():
         table.success[0] = 1.0
 
 
-def test_an_empty_table_has_no_best():
-    assert SuccessTable(**{name: part[:0] for name, part in PARTS.items()}).best == ()
+def test_the_surest_set_is_not_the_luckiest():
+    grid = small_grid(nx=6, ny=4, bed=2)
+    sets = build_sets(random_scores(grid, 5, seed=1, share=0.4), grid)
+    a, b, c, d = (int(h) for h in sets.candidates[:4])
+    members = np.array([[a, -1], [b, -1], [c, -1], [a, d]], dtype=np.int32)
+    table = SuccessTable(**{**PARTS, "members": members})
+    # (c,) has the greatest mean, of which less is known.
+    high, low = PARTS["high"], np.array([0.4, 0.2, 0.6, 0.7])
+    assert table.surest(sets) == (a, d)
+    assert table.surest(sets, max_members=1) == (c,)
+    equal = SuccessTable(**{**PARTS, "members": members, "low": np.minimum(low, 0.2), "high": high})
+    scores = [sum(sets.scores_of(equal.set_at(row))) for row in range(4)]
+    assert equal.surest(sets) == equal.set_at(int(np.argmax(scores)))
+    none = SuccessTable(**{name: part[:0] for name, part in PARTS.items()})
+    assert none.surest(sets) == ()
 
 
 @pytest.mark.parametrize(
