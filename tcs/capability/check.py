@@ -56,7 +56,7 @@ class MapCheck:
 
 
 def check_map(
-    reach: Reach, grid: MapGrid, grasps: str, *, radius: float, queries: int = 20_000,
+    reach: Reach, grid: MapGrid, grasps: str, *, radius: float | None = None, queries: int = 20_000,
     seed: int = 0, jobs: int = 2,
 ) -> MapCheck:  # fmt: skip
     """Return how often a whole map of this grid would be right, without making all of it.
@@ -68,7 +68,7 @@ def check_map(
         reach: The robot.
         grid: The cells.
         grasps: Which tool poses are asked for: "side", "top", or "all" orientations.
-        radius: That of the map [m].
+        radius: That of the map [m]; None is the arm's length.
         queries: How many poses.
         seed: Of the poses.
         jobs: Number of threads.
@@ -79,7 +79,8 @@ def check_map(
     R_BT, p_BT = random_poses(reach, grasps, queries, seed)
     cells, of_query = np.unique(grid.nearest(R_BT, p_BT).cells, axis=0, return_inverse=True)
     R_BC, p_BC = grid.tool_in_base(cells)
-    near = np.linalg.norm(p_BC - reach.shoulder, axis=1) <= radius
+    most = reach.length if radius is None else radius
+    near = np.linalg.norm(p_BC - reach.shoulder, axis=1) <= most
     held = near & reach.solve(R_BC, p_BC, jobs=jobs).reached
     return MapCheck.of(held[of_query.ravel()], reach.solve(R_BT, p_BT, jobs=jobs).reached)
 

@@ -104,6 +104,11 @@ class Reach:
         """Origin of the arm's first moving link in B at `lift` [m], shape (3,)."""
         return np.asarray(self.p_BA + self.R_BA @ self.lowered.arrays.chain.p[0])
 
+    @property
+    def length(self) -> float:
+        """Farthest that the tool can be from the shoulder, the arm stretched out [m]."""
+        return float(np.linalg.norm(self.lowered.arrays.chain.p[1:], axis=1).sum())
+
     def solve(
         self, R_BT: FloatArray, p_BT: FloatArray, *, level: int | None = None, jobs: int = 2,
         on_progress: OnProgress | None = None,

@@ -24,6 +24,13 @@ _Text = Annotated[
     Path | None, typer.Option(help="Also write it as text: score x y z R11 .. R33, a line each.")
 ]
 _Robot = Annotated[str, typer.Option(help="Name or YAML file of a robot.")]
+_Radius = Annotated[
+    float | None,
+    typer.Option(
+        help="Farthest the tool may be from the shoulder, in metres; the thesis takes 0.9.",
+        show_default="the arm's length",
+    ),
+]
 _Tool = Annotated[
     str | None, typer.Option(help="Another frame of the robot as the tool.", show_default="its own")
 ]
@@ -63,9 +70,7 @@ def from_ik(
     grasps: _Grasps = "side+top",
     step: _Step = 0.05,
     turns: _Turns = 16,
-    radius: Annotated[
-        float, typer.Option(help="Farthest the tool may be from the shoulder, in metres.")
-    ] = 0.9,
+    radius: _Radius = None,
     tool: _Tool = None,
     measure: _Measure = _MEASURE,
     view: _View = "corrected",
@@ -191,6 +196,14 @@ def merge_maps(
     split: Annotated[
         bool, typer.Option("--split", help="As many base poses as it takes, in order.")
     ] = False,
+    environment: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of a room: also the best base pose that it leaves."),
+    ] = None,
+    task_at: Annotated[
+        tuple[float, float, float],
+        typer.Option(metavar="X Y YAW_DEG", help="Where the task's frame is in that room."),
+    ] = (0.0, 0.0, 0.0),
     out: Annotated[
         Path | None, typer.Option(help="CSV of every base pose: x, y, yaw_deg, lift, score.")
     ] = None,
@@ -212,13 +225,19 @@ def merge_maps(
         start=math.radians(start_deg),
         end=math.radians(end_deg),
     )
-    if split and (out is not None or picture is not None):
-        raise typer.BadParameter("--split has no one map to write or draw.", param_hint="--split")
+    if split and (out, picture, environment) != (None, None, None):
+        raise typer.BadParameter(
+            "--split has no one map to write, to draw or to put into a room.", param_hint="--split"
+        )
     if split:
         result = work.split(capability, asked, lift=lift, scale=scale)
         talk.print_result(result, reports.report_stops, as_json=as_json)
         return
-    result = work.merge(capability, asked, lift=lift, scale=scale, out=out, picture=picture)
+    at = (task_at[0], task_at[1], math.radians(task_at[2]))
+    room = None if environment is None else work.Room(environment, at)
+    result = work.merge(
+        capability, asked, lift=lift, scale=scale, room=room, out=out, picture=picture
+    )
     talk.print_result(result, reports.report_merged, as_json=as_json)
 
 
@@ -254,9 +273,7 @@ def map_check(
     ] = None,
     step: _Step = 0.05,
     turns: _Turns = 16,
-    radius: Annotated[
-        float, typer.Option(help="Farthest the tool may be from the shoulder, in metres.")
-    ] = 0.9,
+    radius: _Radius = None,
     tool: _Tool = None,
     queries: Annotated[int, typer.Option(min=1, help="Random tool poses of each kind.")] = 20_000,
     seed: _Seed = 0,

@@ -32,6 +32,8 @@ def report_merged(result: dict[str, Any]) -> None:
     typer.echo(f"{result['map']}, {result['task']}: {result['base_poses']:,} base poses")
     for name in ("best", "worst"):
         typer.echo(f"{name:<6} {_shown(result[name])}")
+    if "left" in result:
+        typer.echo(f"left   {_shown(result['left'])}; the room takes {result['taken']} better ones")
     off, turn = result["off_cell_m"], result["off_cell_rad"]
     if off or turn:
         typer.echo(f"tool poses are off the grid by up to {off:.4f} m, {turn:.4f} rad")

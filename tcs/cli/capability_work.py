@@ -13,7 +13,7 @@ import typer
 from tcs.errors import StoreError, UnknownNameError
 
 if TYPE_CHECKING:
-    from tcs.capability import CapabilityMap, GraspTask, MapGrid, Reach, Recording
+    from tcs.capability import CapabilityMap, GraspTask, MapGrid, Reach, Recording, TaskMap
     from tcs.capability.from_recording import Recorded
 
 TASKS = ("pick-and-place", "linear", "curved")
@@ -116,13 +116,22 @@ class AskedTask:
         return pick_and_place_task(self.length, self.height, **options)
 
 
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A room with the task in it."""
+
+    environment: str
+    at: tuple[float, float, float]
+    """Where the task frame is in W: x, y [m] and heading [rad]."""
+
+
 def from_ik(
     setup: Setup,
     out: Path,
     text: Path | None,
     *,
     kind: str,
-    radius: float,
+    radius: float | None,
     view: str,
     jobs: int,
     on_progress: Callable[[int, int], None],
@@ -192,9 +201,15 @@ def from_bags(
 
 
 def merge(
-    path: Path, asked: AskedTask, *, lift: float | None, scale: str, out: Path | None,
+    path: Path,
+    asked: AskedTask,
+    *,
+    lift: float | None,
+    scale: str,
+    room: Room | None,
+    out: Path | None,
     picture: Path | None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Merge a map over a task, and write or draw the result."""
     from tcs.capability import load_map
     from tcs.capability import merge as merged
@@ -225,7 +240,9 @@ def merge(
         from tcs.draw import save_figure
 
         save_figure(picture, task_figure(found))
+    left = {} if room is None else _left_by(room, capability, found)
     return {
+        **left,
         "map": found.name,
         "task": task.name,
         "positions": [[p.x, p.y, p.height] for p in task.positions],
@@ -276,7 +293,7 @@ def show(path: Path, out: Path, *, tilt: int, height: float | None) -> dict[str,
 
 
 def check(
-    path: Path | None, setup: Setup, grasps: tuple[str, ...], *, radius: float, queries: int,
+    path: Path | None, setup: Setup, grasps: tuple[str, ...], *, radius: float | None, queries: int,
     seed: int, jobs: int,
 ) -> dict[str, Any]:  # fmt: skip
     """Compare a map, or one that is yet to be made, with inverse kinematics."""
@@ -316,6 +333,19 @@ def check(
         rows[name] = check_stored(reach, capability, name, **options).to_json()
     shown = {"step": capability.grid.step, "turns": capability.grid.turns}
     return {"map": str(path), **shown, "grasps": rows}
+
+
+def _left_by(room: Room, capability: CapabilityMap, found: TaskMap) -> dict[str, Any]:
+    """Return the best base pose that a room leaves, and how many better ones it takes away."""
+    from tcs.capability.surroundings import Surroundings
+    from tcs.robots import load_robot
+    from tcs.scene import load_environment
+
+    robot = load_robot(str(capability.metadata["robot"]))
+    robot = robot.model_copy(update={"tool_frame": str(capability.metadata["tool"])})
+    around = Surroundings(robot, load_environment(room.environment), room.at)
+    base, taken = around.best(found)
+    return {"left": base.to_json(), "taken": taken}
 
 
 def _of_recording(

@@ -24,7 +24,7 @@ def test_shares_by_hand():
 def test_a_map_that_is_not_made_judges_as_the_one_that_is(ihcm, tiago):
     at = Reach(tiago, lift=ihcm.lift, step=0.1)
     for grasps in ("side", "top"):
-        lazy = check_map(at, ihcm.grid, grasps, radius=0.9, queries=2000, seed=4)
+        lazy = check_map(at, ihcm.grid, grasps, queries=2000, seed=4)
         assert lazy == check_stored(at, ihcm, grasps, queries=2000, seed=4)
 
 
@@ -44,7 +44,7 @@ def test_the_issue_bars_are_met(reach, grasps):
 
 def test_half_the_steps_judge_better(reach):
     coarse, fine = (
-        check_map(reach, MapGrid.of(step, turns, "side"), "side", radius=1.1, queries=6000)
+        check_map(reach, MapGrid.of(step, turns, "side"), "side", queries=6000)
         for step, turns in ((0.1, 8), (0.025, 32))
     )
     assert fine.accuracy >= 0.98

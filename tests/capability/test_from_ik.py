@@ -57,7 +57,7 @@ def test_every_cell_is_free_at_the_lift_the_map_was_made_at(ihcm):
 
 def test_a_cell_that_is_not_held_is_not_reached(ihcm, tiago):
     at = Reach(tiago, lift=ihcm.lift, step=0.1)
-    cells = cells_around(ihcm.grid, at.shoulder, 0.9)
+    cells = cells_around(ihcm.grid, at.shoulder, at.length)
     gone = cells[ihcm.rows_of(cells) < 0][::97]
     assert not at.solve(*ihcm.grid.tool_in_base(gone)).reached.any()
 
@@ -78,6 +78,23 @@ def test_cells_around_are_those_whose_shoulder_is_near(reach):
     _, p = grid.tool_in_base(every)
     inside = np.linalg.norm(p - reach.shoulder, axis=1) <= 0.5 - 1e-12
     assert set(map(tuple, every[inside])) <= set(map(tuple, cells.tolist()))
+
+
+def test_no_posture_is_longer_than_the_arm(reach, rng):
+    lower, upper = reach.limits
+    _, p_AT = reach.tool_poses(rng.uniform(lower, upper, (20_000, 7)))
+    away = np.linalg.norm(p_AT @ reach.R_BA.T + reach.p_BA - reach.shoulder, axis=1)
+    assert 0.9 * reach.length < away.max() <= reach.length
+
+
+def test_a_smaller_radius_leaves_out_what_is_farther(tiago):
+    at = Reach(tiago, lift=0.15, step=0.1)
+    grid = MapGrid.of(0.1, 4, "side")
+    whole, near = map_from_ik(at, grid), map_from_ik(at, grid, radius=0.7)
+    _, p_BT = grid.tool_in_base(whole.cells)
+    inside = np.linalg.norm(p_BT - at.shoulder, axis=1) <= 0.7
+    assert 0 < inside.sum() < len(inside)
+    np.testing.assert_array_equal(near.cells, whole.cells[inside])
 
 
 def test_threads_do_not_change_the_map(tiago):

@@ -79,6 +79,23 @@ def test_show_draws_a_layer(made, tcs_command, tmp_path, ending):
     )
 
 
+def test_a_room_takes_base_poses_away(made, tcs_command, tmp_path):
+    task = ("--task", "linear", "--length", 0.2, "--samples", 2, "--height", 0.65)
+    best = tcs_command("capability", "merge", made[0], *task, "--json").json["best"]
+    room = tmp_path / "room.yaml"
+    room.write_text(
+        "based_on: wheelchair\nname: post\nmodels: []\nbody_frames: {}\npadding: {}\njoints: {}\n"
+        "errors: {}\nobstacles:\n- name: post\n  box: [0.1, 0.1, 1.0]\n"
+        f"  xyz: [{best['x'] + 1.0}, {best['y']}, 0.5]\n"
+    )
+    ran = tcs_command(
+        "capability", "merge", made[0], *task, "--environment", room, "--task-at", 1, 0, 0, "--json"
+    )
+    assert ran.json["best"] == best
+    assert ran.json["taken"] >= 1
+    assert ran.json["left"]["score"] <= best["score"]
+
+
 def test_split_gives_stops_in_order(made, tcs_command):
     ran = tcs_command(
         "capability", "merge", made[0], "--task", "linear", "--length", 2.0, "--samples", 5,
