@@ -36,8 +36,8 @@ def best_estimated(
     """
     if success is None:
         raise SelectionError(
-            "Weight delta asks for the success under error, which was estimated for no set. "
-            "Estimate it first: tcs robustify FILE."
+            "Weight delta asks for the success under error, which was estimated for no set of this "
+            "table. Estimate it first: tcs robustify FILE."
         )
     best: tuple[int, ...] | None = None
     most = -np.inf
