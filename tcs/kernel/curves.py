@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.measure import inverse_condition
 from tcs.kernel.newton import Look, converge, factorise, look_at, new_look, step_to_goal, way_along
@@ -31,6 +31,8 @@ OFF_GOAL = 3e-4
 """Greatest error [rad and m] that may be left after one step."""
 LOST = 3e-2
 """Error after a stride [rad and m] with which the stride is taken back."""
+SETTLING = whole(4)
+"""Looks that a place on a cubic gets to come to the goal; it takes 2."""
 SAME_CURVE = 0.04
 """How far beside a known curve [rad, as a norm] a solution may lie and count as on it: points are
 up to a stride apart, and the curve bends away from their chord."""
@@ -306,4 +308,4 @@ def settle(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, curves: Curves, exact: float
 ) -> bool:
     """Bring `q_now`, close to the goal already, to it; return whether that succeeded."""
-    return converge(arm, R_AG, p_AG, curves.q_now, curves.look, 4, exact)
+    return converge(arm, R_AG, p_AG, curves.q_now, curves.look, SETTLING, exact)

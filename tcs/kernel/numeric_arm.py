@@ -23,6 +23,9 @@ SAMPLES = 1 << 18
 """Postures in the table."""
 ACROSS, UP, TILTS, TURNS = 14, 28, 8, 12
 """Cells of the table: distance from axis 1, height along it, and tilt and turn of axis 7."""
+WIDER = 0.25
+"""How far beyond the limits the table goes [rad]: few postures are in a corner of the limits, and
+goals that need one would find no start near."""
 ROUNDING = 1e-9
 """Taken off bounds of what is within reach [m], far above the rounding of a sum of lengths."""
 FULL_TURN = 1e3
@@ -50,7 +53,7 @@ class NumericArm(NamedTuple):
     first: IntArray
     """Where each cell's postures begin, and where the last one's end, shape (cells + 1,)."""
     postures: FloatArray
-    """Joints 2 to 6 [rad], sorted by cell, shape (SAMPLES, 5)."""
+    """Joints 2 to 6 [rad], up to WIDER beyond their limits, sorted by cell, shape (SAMPLES, 5)."""
     azimuth: FloatArray
     """Direction of the point on axis 7 about axis 1, joint 1 at zero [rad], shape (SAMPLES,)."""
 
@@ -78,7 +81,8 @@ def _numeric_arm(R_bytes: bytes, p_bytes: bytes, low_bytes: bytes, high_bytes: b
     limited = upper - lower < 2.0 * np.pi
     low, high = joint_ranges(lower, upper)
     slides = _slides(R, p)
-    postures = low[1:6] + spread(SAMPLES, 5) * (high - low)[1:6]
+    wide_low, wide_high = np.where(limited, low - WIDER, low), np.where(limited, high + WIDER, high)
+    postures = wide_low[1:6] + spread(SAMPLES, 5) * (wide_high - wide_low)[1:6]
     figures, azimuth = np.empty((SAMPLES, 4)), np.empty(SAMPLES)
     _figures_of(R, p.copy(), slides[6], postures, figures, azimuth)
     least = np.array([0.0, figures[:, 1].min(), -1.0, -np.pi])

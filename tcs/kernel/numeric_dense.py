@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.borrow import borrowed
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
 from tcs.kernel.measure import measure_at
 from tcs.kernel.numeric_arm import NumericArm, joint_ranges, numeric_arm_of, spread
@@ -17,7 +17,7 @@ from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 
 STARTS = 400
 """Postures spread over the joint limits, each brought to the goal."""
-LOOKS = 60
+LOOKS = whole(60)
 """Looks that a start gets: it may be half a turn and a whole arm off."""
 STRIDE, SPACING = 0.08, 0.0125
 """As in `numeric_pairs`, but finer [rad]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -35,7 +35,7 @@ REFINEMENTS, REFINE_LANES = 3, 8
 """As in `pairs`."""
 SQUEEZES = 8
 """Halvings of the room between two contacts, down to SPACING / 256."""
-ROUGH, SOLVED = 0, 1
+ROUGH, SOLVED = whole(0), whole(1)
 """Joints as the cubic has them; joints of a solution."""
 NO_SOLUTION = -2
 """In place of a contact: there is no solution within the limits."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import jit, whole
 from tcs.kernel.curves import (
     SAME_CURVE,
     Curves,
@@ -32,12 +32,12 @@ TURN = 2.0 * np.pi
 MOST_POINTS, MOST_CURVES, MOST_CANDIDATES = 1024, 64, 4096
 STRIDE = 0.2
 """Longest stride along a curve [rad, as a norm of the joints]."""
-BEYOND = 0.35
+BEYOND = 0.6
 """How far beyond its limits a joint is followed [rad]: curves that leave the limits for a while
 come back, and a start may converge a little beyond."""
-STARTS = 48
+STARTS = 96
 """Postures of the table that are brought to the goal, at most."""
-LOOKS = 10
+LOOKS = whole(10)
 """Looks that a start gets; most take 4."""
 ON_CURVE = 1e-5
 """Error [rad and m] of a start that has arrived."""
@@ -299,6 +299,9 @@ def find_candidates(
                     # Nearer to the limits than both neighbours: a short stretch may hide here.
                     low = max((j - 2) / parts, 0.0)
                     found = _at_peak(problem, arm, hunt, n, low, share, found)
+                elif j == parts and before < slack < INSIDE and slack > -length / parts:
+                    # Or on the way to the next point, beyond which it falls again.
+                    found = _at_peak(problem, arm, hunt, n, (j - 1) / parts, share, found)
                 if slack >= INSIDE:
                     found = _add(problem, hunt, n, share, found)
                 early, before = before, slack
@@ -331,8 +334,8 @@ def _at_limit(
 def _at_peak(
     problem: Problem, arm: NumericArm, hunt: Hunt, n: int, low: float, high: float, found: int
 ) -> int:
-    """Append the place between two that is farthest inside the limits, if it is inside."""
-    q = hunt.curves.q_now
+    """Append the place between two that is farthest inside the limits, if it may be inside."""
+    q, before, after = hunt.curves.q_now, -np.inf, -np.inf
     for _ in range(2 * HALVINGS):
         first, second = low + GOLDEN * (high - low), high - GOLDEN * (high - low)
         point_between(hunt.curves, n, first, q)
@@ -347,6 +350,9 @@ def _at_peak(
             high = second
         else:
             low = first
+    # The cubic cannot tell: whoever takes the candidate has to find a solution that keeps limits.
+    if max(before, after) >= -INSIDE:
+        found = _add(problem, hunt, n, 0.5 * (low + high), found)
     return found
 
 

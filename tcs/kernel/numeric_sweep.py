@@ -10,6 +10,8 @@ from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
+    RIDES,
+    STAYS,
     Workspace,
     base_contact,
     gripper_body_contact,
@@ -59,9 +61,9 @@ def _score_numeric_slice(
     for h in range(start, stop):
         row, torso = h - start, h % problem.torso_levels
         state = stand(problem, work, h // problem.torso_levels)
-        code = base_contact(problem, work, 0, 0)
+        code = base_contact(problem, work, STAYS, STAYS)
         if code == NO_CONTACT:
-            code = base_contact(problem, work, torso, 1)
+            code = base_contact(problem, work, torso, RIDES)
         if code != NO_CONTACT:
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code

