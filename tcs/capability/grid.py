@@ -198,13 +198,14 @@ class MapGrid:
         """
         tilt = np.empty(len(R_WT), np.int64)
         heading = np.empty(len(R_WT))
+        # R_WT = Rz(psi) R_ET D: the trace of D is greatest over psi in closed form. Of the product
+        # R_WT R_ET^T it needs five entries, in three sums over products of entries.
+        first, second, third = self.R_ET[:, 0].T, self.R_ET[:, 1].T, self.R_ET[:, 2].T
         for start in range(0, len(R_WT), _CHUNK):
             part = slice(start, start + _CHUNK)
-            # R_WT = Rz(psi) R_ET D: the trace of D is greatest over psi in closed form.
-            M = np.einsum("nij,tkj->ntik", R_WT[part], self.R_ET, optimize=True)
-            along = M[..., 0, 0] + M[..., 1, 1]
-            across = M[..., 1, 0] - M[..., 0, 1]
-            best = np.argmax(M[..., 2, 2] + np.hypot(along, across), axis=1)
+            x, y, z = (np.ascontiguousarray(R_WT[part, row]) for row in range(3))
+            along, across = x @ first + y @ second, y @ first - x @ second
+            best = np.argmax(z @ third + np.hypot(along, across), axis=1)
             rows = np.arange(len(best))
             tilt[part] = best
             heading[part] = np.arctan2(across[rows, best], along[rows, best])

@@ -82,14 +82,14 @@ class MapVolume:
         self._score = capability.score(scale).astype(np.float32)
         self._low = cells.min(axis=0) if len(cells) else np.zeros(5, np.int32)
         self._high = cells.max(axis=0) if len(cells) else np.zeros(5, np.int32)
-        self._far = int(np.abs(cells[:, X : Y + 1]).max(initial=0))
+        self._far = float(np.hypot(cells[:, X], cells[:, Y]).max(initial=0.0))
         self._of_tilt: dict[int, _Spread] = {}
 
     def box_about(self, x: float, y: float) -> Box:
         """Return the base places from which a tool at (x, y) [m] may be reached at all."""
         step = self.capability.grid.step
-        # A map turned about the tool reaches as far as its corners; one more for the rounding.
-        far = math.ceil(self._far * math.sqrt(2.0)) + 1
+        # However the map is turned about the tool; one more for the rounding.
+        far = math.ceil(self._far) + 1
         return Box(round(x / step) - far, round(y / step) - far, 2 * far + 1, 2 * far + 1)
 
     def scores(

@@ -1,0 +1,241 @@
+"""Measure capability maps: making them, merging them, their accuracy, and the thesis's task.
+
+Usage: python benchmarks/capability.py [--repeats 5] [--queries 40000] [--seeds 5] [--pictures DIR]
+
+The last part is the pick-and-place task of the ITCM thesis on TIAGo: two positions 15 cm apart at
+0.41 m, three side grasps each with a pre-grasp 5 cm before, the shoulder at 0.91 m. Its operator is
+simulated, so that a few seeds are shown. Nothing here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from table import header, row, spread
+
+from tcs.capability import (
+    BasePose,
+    CapabilityMap,
+    GraspTask,
+    MapGrid,
+    MapVolume,
+    Operator,
+    Reach,
+    TaskMap,
+    check_map,
+    map_from_ik,
+    map_from_recording,
+    merge,
+    pick_and_place_task,
+    simulate,
+)
+from tcs.capability.picture import task_figure
+from tcs.capability.surroundings import Surroundings
+from tcs.draw import save_figure
+from tcs.robots import load_robot
+from tcs.scene import EnvironmentFile
+
+LIFT = 0.1725
+"""Brings TIAGo's shoulder to 0.91 m."""
+HEIGHT = 0.41
+# Table 1 of the ITCM thesis: the task in the robot's frame, x, y [m] and rotation [deg].
+HIGH, EXPERT, LOW = (0.75, 0.15, 0.0), (0.88, 0.20, 2.9), (0.55, -0.45, -90.0)
+
+
+def main() -> None:
+    """Run every measurement and print it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--queries", type=int, default=40_000)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--pictures", type=Path)
+    options = parser.parse_args()
+    header()
+    reach = Reach(load_robot("tiago"), lift=LIFT)
+    compile_first(reach)
+    ihcm = making(reach, options.jobs)
+    merging(ihcm, options.repeats)
+    inverting(reach, options.repeats)
+    accuracy(reach, options.queries, options.jobs)
+    thesis_task(reach, ihcm, options.seeds, options.pictures)
+
+
+def compile_first(reach: Reach) -> None:
+    """Run everything compiled once, for no time below is to hold compiling."""
+    reach.free_lifts(np.zeros((1, 7)))
+    reach.manipulability(np.zeros((1, 7)))
+    simulate(reach, Operator(seconds=1.0))
+
+
+def timed(run: Callable[[], object]) -> tuple[float, float]:
+    """Return wall and processor seconds of a call."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    run()
+    return time.perf_counter() - wall, time.process_time() - cpu
+
+
+def making(reach: Reach, jobs: int) -> CapabilityMap:
+    """Measure an IHCM with side and top grasps, 5 cm and pi/8, and return the whole one."""
+    for radius in (0.9, reach.length):
+        begun = time.perf_counter(), time.process_time()
+        found = map_from_ik(reach, MapGrid.of(), radius=radius, jobs=jobs)
+        wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+        cells = f"{found.metadata['cells_asked']:,} cells asked, {len(found.cells):,} held"
+        said = f"{wall:.1f} s on {jobs} threads, {cpu:.1f} s of the processor; {cells}"
+        row(f"IHCM, radius {radius:.2f} m", said)
+    return found
+
+
+def merging(ihcm: CapabilityMap, repeats: int) -> None:
+    """Measure the merge of twelve tool poses, all lifts and one."""
+    task = the_task(1)
+    volume = MapVolume(ihcm)
+    row("merge, first task of a map", spread_ms([timed(lambda: merge(MapVolume(ihcm), task))[0]]))
+    for lift, name in ((None, "any lift"), (LIFT, "one lift")):
+        wall = [timed(lambda lift=lift: merge(volume, task, lift=lift))[0] for _ in range(repeats)]
+        row(f"merge, {name}", spread_ms(wall))
+
+
+def inverting(reach: Reach, repeats: int) -> None:
+    """Measure 800 grasps inverted to cells: forward kinematics, inversion, nearest cells."""
+    lower, upper = reach.limits
+    joints = np.random.default_rng(0).uniform(lower, upper, (800, 7))
+    for grasps in ("side+top", "all"):
+        grid = MapGrid.of(grasps=grasps)
+
+        def invert(grid: MapGrid = grid) -> None:
+            R_AT, p_AT = reach.tool_poses(joints)
+            grid.nearest(reach.R_BA @ R_AT, p_AT @ reach.R_BA.T + reach.p_BA)
+
+        row(f"800 grasps inverted, {grasps}", spread_ms([timed(invert)[0] for _ in range(repeats)]))
+
+
+def accuracy(reach: Reach, queries: int, jobs: int) -> None:
+    """Measure how often maps of two grids are right."""
+    print("\nmap beside inverse kinematics, shares of all queries [%]")
+    print(f"{'grasps':<7} {'grid':<16} radius  true   right  false+ false-  recall precision")
+    for step, turns, radius in (
+        (0.05, 16, 0.9),
+        (0.05, 16, None),
+        (0.025, 32, 0.9),
+        (0.025, 32, None),
+    ):
+        for grasps in ("side", "top", "all"):
+            grid = MapGrid.of(step, turns, grasps)
+            found = check_map(reach, grid, grasps, radius=radius, queries=queries, jobs=jobs)
+            shares = (
+                found.reachable, found.accuracy, found.false_positives, found.false_negatives,
+                found.recall, found.precision,
+            )  # fmt: skip
+            shown = " ".join(f"{100 * share:6.2f}" for share in shares)
+            grid_said = f"{step:g} m, {360 / turns:g} deg  {radius or reach.length:.2f}"
+            print(f"{grasps:<7} {grid_said}  {shown}")
+
+
+def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | None) -> None:
+    """Compare the thesis's pick-and-place task with its published base poses."""
+    maps = []
+    for seed in range(seeds):
+        simulated = simulate(reach, Operator(height=HEIGHT), seed=seed)
+        grid = MapGrid.of(grasps="side")
+        recorded = map_from_recording(reach, grid, simulated.recording, height=HEIGHT)
+        maps.append((f"ITCM, seed {seed}", recorded.capability))
+        if seed == 0:
+            print("\nTable 3: from the recorded to the grid's pose, mean (std)")
+            for axis, error in recorded.error_table().items():
+                print(f"  {axis:<6} {error['mean']:.4f} ({error['std']:.4f})")
+    maps.append(("IHCM", ihcm))
+    around = Surroundings(reach.robot, table())
+    for direction, words in ((1, "left"), (3, "right")):
+        print(
+            f"\npick and place, {words} along the table's edge; x, y [m], yaw [deg] of the base in"
+        )
+        print(
+            "the task's frame, and its score: base poses | best | best that the table leaves, how"
+        )
+        print("far from ITCM-high and expert | share that scores less than ITCM-high, expert,")
+        print("ITCM-low (---- where not in the map) | best score at yaw 0 | worst")
+        for name, capability in maps:
+            found = merge(capability, the_task(direction), scale="thesis", lift=LIFT)
+            print(f"  {name:<13} {described(found, around)}")
+    if pictures is not None:
+        pair = (maps[-1][1], maps[0][1])
+        for direction in (1, 3):
+            merged = [merge(m, the_task(direction), scale="thesis", lift=LIFT) for m in pair]
+            save_figure(pictures / f"pick_and_place_{direction}.png", task_figure(*merged))
+
+
+def the_task(direction: int) -> GraspTask:
+    """Return the thesis's task, its second position to the left (1) or to the right (3)."""
+    return pick_and_place_task(0.15, HEIGHT, pre_grasps=(0.05,), direction=direction)
+
+
+def table() -> EnvironmentFile:
+    """Return the thesis's table, 37 cm high and 75.5 cm wide, its edge 10 cm before the cup."""
+    axes = {
+        name: {"unit": unit, "start": 0.0, "step": 0.0, "count": 1}
+        for name, unit in (("base_x", "m"), ("base_y", "m"), ("base_yaw", "deg"), ("torso", "m"))
+    }
+    box = {"name": "table", "box": [0.6, 0.755, 0.37], "xyz": [0.2, 0.0, 0.185]}
+    return EnvironmentFile(
+        name="table", title="A table", origin="Under the cup", source="ITCM thesis, III.B",
+        grid=axes, obstacles=[box],
+    )  # fmt: skip
+
+
+def base_of(seen: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the base in the task's frame, from the task in the robot's; yaw [rad]."""
+    x, y, turn = seen[0], seen[1], math.radians(seen[2])
+    c, s = math.cos(turn), math.sin(turn)
+    return -(c * x + s * y), s * x - c * y, -turn
+
+
+def described(found: TaskMap, around: Surroundings) -> str:
+    """Return one line on a task map."""
+    poses = found.base_poses
+    best, (left, _) = found.best(), around.best(found)
+    front = poses[np.abs(poses[:, 2]) < 0.01]
+    apart = [
+        math.hypot(left.x - base_of(other)[0], left.y - base_of(other)[1])
+        for other in (HIGH, EXPERT)
+    ]
+    ranks = " ".join(quantile(poses, base_of(other), found) for other in (HIGH, EXPERT, LOW))
+    yaw_0 = f"{front[:, 4].max():.3f}" if len(front) else "none"
+    return (
+        f"{len(poses):>5} | {placed(best)} | {placed(left)}, {apart[0]:.2f} {apart[1]:.2f} | "
+        f"{ranks} | {yaw_0} | {placed(found.worst())}"
+    )
+
+
+def placed(base: BasePose) -> str:
+    """Return a base pose and its score, briefly."""
+    yaw = math.degrees(base.yaw)
+    return f"{base.x:5.2f} {base.y:5.2f} {yaw:6.1f} {base.score:.3f}"
+
+
+def quantile(poses: np.ndarray, base: tuple[float, float, float], found: TaskMap) -> str:
+    """Return the share of base poses that score less than the cell nearest to one."""
+    step, turn = found.grid.step, found.grid.turn
+    near = (np.abs(poses[:, 0] - base[0]) <= step / 2 + 1e-9) & (
+        np.abs(poses[:, 1] - base[1]) <= step / 2 + 1e-9
+    )
+    gap = (poses[:, 2] - base[2] + math.pi) % (2 * math.pi) - math.pi
+    rows = np.flatnonzero(near & (np.abs(gap) <= turn / 2 + 1e-9))
+    if not len(rows):
+        return "----"
+    return f"{(poses[:, 4] < poses[rows[0], 4]).mean():.2f}"
+
+
+def spread_ms(seconds: list[float]) -> str:
+    """Return a spread in milliseconds."""
+    return spread(seconds, "ms", 1e3)
+
+
+if __name__ == "__main__":
+    main()
