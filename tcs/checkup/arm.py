@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,8 +13,9 @@ from pydrake.math import RigidTransform
 from tcs.errors import ArmClassError
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.ik import lane_joints, wrist_goal
+from tcs.kernel.numeric_solutions import numeric_solutions
 from tcs.kernel.solver import FIRST, ArmSolver, arm_solver
-from tcs.scene import Scene
+from tcs.scene import Scene, arm_chain
 
 RECOVERED = 1e-4
 """A posture counts as found again when every joint agrees to this [rad]. Figures of a URDF let axes
@@ -59,24 +61,30 @@ class RoundTrip:
     """Random postures, brought to a tool pose by Drake and back by the kernel.
 
     Attributes:
+        method: "closed form", which has to give every posture back, or "numeric", which looks for
+            any posture with the same tool pose, and may fail.
         samples: How many postures were drawn, uniformly within the limits.
-        recovered: How many of them are among the kernel's solutions.
+        recovered: How many of them are among the kernel's solutions; numeric: for how many there
+            is a solution at all.
         solutions: How many solutions the kernel gave in all.
-        joint_error: The worst joint of the recovered postures [rad].
+        joint_error: The worst joint of the recovered postures [rad]; None where solutions are
+            other postures.
         position_error: How far the worst solution's tool is off its goal [m].
         rotation_error: The same for its orientation [rad].
     """
 
+    method: Literal["closed form", "numeric"]
     samples: int
     recovered: int
     solutions: int
-    joint_error: float
+    joint_error: float | None
     position_error: float
     rotation_error: float
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain containers."""
         return {
+            "method": self.method,
             "samples": self.samples,
             "recovered": self.recovered,
             "success_rate": self.recovered / self.samples,
@@ -97,18 +105,21 @@ def arm_class(chain: Chain) -> ArmClass:
     return ArmClass("closed form" if solver.free == FIRST else "reversed", "", distances, solver)
 
 
-def round_trip(scene: Scene, solver: ArmSolver, samples: int, seed: int) -> RoundTrip:
+def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) -> RoundTrip:
     """Return what becomes of random postures on the way to their tool pose and back.
 
-    Drake says where the tool is; the kernel solves for that pose with the free joint where it was
-    drawn, on every branch; Drake says where each solution puts the tool.
+    Drake says where the tool is; the kernel solves for that pose, in closed form with the free
+    joint where it was drawn, on every branch; Drake says where each solution puts the tool.
 
     Args:
         scene: The robot, anywhere; its state is changed.
-        solver: The arm's closed form.
+        solver: The arm's closed form; None has the arm solved numerically.
         samples: Number of postures.
         seed: Seed of the draws.
     """
+    # The chain is read off the scene with the arm at zero.
+    scene.set_arm(np.zeros(len(scene.arm_limits[0])))
+    chain, _ = arm_chain(scene)
     lower, upper = scene.arm_limits
     first, last = (np.where(np.isfinite(x), x, s * np.pi) for x, s in ((lower, -1), (upper, 1)))
     recovered = solutions = 0
@@ -116,7 +127,7 @@ def round_trip(scene: Scene, solver: ArmSolver, samples: int, seed: int) -> Roun
     for drawn in np.random.default_rng(seed).uniform(first, last, size=(samples, len(first))):
         X_AG = _tool_in_arm_base(scene, drawn)
         closest = np.inf
-        for q in _branches(solver, X_AG, float(drawn[solver.free])):
+        for q in _solved(chain, solver, X_AG, drawn):
             X_GT = X_AG.inverse() @ _tool_in_arm_base(scene, q)
             off = float(np.linalg.norm(X_GT.translation()))
             turned = abs(float(X_GT.rotation().ToAngleAxis().angle()))
@@ -127,10 +138,28 @@ def round_trip(scene: Scene, solver: ArmSolver, samples: int, seed: int) -> Roun
             rotation_error = max(rotation_error, turned)
             apart = (q - drawn + np.pi) % (2 * np.pi) - np.pi
             closest = min(closest, float(np.abs(apart).max()))
-        if closest <= RECOVERED:
+        # Any solution will do where the posture itself is one of a continuum.
+        if closest <= (np.pi if solver is None else RECOVERED):
             recovered += 1
             joint_error = max(joint_error, closest)
-    return RoundTrip(samples, recovered, solutions, joint_error, position_error, rotation_error)
+    return RoundTrip(
+        method="numeric" if solver is None else "closed form",
+        samples=samples,
+        recovered=recovered,
+        solutions=solutions,
+        joint_error=None if solver is None else joint_error,
+        position_error=position_error,
+        rotation_error=rotation_error,
+    )
+
+
+def _solved(
+    chain: Chain, solver: ArmSolver | None, X_AG: RigidTransform, drawn: FloatArray
+) -> Iterable[FloatArray]:
+    """Return the kernel's solutions for a tool pose [rad], each of shape (7,)."""
+    if solver is None:
+        return numeric_solutions(chain, X_AG.rotation().matrix(), X_AG.translation())
+    return _branches(solver, X_AG, float(drawn[solver.free]))
 
 
 def _branches(solver: ArmSolver, X_AG: RigidTransform, free: float) -> list[FloatArray]:

@@ -20,6 +20,9 @@ MOST_EXCESS = 2.0
 """Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
 look: they block goals that the real arm reaches."""
 
+MOST_LOST = 0.05
+"""Share of tool poses that a numeric solver may find nothing for: more would show in the scores."""
+
 SUNK = 0.02
 """Surfaces that reach farther below the floor than this [m] mean that the root does not lie on it;
 models of wheels sink in by millimetres."""
@@ -75,7 +78,7 @@ class RobotCheck:
         margin: Contacts closer than this count [m].
         lowest: Height of the lowest point of any surface above the root, the arm at rest [m].
         contacts: Pairs that scoring checks and that are closer than that at rest.
-        trip: The IK round trip; None for an arm outside the closed-form classes.
+        trip: The IK round trip.
         seed: Seed of the round trip's postures.
     """
 
@@ -87,7 +90,7 @@ class RobotCheck:
     margin: float
     lowest: float
     contacts: tuple[Contact, ...]
-    trip: RoundTrip | None
+    trip: RoundTrip
     seed: int
 
     @property
@@ -104,8 +107,6 @@ class RobotCheck:
     def problems(self) -> tuple[str, ...]:
         """What keeps the robot from being scored, or its scores from being right."""
         found = []
-        if self.arm.solver is None:
-            found.append(self.arm.reason)
         found += [
             f"joint '{joint.name}' cannot move: its limits in force are both {joint.in_force[0]:g}."
             for joint in self.limits
@@ -123,11 +124,16 @@ class RobotCheck:
                 f"its surface reaches {-self.lowest:.3f} m below '{self.robot.root_body}', but the "
                 "root has to lie on the floor: give the URDF a link there that carries the rest."
             )
-        if self.trip is not None and self.trip.recovered < self.trip.samples:
-            lost = self.trip.samples - self.trip.recovered
+        lost = self.trip.samples - self.trip.recovered
+        if lost and self.arm.solver is not None:
             found.append(
                 f"{lost} of {self.trip.samples} random postures are not among the kernel's "
                 "solutions for their own tool pose."
+            )
+        if lost > MOST_LOST * self.trip.samples and self.arm.solver is None:
+            found.append(
+                f"no solution for {lost} of {self.trip.samples} tool poses of random postures: "
+                "what scoring reaches would be too little to go by."
             )
         return tuple(found)
 
@@ -135,6 +141,8 @@ class RobotCheck:
     def notes(self) -> tuple[str, ...]:
         """What is not wrong, but worth knowing."""
         found = []
+        if self.arm.solver is None:
+            found.append(f"{self.arm.reason} So it is solved numerically, which takes longer.")
         bulky = [b for b in self.bodies if b.body in self._moved and b.excess > MOST_EXCESS]
         found += [
             f"the primitives of '{body.body}' take {body.excess:.2f} times the volume of its hull: "
@@ -193,9 +201,7 @@ class RobotCheck:
                     for first, second, distance in self.contacts
                 ],
             },
-            "ik_round_trip": None
-            if self.trip is None
-            else {**self.trip.to_json(), "seed": self.seed},
+            "ik_round_trip": {**self.trip.to_json(), "seed": self.seed},
         }
 
 
@@ -227,7 +233,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         margin=_NOWHERE.contact_margin,
         lowest=_lowest(robot, positions),
         contacts=contacts,
-        trip=None if arm.solver is None else round_trip(scene, arm.solver, samples, seed),
+        trip=round_trip(scene, arm.solver, samples, seed),
         seed=seed,
     )
 

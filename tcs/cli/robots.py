@@ -87,7 +87,9 @@ def _report_check(found: dict[str, Any]) -> None:
     arm, trip, touch = found["arm_class"], found["ik_round_trip"], found["self_collision"]
     echo = typer.echo
     echo(f"robot            {found['robot']}")
-    echo(f"arm class        {arm['class'] or 'outside the closed-form classes'}")
+    echo(
+        f"arm class        {arm['class'] or 'outside the closed-form classes, solved numerically'}"
+    )
     distances = ", ".join(
         f"{axes} {'parallel' if metres is None else f'{metres * 1e3:.3g} mm'}"
         for axes, metres in arm["metres_from_meeting"].items()
@@ -104,12 +106,13 @@ def _report_check(found: dict[str, Any]) -> None:
     for body, excess in largest[:5]:
         echo(f"  {body:<28} {excess:.2f}")
     echo(f"self-collision   {len(touch['pairs'])} pairs closer than {touch['margin_m'] * 1e3:g} mm")
-    if trip is not None:
-        echo(
-            f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} postures found again, "
-            f"joints to {trip['max_joint_error_rad']:.1e} rad, "
-            f"tool to {trip['max_position_error_m']:.1e} m"
-        )
+    found_again = "poses reached again" if arm["class"] is None else "postures found again"
+    joints = trip["max_joint_error_rad"]
+    echo(
+        f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} {found_again}, "
+        + ("" if joints is None else f"joints to {joints:.1e} rad, ")
+        + f"tool to {trip['max_position_error_m']:.1e} m"
+    )
     for kind in ("problems", "notes"):
         for line in found[kind]:
             echo(f"{kind[:-1]:<16} {line}")

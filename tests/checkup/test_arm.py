@@ -1,8 +1,11 @@
 """Arm classes with their distances, and a round trip that can fail."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tcs.checkup import check_up
 from tcs.checkup.arm import arm_class, round_trip
 from tcs.checkup.report import _NOWHERE
 from tcs.kernel.arrays import Chain
@@ -55,3 +58,27 @@ def test_a_wrong_solver_is_found_out(pr2):
     p[7] += [0.0, 0.0, 0.001]
     longer = arm_class(chain._replace(p=p)).solver
     assert round_trip(scene, longer, 20, seed=0).recovered == 0
+
+
+def test_a_numeric_solver_that_finds_too_little_is_a_problem(pr2):
+    found = check_up(pr2, samples=1)
+    outside = replace(found.arm, name=None, solver=None, reason="Axes pass each other.")
+    nothing = replace(found.trip, method="numeric", samples=100, recovered=94, joint_error=None)
+    broken = replace(found, arm=outside, trip=nothing)
+    assert broken.problems == (
+        "no solution for 6 of 100 tool poses of random postures: what scoring reaches would be too "
+        "little to go by.",
+    )
+    assert replace(broken, trip=replace(nothing, recovered=95)).problems == ()
+    assert "solved numerically" in broken.notes[0]
+
+
+def test_a_closed_arm_is_solved_numerically_too(pr2):
+    """Without its closed form, Drake still has to confirm what comes back."""
+    scene = Scene(SceneSpec(pr2, _NOWHERE))
+    trip = round_trip(scene, None, 20, seed=0)
+    assert (trip.method, trip.joint_error) == ("numeric", None)
+    # Of 200 poses it found 200; one of 20 may be lost to chance.
+    assert trip.recovered >= 19
+    assert trip.solutions > trip.recovered
+    assert trip.position_error < 1e-8
