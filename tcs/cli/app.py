@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import capability, reports, robots, robustness, talk
+from tcs.cli import capability, reports, robots, robustness, talk, view
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -395,6 +395,6 @@ def export(
     )
 
 
-app.command()(robustness.evaluate)
-app.command()(robustness.robustify)
+for command in (robustness.evaluate, robustness.robustify, view.view):
+    app.command()(command)
 app.command("map-check")(capability.map_check)

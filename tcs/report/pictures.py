@@ -113,14 +113,14 @@ def map_figure(file: ScoreFile, shown: Shown) -> Figure:
         StoreMismatchError: If the models are not those the file was made from.
     """
     job, scene = _stage(file, shown)
-    base = _base_outline(scene)
+    base = base_outline(scene)
     _set_room(scene, shown.members)
     return draw_map(
         PlaceMap.of(file.tables[shown.table].scores, job.grid),
-        _room(scene, job),
+        _room(scene),
         [Stand(member, base) for member in shown.members],
         here=Stand(shown.here, base) if shown.here is not None else None,
-        title=_title(job),
+        title=title_of(job),
         subtitle=shown.subtitle,
         measure=file.metadata["measure"],
     )
@@ -140,7 +140,7 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
         )
     job, scene = _stage(file, shown)
     views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
-    return draw_scene(views, title=f"{_title(job)}\n{shown.subtitle}")
+    return draw_scene(views, title=f"{title_of(job)}\n{shown.subtitle}")
 
 
 def _stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
@@ -151,7 +151,8 @@ def _stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
     return job, scene
 
 
-def _title(job: Job) -> str:
+def title_of(job: Job) -> str:
+    """Return task, environment and robot, for a person."""
     return f"{job.task.title} · {job.spec.environment.title} · {job.spec.robot.title}"
 
 
@@ -174,7 +175,7 @@ def _view(file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int) ->
     joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)
-    solids = [*_robot(scene), *_room(scene, job), *_goals(scene, job, current)]
+    solids = [*_robot(scene), *_room(scene), *_goals(scene, job, current)]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
     base = np.array([member.base_x, member.base_y, 0.0])
     # Across the line from robot to person, from both sides: neither stands before the other.
@@ -196,18 +197,26 @@ def _robot(scene: Scene) -> list[Solid]:
     ]
 
 
-def _room(scene: Scene, job: Job) -> list[Solid]:
-    """Return furniture, person and obstacles; whatever carries a body frame is the person."""
-    frames = job.spec.environment.body_frames.values()
+def _room(scene: Scene) -> list[Solid]:
+    """Return furniture, person and obstacles."""
+    return [_solid(scene, part, kind) for part, kind in room_parts(scene)]
+
+
+def room_parts(scene: Scene) -> list[tuple[Part, Kind]]:
+    """Return every shape of the room but the floor, and what it is of.
+
+    Whatever carries a body frame is the person.
+    """
+    frames = scene.spec.environment.body_frames.values()
     people = {link.split("::", maxsplit=1)[0] for link in frames}
     plant = scene.built.plant
-    solids = []
+    found = []
     for part in scene.built.parts:
         if part.group is Group.ROOM and part.name != FLOOR:
             instance = plant.get_body(part.body).model_instance()
             is_person = plant.GetModelInstanceName(instance) in people
-            solids.append(_solid(scene, part, Kind.PERSON if is_person else Kind.FURNITURE))
-    return solids
+            found.append((part, Kind.PERSON if is_person else Kind.FURNITURE))
+    return found
 
 
 def _goals(scene: Scene, job: Job, current: int | None) -> list[Solid]:
@@ -227,8 +236,11 @@ def _solid(scene: Scene, part: Part, kind: Kind) -> Solid:
     return Solid.placed(kind, corners, X_WP.rotation().matrix(), X_WP.translation())
 
 
-def _base_outline(scene: Scene) -> FloatArray:
-    """Return the outline of what stands on the floor, in the base's frame [m], shape (n, 2)."""
+def base_outline(scene: Scene) -> FloatArray:
+    """Return the outline of what stands on the floor, in the base's frame [m], shape (n, 2).
+
+    The base of the scene is left at the origin.
+    """
     scene.place_base(0.0, 0.0, 0.0)
     plant, standing = scene.built.plant, scene.spec.robot.standing_bodies
     body = [part for part in scene.built.parts if part.group is Group.BODY]

@@ -54,9 +54,13 @@ class Job:
         """How many observed states there are."""
         return math.prod(axis.count for axis in self.observed)
 
-    def scene(self) -> Scene:
-        """Return a new live scene in which this task's allowed contacts are allowed."""
-        return Scene(self.spec, allowed_contacts=self.task.allowed_contacts)
+    def scene(self, *, meshes: bool = False) -> Scene:
+        """Return a new live scene in which this task's allowed contacts are allowed.
+
+        Args:
+            meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
+        """
+        return Scene(self.spec, allowed_contacts=self.task.allowed_contacts, meshes=meshes)
 
     def lowered(self, scene: Scene) -> LoweredScene:
         """Return the scene as arrays."""

@@ -1,0 +1,89 @@
+"""What `tcs view` does: a score file becomes a scene in the browser."""
+
+from __future__ import annotations
+
+import time
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+import tcs
+from tcs.cli import talk
+from tcs.cli.places import observed_settings
+from tcs.report.pictures import Shown, title_of
+from tcs.scoring import reopen
+from tcs.tables import InitialConfiguration
+from tcs.view import Answers, Props, Viewer, legend, open_meshcat
+
+
+@dataclass(frozen=True, eq=False)
+class Staged:
+    """A score file, ready to be shown."""
+
+    answers: Answers
+    props: Props
+    title: str
+    """Task, environment, robot."""
+    subtitle: str
+    """The set, and its scores."""
+    source: str
+    """Where the robot's models come from, and under which licence."""
+
+
+def stage(
+    path: Path,
+    here: InitialConfiguration | None,
+    max_members: int | None,
+    observed: Sequence[str],
+    *,
+    meshes: bool,
+) -> Staged:
+    """Return what a score file answers, and the scene to show it in.
+
+    Args:
+        path: The score file.
+        here: Where the robot is now, if that matters to the choice of the set.
+        max_members: Most members of the set.
+        observed: How the person is found: "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
+        meshes: Whether the robot is shown as its meshes.
+
+    Raises:
+        StoreError: If the file cannot be used, or the models are not those it was made from.
+        SelectionError: If no such set can be chosen.
+    """
+    file = tcs.load(path)
+    shown = Shown.of(file, here, max_members, observed_settings(observed, file.observed_axes))
+    job, scene, _ = reopen(file, meshes=meshes)
+    for name, value in file.observed_states[shown.table].items():
+        scene.set_joint(name, value)
+    answers = Answers.of(file, shown.table, shown.indices)
+    return Staged(
+        answers,
+        Props(scene, job.task, answers, meshes=meshes),
+        title_of(job),
+        shown.subtitle,
+        job.spec.robot.source,
+    )
+
+
+def show_live(staged: Staged, *, port: int | None, browser: bool, duration: float | None) -> None:
+    """Open the viewer and answer its controls until Ctrl-C, or for `duration` [s].
+
+    Raises:
+        OutputError: If it cannot listen at that port.
+    """
+    begun = time.perf_counter()
+    meshcat = open_meshcat(port)
+    typer.echo(f"{staged.title}; {staged.subtitle}")
+    typer.echo(f"arrows: {legend()}")
+    viewer = Viewer(meshcat, staged.props, staged.answers, typer.echo)
+    talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
+    if browser:
+        webbrowser.open(meshcat.web_url())
+    try:
+        viewer.run(duration)
+    except KeyboardInterrupt:
+        talk.say(f"closed after {time.perf_counter() - begun:.0f} s.")
