@@ -79,7 +79,7 @@ def test_select_for_a_person(tcs_command, small_file):
         pytest.param(("--here", "1", "2"), id="half a place"),
         pytest.param(("--here", "1", "2", "north"), id="no number"),
         pytest.param((*HERE, "--max-members", "4"), id="four members"),
-        pytest.param((*HERE, "--delta", "1"), id="unknown option"),
+        pytest.param((*HERE, "--epsilon", "1"), id="unknown option"),
     ],
 )
 def test_misuse_exits_with_2(tcs_command, small_file, words):
