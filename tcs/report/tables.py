@@ -140,10 +140,10 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
         for gain in row.gains
     ]
     return Table(
-        "The set with the greatest estimated success against the set with the greatest P_R + P_M: "
-        "percentage of goals reached, on the same samples for both, none of which had a part in "
-        "the estimate. Gain: in points, with its interval and the p of the signed rank test. All "
-        "at once: share of the samples in which nothing is lost, before and after.",
+        "The surest set against the set with the greatest P_R + P_M: percentage of goals reached, "
+        "on the same samples for both, none of which had a part in the "
+        "estimate. Gain: in points, with its interval and the p of the signed rank test. All at "
+        "once: share of the samples in which nothing is lost, before and after.",
         columns,
         body,
     )
