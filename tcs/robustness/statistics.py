@@ -50,26 +50,26 @@ def intervals_of(
         samples: Shape (k, n), n >= 1.
 
     Returns:
-        Shapes (k,). The intervals are Student's t, cut to [0, 1]. Where all samples are equal t
-        has no width and would claim certainty: there the interval takes in a share of other
-        samples of up to 1 - 0.025^(1/n), the exact binomial limit for something never seen in n
-        samples.
+        Shapes (k,). The intervals are Student's t of the samples and two more, a 0 and a 1, cut to
+        [0, 1]. Without the two, samples that are all equal would claim certainty, and one failure
+        among a thousand would look surer than none.
+
+    Source:
+        The two added samples: Agresti and Coull, The American Statistician 52 (1998), for shares.
     """
     # Imported where it is needed: much of this room does without.
     from scipy.special import stdtrit
 
     values = samples.astype(np.float64)
-    n = values.shape[1]
-    mean = np.clip(values.mean(axis=1), values.min(axis=1), values.max(axis=1))
-    tail = (1.0 - CONFIDENCE) / 2.0
-    unseen = 1.0 - tail ** (1.0 / n)
-    low, high = mean - unseen * mean, mean + unseen * (1.0 - mean)
-    differ = np.any(values != values[:, :1], axis=1)
-    if np.any(differ):
-        half = float(stdtrit(n - 1, 1.0 - tail)) / math.sqrt(n) * values[differ].std(axis=1, ddof=1)
-        low[differ] = np.maximum(mean[differ] - half, 0.0)
-        high[differ] = np.minimum(mean[differ] + half, 1.0)
-    return mean, low, np.minimum(high, 1.0)
+    k, n = values.shape
+    mean = values.mean(axis=1)
+    more = np.concatenate([values, np.zeros((k, 1)), np.ones((k, 1))], axis=1)
+    half = float(stdtrit(n + 1, (1.0 + CONFIDENCE) / 2.0)) / math.sqrt(n + 2)
+    half = half * more.std(axis=1, ddof=1)
+    middle = more.mean(axis=1)
+    # The two samples move the middle by less than half the width; rounding must not undo that.
+    low = np.clip(middle - half, 0.0, mean)
+    return mean, low, np.maximum(np.minimum(middle + half, 1.0), mean)
 
 
 @dataclass(frozen=True, slots=True)

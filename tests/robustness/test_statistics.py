@@ -15,8 +15,9 @@ def test_mean_std_and_interval_by_hand():
     found = mean_of([0.25, 0.5, 0.5, 0.75])
     assert found.mean == 0.5
     assert found.std == pytest.approx(math.sqrt(0.125 / 3))
-    # Student's t at 97.5 % of 3 degrees of freedom, from a printed table.
-    half = 3.1824 * math.sqrt(0.125 / 3) / 2
+    # With a 0 and a 1: squares about 0.5 add up to 0.125 + 0.5. Student's t at 97.5 % of five
+    # degrees of freedom, from a printed table.
+    half = 2.5706 * math.sqrt(0.625 / 5) / math.sqrt(6)
     assert found.ci95 == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
 
 
@@ -26,13 +27,36 @@ def test_the_interval_stays_within_what_is_possible():
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
 def test_equal_samples_claim_no_certainty(value):
-    low, high = mean_of(np.full(1000, value)).ci95
-    # Something never seen in 1000 samples happens in fewer than 1 - 0.025^(1/1000) of them.
-    unseen = -math.log(0.025) / 1000
-    # The logarithm leaves out a term of second order, unseen^2 / 2.
-    expected = (value - unseen * value, value + unseen * (1.0 - value))
-    assert (low, high) == pytest.approx(expected, abs=unseen**2)
+    found = mean_of(np.full(1000, value))
+    low, high = found.ci95
+    assert found.std == 0.0
+    assert low <= value <= high
+    # Something never seen in n samples happens in fewer than 3.7 / n of them (97.5 %).
+    assert 0.5e-3 < high - low < 3.7e-3
     assert mean_of([value]).std == 0.0
+
+
+@pytest.mark.parametrize("count", [10, 64, 1024])
+def test_a_failure_never_makes_surer(count):
+    ends = []
+    for failures in range(6):
+        samples = np.ones(count)
+        samples[:failures] = 0.5
+        found = mean_of(samples)
+        assert found.ci95[0] <= found.mean <= found.ci95[1]
+        ends.append(found.ci95)
+    assert ends == sorted(ends, reverse=True)
+    assert len({low for low, _ in ends}) == 6
+
+
+@pytest.mark.parametrize("chance", [0.95, 0.99, 0.998])
+def test_the_interval_of_rare_failures_covers_as_often_as_it_says(rng, chance):
+    covered = 0
+    for _ in range(400):
+        low, high = mean_of(rng.binomial(1, chance, 500)).ci95
+        covered += low <= chance <= high
+    # Four standard errors of a share of 0.95 in 400; more often is no fault.
+    assert covered / 400 > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 400)
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says(rng):
