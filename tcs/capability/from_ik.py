@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.capability.grid import CellArray, MapGrid, yaw_rotation
-from tcs.capability.head import head_names, head_view
-from tcs.capability.map import ICM, IHCM, CapabilityMap
+from tcs.capability.head import View, head_names, head_view
+from tcs.capability.map import ICM, IHCM, MAX_LIFTS, CapabilityMap
 from tcs.capability.reach import OnProgress, Reach
-from tcs.capability.visibility import CORRECTED, visibility
-from tcs.errors import GridError
+from tcs.capability.visibility import CORRECTED, VISIBILITIES, visibility
+from tcs.errors import GridError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
 
 MAX_CELLS = 60_000_000
@@ -46,13 +46,15 @@ def map_from_ik(
         on_progress: Called with cells done and in all.
 
     Raises:
-        UnknownNameError: If the robot has no head file and an IHCM is asked for.
-        GridError: If there are far too many cells.
+        UnknownNameError: If the robot has no head file and an IHCM is asked for, or there is no
+            such rule.
+        GridError: If there are far too many cells or lifts.
 
     Source:
         ITCM thesis, Appendix B. There TRAC-IK solves for the cells; here it is the closed form,
         which does not miss solutions at random.
     """
+    seen_from(reach, grid, kind, view_rule)
     radius = reach.length if radius is None else radius
     cells = cells_around(grid, reach.shoulder, radius)
     R_BT, p_BT = grid.tool_in_base(cells)
@@ -90,17 +92,13 @@ def finished_map(
         metadata: What else is to be remembered.
 
     Raises:
-        UnknownNameError: If the robot has no head file and the kind counts visibility.
+        UnknownNameError: If the robot has no head file and the kind counts visibility, or there is
+            no such rule.
+        GridError: If there are more lifts than a map holds.
     """
     order = np.argsort(grid.keys(cells))
-    seen = np.zeros(len(cells))
-    if kind != ICM or reach.robot.name in head_names():
-        seen = visibility(head_view(reach.scene, reach.lift), p_BT, view_rule)
-    if len(reach.lifts) > 32:
-        raise GridError(
-            f"the lift has {len(reach.lifts)} levels of {grid.step:g} m; a map holds 32 at most. "
-            "Take a larger step."
-        )
+    view = seen_from(reach, grid, kind, view_rule)
+    seen = np.zeros(len(cells)) if view is None else visibility(view, p_BT, view_rule)
     return CapabilityMap(
         kind=kind,
         grid=grid,
@@ -123,6 +121,27 @@ def finished_map(
         },
         joints=joints[order].astype(np.float32),
     )
+
+
+def seen_from(reach: Reach, grid: MapGrid, kind: str, view_rule: str) -> View | None:
+    """Return what the robot's camera sees, None for an ICM of a robot without a head file.
+
+    Also refuses what no map can be made of, before the work.
+
+    Raises:
+        UnknownNameError: If there is no such rule, or no head where one is needed.
+        GridError: If there are more lifts than a map holds.
+    """
+    if view_rule not in VISIBILITIES:
+        raise UnknownNameError("visibility", view_rule, VISIBILITIES)
+    if len(reach.lifts) > MAX_LIFTS:
+        raise GridError(
+            f"the lift has {len(reach.lifts)} levels of {grid.step:g} m; a map holds {MAX_LIFTS} "
+            "at most. Take a larger step."
+        )
+    if kind == ICM and reach.robot.name not in head_names():
+        return None
+    return head_view(reach.scene, reach.lift)
 
 
 def manipulability_scale(reach: Reach) -> float:

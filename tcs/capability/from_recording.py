@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tcs.capability.from_ik import finished_map
+from tcs.capability.from_ik import finished_map, seen_from
 from tcs.capability.grid import MapGrid, NearestCells
 from tcs.capability.map import ITCM, CapabilityMap
 from tcs.capability.reach import Reach
@@ -75,13 +75,15 @@ def map_from_recording(
 
     Raises:
         DataFileError: If no sample is left.
-        UnknownNameError: If the robot has no head file.
+        UnknownNameError: If the robot has no head file, or there is no such rule.
+        GridError: If there are more lifts than a map holds.
 
     Source:
         ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). Of the samples in a cell the
         one nearest to its centre counts: both distances, of position and of orientation, are
         stretched to 0 to 1 over all samples and multiplied.
     """
+    seen_from(reach, grid, ITCM, view_rule)
     R_AT, p_AT = reach.tool_poses(recording.joints)
     R_BT = reach.R_BA @ R_AT
     p_BT = p_AT @ reach.R_BA.T + reach.p_BA

@@ -18,6 +18,9 @@ ICM, IHCM, ITCM = "ICM", "IHCM", "ITCM"
 KINDS = (ICM, IHCM, ITCM)
 """From inverse kinematics; the same with visibility; from what was recorded."""
 
+MAX_LIFTS = 32
+"""Lifts are told apart by the bits of one number."""
+
 FIXED, SPREAD = "fixed", "thesis"
 SCALES = (FIXED, SPREAD)
 
@@ -79,7 +82,7 @@ class CapabilityMap:
             values = getattr(self, name)
             if not np.all((values >= 0.0) & (values <= 1.0)):
                 raise StoreError(f"capability map: {name} is not within 0 to 1 everywhere.")
-        if not 1 <= len(self.lifts) <= 32 or self.lift not in self.lifts:
+        if not 1 <= len(self.lifts) <= MAX_LIFTS or self.lift not in self.lifts:
             raise StoreError("capability map: its lift is none of those looked at.")
         if not self.manipulability_scale > 0.0:
             raise StoreError("capability map: the scale of manipulability must be positive.")

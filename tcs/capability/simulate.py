@@ -81,12 +81,13 @@ def simulate(reach: Reach, operator: Operator, *, seed: int = 0) -> Simulated:
         published; this one is resolved-rate control with damped least squares.
     """
     rng = np.random.default_rng(seed)
-    count = round(operator.seconds / PERIOD)
-    if count < 1 or not np.all(np.isfinite([operator.height, operator.scale, *operator.centre])):
+    numbers = (operator.seconds, operator.height, operator.scale, *operator.centre)
+    if not (np.all(np.isfinite(numbers)) and operator.seconds >= PERIOD):
         raise DataFileError(
             f"a recording of {operator.seconds:g} s at {operator.height:g} m: numbers must be "
             f"finite, and the time at least {PERIOD:g} s."
         )
+    count = round(operator.seconds / PERIOD)
     depth, width = (operator.scale * side for side in MASTER_BOX[:2])
     # A path from one end of the box to the other takes some seconds; no hand outruns this many.
     middle = np.array([*operator.centre, np.mean(operator.headings)])

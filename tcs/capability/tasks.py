@@ -20,6 +20,8 @@ from tcs.kernel.arrays import FloatArray
 FRONT_AND_SIDES = (0.0, math.pi / 2, -math.pi / 2)
 """From the front, the right and the left: headings of the thesis's pick-and-place task."""
 ALL_SIDES = (0.0, math.pi / 2, math.pi, -math.pi / 2)
+FARTHEST = 20.0
+"""Farthest that a position may be from the origin along an axis [m]: beyond, it is no metres."""
 _MOST_POSITIONS = 64
 _APPROACHES = {SIDE: (0.0, 0.0), TOP: (math.pi / 2, 0.0)}
 """Pitch and roll of the tool in E [rad]."""
@@ -93,6 +95,10 @@ class GraspTask:
                 numbers = (position.x, position.y, position.height, grasp.heading, *angles)
                 if not np.all(np.isfinite([*numbers, *grasp.pre_grasps])):
                     raise TaskError(f"{where} holds a number that is not finite.")
+            if max(abs(position.x), abs(position.y), abs(position.height)) > FARTHEST:
+                raise TaskError(
+                    f"{where} is more than {FARTHEST:g} m from the task's origin. Write metres."
+                )
 
 
 def linear_task(
@@ -124,15 +130,16 @@ def linear_task(
         name: Of the task.
 
     Raises:
-        TaskError: If the line is shorter than a step, or there are fewer than two samples.
+        TaskError: If the line is shorter than a step or longer than `FARTHEST`, or there are fewer
+            than two samples.
 
     Source:
         ITCM thesis, Appendix A.1 and Figure 16.
     """
-    if not (np.isfinite(length) and length >= step and samples >= 2):
+    if not (step <= length <= FARTHEST and samples >= 2):
         raise TaskError(
             f"task '{name}': a line of {length:g} m with {samples} samples; must be at least one "
-            f"step of {step:g} m and 2 samples."
+            f"step of {step:g} m, at most {FARTHEST:g} m, and have 2 samples."
         )
     steps = round(length / step)
     spacing = max(1, steps // (samples - 1))

@@ -129,6 +129,18 @@ def test_a_lift_out_of_range_is_refused(tiago, lift, words):
         Reach(tiago, lift=lift)
 
 
+def test_what_no_map_can_be_made_of_is_refused_before_the_work(tiago, monkeypatch):
+    def solve(*_arguments, **_options):
+        raise AssertionError
+
+    monkeypatch.setattr(Reach, "solve", solve)
+    fine = Reach(tiago, lift=0.15, step=0.01)
+    with pytest.raises(GridError, match=r"36 levels of 0\.01 m; a map holds 32"):
+        map_from_ik(fine, MapGrid.of(0.01, 16, "side"))
+    with pytest.raises(UnknownNameError, match="unknown visibility 'best'"):
+        map_from_ik(Reach(tiago), MapGrid.of(), view_rule="best")
+
+
 def test_far_too_many_cells_are_refused(reach):
     with pytest.raises(GridError, match="cells"):
         cells_around(MapGrid.of(0.01, 32, "all"), reach.shoulder, 0.9)

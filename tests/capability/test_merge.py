@@ -205,7 +205,7 @@ def test_an_empty_intersection_names_the_best_subset(ihcm):
 
 def test_positions_too_far_apart_to_share_a_box(ihcm):
     with pytest.raises(SelectionError, match=r"best subset: 1 of 2"):
-        merge(ihcm, linear_task(30.0, 2, 0.65, step=0.1))
+        merge(ihcm, linear_task(15.0, 2, 0.65, step=0.1))
 
 
 def test_a_height_nothing_reaches(ihcm):

@@ -87,6 +87,7 @@ def test_its_map_holds_only_what_inverse_kinematics_reaches(reach, minute):
     [
         (Operator(centre=(9.0, 0.0)), "cannot start: no place in the box"),
         (Operator(seconds=0.0), "at least 0.02 s"),
+        (Operator(seconds=math.nan), "finite"),
         (Operator(height=math.nan), "finite"),
     ],
 )

@@ -101,6 +101,8 @@ def test_grasps_point_where_they_say():
         (lambda: linear_task(0.01, 2, 0.8), "at least one step"),
         (lambda: linear_task(0.5, 1, 0.8), "2 samples"),
         (lambda: linear_task(math.nan, 2, 0.8), "at least one step"),
+        (lambda: linear_task(500.0, 2, 0.8), "at most 20 m"),
+        (lambda: linear_task(0.5, 2, 80.0), "Write metres"),
         (lambda: linear_task(0.5, 2, math.inf), "not finite"),
         (lambda: linear_task(0.5, 2, 0.8, headings=()), "no grasp"),
         (lambda: curved_task(0.01, 0, 1, 3, 0.8), "radius"),
