@@ -36,6 +36,14 @@ _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
 """Of meshes that the URDF gives no colour."""
 _MAP_HEIGHT, _LINE_HEIGHT = 0.004, 0.008
 """Above the floor [m], one above the other, so that none flickers through the next."""
+_LIGHTS = {
+    "SpotLight": 0.0,
+    "PointLightNegativeX": 6.0,
+    "PointLightPositiveX": 6.0,
+    "AmbientLight": 0.9,
+    "FillLight": 0.4,
+}
+"""Strengths of Meshcat's lights: under its own ones the colours of the map fade to white."""
 _CAMERA = np.array([1.9, -1.9, 1.3])
 """From the middle of the goals [m]: all of a bed and a robot fits into the picture."""
 
@@ -110,6 +118,8 @@ class Props:
         """
         meshcat.SetProperty("/Grid", "visible", False)
         meshcat.SetProperty("/Axes", "visible", False)
+        for light, strength in _LIGHTS.items():
+            meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", strength)
         meshcat.SetObject("ground", Box(6.0, 6.0, 0.01), Rgba(0.93, 0.93, 0.91, 1.0))
         meshcat.SetTransform("ground", RigidTransform([0.0, 0.0, -0.006]))
         for root, shapes in ((ROBOT, self._robot), (ROOM, self._room)):
