@@ -16,7 +16,7 @@ DATA_PARTS = ("models", "tasks")
 
 # Distributions whose module is called otherwise; one that is found by its files alone, and one
 # that trimesh imports for us.
-MODULE_OF = {"drake": "pydrake", "pyyaml": "yaml"}
+MODULE_OF = {"drake": "pydrake", "pillow": "PIL", "pyyaml": "yaml"}
 WITHOUT_MODULE = {"example-robot-data", "pycollada"}
 
 
