@@ -18,6 +18,8 @@ from tcs.writing import whole_file
 _SHADES = 16
 """Meshcat takes lines of one colour at a time."""
 _ABOVE_FLOOR = 0.005
+_EYE = np.array([-1.3, -1.3, 1.5])
+"""From the middle of what there is to the eye, when the page opens [m]."""
 _GREY = Rgba(0.92, 0.92, 0.9, 1.0)
 _PURPLE = Rgba(0.48, 0.25, 0.63, 1.0)
 
@@ -48,6 +50,9 @@ def write_page(
     log.setLevel(logging.WARNING)
     meshcat = Meshcat()
     log.setLevel(level)
+    meshcat.SetProperty("/Grid", "visible", False)
+    middle = np.append(0.5 * (poses[:, :2].min(axis=0) + poses[:, :2].max(axis=0)), 0.2)
+    meshcat.SetCameraPose(middle + _EYE, middle)
     meshcat.SetObject("floor", Box(6.0, 6.0, 0.01), _GREY)
     meshcat.SetTransform("floor", RigidTransform([0.0, 0.0, -0.01]))
     start = np.column_stack([poses[:, :2], np.full(len(poses), _ABOVE_FLOOR)])
