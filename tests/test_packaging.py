@@ -90,7 +90,7 @@ def test_wheel_carries_every_data_file_and_module(wheel):
     assert data_files()
     assert {f"tcs/_data/{name}" for name in data_files()} <= names
     modules = {str(path.relative_to(CHECKOUT)) for path in (CHECKOUT / "tcs").rglob("*.py")}
-    assert modules | {"tcs/py.typed"} <= names
+    assert modules | {"tcs/py.typed", "tcs/report/page.css", "tcs/report/paper.yaml"} <= names
 
 
 def test_wheel_carries_nothing_else(wheel):
