@@ -29,7 +29,7 @@ from tcs.kernel.numeric_arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures
 from tcs.kernel.problem import Problem
 
 TURN = 2.0 * np.pi
-MOST_POINTS, MOST_CURVES, MOST_CANDIDATES = 1024, 64, 4096
+MOST_POINTS, MOST_CURVES, MOST_CANDIDATES = 4096, 64, 16_384
 STRIDE = 0.2
 """Longest stride along a curve [rad, as a norm of the joints]."""
 BEYOND = 0.6
