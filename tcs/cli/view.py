@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from tcs.cli import talk
+
 
 def view(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")],
@@ -34,6 +36,21 @@ def view(
             help="How the person is found, e.g. person_y=0.03 (m; AXIS_deg=VALUE for angles).",
         ),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PAGE",
+            help="Write one self-contained .html page that plays through the set, and end.",
+        ),
+    ] = None,
+    meshes: Annotated[
+        bool,
+        typer.Option(
+            "--meshes",
+            help="With --export: the robot's meshes in place of its collision shapes; mind their "
+            "licence, which is told.",
+        ),
+    ] = False,
     port: Annotated[
         int | None,
         typer.Option(
@@ -48,11 +65,26 @@ def view(
         float | None,
         typer.Option(min=0.0, help="Close after so many seconds.", show_default="at Ctrl-C"),
     ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --export: print one JSON object.")
+    ] = False,
 ) -> None:
     """Look at it in the browser: step through set and goals, or stand elsewhere."""
+    if export is None and (meshes or as_json):
+        raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
+
+    from tcs.cli.places import check_writable, place
+
+    if export is not None:
+        check_writable(export)
+
     from tcs.cli import view_work as work
-    from tcs.cli.places import place
 
     chosen_from = place(here, torso) if here else None
-    staged = work.stage(file, chosen_from, max_members, observed or (), meshes=True)
+    as_meshes = meshes or export is None
+    staged = work.stage(file, chosen_from, max_members, observed or (), meshes=as_meshes)
+    if export is not None:
+        result = work.export(staged, export, meshes=meshes)
+        talk.print_result(result, work.report_page, as_json=as_json)
+        return
     work.show_live(staged, port=port, browser=browser, duration=duration)

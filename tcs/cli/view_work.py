@@ -7,6 +7,7 @@ import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -16,7 +17,8 @@ from tcs.cli.places import observed_settings
 from tcs.report.pictures import Shown, title_of
 from tcs.scoring import reopen
 from tcs.tables import InitialConfiguration
-from tcs.view import Answers, Props, Viewer, legend, open_meshcat
+from tcs.view import Answers, Props, Viewer, legend, open_meshcat, page
+from tcs.writing import whole_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,48 @@ def stage(
         shown.subtitle,
         job.spec.robot.source,
     )
+
+
+def export(staged: Staged, path: Path, *, meshes: bool) -> dict[str, Any]:
+    """Write the scene as one page and return what was written.
+
+    Args:
+        staged: The scene, built with the robot's meshes or without.
+        path: The page to write.
+        meshes: Whether it was built with them; the page then says whose they are.
+
+    Raises:
+        OutputError: If it cannot be written there.
+    """
+    notes = [staged.subtitle]
+    if meshes:
+        notes.append(
+            f"This page holds copies of the robot's meshes. Its robot file: {staged.source}"
+        )
+    text = page(
+        open_meshcat(), staged.props, staged.answers, title=staged.title, notes=notes
+    ).encode()
+    with whole_file(path, "Page") as stream:
+        stream.write(text)
+    return {
+        "file": str(path),
+        "bytes": len(text),
+        "meshes": meshes,
+        "members": [
+            staged.answers.grid.configuration(index).to_json() for index in staged.answers.members
+        ],
+        "source": staged.source if meshes else None,
+    }
+
+
+def report_page(result: dict[str, Any]) -> None:
+    """Print what was written, and whose meshes went into it."""
+    typer.echo(f"wrote {result['file']}: {result['bytes'] / 1e6:.1f} MB")
+    if result["meshes"]:
+        typer.echo(
+            "It holds copies of the robot's meshes; mind their licence when you pass it on. Its "
+            f"robot file: {result['source']}"
+        )
 
 
 def show_live(staged: Staged, *, port: int | None, browser: bool, duration: float | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tcs.view.answers import Answers, Verdict, legend
 from tcs.view.controls import Controls, Slider, State
+from tcs.view.export import Step, page, script
 from tcs.view.floor import Floor, floor_of
 from tcs.view.live import Viewer, open_meshcat
 from tcs.view.props import Props
@@ -15,9 +16,12 @@ __all__ = [
     "Props",
     "Slider",
     "State",
+    "Step",
     "Verdict",
     "Viewer",
     "floor_of",
     "legend",
     "open_meshcat",
+    "page",
+    "script",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -62,13 +63,17 @@ class Verdict:
         Args:
             goal: The goal that is shown: it is told first.
         """
-        first = f"goal {goal} {self._said(goal)}"
+        return f"goal {goal} {self._said(goal)}; {self.summary}"
+
+    @property
+    def summary(self) -> str:
+        """What is reached, the scores, and why the rest is not reached."""
         scores = (
             f"{len(self.reached)} of {len(self.reasons)} goals, "
             f"P_R {self.reachability:.0%}, P_M {self.manipulability:.3f}"
         )
         rest = self._missed()
-        return f"{first}; {scores}{'; ' if rest else ''}{rest}"
+        return f"{scores}{'; ' if rest else ''}{rest}"
 
     def _said(self, goal: int) -> str:
         reason, pair = self.reasons[goal], self.pairs[goal]
@@ -83,7 +88,7 @@ class Verdict:
         for g, reason in enumerate(self.reasons):
             if reason != Reason.REACHED:
                 found.setdefault(reason, []).append(g)
-        return "; ".join(f"{_words(reason)}: {_listed(found[reason])}" for reason in sorted(found))
+        return "; ".join(f"{_words(reason)}: {listed(found[reason])}" for reason in sorted(found))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +139,10 @@ class Answers:
         """Return the stored arm joints [rad] at a goal, shape (7,); None where not reached."""
         return self.scores.joints_of(index, goal)
 
+    def environment_state(self, index: int) -> int:
+        """Return the number of a configuration's environment state, in C order over its axes."""
+        return index // (self.grid.size // math.prod(self.grid.environment_shape))
+
     def served(self, number: int) -> tuple[int, ...]:
         """Return the goals that a member of the set serves better than the others do.
 
@@ -159,5 +168,6 @@ def _words(reason: Reason) -> str:
     return reason.name.lower().replace("_", " ")
 
 
-def _listed(goals: Iterable[int]) -> str:
+def listed(goals: Iterable[int]) -> str:
+    """Return numbers of goals, one after the other."""
     return " ".join(str(goal) for goal in goals)

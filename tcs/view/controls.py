@@ -158,10 +158,7 @@ class Controls:
 
     def environment_state(self, state: State) -> int:
         """Return the number of the environment's state, in C order over its axes."""
-        number = 0
-        for count, along in zip(self._answers.grid.environment_shape, state.along, strict=False):
-            number = number * count + along
-        return number
+        return self._answers.environment_state(self.index(state))
 
     def heading(self, state: State) -> str:
         """Return where the configuration comes from, as words."""

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Meshcat, Rgba, Role, Shape, Sphere
+from pydrake.geometry import Box, Mesh, Meshcat, Rgba, Role, Shape, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
 from tcs.draw import Kind, Stand
 from tcs.report.pictures import base_outline, room_parts
+from tcs.robots.meshes import mesh_triangles
 from tcs.scene import Scene, goal_poses
 from tcs.scene.contacts import Group
 from tcs.tables import Reason
@@ -109,12 +111,14 @@ class Props:
             frozenset(enumerate(verdict.reasons)),
         )
 
-    def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow]) -> None:
+    def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
         """Give Meshcat everything there is, nothing placed yet.
 
         Args:
             meshcat: An empty one.
             arrows: The arrows that will be seen at some time; all are hidden.
+            compact: Whether meshes are handed over as bare triangles, which take a fifth of the
+                room of their files, but seconds to read.
         """
         meshcat.SetProperty("/Grid", "visible", False)
         meshcat.SetProperty("/Axes", "visible", False)
@@ -125,7 +129,11 @@ class Props:
         for root, shapes in ((ROBOT, self._robot), (ROOM, self._room)):
             for number, one in enumerate(shapes):
                 path = f"{root}/{int(one.body)}/{number}"
-                meshcat.SetObject(path, one.shape, one.colour)
+                if compact and isinstance(one.shape, Mesh):
+                    corners, faces = _triangles(one.shape)
+                    meshcat.SetTriangleMesh(path, corners, faces, one.colour)
+                else:
+                    meshcat.SetObject(path, one.shape, one.colour)
                 meshcat.SetTransform(path, one.X_LS)
         corners, faces = _arrow()
         for goal, reason in arrows:
@@ -156,10 +164,10 @@ def arrow_path(arrow: Arrow) -> str:
     return f"{GOALS}/{goal}/{reason.name.lower()}"
 
 
-def draw_floor(meshcat: Meshcat, floor: Floor) -> None:
-    """Lay a score map on the floor in place of an older one."""
+def draw_floor(meshcat: Meshcat, floor: Floor, path: str = FLOOR) -> None:
+    """Lay a score map on the floor, in place of an older one at that path."""
     if not len(floor.places):
-        meshcat.Delete(FLOOR)
+        meshcat.Delete(path)
         return
     signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     flat = floor.places[:, None] + signs * np.array(floor.half)
@@ -171,7 +179,7 @@ def draw_floor(meshcat: Meshcat, floor: Floor) -> None:
     )
     colours = np.repeat(floor.colours, 4, axis=0)
     meshcat.SetTriangleColorMesh(
-        FLOOR, np.asfortranarray(corners.T), np.asfortranarray(faces.T),
+        path, np.asfortranarray(corners.T), np.asfortranarray(faces.T),
         np.asfortranarray(colours.T),
     )  # fmt: skip
 
@@ -232,6 +240,17 @@ def _resting_arm(scene: Scene) -> FloatArray:
     told = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
     lower, upper = scene.arm_limits
     return np.asarray(np.clip(told, lower, upper))
+
+
+def _triangles(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return corners [m], shape (3, n), and triangles, shape (3, m), of a mesh."""
+    found = mesh_triangles(Path(mesh.source().path()))
+    # Files repeat a corner for each of its triangles; Meshcat keeps it in single precision.
+    single = found.reshape(-1, 3).astype(np.float32)
+    corners, at = np.unique(single, axis=0, return_inverse=True)
+    scaled = corners.astype(np.float64) * mesh.scale3()
+    faces = at.reshape(-1, 3).astype(np.int32)
+    return np.asfortranarray(scaled.T), np.asfortranarray(faces.T)
 
 
 def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:
