@@ -32,13 +32,6 @@ def test_json_holds_what_is_promised(found):
 
 def test_every_posture_comes_back(found):
     assert found.trip.recovered == found.trip.samples == 200
-    assert found.trip.position_error < 1e-8
-    if found.trip.method == "numeric":
-        # Other postures with the same tool pose, off by what Newton's method leaves.
-        assert found.arm.name is None
-        assert found.trip.joint_error is None
-        assert found.trip.solutions >= 200
-        return
     # One solution at least, the posture itself; eight at most, two for each of three choices.
     assert 200 <= found.trip.solutions <= 1600
     # Measured 1e-12 to 1e-8, the worst next to a singularity.
