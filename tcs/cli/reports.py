@@ -169,6 +169,9 @@ def report_choice(result: Mapping[str, Any]) -> None:
 def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
     """Print what re-checking found."""
     low, high = found["recall_ci95"]
+    recall = f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"
+    if not found["dense_checked"]:
+        recall = "not estimated: no unreached pair was scanned"
     rows = (
         ("reached pairs re-checked with Drake", f"{found['checked']:,}"),
         ("  of them false", f"{found['false_reached']:,}"),
@@ -179,7 +182,7 @@ def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
         (f"unreached pairs scanned densely ({_DENSE[found['ik']]})", f"{found['dense_checked']:,}"),
         ("  of them reachable after all", f"{found['missed']:,}"),
         ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
-        ("recall", f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"),
+        ("recall", recall),
         (f"mean {found['measure']} left behind", f"{found['mean_shortfall']:.1e}"),
         ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
     )

@@ -28,7 +28,7 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"folder '{folder}' cannot be made: {error.strerror}. Name a folder with --out."
+            f"folder '{folder}' cannot be made: {error.strerror}. Name another one."
         ) from error
 
 

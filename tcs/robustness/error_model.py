@@ -124,7 +124,7 @@ def check_draws(samples: int, seed: int) -> None:
     Raises:
         TcsError: If one is out of range.
     """
-    if not 1 <= samples <= MAX_SAMPLES:
-        raise TcsError(f"samples is {samples}; must be 1 to {MAX_SAMPLES:,}.")
-    if not 0 <= seed <= MAX_SEED:
+    if samples % 1 or not 1 <= samples <= MAX_SAMPLES:
+        raise TcsError(f"samples is {samples}; must be a whole number, 1 to {MAX_SAMPLES:,}.")
+    if seed % 1 or not 0 <= seed <= MAX_SEED:
         raise TcsError(f"seed is {seed}; must be a whole number from 0 to {MAX_SEED}.")

@@ -97,7 +97,7 @@ class Evaluation:
             "observed": dict(self.observed),
             "reachability": round(self.reachability, 12),
             "manipulability": round(self.manipulability, 12),
-            "mean": self.summary.mean,
+            "mean": round(self.summary.mean, 12),
             "std": self.summary.std,
             "ci95": list(self.summary.ci95),
             "per_goal": self.per_goal.tolist(),

@@ -373,6 +373,8 @@ def _tried(
             size = 0
         batches[-1].append(run)
         size += run.stop - run.start
+    if jobs < 1:
+        raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     parallel = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
     for batch, found in zip(
         batches, parallel(delayed(_try)(world, stands, batch) for batch in batches), strict=True

@@ -10,6 +10,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from tcs.errors import TcsError
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
@@ -69,7 +70,10 @@ def sweep(
 
     Raises:
         UnknownNameError: If there is no measure of that name.
+        TcsError: If there is to be no thread.
     """
+    if jobs < 1:
+        raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     problem = build_problem(lowered.arrays, lowered.grid, measure)
     compile_seconds = warm_up(problem, on_compile)
     size, goals = _size(problem), problem.goal_p.shape[1]

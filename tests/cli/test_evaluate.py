@@ -82,7 +82,7 @@ def test_a_misspelt_joint_is_named_with_the_nearest(tcs_command, stored, tmp_pat
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("--samples", 0), 1, "samples is 0; must be 1 to 1,000,000."),
+        (("--samples", 0), 1, "samples is 0; must be a whole number, 1 to 1,000,000."),
         (("--select", "bets"), 1, "Did you mean 'best'?"),
         (("--members", 1), 2, "--members"),
         (("--observed", "person_y=0.1"), 1, "unknown observed axis 'person_y'"),

@@ -127,7 +127,9 @@ def test_one_and_two_with_and_without(bed_trials):
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
-        ({"samples": 0}, TcsError, "samples is 0; must be 1"),
+        ({"samples": 0}, TcsError, "samples is 0; must be a whole number, 1"),
+        ({"samples": 1.5}, TcsError, "samples is 1.5"),
+        ({"jobs": 0}, TcsError, "jobs is 0; must be 1 or more"),
         ({"seed": -1}, TcsError, "seed is -1"),
         ({"select": "bset"}, UnknownNameError, "Did you mean 'best'"),
         ({"select": [3]}, TcsError, "must be a configuration that reaches a goal"),

@@ -80,6 +80,19 @@ def test_rank_sum_is_scipys_with_ties_corrected(rng):
     assert rank_sum(one, other).p == pytest.approx(stats.ranksums(one, other).pvalue, rel=0.02)
 
 
+def test_ranks_do_not_see_the_rounding_of_shares(rng):
+    ones = rng.integers(0, 8, 200)
+    others = np.clip(ones + rng.integers(-1, 2, 200), 0, 7)
+    weights = np.full(7, 1 / 7)
+    # Shares as they come about, by adding up weights, in two different orders.
+    first = np.array([weights[:n].sum() for n in ones])
+    second = np.array([1.0 - weights[n:].sum() for n in others])
+    assert len(np.unique(np.abs(first - second))) > len(np.unique(np.abs(ones - others)))
+    for test in (rank_sum, signed_rank):
+        assert test(first, second).p == test(ones / 7.0, others / 7.0).p
+        assert test(first, second).p == pytest.approx(test(1.0 * ones, 1.0 * others).p, rel=1e-12)
+
+
 def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
     luck = rng.normal(size=100)
     first, second = luck + 0.05, luck + rng.normal(0, 0.05, 100)
