@@ -23,10 +23,10 @@ KEYS: Mapping[str, str] = {
 _PARTS = 1_000_000
 """Of a metre or degree: finer than anybody writes a grid."""
 _STAND = {
-    "base_x": "stand here: x",
-    "base_y": "stand here: y",
-    "base_yaw": "stand here: heading",
-    "torso": "stand here: torso",
+    "base_x": "stand at x",
+    "base_y": "stand at y",
+    "base_yaw": "heading",
+    "torso": "torso",
 }
 
 
@@ -57,7 +57,7 @@ class Slider:
     def tick(self) -> float:
         """The step that Meshcat is given: it rounds to multiples of it, whatever the lowest value.
 
-        >>> Slider("stand here: x [m]", 0.1, 0.5, 0.2).tick
+        >>> Slider("stand at x [m]", 0.1, 0.5, 0.2).tick
         0.1
         """
         low, step = (round(abs(value) * _PARTS) for value in (self.low, self.step))
