@@ -42,7 +42,8 @@ def solve_lanes(
         count: How many lanes to fill.
         slack: Filled: >= 0 where the branch exists and every joint keeps its limits. It measures
             the worst condition, as a difference of cosines, and varies continuously with q1.
-        measure: Filled: kinematic isotropy to the sixth power, meaningful where slack >= 0.
+        measure: Filled: kinematic isotropy to the sixth power where slack >= 0; elsewhere, from
+            -1 to 0, how far the wrist is from straight, less the squared sine of its bend.
 
     Source:
         Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
@@ -189,7 +190,8 @@ def solve_lanes(
         # Of length 1 but where wrist or aim are out of reach: as for joint 2.
         D = np.sqrt(c7 * c7 + s7 * s7 + TINY)
         c7, s7 = c7 / D, s7 / D
-        left = min(elbow_left, min(aim_left / N, wrist_left / N6))
+        bend = wrist_left / N6
+        left = min(elbow_left, min(aim_left / N, bend))
         # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
         # directions are no solutions. Elsewhere these terms are far above any slack.
         left = min(left, min(min(N, D2) * SHARP - square, D5 * SHARP - 1.0))
@@ -199,7 +201,8 @@ def solve_lanes(
         left = min(left, c4 * mc4 + s4 * ms4 - h4)
         left = min(left, c5 * mc5 + s5 * ms5 - h5)
         left = min(left, c6 * mc6 + s6 * ms6 - h6)
-        slack[i] = min(left, c7 * mc7 + s7 * ms7 - h7)
+        left = min(left, c7 * mc7 + s7 * ms7 - h7)
+        slack[i] = left
         # Axes 1, 2 (3 is z), 4 .. 6 in L3, and the velocity of W that each joint causes.
         px, py = c2 * a20 + s2 * a21, -s2 * a20 + c2 * a21
         gx, gy = b00 * px + b10 * py + b20 * a22, b01 * px + b11 * py + b21 * a22
@@ -266,4 +269,5 @@ def solve_lanes(
         trace += kx * kx + ky * ky + kz * kz
         scale = 6.0 / trace
         scale = scale * scale * scale
-        measure[i] = det * scale * scale
+        isotropy = det * scale * scale
+        measure[i] = isotropy if left >= 0.0 else -max(bend, 0.0)

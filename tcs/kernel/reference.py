@@ -119,6 +119,8 @@ class Solution:
     """Joint angles [rad], turned into the limits where they can be, shape (7,)."""
     slack: float
     """>= 0 where the branch exists and every joint keeps its limits."""
+    bend: float
+    """Squared sine of how far the wrist (of a mirrored arm, the shoulder) is bent."""
 
 
 def is_mirrored(chain: Chain) -> bool:
@@ -166,7 +168,7 @@ def upright_solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, in
                 q7 = math.atan2(N[1, 0], N[0, 0])
                 left = min(elbow_left, aim_left, wrist_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
-                found[elbow_sign, aim_sign, wrist_sign] = limited(chain, q, left)
+                found[elbow_sign, aim_sign, wrist_sign] = limited(chain, q, left, wrist_left)
     return found
 
 
@@ -203,17 +205,17 @@ def mirrored_solutions(chain: Chain, X_AG: Pose, q7: float) -> dict[tuple[int, i
                 q1 = math.atan2(-N[0, 1], N[0, 0])
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
-                found[elbow_sign, aim_sign, lift_sign] = limited(chain, q, left)
+                found[elbow_sign, aim_sign, lift_sign] = limited(chain, q, left, shoulder_left)
     return found
 
 
-def limited(chain: Chain, angles: list[float], left: float) -> Solution:
+def limited(chain: Chain, angles: list[float], left: float, bend: float) -> Solution:
     """Return a solution turned into its limits, its slack no more than what is `left` anyway."""
     q = np.array(angles)
     for i in range(7):
         q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
         left = min(left, kept)
-    return Solution(q, left)
+    return Solution(q, left, max(bend, 0.0))
 
 
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:

@@ -43,7 +43,15 @@ from tcs.kernel.reference import (
     solutions,
     turn,
 )
-from tcs.kernel.search import FINE_STEP, FINEST_LANES, FIRST_LANES, LEAST_LANES, PEAK_LOOKS
+from tcs.kernel.search import (
+    FINE_STEP,
+    FINEST_LANES,
+    FIRST_LANES,
+    LEAST_LANES,
+    PEAK_LOOKS,
+    STRAIGHT,
+    STRAIGHT_LOOKS,
+)
 
 Branch = tuple[int, int, int]
 
@@ -242,7 +250,8 @@ def elbow_spans(chain: Chain) -> tuple[float, float]:
 def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -> list[Candidate]:
     """Return the feasible angles of the kernel's two looks: over the arcs, inside the windows."""
     length = sum(last - first for first, last in arcs)
-    found = []
+    found: list[Candidate] = []
+    straight: list[tuple[Branch, float, float]] = []
     for first, last in arcs:
         share = FIRST_LANES * (last - first) / length if length else 0
         count = max(LEAST_LANES, int(share + 0.5))
@@ -250,9 +259,31 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
         looks = [solutions(chain, X_AG, angle) for angle in angles]
         for branch in looks[0]:
             slack = [look[branch].slack for look in looks]
-            for i, j in windows_of(slack, (last - first) / (count - 1)):
+            step = (last - first) / (count - 1)
+            for i, j in windows_of(slack, step):
                 found += look_closer(chain, X_AG, branch, angles[i], angles[j])
+            bend = [math.inf, *(look[branch].bend for look in looks), math.inf]
+            for i in range(1, count + 1):
+                if bend[i] < STRAIGHT and bend[i] <= bend[i - 1] and bend[i] < bend[i + 1]:
+                    straight.append((branch, angles[i - 1], step))
+    if not found:
+        for branch, middle, step in straight:
+            found += close_in_straight(chain, X_AG, branch, middle, step)
     return found
+
+
+def close_in_straight(
+    chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
+) -> list[Candidate]:
+    """Return the feasible angles about one at which the wrist is all but straight."""
+    for _ in range(STRAIGHT_LOOKS):
+        low, step = middle - step, 2 * step / (FINEST_LANES - 1)
+        angles = [low + i * step for i in range(FINEST_LANES)]
+        found = candidates_at(chain, X_AG, branch, angles, step)
+        if found:
+            return found
+        middle = min(angles, key=lambda angle: solutions(chain, X_AG, angle)[branch].bend)
+    return []
 
 
 def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:

@@ -25,7 +25,13 @@ PEAK_LOOKS = 4
 """How often lanes close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
 rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
 as the two happen to let them be."""
+STRAIGHT = 0.05
+"""Squared sine of the wrist's bend below which joints 5 and 7 (of a mirrored arm, 1 and 3) swing by
+half a turn within a few hundredths of a radian, past the window in which both keep their limits."""
 NONE = whole(0)
+STRAIGHT_LOOKS = 5
+"""How often lanes close in on a straight wrist, each time to 2/7 of their spacing: from 0.05 rad
+down to 1e-4 rad."""
 MAX_LANES = 512
 MAX_WINDOWS = 32
 MAX_CANDIDATES = 4096
@@ -42,6 +48,9 @@ class Search(NamedTuple):
     peaks: FloatArray
     """Infeasible angles that are nearer to feasible than their neighbours [rad], shape
     (MAX_WINDOWS,)."""
+    straight: FloatArray
+    """Where the wrist is straightest: angle [rad], spacing of the lanes [rad] and branch, shape
+    (MAX_WINDOWS, 3)."""
     angle: FloatArray
     cosine: FloatArray
     sine: FloatArray
@@ -76,6 +85,7 @@ def new_search() -> Search:
         np.empty((MAX_WINDOWS, 2)),
         np.empty((MAX_WINDOWS, 2)),
         np.empty(MAX_WINDOWS),
+        np.empty((MAX_WINDOWS, 3)),
         np.empty(MAX_LANES),
         np.empty(MAX_LANES),
         np.empty(MAX_LANES),
@@ -161,7 +171,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     length = 0.0
     for k in range(arcs):
         length += search.arcs[k, 1] - search.arcs[k, 0]
-    found = NONE
+    found = straight = NONE
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
         share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0
@@ -178,6 +188,53 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
                 start = first + search.windows[w, 0] * step
                 stop = first + search.windows[w, 1] * step
                 found = _look_closer(arm, search, b, start, stop, found)
+            if found == 0:
+                straight = _note_straight(search, b, count, step, first, straight)
+    if found == 0:
+        for n in range(straight):
+            found = _close_in_straight(arm, search, n, found)
+    return found
+
+
+@jit
+def _note_straight(
+    search: Search, b: int, count: int, step: float, first: float, straight: int
+) -> int:
+    """Append the lanes at which the wrist is straighter than at both their neighbours.
+
+    No lane is feasible, so `measure` tells of the bend.
+    """
+    bend = search.measure
+    for i in range(count):
+        if bend[i] > -STRAIGHT and straight < MAX_WINDOWS:
+            left = bend[i - 1] if i > 0 else -np.inf
+            right = bend[i + 1] if i + 1 < count else -np.inf
+            if left <= bend[i] and right < bend[i]:
+                search.straight[straight, 0] = first + i * step
+                search.straight[straight, 1] = step
+                search.straight[straight, 2] = b
+                straight += 1
+    return straight
+
+
+@jit
+def _close_in_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
+    """Append feasible angles about one at which the wrist is all but straight, if there are any."""
+    middle, step = search.straight[n, 0], search.straight[n, 1]
+    b = int(search.straight[n, 2])
+    for _ in range(STRAIGHT_LOOKS):
+        step = fill_lanes(search, middle - step, middle + step, FINEST_LANES)
+        solve_lanes(
+            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES,
+            search.slack, search.measure,
+        )  # fmt: skip
+        before = found
+        for i in range(FINEST_LANES):
+            if search.slack[i] >= 0.0:
+                found = _add(search, b, i, step, found)
+        if found > before:
+            break
+        middle = search.angle[best_of(search.measure, FINEST_LANES)]
     return found
 
 

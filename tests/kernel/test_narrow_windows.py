@@ -21,10 +21,12 @@ NEXT_TO_A_LIMIT = [
     (86787, 3), (64777, 1), (64071, 5), (73541, 5), (80859, 5), (58945, 2), (61873, 1), (63310, 2),
     (79465, 5),
 ]  # fmt: skip
+# Of shaving, with TIAGo. The wrist is all but straight, and joints 5 and 7 swing by half a turn.
+STRAIGHT_WRIST = [(50114, 6), (51599, 6), (64780, 5), (69101, 5), (53000, 6)]
 
 
-def problem_of(task, environment):
-    job = load_job(task, environment, "pr2")
+def problem_of(task, environment, robot="pr2"):
+    job = load_job(task, environment, robot)
     lowered = job.lowered(job.scene())
     return build_problem(lowered.arrays, lowered.grid)
 
@@ -39,6 +41,11 @@ def feeding():
     return problem_of("feeding", "wheelchair")
 
 
+@pytest.fixture(scope="module")
+def shaving_with_tiago():
+    return problem_of("shaving", "wheelchair", "tiago")
+
+
 @pytest.mark.parametrize(("h", "g"), BETWEEN_LIMITS, ids=str)
 def test_a_window_between_two_limits_is_found(scratching, h, g):
     check(scratching, h, g)
@@ -47,6 +54,11 @@ def test_a_window_between_two_limits_is_found(scratching, h, g):
 @pytest.mark.parametrize(("h", "g"), NEXT_TO_A_LIMIT, ids=str)
 def test_room_between_a_contact_and_a_limit_is_found(feeding, h, g):
     check(feeding, h, g)
+
+
+@pytest.mark.parametrize(("h", "g"), STRAIGHT_WRIST, ids=str)
+def test_a_window_at_a_straight_wrist_is_found(shaving_with_tiago, h, g):
+    check(shaving_with_tiago, h, g)
 
 
 def check(problem, h, g):

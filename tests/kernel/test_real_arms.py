@@ -33,7 +33,7 @@ def kernel_solutions(chain, X_AG, angle):
         solve_lanes(solver, goal, branch, cosine, sine, 1, slack, measure)
         q = np.full(7, np.nan)
         lane_joints(solver, goal, branch, angle, q)
-        found.append((q, slack[0], measure[0] ** (1 / 6)))
+        found.append((q, slack[0], max(measure[0], 0.0) ** (1 / 6)))
     return found
 
 

@@ -15,7 +15,6 @@ from tcs.kernel.arrays import BOX, SPHERE, GridArrays
 from tcs.kernel.pairs import ARM_BLOCKED, BODY_BLOCKED, GRIPPER_BLOCKED, REACHED
 from tcs.kernel.problem import build_problem
 from tcs.kernel.reference import compose, isotropy, jacobian, link_poses, shapes_of, turn
-from tcs.kernel.stand import arm_radius
 from tcs.tables import Reason
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
 from tests.kernel.shapes import placed, rotation, straight_arm
@@ -266,7 +265,7 @@ def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
     # Straight up, this arm needs every centimetre that `arm_radius` grants.
     chain = straight_arm(np.full(7, 3.0), 0.0)
     scene, grid = toy_scene(chain, 0), toy_grid()
-    radius = arm_radius(build_problem(scene, grid))
+    radius = build_problem(scene, grid).arm_radius
     extents = []
     for q in (np.zeros(7), *rng.uniform(-3, 3, (50, 7))):
         poses = link_poses(chain, q)
