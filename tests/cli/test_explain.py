@@ -21,7 +21,9 @@ def stored(tmp_path):
 def test_json_is_what_python_returns(tcs_command, stored):
     ran = tcs_command("explain", stored, "--goal", 2, "--configuration", 17, "--json")
     assert (ran.code, ran.err) == (0, "")
-    assert ran.json == tcs.explain(tcs.load(stored), 2, 17).to_json()
+    file = tcs.load(stored)
+    expected = {**tcs.explain(file, 2, 17).to_json(), "measure": file.metadata["measure"]}
+    assert ran.json == expected
     assert {"reasons", "blocking_pairs", "nearest_reaching"} <= set(ran.json)
     assert {"members", "changes"} <= set(ran.json["nearest_reaching"])
     assert sum(ran.json["reasons"].values()) == GRID.size
