@@ -98,9 +98,14 @@ def robustify(
         "seed": seed,
         "sets": sets,
         "errors": trials.errors.to_json(),
+        "errors_of_environment": errors is None,
         "check_base": check_base,
     }
-    metadata = {**file.metadata, "robustness": made}
+    # Each table has a record of its own: others may have been estimated at another time.
+    records = list(file.metadata.get("robustness", [None] * len(scored)))
+    for number in chosen:
+        records[number] = made
+    metadata = {**file.metadata, "robustness": records}
     return dataclasses.replace(file, metadata=metadata, tables=tuple(scored))
 
 
@@ -108,7 +113,8 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
     """Return what was estimated, as plain containers: what `tcs robustify --json` prints."""
     grid = Grid.from_dict(file.grid)
     tables = []
-    for scored, state in zip(file.tables, file.observed_states, strict=True):
+    records = file.metadata.get("robustness", [None] * len(file.tables))
+    for scored, state, made in zip(file.tables, file.observed_states, records, strict=True):
         success = scored.success
         if success is None:
             continue
@@ -127,8 +133,9 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
                     "sets": int(success.of_size(size).size),
                 }
             )
-        tables.append({"observed": shown_state(file.observed_axes, state), "best": best})
-    return {"tables": tables, "robustness": file.metadata.get("robustness")}
+        observed = shown_state(file.observed_axes, state)
+        tables.append({"observed": observed, "best": best, "made": made})
+    return {"tables": tables}
 
 
 def success_of(

@@ -25,9 +25,10 @@ def test_every_table_gets_estimates_of_singles_and_pairs(chair_file, done):
         assert success.row_of(tuple(sorted(sets.best))) is not None
         assert success.row_of(sets.best_single) is not None
         assert set(success.samples.tolist()) <= {64, 128}
-    made = done.metadata["robustness"]
+    (made,) = done.metadata["robustness"]
     assert (made["samples"], made["seed"], made["check_base"]) == (128, 0, False)
     assert made["errors"]["person_y"] == {"distribution": "normal", "std": 0.05}
+    assert made["errors_of_environment"]
 
 
 def test_estimates_are_means_of_evaluations(done):
@@ -64,6 +65,13 @@ def test_one_table_alone(bed_file):
         evaluate(done, select="robust", table=0)
     (table,) = success_summary(done)["tables"]
     assert table["observed"] == {"person_y": 0.05}
+    # Each table keeps the record of how it was estimated.
+    both = robustify(done, samples=65, sets=10, check_base=True, tables=[0])
+    assert [made["samples"] for made in both.metadata["robustness"]] == [65, 64]
+    assert [table["made"]["check_base"] for table in success_summary(both)["tables"]] == [
+        True,
+        False,
+    ]
 
 
 def test_choosing_weighs_the_estimates(done):
