@@ -22,7 +22,7 @@ NEXT_TO_A_LIMIT = [
     (79465, 5),
 ]  # fmt: skip
 # Of shaving, with TIAGo. The wrist is all but straight, and joints 5 and 7 swing by half a turn.
-STRAIGHT_WRIST = [(50114, 6), (51599, 6), (64780, 5), (69101, 5), (53000, 6)]
+STRAIGHT_WRIST = [(50114, 6), (51599, 6), (64780, 5), (69101, 5), (81542, 4)]
 
 
 def problem_of(task, environment, robot="pr2"):
