@@ -18,7 +18,7 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.rows import default_path, score_one
 from tcs.errors import UnknownNameError
-from tcs.report import Plan, load_paper, make_folder, study_rows, write_report
+from tcs.report import Plan, check_row, load_paper, make_folder, study_rows, write_report
 from tcs.robustness import robustify
 from tcs.robustness.error_model import check_draws
 
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     for (task, environment), path in zip(rows, paths, strict=True):
         if not path.exists():
             score_one(task, environment, ROBOT, path, jobs=options.jobs)
-        estimate(path, options)
+        estimate(path, (task, environment), options)
     plan = Plan(samples=options.samples, seed=options.seed)
     begun = time.perf_counter()
     with talk.progress_bar("rows tried") as on_progress:
@@ -79,9 +79,10 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def estimate(path: Path, options: argparse.Namespace) -> None:
-    """Have the success of the best sets estimated, with the person where they belong."""
+def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> None:
+    """Have the success of the best sets of a row estimated, with the person where they belong."""
     file = tcs.load(path)
+    check_row(path, file, *row, ROBOT)
     made = file.metadata.get("robustness", [None] * len(file.tables))[file.nominal_index]
     if made is not None and made["errors_of_environment"] and not made["check_base"]:
         # Whoever has estimated more thoroughly is believed.

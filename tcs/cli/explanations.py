@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from tcs.cli.reports import REASONS, members_table, new_table
+from tcs.cli.reports import REASONS, members_table, new_table, said_off
 from tcs.cli.talk import paper
 
 MOST_PAIRS = 4
@@ -23,7 +23,7 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     if result["observed"]:
         state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
         off = "".join(
-            f"; {name} is {value:+g} off" for name, value in result["observed_off"].items()
+            f"; {said_off(name, value)}" for name, value in result["observed_off"].items()
         )
         out.print(f"Scored for {state}{off}.")
     if result["explained"] is not None:

@@ -160,10 +160,19 @@ def report_choice(result: Mapping[str, Any]) -> None:
         )
     if "observed" in result:
         state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
-        off = [f"{name} is {value:+g} off" for name, value in result["observed_off"].items()]
+        off = [said_off(name, value) for name, value in result["observed_off"].items()]
         if result["frames_off"] is not None:
             off.append(f"what is seen is {result['frames_off']:.3f} m off")
         out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
+
+
+def said_off(name: str, value: float) -> str:
+    """Return how far what is observed is from what was scored; a zero has no sign.
+
+    >>> said_off("person_y", -0.02), said_off("person_y", -0.0)
+    ('person_y is -0.02 off', 'person_y is as observed')
+    """
+    return f"{name} is {value:+g} off" if value else f"{name} is as observed"
 
 
 def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:

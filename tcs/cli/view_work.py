@@ -85,7 +85,8 @@ def export(staged: Staged, path: Path, *, meshes: bool) -> dict[str, Any]:
     notes = [staged.subtitle]
     if meshes:
         notes.append(
-            f"This page holds copies of the robot's meshes. Its robot file: {staged.source}"
+            "This page holds the robot's meshes in another format: every triangle in its place, no "
+            f"textures. Its robot file says of them: {staged.source}"
         )
     text = page(
         open_meshcat(), staged.props, staged.answers, title=staged.title, notes=notes
@@ -108,8 +109,8 @@ def report_page(result: dict[str, Any]) -> None:
     typer.echo(f"wrote {result['file']}: {result['bytes'] / 1e6:.1f} MB")
     if result["meshes"]:
         typer.echo(
-            "It holds copies of the robot's meshes; mind their licence when you pass it on. Its "
-            f"robot file: {result['source']}"
+            "It holds the robot's meshes; mind their licence when you pass it on. Its robot file "
+            f"says of them: {result['source']}"
         )
 
 

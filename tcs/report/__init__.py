@@ -7,7 +7,7 @@ from tcs.report.html import as_html
 from tcs.report.markdown import as_markdown
 from tcs.report.paper import Paper, load_paper
 from tcs.report.robustness import robustness_page
-from tcs.report.study import Plan, RowStudy, study_row, study_rows
+from tcs.report.study import Plan, RowStudy, check_row, study_row, study_rows
 from tcs.report.write import make_folder, write_report
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Section",
     "as_html",
     "as_markdown",
+    "check_row",
     "load_paper",
     "make_folder",
     "robustness_page",

@@ -65,7 +65,7 @@ def _section(section: Section) -> str:
 
 @singledispatch
 def _written(block: Block) -> str:
-    raise NotImplementedError(type(block).__name__)
+    raise TypeError(f"a page has no block of type {type(block).__name__}: see tcs.report.blocks.")
 
 
 @_written.register

@@ -19,7 +19,7 @@ def as_markdown(page: Page) -> str:
 
 @singledispatch
 def _written(block: Block) -> str:
-    raise NotImplementedError(type(block).__name__)
+    raise TypeError(f"a page has no block of type {type(block).__name__}: see tcs.report.blocks.")
 
 
 @_written.register

@@ -12,6 +12,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from tcs.draw import as_png
+from tcs.errors import StoreMismatchError
 from tcs.kernel.cache import is_compiled
 from tcs.report.paper import load_paper
 from tcs.report.pictures import Shown, map_figure, scene_figure
@@ -28,7 +29,7 @@ from tcs.robustness import (
     robust_gains,
 )
 from tcs.robustness.losses import Losses
-from tcs.store import load_scores
+from tcs.store import ScoreFile, load_scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +88,29 @@ class RowStudy:
     def name(self) -> str:
         """Task and environment in words."""
         return f"{self.task.replace('_', ' ')}, {self.environment}"
+
+
+def check_row(path: Path, file: ScoreFile, task: str, environment: str, robot: str) -> None:
+    """Refuse a score file that holds another row than its name says.
+
+    Args:
+        path: Where it was found.
+        file: What it holds.
+        task: Name of the task that is wanted.
+        environment: Name of the environment.
+        robot: Name of the robot.
+
+    Raises:
+        StoreMismatchError: If it is of another task, environment or robot.
+    """
+    wanted = {"task": task, "environment": environment, "robot": robot}
+    for key, name in wanted.items():
+        found = file.metadata[key]
+        if found != name:
+            raise StoreMismatchError(
+                f"Score file '{path}' is of {key} '{found}', not '{name}' as its name says. Name "
+                "another folder of score files, or take this one out of it to have the row scored."
+            )
 
 
 def study_row(path: Path, plan: Plan, jobs: int = 1) -> RowStudy:

@@ -92,6 +92,12 @@ def test_tones_are_classes_beside_the_words():
     assert '<td class="number">0.0</td>' in html
 
 
+@pytest.mark.parametrize("write", [as_html, as_markdown])
+def test_what_is_no_block_is_named(write):
+    with pytest.raises(TypeError, match=r"no block of type float.*tcs\.report\.blocks"):
+        write(page_of(1.5))
+
+
 def test_rows_have_as_many_cells_as_columns():
     with pytest.raises(AssertionError):
         Table("t", [Column("a"), Column("b")], [["1"]])

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tcs.store import save_scores
+from tests.store.example import score_file
+
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "robustness_report.py"
 
 
@@ -30,6 +33,18 @@ def test_what_cannot_be_is_told_in_a_line_before_the_work(tmp_path, words, said)
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_of_another_row_is_refused(tmp_path):
+    scores = tmp_path / "out" / "scores"
+    scores.mkdir(parents=True)
+    # What it holds was scored in the wheelchair.
+    save_scores(scores / "shaving-bed-pr2.tcs", score_file())
+    done = run("--rows", "shaving/bed", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "is of environment 'wheelchair', not 'bed'" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert list((tmp_path / "out" / "robustness").iterdir()) == []
 
 
 @pytest.mark.slow
