@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from tcs.errors import ArmClassError
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.ik import lane_joints, wrist_goal
-from tcs.kernel.numeric_solutions import numeric_solutions
+from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.kernel.solver import FIRST, ArmSolver, arm_solver
 from tcs.scene import Scene, arm_chain
 

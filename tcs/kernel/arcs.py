@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.solver import ArmSolver
 
 MAX_ARCS = 6
@@ -81,7 +81,7 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
     return count, IN_REACH if count else OUT_OF_LIMITS
 
 
-@jit
+@inner
 def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
     """Return whether a window narrower than the spacing may hide about infeasible lane i.
 

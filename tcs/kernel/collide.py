@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray, Shapes
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 
 PARALLEL = 1e-12
 """Squared sine below which two edges count as parallel: their cross product is no axis then."""
@@ -81,7 +81,7 @@ def closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
     return _segments(a, i, half_a, b, j, half_b) < reach * reach
 
 
-@jit
+@inner
 def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_b: float) -> float:
     """Return the squared distance between two segments along the shapes' z axes [m^2]."""
     ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
@@ -109,7 +109,7 @@ def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_
     return dx * dx + dy * dy + dz * dz
 
 
-@jit
+@inner
 def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> float:
     """Return the squared distance from a segment along shape i's z axis to box j [m^2]."""
     x, y, z = (
@@ -130,13 +130,13 @@ def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> f
     )  # fmt: skip
 
 
-@jit
+@inner
 def _beyond(x: float, h: float) -> float:
     """Return how far x lies outside [-h, h], signed."""
     return max(x - h, 0.0) + min(x + h, 0.0)
 
 
-@jit
+@inner
 def _line_box(
     px: float, py: float, pz: float,
     dx: float, dy: float, dz: float,
@@ -179,7 +179,7 @@ def _line_box(
     return ex * ex + ey * ey + ez * ez
 
 
-@jit
+@inner
 def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
     """Return whether two boxes are closer than `gap`.
 
@@ -271,7 +271,7 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
     return min(_edges_box(a, i, b, j), _edges_box(b, j, a, i)) < gap * gap
 
 
-@jit
+@inner
 def _edge_gap(
     t1: float, t2: float, m1: float, m2: float,
     a1: float, a2: float, b1: float, b2: float, k1: float, k2: float,
@@ -289,7 +289,7 @@ def _edge_gap(
     return (abs(t2 * m1 - t1 * m2) - spread) / np.sqrt(sine)
 
 
-@jit
+@inner
 def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
     """Return the least squared distance from the 12 edges of box i to box j [m^2]."""
     c = np.empty(3)

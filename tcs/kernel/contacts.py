@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.cache import inner, jit, whole
 from tcs.kernel.collide import BALL, CENTRE, balls_meet, closer, move
 from tcs.kernel.problem import Problem
 
@@ -72,7 +72,7 @@ def new_workspace(problem: Problem) -> Workspace:
     )
 
 
-@jit
+@inner
 def contact_code(problem: Problem, robot_body: int, other: int, partner: int) -> int:
     """Return the code of a contact between a robot body and a ROOM body or another robot body."""
     if partner != ROOM:
@@ -80,7 +80,7 @@ def contact_code(problem: Problem, robot_body: int, other: int, partner: int) ->
     return robot_body * (problem.room_bodies + problem.robot_bodies) + other
 
 
-@jit
+@inner
 def base_contact(problem: Problem, work: Workspace, torso: int, rides: int) -> int:
     """Return the first contact with the room of the body shapes that ride on the torso, or not.
 
@@ -104,7 +104,7 @@ def base_contact(problem: Problem, work: Workspace, torso: int, rides: int) -> i
     return NO_CONTACT
 
 
-@jit
+@inner
 def gripper_room_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
     """Return the first contact of the gripper, tool at a goal, with the room; all in W."""
     _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
@@ -117,7 +117,7 @@ def gripper_room_contact(problem: Problem, work: Workspace, state: int, goal: in
     return NO_CONTACT
 
 
-@jit
+@inner
 def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) -> int:
     """Return the first contact of the gripper, tool at the goal in hand, with the robot's body.
 
@@ -133,7 +133,7 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
     return NO_CONTACT
 
 
-@jit
+@inner
 def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
     """Place the shapes of the last link such that the tool stands at (R, p)."""
     R7, p7 = work.link_R[7], work.link_p[7]
@@ -147,7 +147,7 @@ def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArr
         move(R7, p7, problem.links, i, work.arm, i)
 
 
-@jit
+@inner
 def place_links(
     chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, link_R: FloatArray, link_p: FloatArray
 ) -> None:
@@ -176,7 +176,7 @@ def place_links(
             link_p[i + 1, r] = link_p[i, r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
 
 
-@jit
+@inner
 def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatArray) -> int:
     """Return the first contact of the arm at joint angles q, gripper against the room excepted.
 
@@ -226,7 +226,7 @@ def at_goal(problem: Problem, work: Workspace) -> bool:
     return worst < AT_GOAL
 
 
-@jit
+@inner
 def pair_touches(
     problem: Problem, work: Workspace, body_A: FloatArray, partner: int, i: int, j: int
 ) -> bool:
@@ -241,7 +241,7 @@ def pair_touches(
     return closer(arm, i, arm, j, problem.gap_arm[i, j])
 
 
-@jit
+@inner
 def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
     """Return the contact code of arm shape i and shape j of a partner."""
     if partner == ROOM:
@@ -253,7 +253,7 @@ def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
     return contact_code(problem, problem.link_body[i], other, partner)
 
 
-@jit
+@inner
 def _place_link(problem: Problem, work: Workspace, i: int) -> None:
     """Place arm shape i in A from the link poses in the workspace."""
     frame = problem.link_frame[i]

@@ -46,7 +46,7 @@ def dense_scan(
     """
     if is_outside(problem.arm):
         # Imported where it is needed: most arms have a closed form.
-        from tcs.kernel.numeric_dense import STARTS, numeric_dense_scan
+        from tcs.kernel.numeric.dense import STARTS, numeric_dense_scan
 
         return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
     # Made here, where they outlive the call: the compiled code only borrows them.

@@ -12,7 +12,7 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.borrow import borrowed
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -138,7 +138,7 @@ def follow(
         joints[i] = q
 
 
-@jit
+@inner
 def move_hand(hand: Hand, period: float, target: int, place: FloatArray) -> int:
     """Move the hand towards a target for a period; return 1 when it gets there, else 0."""
     dx, dy = hand.targets[target, 0] - place[0], hand.targets[target, 1] - place[1]
@@ -151,7 +151,7 @@ def move_hand(hand: Hand, period: float, target: int, place: FloatArray) -> int:
     return 1 if share == 1.0 else 0
 
 
-@jit
+@inner
 def command_in_arm_base(
     hand: Hand,
     R_BA: FloatArray,
@@ -171,7 +171,7 @@ def command_in_arm_base(
             R_AC[r, k] = R_BA[0, r] * first + R_BA[1, r] * second + R_BA[2, r] * hand.R_ET[2, k]
 
 
-@jit
+@inner
 def wanted_twist(
     control: Control,
     R_AC: FloatArray,
@@ -204,7 +204,7 @@ def wanted_twist(
             twist[3 + k] *= min(control.gain * distance, control.speed) / distance
 
 
-@jit
+@inner
 def joint_rates(
     problem: Problem,
     control: Control,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.solver import LAST, ArmSolver
 
 
@@ -126,7 +126,7 @@ def within(angle: float, lower: float, upper: float) -> float:
     return min(max(angle, lower), upper)
 
 
-@jit
+@inner
 def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, sign: int) -> float:
     """Return the turn about z after which R (x, y, z) has the z component `height`."""
     P = R[2, 0] * x + R[2, 1] * y
@@ -136,14 +136,14 @@ def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, 
     return np.arctan2(Q * m + P * h, P * m - Q * h)
 
 
-@jit
+@inner
 def _unturn(angle: float, v: FloatArray) -> None:
     """Turn v by -angle about z, in place."""
     c, s = np.cos(angle), np.sin(angle)
     v[0], v[1] = c * v[0] + s * v[1], -s * v[0] + c * v[1]
 
 
-@jit
+@inner
 def _unrotate(R: FloatArray, v: FloatArray) -> None:
     """Replace v by R^T v, in place."""
     x, y, z = v[0], v[1], v[2]

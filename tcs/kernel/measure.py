@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import place_links
 from tcs.kernel.dexterity import INVERSE_CONDITION, THESIS, UNLIMITED
 from tcs.kernel.problem import Problem
@@ -44,7 +44,7 @@ def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatAr
         J[3, i], J[4, i], J[5, i] = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
 
 
-@jit
+@inner
 def gram(J: FloatArray, G: FloatArray) -> float:
     """Fill the lower triangle of G = J J^T, shape (6, 6), and return its trace."""
     trace = 0.0
@@ -124,7 +124,7 @@ def inverse_condition(J: FloatArray) -> float:
     return np.sqrt(max(least, 0.0) / most)
 
 
-@jit
+@inner
 def inverse_condition_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
     """Return `inverse_condition` of the Jacobian at joint angles q.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.cache import inner, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -47,20 +47,20 @@ SAME_STRETCH = 1.01
 seen; the hundredth is for rounding."""
 
 
-@jit
+@inner
 def lanes_measure(problem: Problem) -> bool:
     """Return whether what the lanes are filled with, isotropy, is the measure that counts."""
     return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
 
 
-@jit
+@inner
 def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
     """Return the measure that counts at an angle of the free joint on branch b; fills `q`."""
     lane_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
     return measure_at(problem, search.q)
 
 
-@jit
+@inner
 def best_free(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> tuple[int, int]:
@@ -90,7 +90,7 @@ def best_free(
     return -1, first_contact
 
 
-@jit
+@inner
 def squeeze(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> int:
@@ -131,7 +131,7 @@ def squeeze(
     return -1
 
 
-@jit
+@inner
 def _by_angle(search: Search, found: int) -> None:
     """Put the candidates in order: branch by branch, by their angles."""
     for n in range(found):
@@ -140,7 +140,7 @@ def _by_angle(search: Search, found: int) -> None:
     put_in_order(search, found)
 
 
-@jit
+@inner
 def _are_neighbours(search: Search, m: int, n: int) -> bool:
     """Return whether nothing infeasible was seen between two candidates that follow each other."""
     width = search.found_angle[n] - search.found_angle[m]
@@ -148,7 +148,7 @@ def _are_neighbours(search: Search, m: int, n: int) -> bool:
     return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
 
 
-@jit
+@inner
 def _add_ends(problem: Problem, search: Search, found: int) -> int:
     """Append the last angle that keeps all limits at each end of the feasible stretches.
 
@@ -169,7 +169,7 @@ def _add_ends(problem: Problem, search: Search, found: int) -> int:
     return found
 
 
-@jit
+@inner
 def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) -> int:
     """Append where the stretch ends that candidate n is the outermost of, to one side."""
     b, angle = search.found_branch[n], search.found_angle[n]
@@ -188,7 +188,7 @@ def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) ->
     return found + 1
 
 
-@jit
+@inner
 def _between(
     problem: Problem,
     work: Workspace,
@@ -229,7 +229,7 @@ def _between(
     return answer
 
 
-@jit
+@inner
 def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float) -> float:
     """Return what a candidate at this angle on branch b is worth, or -1 if it is none."""
     arm = problem.arm
@@ -243,7 +243,7 @@ def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float)
     return search.measure[0] if lanes_measure(problem) else measure_of(problem, search, b, angle)
 
 
-@jit
+@inner
 def refine(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, winner: int
 ) -> None:
@@ -284,7 +284,7 @@ def refine(
         step = fine
 
 
-@jit
+@inner
 def score_pair(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, arcs: int
 ) -> tuple[int, int]:

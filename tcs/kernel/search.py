@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.kernel.arcs import MAX_ARCS, PEAK_SLOPE, is_peak, windows_of
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.cache import inner, jit, whole
 from tcs.kernel.lanes import solve_lanes
 from tcs.kernel.solver import ArmSolver
 
@@ -103,7 +103,7 @@ def new_search() -> Search:
     )
 
 
-@jit
+@inner
 def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
     """Spread `count` >= 2 lanes evenly from first to last, ends included; return their spacing.
 
@@ -120,7 +120,7 @@ def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
     return step
 
 
-@jit
+@inner
 def best_of(measure: FloatArray, count: int) -> int:
     """Return the index of the greatest value, the first one of equals."""
     best = 0
@@ -130,7 +130,7 @@ def best_of(measure: FloatArray, count: int) -> int:
     return best
 
 
-@jit
+@inner
 def put_in_order(search: Search, count: int) -> None:
     """Fill `order` with the first candidates by ascending `key`, equal ones as they come.
 
@@ -196,7 +196,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     return found
 
 
-@jit
+@inner
 def _note_straight(
     search: Search, b: int, count: int, step: float, first: float, straight: int
 ) -> int:
@@ -217,7 +217,7 @@ def _note_straight(
     return straight
 
 
-@jit
+@inner
 def _close_in_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
     """Append feasible angles about one at which the wrist is all but straight, if there are any."""
     middle, step = search.straight[n, 0], search.straight[n, 1]
@@ -238,7 +238,7 @@ def _close_in_straight(arm: ArmSolver, search: Search, n: int, found: int) -> in
     return found
 
 
-@jit
+@inner
 def _look_closer(
     arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
 ) -> int:
@@ -271,7 +271,7 @@ def _look_closer(
     return found
 
 
-@jit
+@inner
 def _close_in(
     arm: ArmSolver,
     search: Search,
@@ -301,7 +301,7 @@ def _close_in(
     return found
 
 
-@jit
+@inner
 def _look_between(
     arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
 ) -> int:
@@ -320,7 +320,7 @@ def _look_between(
     return found
 
 
-@jit
+@inner
 def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
     """Append lane i as a candidate on branch b; return how many there are now."""
     if found == MAX_CANDIDATES:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 
 
 class SetArrays(NamedTuple):
@@ -101,7 +101,7 @@ def pair_manipulability(a: FloatArray, i: int, b: FloatArray, j: int, weights: F
     return total
 
 
-@jit
+@inner
 def keep_best(
     arrays: SetArrays,
     i: int,
@@ -126,7 +126,7 @@ def keep_best(
     members[0], members[1] = a, b
 
 
-@jit
+@inner
 def bound_cell_pair(
     arrays: SetArrays,
     first: int,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import BALL, CENTRE, TURN, move
 from tcs.kernel.contacts import Workspace
 from tcs.kernel.problem import Problem
@@ -37,7 +37,7 @@ def stand(problem: Problem, work: Workspace, place: int) -> int:
     return state
 
 
-@jit
+@inner
 def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, g: int) -> None:
     """Fill the pose of a goal in the arm base A, `work.R_AG` and `work.p_AG`."""
     A, a = problem.base_R[torso], problem.base_p[torso]
@@ -61,7 +61,7 @@ def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, 
             p_AG[r] += A[m, r] * along
 
 
-@jit
+@inner
 def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
     """Move the room from B to A and list the shapes that the arm could touch at all."""
     A, a = problem.base_R[torso], problem.base_p[torso]

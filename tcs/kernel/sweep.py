@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
-from tcs.kernel.arrays import IntArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.borrow import borrowed
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
     RIDES,
@@ -82,7 +82,7 @@ def score_slice(
     """
     if is_outside(problem.arm):
         # Imported where it is needed: most arms have a closed form.
-        from tcs.kernel.numeric_sweep import score_numeric_slice
+        from tcs.kernel.numeric.sweep import score_numeric_slice
 
         score_numeric_slice(problem, grippers, start, stop, scores)
         return
@@ -145,15 +145,15 @@ def _score_slice(
             scores.reason[row, g] = reason
             scores.contact[row, g] = code
             if reason == REACHED:
-                _keep(problem, search, rounded, scores, row, g)
+                keep(problem, search.best, rounded, scores, row, g)
 
 
-@jit
-def _keep(
-    problem: Problem, search: Search, rounded: NDArray[np.float64], scores: Scores, row: int, g: int
+@inner
+def keep(
+    problem: Problem, best: FloatArray, rounded: FloatArray, scores: Scores, row: int, g: int
 ) -> None:
     """Write the winner. Its measure is that of the rounded joints, as anyone can recompute."""
-    rounded_inward(search.best, problem.arm.lower, problem.arm.upper, rounded)
+    rounded_inward(best, problem.arm.lower, problem.arm.upper, rounded)
     for i in range(7):
         scores.joints[row, g, i] = rounded[i]
     scores.isotropy[row, g] = measure_at(problem, rounded)

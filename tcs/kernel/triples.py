@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.sets import BestPairs, MemberPairs, SetArrays, pair_manipulability
 
 ROOM = 1e-6
@@ -50,7 +50,7 @@ def fill_pairs(
                 pairs[i, j] = -1.0
 
 
-@jit
+@inner
 def triple_scores(arrays: SetArrays, i: int, j: int, k: int) -> tuple[float, float]:
     """Return P_R and P_M of three rows together, TCS eq. (1) and (4)."""
     reachability = manipulability = 0.0
@@ -63,7 +63,7 @@ def triple_scores(arrays: SetArrays, i: int, j: int, k: int) -> tuple[float, flo
     return reachability, manipulability
 
 
-@jit
+@inner
 def in_order(a: int, b: int, c: int) -> tuple[int, int, int]:
     """Return three numbers in ascending order."""
     if a > b:
@@ -75,7 +75,7 @@ def in_order(a: int, b: int, c: int) -> tuple[int, int, int]:
     return a, b, c
 
 
-@jit
+@inner
 def note_triple(
     arrays: SetArrays,
     rows: tuple[int, int, int],
@@ -102,7 +102,7 @@ def note_triple(
     old[0], old[1], old[2] = a, b, c
 
 
-@jit
+@inner
 def partners_of(
     arrays: SetArrays, pairs: NDArray[np.float32], i: int, least: float
 ) -> tuple[IntArray, FloatArray]:

@@ -25,7 +25,7 @@ moves, and scratch memory that stays in the processor's cache."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """How inverse kinematics was solved: in closed form, or by Newton's method from many starts."""
-_ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "numeric_sweep._score_numeric_slice"}
+_ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "sweep._score_numeric_slice"}
 """Modules and functions of the kernel that all the rest is compiled into."""
 
 

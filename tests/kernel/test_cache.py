@@ -15,7 +15,7 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.kernel import cache
-from tcs.kernel.cache import jit, jit_folder, kernel_digest
+from tcs.kernel.cache import inner, jit, jit_folder, kernel_digest
 
 ROOT = Path(__file__).parents[2]
 KERNEL = ROOT / "tcs" / "kernel"
@@ -34,7 +34,9 @@ def test_a_copy_has_the_same_digest(copy):
     assert len(kernel_digest(copy)) == 16
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in KERNEL.glob("*.py")))
+@pytest.mark.parametrize(
+    "name", sorted(path.relative_to(KERNEL).as_posix() for path in KERNEL.rglob("*.py"))
+)
 def test_one_byte_in_any_source_changes_the_digest(copy, name):
     before = kernel_digest(copy)
     source = copy / name
@@ -112,6 +114,14 @@ def test_decorating_leaves_numbas_settings_alone():
     before = numba.config.CACHE_DIR
     jit(lambda x: x)
     assert before == numba.config.CACHE_DIR
+
+
+def test_a_function_for_compiled_callers_refuses_to_be_called_from_python():
+    double = inner(lambda x: 2 * x)
+    quadruple = jit(lambda x: double(double(x)))
+    assert quadruple(10) == 40
+    with pytest.raises(TypeError, match="compiled for compiled callers only"):
+        double(10)
 
 
 SCRIPT = """

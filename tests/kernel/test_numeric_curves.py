@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tcs.kernel import reference
-from tcs.kernel.curves import new_curves, point_between, slack_of, trace
 from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY
-from tcs.kernel.newton import (
+from tcs.kernel.numeric.arm import FULL_TURN, WIDER, figures_at, numeric_arm
+from tcs.kernel.numeric.curves import new_curves, point_between, slack_of, trace
+from tcs.kernel.numeric.newton import (
     FAR_TURN,
     converge,
     factorise,
@@ -17,9 +18,8 @@ from tcs.kernel.newton import (
     step_to_goal,
     way_along,
 )
-from tcs.kernel.numeric_arm import FULL_TURN, WIDER, figures_at, numeric_arm
-from tcs.kernel.numeric_search import is_within_span
-from tcs.kernel.numeric_solutions import numeric_solutions
+from tcs.kernel.numeric.search import is_within_span
+from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.kernel.reference import link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, offset_arm, random_joints, straight_arm, turned_by

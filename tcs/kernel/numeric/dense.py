@@ -9,9 +9,9 @@ from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
 from tcs.kernel.measure import measure_at
-from tcs.kernel.numeric_arm import NumericArm, joint_ranges, numeric_arm_of, spread
-from tcs.kernel.numeric_pairs import NOWHERE, choose, squeeze
-from tcs.kernel.numeric_search import Hunt, find_candidates, hunt_from, new_hunt
+from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of, spread
+from tcs.kernel.numeric.pairs import NOWHERE, choose, squeeze
+from tcs.kernel.numeric.search import Hunt, find_candidates, hunt_from, new_hunt
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 

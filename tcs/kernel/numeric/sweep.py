@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.borrow import borrowed
@@ -17,10 +16,9 @@ from tcs.kernel.contacts import (
     gripper_body_contact,
     new_workspace,
 )
-from tcs.kernel.measure import measure_at, rounded_inward
-from tcs.kernel.numeric_arm import NumericArm, numeric_arm_of
-from tcs.kernel.numeric_pairs import score_numeric_pair
-from tcs.kernel.numeric_search import (
+from tcs.kernel.numeric.arm import NumericArm, numeric_arm_of
+from tcs.kernel.numeric.pairs import score_numeric_pair
+from tcs.kernel.numeric.search import (
     MOST_CANDIDATES,
     MOST_CURVES,
     MOST_POINTS,
@@ -31,7 +29,7 @@ from tcs.kernel.numeric_search import (
 from tcs.kernel.pairs import BODY_BLOCKED, GRIPPER_BLOCKED, REACHED, TOO_FAR
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
-from tcs.kernel.sweep import Scores
+from tcs.kernel.sweep import Scores, keep
 
 
 def score_numeric_slice(
@@ -58,10 +56,14 @@ def _score_numeric_slice(
     problem, arm = borrowed(owned_problem), borrowed(owned_arm)
     work, hunt, scores = borrowed(owned_work), borrowed(owned_hunt), borrowed(owned_scores)
     rounded = np.empty(7)
+    place, base_code, state = -1, NO_CONTACT, 0
     for h in range(start, stop):
         row, torso = h - start, h % problem.torso_levels
-        state = stand(problem, work, h // problem.torso_levels)
-        code = base_contact(problem, work, STAYS, STAYS)
+        if h // problem.torso_levels != place:
+            place = h // problem.torso_levels
+            state = stand(problem, work, place)
+            base_code = base_contact(problem, work, STAYS, STAYS)
+        code = base_code
         if code == NO_CONTACT:
             code = base_contact(problem, work, torso, RIDES)
         if code != NO_CONTACT:
@@ -94,15 +96,4 @@ def _score_numeric_slice(
             scores.reason[row, g] = reason
             scores.contact[row, g] = code
             if reason == REACHED:
-                _keep(problem, hunt, rounded, scores, row, g)
-
-
-@jit
-def _keep(
-    problem: Problem, hunt: Hunt, rounded: NDArray[np.float64], scores: Scores, row: int, g: int
-) -> None:
-    """Write the winner, as `sweep._keep`."""
-    rounded_inward(hunt.best, problem.arm.lower, problem.arm.upper, rounded)
-    for i in range(7):
-        scores.joints[row, g, i] = rounded[i]
-    scores.isotropy[row, g] = measure_at(problem, rounded)
+                keep(problem, hunt.best, rounded, scores, row, g)

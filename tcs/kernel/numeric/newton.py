@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit
-from tcs.kernel.numeric_arm import NumericArm
+from tcs.kernel.cache import inner, jit
+from tcs.kernel.numeric.arm import NumericArm
 
 LEAST_PIVOT = 1e-14
 """Pivots of J J^T are kept above this: next to a singularity a step is long, but never infinite."""
@@ -138,7 +138,7 @@ def factorise(look: Look, damping: float) -> float:
     return det
 
 
-@jit
+@inner
 def _solve(look: Look) -> None:
     """Replace x by the solution of (J J^T) y = x."""
     G, x = look.G, look.x

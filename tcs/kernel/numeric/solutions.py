@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray
-from tcs.kernel.curves import settle
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.ik import within
-from tcs.kernel.numeric_arm import numeric_arm
-from tcs.kernel.numeric_search import (
+from tcs.kernel.numeric.arm import numeric_arm
+from tcs.kernel.numeric.curves import settle
+from tcs.kernel.numeric.search import (
     MOST_CANDIDATES,
     MOST_CURVES,
     MOST_POINTS,

@@ -11,8 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit, whole
-from tcs.kernel.curves import (
+from tcs.kernel.cache import inner, jit, whole
+from tcs.kernel.dexterity import UNLIMITED
+from tcs.kernel.ik import within
+from tcs.kernel.measure import limit_penalty
+from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at
+from tcs.kernel.numeric.curves import (
     SAME_CURVE,
     Curves,
     is_known,
@@ -21,11 +25,7 @@ from tcs.kernel.curves import (
     slack_of,
     trace,
 )
-from tcs.kernel.dexterity import UNLIMITED
-from tcs.kernel.ik import within
-from tcs.kernel.measure import limit_penalty
-from tcs.kernel.newton import converge
-from tcs.kernel.numeric_arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at
+from tcs.kernel.numeric.newton import converge
 from tcs.kernel.problem import Problem
 
 TURN = 2.0 * np.pi
@@ -176,7 +176,7 @@ def find_curves(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, hunt: Hunt,
     return count
 
 
-@jit
+@inner
 def _start(arm: NumericArm, hunt: Hunt, n: int, azimuth: float, R_F7: FloatArray) -> bool:
     """Fill `q_now` with posture n of the table, joints 1 and 7 turned to the goal.
 
@@ -203,7 +203,7 @@ def _start(arm: NumericArm, hunt: Hunt, n: int, azimuth: float, R_F7: FloatArray
     return abs(q[6] - arm.middle[6]) <= arm.half[6] + BEYOND
 
 
-@jit
+@inner
 def place_last(arm: NumericArm, q: FloatArray, both: FloatArray) -> None:
     """Fill both[0] with the orientation of L7 in F at joint angles q; both[1] is scratch."""
     S, T = both[0], both[1]
@@ -223,7 +223,7 @@ def place_last(arm: NumericArm, q: FloatArray, both: FloatArray) -> None:
         S[:] = T
 
 
-@jit
+@inner
 def hunt_from(
     arm: NumericArm,
     R_AG: FloatArray,
@@ -308,7 +308,7 @@ def find_candidates(
     return found
 
 
-@jit
+@inner
 def _at_limit(
     problem: Problem,
     arm: NumericArm,
@@ -330,7 +330,7 @@ def _at_limit(
     return _add(problem, hunt, n, inner, found)
 
 
-@jit
+@inner
 def _at_peak(
     problem: Problem, arm: NumericArm, hunt: Hunt, n: int, low: float, high: float, found: int
 ) -> int:
@@ -356,7 +356,7 @@ def _at_peak(
     return found
 
 
-@jit
+@inner
 def _add(problem: Problem, hunt: Hunt, n: int, share: float, found: int) -> int:
     """Append a candidate; its measure is that of the points about it, interpolated."""
     if found == len(hunt.at):
@@ -373,7 +373,7 @@ def _add(problem: Problem, hunt: Hunt, n: int, share: float, found: int) -> int:
     return found + 1
 
 
-@jit
+@inner
 def turn_into_limits(problem: Problem, q: FloatArray) -> None:
     """Turn every joint by full turns into its limits."""
     for i in range(7):

@@ -11,11 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.cache import inner, jit, whole
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.measure import inverse_condition
-from tcs.kernel.newton import Look, converge, factorise, look_at, new_look, step_to_goal, way_along
-from tcs.kernel.numeric_arm import NumericArm
+from tcs.kernel.numeric.arm import NumericArm
+from tcs.kernel.numeric.newton import (
+    Look,
+    converge,
+    factorise,
+    look_at,
+    new_look,
+    step_to_goal,
+    way_along,
+)
 
 TURN_BACK = 6.283185307179586
 LEAST_STRIDE = 1e-3
@@ -91,7 +99,7 @@ def slack_of(arm: NumericArm, q: FloatArray) -> float:
     return worst
 
 
-@jit
+@inner
 def is_known(curves: Curves, count: int, q: FloatArray, beside: float) -> bool:
     """Return whether joint angles q lie on one of the first `count` curves.
 
@@ -163,7 +171,7 @@ def trace(
     return count
 
 
-@jit
+@inner
 def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int) -> float:
     """Write the joints and the direction in hand as point n of a curve; return its slack."""
     J = curves.look.J
@@ -189,7 +197,7 @@ def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: i
     return curves.slack[n]
 
 
-@jit
+@inner
 def _walk(
     arm: NumericArm,
     R_AG: FloatArray,
@@ -268,7 +276,7 @@ def _walk(
     return n, False
 
 
-@jit
+@inner
 def _has_closed(curves: Curves, start: int, n: int) -> bool:
     """Return whether the start lies between points n - 1 and n."""
     before = after = apart = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.cache import inner, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -12,10 +12,10 @@ from tcs.kernel.contacts import (
     pair_touches,
     place_links,
 )
-from tcs.kernel.curves import point_between, settle, slack_of
 from tcs.kernel.measure import measure_at
-from tcs.kernel.numeric_arm import NumericArm
-from tcs.kernel.numeric_search import (
+from tcs.kernel.numeric.arm import NumericArm
+from tcs.kernel.numeric.curves import point_between, settle, slack_of
+from tcs.kernel.numeric.search import (
     SPACING,
     WHOLE,
     Hunt,
@@ -46,7 +46,7 @@ NEIGHBOURS = 0.75
 least, and the limits may lie between."""
 
 
-@jit
+@inner
 def solve_at(arm: NumericArm, work: Workspace, hunt: Hunt, at: float) -> bool:
     """Fill `q_now` with the solution at a place on the curves; return whether it keeps limits."""
     curves = hunt.curves
@@ -55,7 +55,7 @@ def solve_at(arm: NumericArm, work: Workspace, hunt: Hunt, at: float) -> bool:
     return arrived and slack_of(arm, curves.q_now) >= 0.0
 
 
-@jit
+@inner
 def contact_at(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
     at: float, first: int, last: int, least: float,
@@ -92,7 +92,7 @@ def contact_at(
     return contact
 
 
-@jit
+@inner
 def choose(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
 ) -> tuple[float, int]:
@@ -135,7 +135,7 @@ def choose(
     return NOWHERE, first_contact
 
 
-@jit
+@inner
 def squeeze(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
 ) -> float:
@@ -173,7 +173,7 @@ def squeeze(
     return NOWHERE
 
 
-@jit
+@inner
 def refine(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
     count: int, centre: float, spacing: float,
@@ -203,7 +203,7 @@ def refine(
         centre, step = best_at, fine
 
 
-@jit
+@inner
 def score_numeric_pair(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt
 ) -> tuple[int, int]:
