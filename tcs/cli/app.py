@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import capability, reports, robots, robustness, talk, view
+from tcs.cli import capability, options, pictures, reports, robots, robustness, talk, view
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -19,39 +19,6 @@ app = typer.Typer(
 app.add_typer(robots.app, name="robot")
 app.add_typer(capability.app, name="capability")
 
-_File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-_HERE = typer.Option(
-    "--here",
-    metavar="X Y YAW_DEG",
-    help="Where the robot is now, in the environment frame (m, m, deg).",
-)
-_Torso = Annotated[float, typer.Option(help="How high the torso is now, in metres.")]
-_At = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="AXIS=VALUE",
-        help="How an axis of the environment is set now, in metres; AXIS_deg=VALUE for angles.",
-    ),
-]
-_Observed = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="AXIS=VALUE",
-        help="How the person is found, e.g. person_y=0.03 (m; AXIS_deg=VALUE for angles); the "
-        "nearest state that was scored is used.",
-    ),
-]
-_Members = Annotated[
-    int | None,
-    typer.Option(
-        min=1,
-        max=3,
-        help="At most so many places to stand at: 1, 2 or 3.",
-        show_default="what the file holds",
-    ),
-]
-_SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
 
 
 def main() -> None:
@@ -71,7 +38,7 @@ def _top(
 
 
 @app.command("list")
-def list_known(as_json: _Json = False) -> None:
+def list_known(as_json: options.Json = False) -> None:
     """List the tasks, environments and robots there are."""
     from tcs.cli.catalogue import catalogue
 
@@ -94,7 +61,7 @@ def score(
             "--all", help="Every task in every environment it is for, or in the one named."
         ),
     ] = False,
-    robot: Annotated[str, typer.Option(help="Name or YAML file of a robot.")] = "pr2",
+    robot: options.Robot = "pr2",
     measure: Annotated[
         str,
         typer.Option(
@@ -102,7 +69,7 @@ def score(
             "-limited less near joint limits, with -limited-thesis as the ITCM thesis has it."
         ),
     ] = "isotropy",
-    jobs: Annotated[int, typer.Option(min=1, help="Number of threads.")] = 2,
+    jobs: options.Jobs = 2,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -137,8 +104,8 @@ def score(
             "environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
         ),
     ] = None,
-    at: _At = None,
-    as_json: _Json = False,
+    at: options.At = None,
+    as_json: options.Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to choose from."""
     if (task is None) != everything:
@@ -174,10 +141,10 @@ def score(
 
 @app.command()
 def select(
-    file: _File,
-    here: Annotated[tuple[float, float, float], _HERE],
-    torso: _Torso = 0.0,
-    at: _At = None,
+    file: options.File,
+    here: Annotated[tuple[float, float, float], options.HERE],
+    torso: options.Torso = 0.0,
+    at: options.At = None,
     alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
     beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
     gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
@@ -198,8 +165,8 @@ def select(
             help="How the base drives: straight, as in the paper, or around the furniture."
         ),
     ] = "straight",
-    max_members: _Members = None,
-    observed: _Observed = None,
+    max_members: options.Members = None,
+    observed: options.Observed = None,
     seen: Annotated[
         list[str] | None,
         typer.Option(
@@ -208,7 +175,7 @@ def select(
             "person is found, in place of --observed.",
         ),
     ] = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Choose where to stand now: the set with the greatest utility from here."""
     import tcs
@@ -238,7 +205,7 @@ def select(
 
 @app.command()
 def explain(
-    file: _File,
+    file: options.File,
     goal: Annotated[int, typer.Option(help="Number of the goal, from 0.", show_default=False)],
     configuration: Annotated[
         int | None,
@@ -254,8 +221,8 @@ def explain(
             help="A place instead, in the environment frame (m, m, deg); see --torso, --at.",
         ),
     ] = None,
-    torso: _Torso = 0.0,
-    at: _At = None,
+    torso: options.Torso = 0.0,
+    at: options.At = None,
     metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
     turn_weight: Annotated[float, typer.Option(help="Cost of a radian of turning.")] = 0.3,
     torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso lift.")] = 1.0,
@@ -270,8 +237,8 @@ def explain(
         str,
         typer.Option(metavar="straight|around", help="How the base drives: around the furniture?"),
     ] = "around",
-    observed: _Observed = None,
-    as_json: _Json = False,
+    observed: options.Observed = None,
+    as_json: options.Json = False,
 ) -> None:
     """Say why a goal is not reached, and the least change that would reach it."""
     if configuration is not None and here is not None:
@@ -306,13 +273,13 @@ def explain(
 
 @app.command()
 def verify(
-    file: _File,
+    file: options.File,
     pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check.")] = 500,
     dense: Annotated[
         int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
     ] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random choice.")] = 0,
-    as_json: _Json = False,
+    seed: options.Seed = 0,
+    as_json: options.Json = False,
 ) -> None:
     """Re-check answers with Drake, and look for answers that were missed."""
     import tcs
@@ -330,53 +297,14 @@ def verify(
         raise typer.Exit(1)
 
 
-@app.command(
-    "picture",
-    help="Draw the robot where it is to stand, its arm at a goal, from its collision shapes.\n\n"
-    + _SHOWN_SET,
-)
-@app.command(
-    "map",
-    help="Draw the best score per base place, from above, and where the chosen members stand.\n\n"
-    + _SHOWN_SET,
-)
-def draw(
-    context: typer.Context,
-    file: _File,
-    out: Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")],
-    here: Annotated[tuple[float, float, float] | None, _HERE] = None,
-    torso: _Torso = 0.0,
-    max_members: _Members = None,
-    observed: _Observed = None,
-    as_json: _Json = False,
-) -> None:
-    """Draw one of the two pictures, of the set chosen from here or of the best one."""
-    import tcs
-    from tcs.cli.places import check_writable, observed_settings, place
-    from tcs.draw import check_format, save_figure
-
-    check_format(out)
-    check_writable(out)
-    loaded = tcs.load(file)
-
-    from tcs.report import pictures
-
-    found = observed_settings(observed or (), loaded.observed_axes)
-    shown = pictures.Shown.of(loaded, place(here, torso) if here else None, max_members, found)
-    figure = pictures.map_figure if context.info_name == "map" else pictures.scene_figure
-    save_figure(out, figure(loaded, shown))
-    result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
-    talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
-
-
 @app.command()
 def export(
-    file: _File,
+    file: options.File,
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
     everything: Annotated[
         bool, typer.Option("--all", help="Also configurations that reach no goal.")
     ] = False,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Write scores as a table: a row for each configuration that reaches a goal."""
     import tcs
@@ -397,4 +325,6 @@ def export(
 
 for command in (robustness.evaluate, robustness.robustify, view.view):
     app.command()(command)
+app.command("map")(pictures.draw_map)
+app.command("picture")(pictures.draw_picture)
 app.command("map-check")(capability.map_check)

@@ -10,20 +10,18 @@ import typer
 
 from tcs.cli import capability_reports as reports
 from tcs.cli import capability_work as work
-from tcs.cli import talk
+from tcs.cli import options, talk
 
 app = typer.Typer(
     help="Capability maps: from which base poses an end-effector pose is reached.",
     no_args_is_help=True,
 )
 
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 _Map = Annotated[Path, typer.Argument(metavar="MAP", help="A capability map.")]
 _Out = Annotated[Path, typer.Option(help="Map to write.")]
 _Text = Annotated[
     Path | None, typer.Option(help="Also write it as text: score x y z R11 .. R33, a line each.")
 ]
-_Robot = Annotated[str, typer.Option(help="Name or YAML file of a robot.")]
 _Radius = Annotated[
     float | None,
     typer.Option(
@@ -47,8 +45,6 @@ _Measure = Annotated[
 _View = Annotated[
     str, typer.Option("--visibility", help="corrected, or thesis for the equations as printed.")
 ]
-_Jobs = Annotated[int, typer.Option(min=1, help="Number of threads.")]
-_Seed = Annotated[int, typer.Option(min=0, help="Seed of everything random.")]
 _Height = Annotated[
     float | None,
     typer.Option(
@@ -64,7 +60,7 @@ _MEASURE = "inverse-condition-limited-thesis"
 @app.command("from-ik")
 def from_ik(
     out: _Out,
-    robot: _Robot = "tiago",
+    robot: options.Robot = "tiago",
     kind: Annotated[str, typer.Option(help="IHCM, or ICM without visibility.")] = "IHCM",
     lift: _Lift = None,
     grasps: _Grasps = "side+top",
@@ -74,9 +70,9 @@ def from_ik(
     tool: _Tool = None,
     measure: _Measure = _MEASURE,
     view: _View = "corrected",
-    jobs: _Jobs = 2,
+    jobs: options.Jobs = 2,
     text: _Text = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Make a map by inverse kinematics of every cell around the tool."""
     robot_setup = work.Setup(robot, tool, lift, step, turns, grasps, measure)
@@ -99,7 +95,7 @@ def record(
             show_default="a simulated operator records",
         ),
     ] = None,
-    robot: _Robot = "tiago",
+    robot: options.Robot = "tiago",
     lift: _Lift = None,
     height: _Height = None,
     grasps: _Grasps = "side",
@@ -117,12 +113,12 @@ def record(
         tuple[float, float],
         typer.Option(metavar="X Y", help="Simulated: middle of the hand's box before the base, m."),
     ] = (0.65, 0.0),
-    seed: _Seed = 0,
+    seed: options.Seed = 0,
     save_csv: Annotated[
         Path | None, typer.Option(help="Simulated: also write the joint states.")
     ] = None,
     text: _Text = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Make a map (ITCM) from recorded joint states, or from those of a simulated operator.
 
@@ -145,7 +141,7 @@ def from_bag(
     topic: Annotated[
         str | None, typer.Option(help="Topic of the joint states.", show_default="any")
     ] = None,
-    robot: _Robot = "tiago",
+    robot: options.Robot = "tiago",
     lift: _Lift = None,
     height: _Height = None,
     grasps: _Grasps = "side",
@@ -156,7 +152,7 @@ def from_bag(
     view: _View = "corrected",
     drop_bad: _DropBad = False,
     text: _Text = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Make a map (ITCM) from the joint states in ROS bags; needs the extra `bags` of tcs."""
     robot_setup = work.Setup(robot, tool, lift, step, turns, grasps, measure)
@@ -210,7 +206,7 @@ def merge_maps(
     picture: Annotated[
         Path | None, typer.Option(help="Picture to draw: .png, .pdf, .svg, or .html to turn.")
     ] = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Merge a map over the grasps of a task: where to stand for all of it."""
     asked = work.AskedTask(
@@ -250,7 +246,7 @@ def show(
         float | None,
         typer.Option(help="Of the tool, in metres.", show_default="where most base poses are"),
     ] = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Draw a map from above: a short line for each base pose, seen from the tool."""
     result = work.show(capability, out, tilt=tilt, height=height)
@@ -266,7 +262,7 @@ def map_check(
             show_default="one that would be made with these options",
         ),
     ] = None,
-    robot: _Robot = "tiago",
+    robot: options.Robot = "tiago",
     lift: _Lift = None,
     grasps: Annotated[
         list[str] | None, typer.Option(help="side, top or all.", show_default="each of them")
@@ -276,9 +272,9 @@ def map_check(
     radius: _Radius = None,
     tool: _Tool = None,
     queries: Annotated[int, typer.Option(min=1, help="Random tool poses of each kind.")] = 20_000,
-    seed: _Seed = 0,
-    jobs: _Jobs = 2,
-    as_json: _Json = False,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = 2,
+    as_json: options.Json = False,
 ) -> None:
     """Compare a map's answers on random tool poses with inverse kinematics itself."""
     robot_setup = work.Setup(robot, tool, lift, step, turns, "side", _MEASURE)

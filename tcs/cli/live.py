@@ -10,7 +10,7 @@ from typing import Any
 import tcs
 from tcs.cli import reports, talk
 from tcs.cli.places import check_writable, frame_places, observed_settings, settings
-from tcs.cli.rows import default_path
+from tcs.cli.rows import default_path, saved_summary
 from tcs.cli.talk import paper
 from tcs.scene import EnvironmentFile, load_environment
 from tcs.space import Axis
@@ -64,20 +64,11 @@ def score_found(
         environment=environment,
         jobs=jobs,
         **sets,
-        on_compile=lambda: talk.say(
-            "compiling for this machine, up to a minute; later runs do without."
-        ),
+        on_compile=talk.say_compiling,
     )
     file = scorer.score(observation)
     tcs.save(path, file)
-    return {
-        "task": file.task["name"],
-        "environment": file.environment["name"],
-        **tcs.summary(file),
-        "observation": file.metadata["observation"],
-        "file": str(path),
-        "file_bytes": path.stat().st_size,
-    }
+    return {**saved_summary(path, file), "observation": file.metadata["observation"]}
 
 
 def _joints(room: EnvironmentFile) -> list[Axis]:

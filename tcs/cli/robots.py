@@ -7,13 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import talk
+from tcs.cli import options, talk
 
 app = typer.Typer(
     help="Robots: draft a file from any URDF, and check one up.", no_args_is_help=True
 )
-
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 @app.command()
@@ -29,7 +27,7 @@ def new(
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="<urdf>.yaml")
     ] = None,
-    as_json: _Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Draft a robot file from any URDF, with its collision shapes in a CSV file beside it."""
     from tcs.cli.places import check_writable
@@ -68,8 +66,8 @@ def check(
     samples: Annotated[
         int, typer.Option(min=1, help="Random postures of the IK round trip.")
     ] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
-    as_json: _Json = False,
+    seed: options.Seed = 0,
+    as_json: options.Json = False,
 ) -> None:
     """Check a robot up: arm class, limits, shapes, self-collision, IK; exit 1 if it is unfit."""
     from tcs.checkup import check_up

@@ -8,26 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import reports, talk
+from tcs.cli import options, reports, talk
 from tcs.cli.places import observed_settings
 
-_File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
-_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-_Seed = Annotated[int, typer.Option(min=0, help="Seed of the random errors.")]
-_Jobs = Annotated[int, typer.Option(min=1, help="Number of threads; results are the same.")]
 _Errors = Annotated[
     Path | None,
     typer.Option(
         help="YAML file of errors by joint, in place of the environment's own.",
         show_default="those of the environment, TCS Table II",
-    ),
-]
-_Observed = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="AXIS=VALUE",
-        help="How the person is believed to be found, e.g. person_y=0.05; the nearest state that "
-        "was scored is used.",
     ),
 ]
 Delta = Annotated[
@@ -44,9 +32,9 @@ _CheckBase = Annotated[
 
 
 def evaluate(
-    file: _File,
+    file: options.File,
     samples: Annotated[int, typer.Option(help="Number of samples.")] = 1000,
-    seed: _Seed = 0,
+    seed: options.Seed = 0,
     errors: _Errors = None,
     select: Annotated[
         str,
@@ -61,10 +49,10 @@ def evaluate(
         int | None,
         typer.Option(min=1, max=2, help="Members of the sets drawn uniformly.", show_default="2"),
     ] = None,
-    observed: _Observed = None,
+    observed: options.Observed = None,
     check_base: _CheckBase = False,
-    jobs: _Jobs = 2,
-    as_json: _Json = False,
+    jobs: options.Jobs = 2,
+    as_json: options.Json = False,
 ) -> None:
     """Try a set again in rooms a little off: how much of the task is still done?"""
     if members is not None and select != "uniform":
@@ -85,15 +73,13 @@ def evaluate(
             check_base=check_base,
             jobs=jobs,
             on_progress=on_progress,
-            on_compile=lambda: talk.say(
-                "compiling for this machine, up to a minute; later runs do without."
-            ),
+            on_compile=talk.say_compiling,
         )
     talk.print_result(found.to_json(), report_evaluation, as_json=as_json)
 
 
 def robustify(
-    file: _File,
+    file: options.File,
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="FILE itself")
     ] = None,
@@ -103,12 +89,12 @@ def robustify(
     samples: Annotated[
         int, typer.Option(help="Samples for the sets that may be the best; others get fewer.")
     ] = 1024,
-    seed: _Seed = 0,
+    seed: options.Seed = 0,
     errors: _Errors = None,
-    observed: _Observed = None,
+    observed: options.Observed = None,
     check_base: _CheckBase = False,
-    jobs: _Jobs = 2,
-    as_json: _Json = False,
+    jobs: options.Jobs = 2,
+    as_json: options.Json = False,
 ) -> None:
     """Estimate the success under error of the best sets, for `tcs select --delta`.
 
@@ -133,9 +119,7 @@ def robustify(
             tables=None if table is None else [table],
             jobs=jobs,
             on_progress=on_progress,
-            on_compile=lambda: talk.say(
-                "compiling for this machine, up to a minute; later runs do without."
-            ),
+            on_compile=talk.say_compiling,
         )
         tcs.save(path, done)
     result = {"file": str(path), **success_summary(done)}

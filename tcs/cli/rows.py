@@ -43,11 +43,14 @@ def score_one(
             jobs=jobs,
             **sets,
             on_progress=on_progress,
-            on_compile=lambda: talk.say(
-                "compiling for this machine, up to a minute; later runs do without."
-            ),
+            on_compile=talk.say_compiling,
         )
         tcs.save(path, file)
+    return saved_summary(path, file)
+
+
+def saved_summary(path: Path, file: tcs.ScoreFile) -> dict[str, Any]:
+    """Return what was scored, and where it was saved to, as plain containers."""
     return {
         "task": file.task["name"],
         "environment": file.environment["name"],

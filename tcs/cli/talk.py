@@ -75,6 +75,11 @@ def say(text: str) -> None:
     typer.echo(f"tcs: {text}", err=True)
 
 
+def say_compiling() -> None:
+    """Tell the user why nothing happens for a while."""
+    say("compiling for this machine, up to a minute; later runs do without.")
+
+
 def print_result(
     result: dict[str, Any], report: Callable[[dict[str, Any]], None], *, as_json: bool
 ) -> None:

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tcs.cli import talk
+from tcs.cli import options, talk
 
 
 def view(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")],
+    file: options.File,
     here: Annotated[
         tuple[float, float, float] | None,
         typer.Option(
@@ -19,23 +19,9 @@ def view(
             help="Start with the set chosen from here (m, m, deg) instead of the best one.",
         ),
     ] = None,
-    torso: Annotated[float, typer.Option(help="How high the torso is now, in metres.")] = 0.0,
-    max_members: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=3,
-            help="At most so many places to stand at: 1, 2 or 3.",
-            show_default="what the file holds",
-        ),
-    ] = None,
-    observed: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="AXIS=VALUE",
-            help="How the person is found, e.g. person_y=0.03 (m; AXIS_deg=VALUE for angles).",
-        ),
-    ] = None,
+    torso: options.Torso = 0.0,
+    max_members: options.Members = None,
+    observed: options.Observed = None,
     export: Annotated[
         Path | None,
         typer.Option(
