@@ -48,6 +48,8 @@ class Joint:
     soft: tuple[float, float]
     """The `safety_controller` element within the hard limits; the hard ones without it."""
     mimic: Mimic | None
+    velocity: float = math.inf
+    """How fast it may move by the `limit` element [m/s or rad/s]; infinite where that says none."""
 
     @property
     def is_movable(self) -> bool:
@@ -222,6 +224,7 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
         hard=hard,
         soft=_soft_limits(element, hard, where),
         mimic=_mimic(element, where),
+        velocity=_velocity(element, where),
     )
 
 
@@ -238,6 +241,14 @@ def _hard_limits(element: ElementTree.Element, kind: str, where: str) -> tuple[f
     if lower > upper:
         raise RobotError(f"{where}: its lower limit {lower} is above its upper limit {upper}.")
     return lower, upper
+
+
+def _velocity(element: ElementTree.Element, where: str) -> float:
+    limit = element.find("limit")
+    text = "0" if limit is None else limit.get("velocity", "0")
+    # Exporters write 0 where they know no velocity; a joint that may not move would be fixed.
+    speed = _numbers(text, 1, where)[0]
+    return speed if speed > 0.0 else math.inf
 
 
 def _soft_limits(

@@ -1,0 +1,196 @@
+"""The arm that a person drives: its chain, its limits, and where its tool is, fast in Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.robots import RobotFile, load_robot
+from tcs.scene import EnvironmentFile, Scene, SceneSpec, arm_chain
+
+JOINTS = 7
+UNSAID_VELOCITY = 1.0
+"""Velocity limit of a joint whose URDF gives none [rad/s]: slower than any arm that ships."""
+
+_NOWHERE = EnvironmentFile(
+    name="nowhere",
+    title="Nothing at all",
+    origin="the robot's base",
+    source="none: there is nothing in it",
+    floor=False,
+    grid={},
+)
+
+
+class Kinematics(NamedTuple):
+    """Where the tool T is in the robot's base B, and how the joints move it."""
+
+    R: FloatArray
+    """R_BT, shape (3, 3)."""
+    p: FloatArray
+    """p_BoTo_B [m], shape (3,)."""
+    jacobian: FloatArray
+    """V_BT per joint rate, shape (6, 7), rows angular then linear [rad/rad; m/rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """The scored arm of a robot, torso and base standing still.
+
+    Attributes:
+        robot: The robot it belongs to.
+        lower: Lower limits in force [rad], shape (7,); -inf where a joint turns on and on.
+        upper: Upper limits in force [rad], shape (7,); +inf where a joint turns on and on.
+        velocity: Greatest joint rates [rad/s], shape (7,).
+        lift: Where the torso stands [m]; 0 for a robot without one.
+        frames: What lies between neighbouring link frames, shape (8, 4, 4): X_BL1 at zero, six
+            steps X_Li-1,Li at zero, X_L7T. Link i turns about the z axis of Li.
+    """
+
+    robot: RobotFile
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
+    lift: float
+    frames: FloatArray
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only, and split the frames into what cosine and sine multiply."""
+        turning = self.frames[:JOINTS]
+        x, y = turning[:, :, 0], turning[:, :, 1]
+        still, cosine, sine = np.zeros_like(turning), np.zeros_like(turning), np.zeros_like(turning)
+        still[:, :, 2:] = turning[:, :, 2:]
+        # F Rz(q): the first two columns turn into one another.
+        cosine[:, :, 0], cosine[:, :, 1] = x, y
+        sine[:, :, 0], sine[:, :, 1] = y, -x
+        object.__setattr__(self, "_parts", (still, cosine, sine))
+        for array in (self.lower, self.upper, self.velocity, self.frames, still, cosine, sine):
+            array.flags.writeable = False
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self.robot.name
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the seven joints, from the base outward."""
+        return self.robot.arm_joints
+
+    @property
+    def bounded(self) -> BoolArray:
+        """Which joints have limits, shape (7,)."""
+        return np.isfinite(self.lower) & np.isfinite(self.upper)
+
+    def link_poses(self, joints: FloatArray) -> FloatArray:
+        """Return X_BL1 .. X_BL7 and X_BT as matrices, shape (8, 4, 4).
+
+        Args:
+            joints: Joint positions [rad], shape (7,).
+        """
+        still, cosine, sine = self._parts  # type: ignore[attr-defined]
+        angles = joints.reshape(JOINTS, 1, 1)
+        steps = still + cosine * np.cos(angles) + sine * np.sin(angles)
+        poses = np.empty((JOINTS + 1, 4, 4))
+        X = poses[0] = steps[0]
+        for i in range(1, JOINTS):
+            X = np.matmul(X, steps[i], out=poses[i])
+        np.matmul(X, self.frames[JOINTS], out=poses[JOINTS])
+        return poses
+
+    def kinematics(self, joints: FloatArray) -> Kinematics:
+        """Return where the tool is and how the joints move it.
+
+        Args:
+            joints: Joint positions [rad], shape (7,).
+        """
+        poses = self.link_poses(joints)
+        axes = poses[:JOINTS, :3, 2].T
+        p = poses[JOINTS, :3, 3]
+        arms = p[:, None] - poses[:JOINTS, :3, 3].T
+        jacobian = np.empty((6, JOINTS))
+        jacobian[:3] = axes
+        # The cross product axis x arm by rows: numpy's own costs more than all of the rest.
+        jacobian[3] = axes[1] * arms[2] - axes[2] * arms[1]
+        jacobian[4] = axes[2] * arms[0] - axes[0] * arms[2]
+        jacobian[5] = axes[0] * arms[1] - axes[1] * arms[0]
+        return Kinematics(poses[JOINTS, :3, :3], p, jacobian)
+
+    def checked(self, joints: object, where: str = "joints") -> FloatArray:
+        """Return seven joint positions as a new array.
+
+        Raises:
+            TcsError: If there are not exactly seven finite numbers.
+        """
+        try:
+            values = np.array(joints, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape != (JOINTS,) or not np.isfinite(values).all():
+            raise TcsError(
+                f"{where}: must be {JOINTS} finite numbers [rad], one for each joint of "
+                f"'{self.name}' from the base outward, but is {joints!r}."
+            )
+        return values
+
+    def beyond(self, joints: FloatArray) -> str:
+        """Return which joint breaks its limits and by what, empty if none does.
+
+        Args:
+            joints: Joint positions [rad], shape (7,).
+        """
+        outside = (joints < self.lower) | (joints > self.upper)
+        if not outside.any():
+            return ""
+        i = int(np.argmax(outside))
+        return (
+            f"joint {i + 1} ('{self.joints[i]}') is at {joints[i]:.4f} rad, outside its limits "
+            f"{self.lower[i]:.4f} to {self.upper[i]:.4f}"
+        )
+
+    def random_joints(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return postures drawn evenly within the limits [rad], shape (count, 7).
+
+        Joints that turn on and on are drawn from a full turn.
+        """
+        lower = np.where(self.bounded, self.lower, -np.pi)
+        upper = np.where(self.bounded, self.upper, np.pi)
+        return rng.uniform(lower, upper, size=(count, JOINTS))
+
+
+def load_arm(robot: RobotFile | str | Path, *, lift: float = 0.0) -> Arm:
+    """Return the scored arm of a robot, read off its Drake plant.
+
+    Args:
+        robot: The robot, its name, or the path of a robot file.
+        lift: How high the torso stands [m]; taken to the nearest height it can have.
+
+    Raises:
+        UnknownNameError: If there is no robot of that name.
+        RobotError: If the robot file or its model cannot be used.
+    """
+    file = robot if isinstance(robot, RobotFile) else load_robot(robot)
+    scene = Scene(SceneSpec(file, _NOWHERE))
+    used = scene.set_torso(lift)
+    scene.set_arm(np.zeros(JOINTS))
+    chain, _ = arm_chain(scene)
+    built = scene.built
+    X_BA = built.arm_base_frame.CalcPose(scene.plant_context, built.base_frame).GetAsMatrix4()
+    frames = np.zeros((JOINTS + 1, 4, 4))
+    frames[:, :3, :3], frames[:, :3, 3], frames[:, 3, 3] = chain.R, chain.p, 1.0
+    frames[0] = X_BA @ frames[0]
+    said = file.model().joints
+    fastest = np.array([said[name].velocity for name in file.arm_joints])
+    return Arm(
+        robot=file,
+        lower=chain.lower.copy(),
+        upper=chain.upper.copy(),
+        velocity=np.where(np.isfinite(fastest), fastest, UNSAID_VELOCITY),
+        lift=used,
+        frames=frames,
+    )

@@ -1,0 +1,152 @@
+"""Null-space control: turning a group of joints while the tool stays (paper, eqs. 9-14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.teleop.arm import JOINTS
+
+HELD = 1e-9
+"""A group holds the tool alone when it leaves less than this over of a metre [m per rad of the
+lead]: rounding of a Jacobian is a thousand times smaller, and it is as much as the figures of a
+URDF let axes miss each other by."""
+_WEAK = 0.002
+"""Singular value of the followers [m/rad] below which they are eased: to hold a tool that the lead
+joint moves at 0.5 m/rad, they would have to turn 250 times as fast as it does."""
+_EASED = 0.3
+"""How much a follower's rate counts against an outside joint's where the followers can do
+nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupMotion:
+    """Joint rates that turn a group while the tool stays.
+
+    Attributes:
+        rates: Joint rates [rad/s], shape (7,).
+        exact: Whether only joints of the group move.
+        slip: Velocity of the tool that no joint could make up for [m/s].
+    """
+
+    rates: FloatArray
+    exact: bool
+    slip: float
+
+
+def group_motion(
+    jacobian: FloatArray,
+    group: tuple[int, ...],
+    rate: float,
+    velocity: FloatArray | None = None,
+    held: BoolArray | None = None,
+    held_rates: FloatArray | None = None,
+) -> GroupMotion:
+    """Return the motion of a joint group in the null space: N_Jp xi of eq. (11).
+
+    The paper solves 0 = J_p theta' (eq. 10) for a 7 x 4 basis whose columns turn one joint group
+    each (eq. 12), and does not say how that basis is made. Ours: the lead joint turns at rate k,
+    and of all motions that hold the tool we take the one in which the joints outside the group
+    move least (least squares; among equals, the smallest rates within the group). With L the lead
+    joint, F the others of its group, O the rest, v the velocity asked of the tool,
+
+        w = v - J_L k,  N = 1 - J_F J_F^+,  r_O = (N J_O)^+ N w,  r_F = J_F^+ (w - J_O r_O).
+
+    Where the group alone can hold the tool, N w = 0, and r_O is set to exactly zero. Where J_F
+    loses rank, followers would have to race; there their rates count as well, the more the weaker
+    they are, without a jump at the border.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        group: Joints of the group, counted from 0, its lead joint first.
+        rate: Rate of the lead joint: k times the speed of the group [rad/s].
+        velocity: Velocity that the tool is to have, to undo its drift [m/s], shape (3,).
+        held: Joints that stay at a rate of their own, e.g. at their limit, shape (7,).
+        held_rates: The rates of these [rad/s], shape (7,).
+
+    Returns:
+        The motion; `slip` says whether the tool is held.
+    """
+    lead = group[0]
+    free = np.ones(JOINTS, bool) if held is None else ~held
+    rates = np.zeros(JOINTS) if held_rates is None else np.where(free, 0.0, held_rates)
+    free[lead] = False
+    rates[lead] = rate
+    own = [joint for joint in group[1:] if free[joint]]
+    others = [joint for joint in range(JOINTS) if free[joint] and joint not in group]
+    wanted = -(jacobian @ rates)
+    if velocity is not None:
+        wanted = wanted + velocity
+    left: FloatArray = wanted
+    weight = 0.0
+    if own:
+        U, s, Vt = np.linalg.svd(jacobian[:, own], full_matrices=False)
+        weight = _weight(float(s[-1]))
+        if weight == 0.0:
+            left = wanted - U @ (wanted @ U)
+    if weight == 0.0:
+        scale = abs(rate) + float(np.linalg.norm(wanted))
+        exact = float(np.linalg.norm(left)) <= HELD * scale
+        if not exact and others:
+            rest = jacobian[:, others]
+            if own:
+                rest = rest - U @ (U.T @ rest)
+            rates[others] = _smallest(rest, left)
+            wanted = wanted - jacobian[:, others] @ rates[others]
+        if own:
+            rates[own] = ((wanted @ U) / s) @ Vt
+            wanted = wanted - jacobian[:, own] @ rates[own]
+    else:
+        both = own + others
+        cost = np.where(np.arange(len(both)) < len(own), weight, 1.0)
+        rates[both] = _smallest(jacobian[:, both] / cost, wanted) / cost
+        wanted = wanted - jacobian[:, both] @ rates[both]
+        exact = False
+    return GroupMotion(rates, bool(exact), float(np.linalg.norm(wanted)))
+
+
+def null_space_basis(jacobian: FloatArray, groups: tuple[tuple[int, ...], ...]) -> FloatArray:
+    """Return N_Jp of eq. (11), one column for each joint group, its lead joint at rate 1.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        groups: The joint groups, lead joints first.
+
+    Returns:
+        Shape (7, groups).
+    """
+    return np.stack([group_motion(jacobian, group, 1.0).rates for group in groups], axis=1)
+
+
+def elbow_direction(jacobian: FloatArray) -> FloatArray:
+    """Return the joint motion that holds the tool's whole pose, its fastest joint at rate 1.
+
+    Component i is (-1)^i times the determinant of J without column i: it turns with the posture
+    without ever changing sign by itself, unlike the last vector of a singular value decomposition.
+
+    Args:
+        jacobian: Shape (6, 7).
+
+    Returns:
+        Shape (7,); zero at a singularity, where more than one motion holds the pose.
+    """
+    *_, Vt = np.linalg.svd(jacobian)
+    n = Vt[-1]
+    oriented = np.linalg.det(np.vstack([jacobian, n]))
+    largest = float(np.abs(n).max())
+    return np.asarray(n * (np.sign(oriented) / largest), dtype=np.float64)
+
+
+def _weight(singular_value: float) -> float:
+    """Return how much the followers' rates count, from their smallest singular value."""
+    if singular_value >= _WEAK:
+        return 0.0
+    return _EASED * float(np.sqrt(1.0 - (singular_value / _WEAK) ** 2))
+
+
+def _smallest(rows: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the least squares solution of least norm."""
+    # Singular values this far below the largest are rounding of a projection.
+    return np.asarray(np.linalg.lstsq(rows, wanted, rcond=1e-9)[0], dtype=np.float64)

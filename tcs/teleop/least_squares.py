@@ -1,0 +1,76 @@
+"""Least squares between bounds: the joints at a bound stay there, the rest does what it can."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray
+
+_ROUNDS = 50
+"""Far more changes of the active set than seven joints ever need; each lowers the cost."""
+
+
+def bounded_minimum(
+    hessian: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return the x between bounds that minimises x^T H x / 2 - g^T x.
+
+    An active set method (Lawson and Hanson, Solving Least Squares Problems, chapter 23, for bounds
+    on both sides): solve for the free variables; go towards the solution up to the first bound on
+    the way and hold that variable there; once all free ones are inside, let go of the held one
+    that pulls inwards most; stop when none does.
+
+    Args:
+        hessian: H, positive definite, shape (n, n).
+        slope: g, shape (n,).
+        lower: Lower bounds, shape (n,), -inf for none.
+        upper: Upper bounds, shape (n,), at least the lower ones.
+
+    Returns:
+        x, shape (n,), and which variables are held at a bound, shape (n,).
+    """
+    x = np.asarray(np.linalg.solve(hessian, slope), dtype=np.float64)
+    side = np.zeros(len(x), np.int8)
+    if ((x >= lower) & (x <= upper)).all():
+        return x, side != 0
+    x = np.clip(np.zeros_like(x), lower, upper)
+    # A pull weaker than this is rounding, of the size that the cost itself is rounded by.
+    slack = 1e-12 * (1.0 + float(np.abs(slope).max()))
+    for _ in range(_ROUNDS):
+        free = np.flatnonzero(side == 0)
+        if len(free):
+            held = np.flatnonzero(side)
+            rest = slope[free] - hessian[np.ix_(free, held)] @ x[held]
+            goal = np.asarray(np.linalg.solve(hessian[np.ix_(free, free)], rest), dtype=np.float64)
+            share, first, at = _first_bound(x[free], goal, lower[free], upper[free])
+            x[free] += share * (goal - x[free])
+            if first >= 0:
+                joint = free[first]
+                x[joint] = (lower, upper)[at][joint]
+                side[joint] = 2 * at - 1
+                continue
+            x[free] = goal
+        # The cost falls where x moves along this; a held variable is let go if that is inwards.
+        pull = slope - hessian @ x
+        inwards = np.where(upper > lower, -side * pull, 0.0)
+        i = int(inwards.argmax())
+        if inwards[i] <= slack:
+            break
+        side[i] = 0
+    return x, side != 0
+
+
+def _first_bound(
+    x: FloatArray, goal: FloatArray, lower: FloatArray, upper: FloatArray
+) -> tuple[float, int, int]:
+    """Return how far x can go towards goal, which variable stops it, and at which side."""
+    share, first, side = 1.0, -1, 0
+    for i in range(len(x)):
+        way = goal[i] - x[i]
+        for at, bound in ((0, lower[i]), (1, upper[i])):
+            over = goal[i] < bound if at == 0 else goal[i] > bound
+            if over:
+                part = max((bound - x[i]) / way, 0.0)
+                if part < share:
+                    share, first, side = part, i, at
+    return float(share), first, side

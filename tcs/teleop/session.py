@@ -1,0 +1,243 @@
+"""Teleoperation: one arm, one person, one step after another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import JOINTS, Arm
+from tcs.teleop.bounds import approach, rate_bounds
+from tcs.teleop.control import moved, pose_error
+from tcs.teleop.flags import ShortArray, flags_of
+from tcs.teleop.modes import Situation, Wish, elbow_way, wish
+from tcs.teleop.settings import Command, Mode, Settings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """The arm after one step, and what the person is told about it.
+
+    Attributes:
+        time: Time since the session began [s].
+        joints: Joint positions [rad], shape (7,), always within the limits.
+        rates: Joint rates during the step [rad/s], shape (7,).
+        R: Orientation of the tool in the robot's base, R_BT, shape (3, 3).
+        p: Position of the tool in the robot's base [m], shape (3,).
+        target_R: Orientation that is held or followed, shape (3, 3).
+        target_p: Position that is held or followed [m], shape (3,).
+        mode: What commands move.
+        limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
+        singular: Whether the task of this mode is singular.
+        singular_value: Smallest singular value of the task's Jacobian [m/rad].
+        worst_joint: The joint closest to a limit, in shares of its range, counted from 0.
+        stopped: Whether the arm does not do what the person asks.
+        reason: Why, in one line; empty while it does.
+    """
+
+    time: float
+    joints: FloatArray
+    rates: FloatArray
+    R: FloatArray
+    p: FloatArray
+    target_R: FloatArray
+    target_p: FloatArray
+    mode: Mode
+    limits: ShortArray
+    singular: bool
+    singular_value: float
+    worst_joint: int
+    stopped: bool
+    reason: str
+
+
+class Teleoperation:
+    """An arm that follows a person's commands, one every `settings.period`."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        joints: ArrayLike,
+        settings: Settings | None = None,
+        mode: Mode = Mode.END_EFFECTOR,
+    ) -> None:
+        """Begin with the arm at rest.
+
+        A posture beyond the limits is no error: the arm holds still there, and every step says
+        why, until `place` puts it elsewhere.
+
+        Args:
+            arm: The arm.
+            joints: Where its joints stand [rad], shape (7,).
+            settings: How commands become motion; None for the defaults.
+            mode: The mode to begin in.
+
+        Raises:
+            TcsError: If the joints are not seven finite numbers.
+        """
+        self.arm = arm
+        self.settings = settings or Settings()
+        self._mode = mode
+        self._time = 0.0
+        self._heard = 0.0
+        self._command = Command()
+        self.place(joints)
+
+    def place(self, joints: ArrayLike) -> None:
+        """Put the arm, at rest, into another posture; time goes on.
+
+        Args:
+            joints: Where its joints stand [rad], shape (7,).
+
+        Raises:
+            TcsError: If they are not seven finite numbers.
+        """
+        self._joints = self.arm.checked(joints, "start posture")
+        self._rates = np.zeros(JOINTS)
+        self._now = self.arm.kinematics(self._joints)
+        self._target_R, self._target_p = self._now.R, self._now.p
+        self._switching = False
+        self._turning: float = 0
+        self._way = 1.0
+        self._beyond = self.arm.beyond(self._joints)
+
+    @property
+    def joints(self) -> FloatArray:
+        """Where the joints stand [rad], shape (7,)."""
+        return self._joints.copy()
+
+    @property
+    def mode(self) -> Mode:
+        """What commands move."""
+        return self._mode
+
+    def step(self, command: Command | None = None) -> Step:
+        """Move the arm on by one period.
+
+        Args:
+            command: What the person asks for; None if nothing was heard: the last command goes on
+                until it has been silent for `settings.timeout`.
+        """
+        settings = self.settings
+        self._time += settings.period
+        why = self._refused(command)
+        asked = self._command
+        if not why and asked.mode is not None and asked.mode != self._mode:
+            self._mode = asked.mode
+            self._switching = True
+        bounds = rate_bounds(self.arm, self._joints, settings.period, settings.acceleration)
+        if why or asked.clutch:
+            self._move(np.zeros(JOINTS), *bounds)
+            self._target_R, self._target_p = self._now.R, self._now.p
+            return self._report(why)
+        if self._switching:
+            # The tool has not come to rest yet; the target waits for it, so nothing pulls it back.
+            self._target_R, self._target_p = self._now.R, self._now.p
+        wanted = self._wish(asked, *bounds)
+        if self._move(wanted.rates, *bounds):
+            self._switching = False
+        self._advance_target(asked, ended=bool(wanted.reason))
+        return self._report(wanted.reason)
+
+    def _refused(self, command: Command | None) -> str:
+        """Take a command over, or say why the arm holds still instead."""
+        settings = self.settings
+        why = ""
+        if command is not None:
+            self._heard = self._time
+            fault = command.fault(len(settings.groups))
+            if fault:
+                why = f"command refused: {fault}. The arm holds still until a sound one comes."
+            else:
+                self._command = command
+        # Half a period, so that counting periods up does not decide by its rounding.
+        elif self._time - self._heard > settings.timeout + 0.5 * settings.period:
+            why = (
+                f"input lost: no command for more than {settings.timeout:g} s. The arm holds still "
+                "until one comes."
+            )
+        if why:
+            # What was asked before must not go on by itself once the reason is gone.
+            self._command = Command()
+        if self._beyond:
+            why = f"start posture: {self._beyond}. The arm holds still; place it within them."
+        return why
+
+    def _wish(self, asked: Command, lower: FloatArray, upper: FloatArray) -> Wish:
+        """Return the joint rates that the command asks for."""
+        settings = self.settings
+        # The Jacobian half way through the step follows the tool's curve to second order.
+        middle = self.arm.kinematics(self._joints + 0.5 * settings.period * self._rates)
+        turning = asked.sign if self._mode is Mode.POSE else 0
+        if turning and not self._turning:
+            # The way of the elbow that turns joint 1 up, as it stands when it begins to turn.
+            self._way = elbow_way(middle.jacobian)
+        self._turning = turning
+        situation = Situation(
+            arm=self.arm,
+            settings=settings,
+            joints=self._joints,
+            jacobian=middle.jacobian,
+            error=pose_error(self._target_R, self._target_p, self._now.R, self._now.p),
+            lower=lower,
+            upper=upper,
+            way=self._way,
+        )
+        return wish(self._mode, asked, situation)
+
+    def _move(self, wanted: FloatArray, lower: FloatArray, upper: FloatArray) -> bool:
+        """Move on by one period; return whether the rates are those wanted."""
+        settings, arm = self.settings, self.arm
+        if self._beyond:
+            return True
+        change = settings.acceleration * settings.period
+        self._rates, arrived = approach(self._rates, wanted, change, lower, upper)
+        # The bounds end at the limits; rounding may go past them by a hair.
+        joints = self._joints + settings.period * self._rates
+        self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)
+        self._now = arm.kinematics(self._joints)
+        return arrived
+
+    def _advance_target(self, asked: Command, *, ended: bool) -> None:
+        """Let the target go where the person wants it, on its leash; or stay with the tool."""
+        settings, now = self.settings, self._now
+        if self._mode is Mode.POSE:
+            return
+        if self._mode is Mode.NULL_SPACE:
+            self._target_R = now.R
+            return
+        if ended:
+            self._target_R, self._target_p = now.R, now.p
+            return
+        linear = np.asarray(asked.linear, dtype=np.float64)
+        angular = np.asarray(asked.angular, dtype=np.float64)
+        self._target_p = self._target_p + linear * settings.period
+        self._target_R = moved(self._target_R, angular, settings.period)
+        error = pose_error(self._target_R, self._target_p, now.R, now.p)
+        angle, way = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
+        if way > settings.leash:
+            self._target_p = now.p + error[3:] * (settings.leash / way)
+        if angle > settings.leash_angle:
+            self._target_R = moved(now.R, error[:3], settings.leash_angle / angle)
+
+    def _report(self, reason: str) -> Step:
+        flags = flags_of(self.arm, self._joints, self._now.jacobian, self._mode, self.settings)
+        return Step(
+            time=self._time,
+            joints=self._joints,
+            rates=self._rates,
+            R=self._now.R,
+            p=self._now.p,
+            target_R=self._target_R,
+            target_p=self._target_p,
+            mode=self._mode,
+            limits=flags.limits,
+            singular=flags.singular,
+            singular_value=flags.singular_value,
+            worst_joint=flags.worst_joint,
+            stopped=bool(reason),
+            reason=reason,
+        )
