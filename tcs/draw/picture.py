@@ -24,6 +24,10 @@ _SIZE = (1500, 1300)
 """Width and height of a view in pixels, before two by two are made one."""
 _FOCAL = 3.5
 """Focal length over half the picture's height: from some 5 m away, a person and a robot fill it."""
+_FILLED = 0.94
+"""How much of the picture its subject may take up."""
+_NEAREST = 0.5
+"""How far the camera keeps from its subject at least [m]."""
 _ELEVATION = np.radians(24.0)
 _FLOOR = np.array([0.95, 0.95, 0.94])
 _LINE = np.array([0.86, 0.86, 0.86])
@@ -31,6 +35,12 @@ _SKY = np.array([1.0, 1.0, 1.0])
 _LIGHTS = ((np.array([0.35, 0.8, 0.5]), 0.50), (np.array([-0.8, 0.1, 0.6]), 0.25))
 """Directions towards the lights (right, up, towards the camera), and their strengths."""
 _AMBIENT = 0.42
+_SAME_DEPTH = 0.003
+"""Relative difference of two depths up to which surfaces may be one: 15 mm at 5 m."""
+_SAME_WAY = 0.9
+"""Cosine of the angle up to which two surfaces look one way: neighbouring facets of a round shape
+with sixteen corners are 22.5 deg apart."""
+_GOALS = (Kind.GOAL, Kind.CURRENT_GOAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +49,8 @@ class View:
 
     solids: Sequence[Solid]
     """What there is."""
-    look_at: FloatArray
-    """The point in the middle [m], shape (3,)."""
-    distance: float
-    """How far away the camera is [m]."""
+    subject: FloatArray
+    """Points that have to be in the picture, which is as close as that allows [m], (n, 3)."""
     azimuths: tuple[float, ...]
     """Directions from which to look [rad]; the one that shows most of the goals is taken."""
     caption: str
@@ -92,8 +100,7 @@ def _rendered(view: View) -> FloatArray:
     """Return the picture from the direction that shows most of the goals, shape (h, w, 3)."""
     triangles = np.concatenate([solid.triangles for solid in view.solids])
     owner = np.repeat(np.arange(len(view.solids)), [len(solid.triangles) for solid in view.solids])
-    goals = (Kind.GOAL, Kind.CURRENT_GOAL)
-    of_goal = np.array([solid.kind in goals for solid in view.solids])[owner]
+    of_goal = np.array([solid.kind in _GOALS for solid in view.solids])[owner]
     best, most = None, -1
     for azimuth in view.azimuths:
         camera = _camera(view, azimuth)
@@ -109,12 +116,29 @@ def _rendered(view: View) -> FloatArray:
 
 
 def _camera(view: View, azimuth: float) -> _Camera:
+    """Return the nearest camera from which no point of the subject is cut off."""
+    R = _facing(azimuth)
+    right, up, backward = (view.subject @ R.T).T
+    # A point is in the picture where |sideways| <= half * (its distance along the view), and the
+    # same upward: four bounds on where the camera is, each with one point that binds.
+    half = np.array([_SIZE[0] / _SIZE[1], 1.0]) / _FOCAL * _FILLED
+    place, distance = np.zeros(3), -np.inf
+    for axis, along in enumerate((right, up)):
+        most = float((along + half[axis] * backward).max())
+        least = float((-along + half[axis] * backward).max())
+        place[axis] = 0.5 * (most - least)
+        distance = max(distance, 0.5 * (most + least) / float(half[axis]))
+    place[2] = max(distance, float(backward.max()) + _NEAREST)
+    return _Camera(place @ R, R)
+
+
+def _facing(azimuth: float) -> FloatArray:
+    """Return the camera's axes as rows: right, up, backward."""
     flat = np.cos(_ELEVATION)
     backward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(_ELEVATION)])
     right = np.cross([0.0, 0.0, 1.0], backward)
     right /= np.linalg.norm(right)
-    up = np.cross(backward, right)
-    return _Camera(view.look_at + view.distance * backward, np.stack([right, up, backward]))
+    return np.stack([right, np.cross(backward, right), backward])
 
 
 def _rasterised(triangles: FloatArray, camera: _Camera) -> _Raster:
@@ -164,14 +188,31 @@ def _shaded(
     light = np.full(len(triangles), _AMBIENT)
     for direction, strength in _LIGHTS:
         light += strength * np.maximum(towards @ (direction / np.linalg.norm(direction)), 0.0)
+    # Goals are signs, not things: their colours are those of the legend, whatever way they face.
+    is_sign = np.array([solid.kind in _GOALS for solid in view.solids])
+    light[is_sign[owner]] = 1.0
     base = np.array([to_rgb(solid.kind.colour) for solid in view.solids])
     image[hit] = np.clip(base[owner[number]] * light[number][:, None], 0.0, 1.0)
-    solid = np.where(hit, owner[np.maximum(raster.triangle, 0)], -1)
-    edge = np.zeros(hit.shape, dtype=np.bool_)
-    edge[:, 1:] |= solid[:, 1:] != solid[:, :-1]
-    edge[1:] |= solid[1:] != solid[:-1]
-    image[edge] *= 0.45
+    image[_edges(owner, towards, raster)] *= 0.45
     return image
+
+
+def _edges(owner: IntArray, normals: FloatArray, raster: _Raster) -> NDArray[np.bool_]:
+    """Return the pixels at which another solid begins, shape (height, width).
+
+    Where two solids share a surface, rounding decides pixel by pixel which of them is seen; there
+    is no edge to be seen there.
+    """
+    number = np.maximum(raster.triangle, 0)
+    solid = np.where(raster.triangle >= 0, owner[number], -1)
+    normal = normals[number]
+    edge = np.zeros(solid.shape, dtype=np.bool_)
+    for here, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        near = np.maximum(raster.depth[here], raster.depth[before])
+        is_apart = np.abs(raster.depth[here] - raster.depth[before]) > _SAME_DEPTH * near
+        is_bent = np.einsum("ijk,ijk->ij", normal[here], normal[before]) < _SAME_WAY
+        edge[here] |= (solid[here] != solid[before]) & (is_apart | is_bent)
+    return edge
 
 
 def _floor(camera: _Camera) -> FloatArray:

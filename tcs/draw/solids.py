@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from tcs.draw import colours
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
 
@@ -22,12 +23,12 @@ _ROUND = 16
 class Kind(Enum):
     """What a solid is of: how a legend calls it, and its colour."""
 
-    FURNITURE = ("furniture", "#7b8794")
-    PERSON = ("person", "#e3a57f")
-    ROBOT = ("robot", "#dfe4ea")
-    ARM = ("scored arm", "#4f86c6")
-    GOAL = ("goals", "#f2b705")
-    CURRENT_GOAL = ("goal shown", "#d7263d")
+    FURNITURE = ("furniture", colours.FURNITURE)
+    PERSON = ("person", colours.PERSON)
+    ROBOT = ("robot", colours.ROBOT)
+    ARM = ("scored arm", colours.ARM)
+    GOAL = ("goals", colours.GOAL)
+    CURRENT_GOAL = ("goal shown", colours.CURRENT_GOAL)
 
     @property
     def label(self) -> str:

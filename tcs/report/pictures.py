@@ -31,8 +31,8 @@ from tcs.space import Grid
 from tcs.store import ScoreFile
 from tcs.tables import InitialConfiguration
 
-_STICK = (0.03, 0.004, 0.004)
-"""Half sizes of the stick that shows where a goal's tool comes from [m]."""
+_ARROW = (0.15, 0.06, 0.010, 0.026)
+"""Of a goal's arrow: length, length of its head, half width of shaft and head [m]."""
 
 
 @dataclass(frozen=True)
@@ -112,12 +112,12 @@ def map_figure(file: ScoreFile, shown: Shown) -> Figure:
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = _stage(file, shown)
+    job, scene = stage(file, shown)
     base = base_outline(scene)
     _set_room(scene, shown.members)
     return draw_map(
         PlaceMap.of(file.tables[shown.table].scores, job.grid),
-        _room(scene),
+        room_solids(scene),
         [Stand(member, base) for member in shown.members],
         here=Stand(shown.here, base) if shown.here is not None else None,
         title=title_of(job),
@@ -138,12 +138,12 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
             "Nothing to draw: no goal is reached from any initial configuration. `tcs map` shows "
             "where the robot can stand at all."
         )
-    job, scene = _stage(file, shown)
+    job, scene = stage(file, shown)
     views = [_view(file, job, scene, shown, i) for i in range(len(shown.members))]
     return draw_scene(views, title=f"{title_of(job)}\n{shown.subtitle}")
 
 
-def _stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
+def stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
     """Return what a file was scored from, and its scene; refuse other models than those."""
     job, scene, _ = reopen(file)
     for name, value in file.observed_states[shown.table].items():
@@ -175,18 +175,19 @@ def _view(file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int) ->
     joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)
-    solids = [*_robot(scene), *_room(scene), *_goals(scene, job, current)]
+    solids = [*_robot(scene), *room_solids(scene), *_goals(scene, job, current)]
+    # The bed may go on beyond the picture; whoever is helped may not.
+    subject = [solid.corners for solid in solids if solid.kind is not Kind.FURNITURE]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
     base = np.array([member.base_x, member.base_y, 0.0])
     # Across the line from robot to person, from both sides: neither stands before the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
     listed = ", ".join(str(g) for g in serves) or "none"
     return View(
-        solids=solids,
-        look_at=np.array([*(0.5 * (goals.mean(axis=0) + base))[:2], 0.75]),
-        distance=4.6,
-        azimuths=tuple(along + math.radians(turn) for turn in (70.0, -70.0)),
-        caption=f"stop {number + 1}, best for goals {listed}; arm at goal {current}",
+        solids,
+        np.concatenate(subject),
+        tuple(along + math.radians(turn) for turn in (70.0, -70.0)),
+        f"stop {number + 1}, best for goals {listed}; arm at goal {current}",
     )
 
 
@@ -197,7 +198,7 @@ def _robot(scene: Scene) -> list[Solid]:
     ]
 
 
-def _room(scene: Scene) -> list[Solid]:
+def room_solids(scene: Scene) -> list[Solid]:
     """Return furniture, person and obstacles."""
     return [_solid(scene, part, kind) for part, kind in room_parts(scene)]
 
@@ -220,13 +221,17 @@ def room_parts(scene: Scene) -> list[tuple[Part, Kind]]:
 
 
 def _goals(scene: Scene, job: Job, current: int | None) -> list[Solid]:
-    """Return a stick for each goal, pointing where the tool points."""
+    """Return an arrow for each goal: it ends where the tool has to be, and points where it does."""
+    length, head, thin, wide = _ARROW
+    half = 0.5 * (length - head)
+    shaft = primitive_corners(BOX, (half, thin, thin)) - [head + half, 0.0, 0.0]
+    square = np.array([[wide, wide], [-wide, wide], [-wide, -wide], [wide, -wide]])
+    tip = np.vstack([np.column_stack([np.full(4, -head), square]), np.zeros((1, 3))])
     solids = []
     for g, X_WG in enumerate(goal_poses(scene, job.task)):
         kind = Kind.CURRENT_GOAL if g == current else Kind.GOAL
-        corners = primitive_corners(BOX, _STICK) - [_STICK[0], 0.0, 0.0]
         R, p = X_WG.rotation().matrix(), X_WG.translation()
-        solids.append(Solid.placed(kind, corners, R, p))
+        solids += [Solid.placed(kind, corners, R, p) for corners in (shaft, tip)]
     return solids
 
 

@@ -15,8 +15,12 @@ def ball(kind, at, radius=0.3):
     return Solid.placed(kind, primitive_corners(SPHERE, (radius, 0.0, 0.0)), np.eye(3), at)
 
 
-def view(*solids, azimuths=(0.0,)):
-    return View(solids, np.array([0.0, 0.0, 1.0]), 4.0, azimuths, "caption")
+# Seen from +x, the picture is 1.6 m high where they are.
+SUBJECT = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 1.8]])
+
+
+def view(*solids, azimuths=(0.0,), subject=SUBJECT):
+    return View(solids, subject, azimuths, "caption")
 
 
 def picture(figure, panel=0):
@@ -63,11 +67,51 @@ def test_the_side_that_shows_the_goals_is_taken(order):
     assert share(image, Kind.GOAL) > 0.002
 
 
-def test_size_on_the_picture_follows_from_the_distance():
-    image = picture(draw_scene([view(ball(Kind.ARM, [0.0, 0.0, 1.0], 0.2))], title=""))
-    seen = np.flatnonzero([share(row[None], Kind.ARM) > 0 for row in image])
-    # Half height 100 px of 200, halved; focal 3.5: 0.4 m at 4 m is 0.1 x 3.5 x 50 = 17.5 px.
-    assert seen.max() - seen.min() + 1 == pytest.approx(17.5, abs=2)
+@pytest.mark.parametrize("azimuth", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize("subject", ["high", "wide"])
+def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    ends = {"high": [[0, 0, 0.1], [0, 0, 1.9]], "wide": [1.3 * across, -1.3 * across]}[subject]
+    solids = [ball(Kind.ARM, end, 0.1) for end in ends]
+    points = np.concatenate([solid.corners for solid in solids])
+    image = picture(draw_scene([view(*solids, azimuths=(azimuth,), subject=points)], title=""))
+    hit = np.abs(image - np.array(to_rgb(Kind.ARM.colour))).max(axis=-1) < 0.5
+    blue = hit & (image[..., 2] > image[..., 0] + 0.1)
+    rows, columns = np.flatnonzero(blue.any(axis=1)), np.flatnonzero(blue.any(axis=0))
+    found = rows if subject == "high" else columns
+    size = image.shape[0 if subject == "high" else 1]
+    # 94 % of the picture, in the middle; the outline takes a pixel at each end.
+    assert np.ptp(found) + 1 == pytest.approx(0.94 * size, abs=4)
+    assert found.min() + found.max() == pytest.approx(size - 1, abs=4)
+
+
+def test_the_other_side_of_the_subject_is_in_the_picture_too():
+    corners = np.array(np.meshgrid([-1.0, 1.0], [-0.7, 0.7], [0.0, 1.5])).reshape(3, -1).T
+    marks = [ball(Kind.CURRENT_GOAL, corner, 0.06) for corner in corners]
+    for azimuth in np.linspace(0.0, 2 * np.pi, 7):
+        points = np.concatenate([mark.corners for mark in marks])
+        image = picture(draw_scene([view(*marks, azimuths=(azimuth,), subject=points)], title=""))
+        red = np.array(to_rgb(Kind.CURRENT_GOAL.colour))
+        assert np.all(np.abs(image[[0, -1]] - red).max(axis=-1) > 0.2)
+        assert np.all(np.abs(image[:, [0, -1]] - red).max(axis=-1) > 0.2)
+
+
+def test_no_edge_within_a_surface_that_two_solids_share():
+    corners = primitive_corners(BOX, (0.3, 0.3, 0.3))
+    turned = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    at = np.array([0.0, 0.0, 1.0])
+    # Which of them is nearer is up to rounding, and another one in every pixel.
+    boxes = [Solid.placed(Kind.ARM, corners, turned, at + i * 1e-12) for i in range(3)]
+    one, all_three = (picture(draw_scene([view(*some)], title="")) for some in (boxes[:1], boxes))
+    np.testing.assert_allclose(all_three, one, atol=0.02)
+    # But for the line around it, which is there.
+    assert one.min() < 0.15
+
+
+def test_goals_have_the_colour_of_the_legend():
+    image = picture(draw_scene([view(ball(Kind.GOAL, [0.0, 0.0, 1.0]))], title=""))
+    middle = image[image.shape[0] // 2, image.shape[1] // 2]
+    np.testing.assert_allclose(middle, to_rgb(Kind.GOAL.colour), atol=1e-6)
 
 
 def test_one_panel_for_each_view_and_a_legend():
@@ -79,5 +123,5 @@ def test_one_panel_for_each_view_and_a_legend():
 
 
 def test_what_is_behind_the_camera_is_left_out():
-    image = picture(draw_scene([view(ball(Kind.ARM, [8.0, 0.0, 3.0]))], title=""))
+    image = picture(draw_scene([view(ball(Kind.ARM, [18.0, 0.0, 7.0]))], title=""))
     assert share(image, Kind.ARM) == 0.0

@@ -1,0 +1,121 @@
+"""The commands that draw: `tcs map` from above, `tcs picture` in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tcs.cli import options, talk
+
+if TYPE_CHECKING:
+    # `tcs list` gets by without drawing.
+    from matplotlib.figure import Figure
+
+    from tcs.report.pictures import Shown
+    from tcs.store import ScoreFile
+
+_SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
+SCORES = ("reachability", "manipulability")
+
+_Out = Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")]
+_Here = Annotated[tuple[float, float, float] | None, options.HERE]
+
+
+def draw_map(
+    file: options.File,
+    out: _Out,
+    here: _Here = None,
+    torso: options.Torso = 0.0,
+    max_members: options.Members = None,
+    observed: options.Observed = None,
+    states: Annotated[
+        bool,
+        typer.Option(
+            "--states",
+            help="A map for each state of the environment, e.g. bed height by head rest.",
+        ),
+    ] = False,
+    score: Annotated[
+        str | None,
+        typer.Option(
+            metavar="reachability|manipulability",
+            help="With --states: what the places are coloured by.",
+            show_default="reachability",
+        ),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Draw the best score per base place, from above, and where the chosen members stand."""
+    if score is not None and not states:
+        raise typer.BadParameter("goes with --states: else both are drawn.", param_hint="--score")
+    if score not in (None, *SCORES):
+        raise typer.BadParameter(f"must be one of {', '.join(SCORES)}.", param_hint="--score")
+
+    def figure(loaded: ScoreFile, shown: Shown) -> Figure:
+        if states:
+            from tcs.report.states import states_figure
+
+            by_manipulability = score == "manipulability"
+            return states_figure(
+                loaded, shown, "manipulability" if by_manipulability else "reachability"
+            )
+        from tcs.report.pictures import map_figure
+
+        return map_figure(loaded, shown)
+
+    _draw(figure, file, out, here, torso, max_members, observed, as_json=as_json)
+
+
+def draw_picture(
+    file: options.File,
+    out: _Out,
+    here: _Here = None,
+    torso: options.Torso = 0.0,
+    max_members: options.Members = None,
+    observed: options.Observed = None,
+    as_json: options.Json = False,
+) -> None:
+    """Draw the robot where it is to stand, its arm at a goal, from its collision shapes."""
+
+    def figure(loaded: ScoreFile, shown: Shown) -> Figure:
+        from tcs.report.pictures import scene_figure
+
+        return scene_figure(loaded, shown)
+
+    _draw(figure, file, out, here, torso, max_members, observed, as_json=as_json)
+
+
+for _command in (draw_map, draw_picture):
+    _command.__doc__ = f"{_command.__doc__}\n\n{_SHOWN_SET}"
+
+
+def _draw(
+    figure: Callable[[ScoreFile, Shown], Figure],
+    file: Path,
+    out: Path,
+    here: tuple[float, float, float] | None,
+    torso: float,
+    max_members: int | None,
+    observed: list[str] | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Draw the set chosen from here, or the best one."""
+    import tcs
+    from tcs.cli.places import check_writable, observed_settings, place
+    from tcs.draw import check_format, save_figure
+
+    check_format(out)
+    check_writable(out)
+    loaded = tcs.load(file)
+
+    from tcs.report.pictures import Shown
+
+    found = observed_settings(observed or (), loaded.observed_axes)
+    shown = Shown.of(loaded, place(here, torso) if here else None, max_members, found)
+    save_figure(out, figure(loaded, shown))
+    result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
+    talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

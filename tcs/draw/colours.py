@@ -1,0 +1,22 @@
+"""Colours of pictures, told apart by who is colour-blind; tests simulate how they see them."""
+
+from __future__ import annotations
+
+SCALE = "viridis"
+"""Of scores: its lightness rises evenly, in grey and for every kind of colour vision."""
+MEMBER = "#b3003b"
+"""Of the chosen places."""
+HERE = "#111111"
+"""Of where the robot is now."""
+CASING = "#ffffff"
+"""Around lines that are drawn over a map: whatever lies below, one of the two stands out."""
+BLOCKED = "#c4cad1"
+"""Of places where the robot cannot stand."""
+EMPTY = "#ffffff"
+"""Of places from which no goal is reached."""
+FURNITURE = "#7b8794"
+PERSON = "#e3a57f"
+ROBOT = "#dfe4ea"
+ARM = "#4f86c6"
+GOAL = "#ffe100"
+CURRENT_GOAL = "#b3003b"
