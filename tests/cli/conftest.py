@@ -7,13 +7,20 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+import tcs
 from tcs.cli.app import app
 from tcs.store import save_scores
-from tests.store.example import score_file
+from tests.rooms import CORNER, write_room
+from tests.store.example import METADATA, score_file
+
+TIMINGS = dict.fromkeys(
+    ("compile_seconds", "scoring_seconds", "sets_seconds", "total_seconds"), 0.5
+)
 
 
 @dataclass(frozen=True)
@@ -70,3 +77,32 @@ def small_file(tmp_path) -> Path:
     path = tmp_path / "small.tcs"
     save_scores(path, score_file())
     return path
+
+
+@pytest.fixture(scope="session")
+def corner(tmp_path_factory) -> Path:
+    """An environment file of the user's own, with 36 configurations."""
+    return write_room(tmp_path_factory.mktemp("corner"), "corner", CORNER)
+
+
+@pytest.fixture
+def example() -> Callable[..., tcs.ScoreFile]:
+    """Makes a score file as `tcs.score` might return it."""
+
+    def make(**changes: Any) -> tcs.ScoreFile:
+        return score_file(metadata={**METADATA, "timings": TIMINGS}, **changes)
+
+    return make
+
+
+@pytest.fixture
+def stand_in(monkeypatch, example):
+    """Calls of `tcs.score`, which returns an example at once."""
+    calls = []
+
+    def score(*arguments, **options):
+        calls.append((arguments, options))
+        return example()
+
+    monkeypatch.setattr(tcs, "score", score)
+    return calls

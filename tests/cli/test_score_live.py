@@ -7,25 +7,6 @@ import pytest
 
 import tcs
 
-CORNER = """
-based_on: wheelchair
-name: corner
-title: A few places beside the wheelchair
-grid:
-  base_x: {unit: m, start: 0.95, step: 0.1, count: 2}
-  base_y: {unit: m, start: -0.7, step: 0.7, count: 2}
-  base_yaw: {unit: deg, start: 90, step: 90, count: 1}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-"""
-
-
-@pytest.fixture(scope="module")
-def corner(tmp_path_factory) -> Path:
-    """An environment file of the user's own, with eight configurations."""
-    path = tmp_path_factory.mktemp("corner") / "corner.yaml"
-    path.write_text(CORNER)
-    return path
-
 
 def test_the_room_is_scored_as_it_is_found(tcs_command, corner, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -10,17 +10,8 @@ from tcs.report import Paper, Plan, load_paper, study_row
 from tcs.robustness import robustify
 from tcs.scoring import score
 from tcs.store import save_scores
+from tests.rooms import BESIDE, write_room
 
-SMALL_ROOM = """
-based_on: wheelchair
-name: small-room
-title: The wheelchair, seen from a few places
-grid:
-  base_x: {unit: m, start: 0.5, step: 0.1, count: 8}
-  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
-  base_yaw: {unit: deg, start: 90, step: 45, count: 4}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-"""
 PLAN = Plan(samples=60, sets=12, set_samples=6)
 
 
@@ -33,8 +24,7 @@ def plan():
 def score_path(tmp_path_factory):
     """A score file."""
     folder = tmp_path_factory.mktemp("study")
-    room = folder / "small-room.yaml"
-    room.write_text(SMALL_ROOM)
+    room = write_room(folder, "small-room", BESIDE)
     path = folder / "shaving-small-room-pr2.tcs"
     file = score("shaving", room)
     save_scores(path, robustify(file, sets=12, samples=32))

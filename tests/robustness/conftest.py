@@ -6,43 +6,27 @@ import pytest
 
 from tcs.robustness import Trials
 from tcs.scoring import score
+from tests.rooms import BESIDE, write_room
 
-SMALL_CHAIR = """
-based_on: wheelchair
-name: small-chair
-title: The wheelchair, seen from a few places
-grid:
-  base_x: {unit: m, start: 0.5, step: 0.1, count: 8}
-  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
-  base_yaw: {unit: deg, start: 90, step: 45, count: 4}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-"""
-
-SMALL_BED = """
-based_on: bed
-name: small-bed
-title: The bed, seen from a few places
-grid:
-  bed_height: {unit: m, start: 0, step: 0.2, count: 2}
-  head_rest: {unit: deg, start: 35, step: 35, count: 2}
-  base_x: {unit: m, start: 0.4, step: 0.3, count: 4}
-  base_y: {unit: m, start: -1, step: 1.8, count: 2}
-  base_yaw: {unit: deg, start: 0, step: 90, count: 4}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
-observed:
-  person_y: {unit: m, start: 0, step: 0.05, count: 2}
-"""
+BED = {
+    "bed_height": (0, 0.2, 2),
+    "head_rest": (35, 35, 2),
+    "base_x": (0.4, 0.3, 4),
+    "base_y": (-1, 1.8, 2),
+    "base_yaw": (0, 90, 4),
+    "torso": (0.15, 0.15, 2),
+}
+FOUND = {"person_y": (0, 0.05, 2)}
 
 
 @pytest.fixture(scope="session")
 def rooms(tmp_path_factory):
     """Paths of two environment files of the user's own, by name."""
     folder = tmp_path_factory.mktemp("rooms")
-    paths = {}
-    for name, text in (("chair", SMALL_CHAIR), ("bed", SMALL_BED)):
-        paths[name] = folder / f"small-{name}.yaml"
-        paths[name].write_text(text)
-    return paths
+    return {
+        "chair": write_room(folder, "small-chair", BESIDE),
+        "bed": write_room(folder, "small-bed", BED, based_on="bed", observed=FOUND),
+    }
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,113 @@
+"""What is said while a command works, and what is left when it is interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+
+import joblib
+import pytest
+
+import tcs
+
+
+def test_first_run_says_that_it_compiles(tcs_command, example, tmp_path, monkeypatch):
+    def score(*_arguments, on_compile, on_progress, **_options):
+        on_compile()
+        on_progress(1, 2)
+        return example()
+
+    monkeypatch.setattr(tcs, "score", score)
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs", "--json")
+    # One line, no bar: stderr is no terminal here.
+    assert ran.err == "tcs: compiling for this machine, up to a minute; later runs do without.\n"
+    assert json.loads(ran.out)["goals"] == 5
+
+
+SLOW_SCORE = """
+import time, tcs
+def score(*arguments, on_progress, **options):
+    for done in range(200):
+        on_progress(done, 200)
+        time.sleep(0.05)
+tcs.score = score
+"""
+
+
+def run_on_terminal(code: str, *words: str) -> str:
+    """What a command draws on a terminal of its own."""
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=theirs, stdin=theirs
+    ) as running:
+        os.close(theirs)
+        seen = b""
+        while True:
+            try:
+                part = os.read(ours, 4096)
+            except OSError:
+                break
+            seen += part
+            if b"/200" in seen and running.poll() is None:
+                running.send_signal(signal.SIGINT)
+            if not part:
+                break
+    os.close(ours)
+    return seen.decode()
+
+
+def test_bar_on_a_terminal(tmp_path):
+    code = f"import sys\n{SLOW_SCORE}\nfrom tcs.cli import main\nmain()"
+    seen = run_on_terminal(code, "score", "shaving", "--out", str(tmp_path / "o.tcs"))
+    assert "configurations" in seen
+    assert "/200" in seen
+    assert "interrupted; no half-written file is left." in seen
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_while_scoring(tmp_path):
+    code = f"import sys\n{SLOW_SCORE.replace('time.sleep', 'print(0, flush=True); time.sleep')}\n"
+    code += "from tcs.cli import main\nmain()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, "score", "shaving", "--out", str(tmp_path / "o.tcs")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        assert running.stdout.readline() == "0\n"
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate()
+    assert running.returncode == 130
+    assert said == "tcs: interrupted; no half-written file is left.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_that_compiled_code_swallows_still_counts(tcs_command, tmp_path, monkeypatch):
+    def score(*_arguments, on_progress, **_options):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        on_progress(1, 2)
+        raise AssertionError("must not get here")
+
+    monkeypatch.setattr(tcs, "score", score)
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
+    assert ran.code == 130
+    assert "interrupted" in ran.err
+
+
+def test_interrupt_while_writing_keeps_the_old_file(tcs_command, small_file, stand_in, monkeypatch):
+    before = small_file.read_bytes()
+
+    def dump(_content, stream, **_options):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(joblib, "dump", dump)
+    ran = tcs_command("score", "shaving", "--out", small_file)
+    assert ran.code == 130
+    assert small_file.read_bytes() == before
+    assert list(small_file.parent.iterdir()) == [small_file]

@@ -1,0 +1,54 @@
+"""Environment files of a user's own: the rooms that come along, seen from a few places."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+_UNITS = {"base_yaw": "deg", "head_rest": "deg"}
+
+BESIDE = {
+    "base_x": (0.5, 0.1, 8),
+    "base_y": (-0.95, 1.7, 2),
+    "base_yaw": (90, 45, 4),
+    "torso": (0.15, 0.15, 2),
+}
+"""Two strips beside the wheelchair: 128 configurations."""
+
+CORNER = {
+    "base_x": (0.95, 0.1, 3),
+    "base_y": (-0.7, 0.7, 3),
+    "base_yaw": (90, 90, 2),
+    "torso": (0.15, 0.15, 2),
+}
+"""Where the PR2 has goals of shaving in reach: 36 configurations."""
+
+
+def write_room(
+    folder: Path,
+    name: str,
+    grid: dict[str, tuple[float, float, int]],
+    *,
+    based_on: str = "wheelchair",
+    observed: dict[str, tuple[float, float, int]] | None = None,
+) -> Path:
+    """Write an environment file and return its path.
+
+    Args:
+        folder: Where to.
+        name: Of file and environment.
+        grid: Start, step and count of each axis, in metres or degrees.
+        based_on: The environment that all the rest is taken from.
+        observed: The same of how the person may be found.
+    """
+    content = {"based_on": based_on, "name": name, "title": f"{based_on}, from a few places"}
+    for key, axes in (("grid", grid), ("observed", observed)):
+        if axes is not None:
+            content[key] = {
+                axis: {"unit": _UNITS.get(axis, "m"), "start": start, "step": step, "count": count}
+                for axis, (start, step, count) in axes.items()
+            }
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    return path
