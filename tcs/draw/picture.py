@@ -35,8 +35,8 @@ _SKY = np.array([1.0, 1.0, 1.0])
 _LIGHTS = ((np.array([0.35, 0.8, 0.5]), 0.50), (np.array([-0.8, 0.1, 0.6]), 0.25))
 """Directions towards the lights (right, up, towards the camera), and their strengths."""
 _AMBIENT = 0.42
-_SAME_DEPTH = 0.003
-"""Relative difference of two depths up to which surfaces may be one: 15 mm at 5 m."""
+_SAME_PLANE = 0.004
+"""How far a point may be off the plane of its neighbour [m] if both are of one surface."""
 _SAME_WAY = 0.9
 """Cosine of the angle up to which two surfaces look one way: neighbouring facets of a round shape
 with sixteen corners are 22.5 deg apart."""
@@ -206,26 +206,34 @@ def _edges(owner: IntArray, normals: FloatArray, raster: _Raster) -> NDArray[np.
     number = np.maximum(raster.triangle, 0)
     solid = np.where(raster.triangle >= 0, owner[number], -1)
     normal = normals[number]
+    # Where nothing is, something is far away.
+    away = 1.0 / np.maximum(raster.depth, 1e-3)
+    point = _rays() * away[..., None]
     edge = np.zeros(solid.shape, dtype=np.bool_)
     for here, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        near = np.maximum(raster.depth[here], raster.depth[before])
-        is_apart = np.abs(raster.depth[here] - raster.depth[before]) > _SAME_DEPTH * near
-        is_bent = np.einsum("ijk,ijk->ij", normal[here], normal[before]) < _SAME_WAY
-        edge[here] |= (solid[here] != solid[before]) & (is_apart | is_bent)
+        off = np.einsum("ijk,ijk->ij", normal[here], point[here] - point[before])
+        bend = np.einsum("ijk,ijk->ij", normal[here], normal[before])
+        is_one_surface = (np.abs(off) < _SAME_PLANE) & (bend > _SAME_WAY)
+        edge[here] |= (solid[here] != solid[before]) & ~is_one_surface
     return edge
+
+
+def _rays() -> FloatArray:
+    """Return what each pixel looks along, in the camera's axes, shape (height, width, 3)."""
+    width, height = _SIZE
+    x = (np.arange(width) + 0.5 - width / 2.0) / (_FOCAL * height / 2.0)
+    y = -(np.arange(height) + 0.5 - height / 2.0) / (_FOCAL * height / 2.0)
+    return np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1)
 
 
 def _floor(camera: _Camera) -> FloatArray:
     """Return the empty floor with a line every half metre, shape (height, width, 3)."""
-    width, height = _SIZE
-    x = (np.arange(width) + 0.5 - width / 2.0) / (_FOCAL * height / 2.0)
-    y = -(np.arange(height) + 0.5 - height / 2.0) / (_FOCAL * height / 2.0)
-    rays = np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1) @ camera.R
+    rays = _rays() @ camera.R
     down = -rays[..., 2]
     reach = camera.p[2] / np.maximum(down, 1e-6)
     spots = camera.p[:2] + reach[..., None] * rays[..., :2]
     # A line is as wide as a pixel is on the floor there, but never less than 8 mm.
-    half = np.maximum(0.004, 1.2 * reach / (_FOCAL * height / 2.0))
+    half = np.maximum(0.004, 1.2 * reach / (_FOCAL * _SIZE[1] / 2.0))
     off = np.abs(np.mod(spots + 0.25, 0.5) - 0.25).min(axis=-1)
     image = np.where((off < half)[..., None], _LINE, _FLOOR)
     fade = np.clip((reach - 5.0) / 3.0, 0.0, 1.0)[..., None]
