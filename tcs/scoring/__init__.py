@@ -6,13 +6,14 @@ from tcs.scoring.job import Job, load_job, score, summary
 from tcs.scoring.live import LiveScorer, score_observed
 from tcs.scoring.reopen import reopen
 from tcs.scoring.rows import all_rows
-from tcs.scoring.sets import build_sets
+from tcs.scoring.sets import SetOptions, build_sets
 from tcs.scoring.sweep import Sweep, sweep, warm_up
 from tcs.scoring.verify import Verification, verify
 
 __all__ = [
     "Job",
     "LiveScorer",
+    "SetOptions",
     "Sweep",
     "Verification",
     "all_rows",

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from tcs.errors import TaskError
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
@@ -25,11 +25,10 @@ from tcs.scene import (
     load_environment,
     lower,
 )
-from tcs.scoring.sets import build_sets, check_set_options
+from tcs.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.scoring.sweep import ANALYTIC, sweep
 from tcs.space import Axis, Grid
 from tcs.store import Scored, ScoreFile, shown_state
-from tcs.tables import ScoreTable, SetTable
 from tcs.tasks import Task, load_task
 
 
@@ -107,12 +106,9 @@ def score(
     *,
     measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
-    rule: str = "paper",
-    same_environment: bool = False,
-    max_members: int = 2,
-    min_distance: float = 0.40,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
+    **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
 
@@ -124,12 +120,10 @@ def score(
             "inverse-condition", or one of them lowered near joint limits, "-limited" or
             "-limited-thesis". Equations: docs/method.md.
         jobs: Number of threads; the result does not depend on it.
-        rule: Which sets are kept: "paper" or "code2015", see `tcs.scoring.build_sets`.
-        same_environment: Whether the members of a set must share the state of the environment.
-        max_members: Most members of a set, 1 to 3.
-        min_distance: Least base x-y distance between two members of a set [m].
         on_progress: Called with configurations scored and in all.
         on_compile: Called before the kernel compiles, when it has to.
+        **sets: Which sets are kept: `rule`, `same_environment`, `max_members`, `min_distance`; see
+            `tcs.scoring.SetOptions`.
 
     Returns:
         Scores and sets, ready for `tcs.save` and `tcs.select`.
@@ -143,24 +137,13 @@ def score(
     """
     begun = time.perf_counter()
     dexterity(measure)
-    check_set_options(rule, max_members, min_distance)
+    options = checked_options(**sets)
     job = load_job(task, environment, robot)
-
-    def sets_of(scores: ScoreTable) -> SetTable:
-        return build_sets(
-            scores,
-            job.grid,
-            rule=rule,
-            same_environment=same_environment,
-            max_members=max_members,
-            min_distance=min_distance,
-            jobs=jobs,
-        )
 
     return score_scene(
         job,
         job.scene(),
-        sets_of,
+        options,
         named=references(job, task, environment, robot),
         measure=measure,
         begun=begun,
@@ -173,7 +156,7 @@ def score(
 def score_scene(
     job: Job,
     scene: Scene,
-    sets_of: Callable[[ScoreTable], SetTable],
+    sets: SetOptions,
     *,
     named: Mapping[str, Any],
     measure: str,
@@ -187,7 +170,7 @@ def score_scene(
     Args:
         job: What is scored.
         scene: A scene of the job; its state is left as it was.
-        sets_of: Builds the sets of a table of scores.
+        sets: Which sets are kept.
         named: Entries of the metadata: how task, environment and robot are found again, and
             whatever else there is to say.
         measure: Name of the dexterity measure.
@@ -208,7 +191,10 @@ def score_scene(
         on_compile=on_compile,
     )
     sets_begun = time.perf_counter()
-    tables = tuple(Scored.of(scores, sets_of(scores)) for scores in swept.tables)
+    tables = tuple(
+        Scored.of(scores, build_sets(scores, job.grid, jobs=jobs, **sets))
+        for scores in swept.tables
+    )
     done = time.perf_counter()
     return ScoreFile(
         metadata={

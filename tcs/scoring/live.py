@@ -7,17 +7,17 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Unpack
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
 from tcs.robots import RobotFile
 from tcs.scene import EnvironmentFile, Observation, find_joints
 from tcs.scoring.job import Job, load_job, references, score_scene
-from tcs.scoring.sets import build_sets, check_set_options
+from tcs.scoring.sets import SetOptions, checked_options
 from tcs.scoring.sweep import warm_up
 from tcs.space import Axis
 from tcs.store import ScoreFile
-from tcs.tables import ScoreTable, SetTable
 from tcs.tasks import Task
 
 Seen = Observation | Mapping[str, float]
@@ -39,11 +39,8 @@ class LiveScorer:
         environment: str | Path | EnvironmentFile = "wheelchair",
         measure: str = DEFAULT_MEASURE,
         jobs: int = 2,
-        rule: str = "paper",
-        same_environment: bool = False,
-        max_members: int = 2,
-        min_distance: float = 0.40,
         on_compile: Callable[[], None] | None = None,
+        **sets: Unpack[SetOptions],
     ) -> None:
         """Load everything, build the scene and have the kernel's machine code at hand.
 
@@ -53,11 +50,8 @@ class LiveScorer:
             environment: Name, path or environment.
             measure: Name of the dexterity measure, see `tcs.score`.
             jobs: Number of threads; the result does not depend on it.
-            rule: Which sets are kept, see `tcs.scoring.build_sets`.
-            same_environment: Whether the members of a set must share the environment's state.
-            max_members: Most members of a set, 1 to 3.
-            min_distance: Least base x-y distance between two members of a set [m].
             on_compile: Called before the kernel compiles, when it has to.
+            **sets: Which sets are kept, see `tcs.scoring.SetOptions`.
 
         Raises:
             UnknownNameError: If a task, environment, robot, frame or measure of that name does not
@@ -66,16 +60,12 @@ class LiveScorer:
             GridError: If the grid is empty or enormous.
             TcsError: If an option of the sets is out of range.
         """
-        check_set_options(rule, max_members, min_distance)
+        self._sets = checked_options(**sets)
         self._job = load_job(task, environment, robot)
         self._named = references(self._job, task, environment, robot)
         self._scene = self._job.scene()
         self._measure = measure
         self._jobs = jobs
-        self._rule = rule
-        self._same_environment = same_environment
-        self._max_members = max_members
-        self._min_distance = min_distance
         lowered = self._job_at({}).lowered(self._scene)
         warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
 
@@ -115,7 +105,7 @@ class LiveScorer:
         return score_scene(
             self._job_at(found.joints),
             self._scene,
-            self._sets_of,
+            self._sets,
             named={**self._named, "observation": told},
             measure=self._measure,
             begun=begun,
@@ -132,17 +122,6 @@ class LiveScorer:
             axes.append(Axis(name, "deg" if turns else "m", start, 0.0, 1))
         return dataclasses.replace(self._job, observed=tuple(axes))
 
-    def _sets_of(self, scores: ScoreTable) -> SetTable:
-        return build_sets(
-            scores,
-            self._job.grid,
-            rule=self._rule,
-            same_environment=self._same_environment,
-            max_members=self._max_members,
-            min_distance=self._min_distance,
-            jobs=self._jobs,
-        )
-
 
 def score_observed(
     task: str | Path | Task,
@@ -152,10 +131,7 @@ def score_observed(
     environment: str | Path | EnvironmentFile = "wheelchair",
     measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
-    rule: str = "paper",
-    same_environment: bool = False,
-    max_members: int = 2,
-    min_distance: float = 0.40,
+    **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
 
@@ -168,10 +144,7 @@ def score_observed(
         environment: Name, path or environment.
         measure: Name of the dexterity measure, see `tcs.score`.
         jobs: Number of threads; the result does not depend on it.
-        rule: Which sets are kept, see `tcs.scoring.build_sets`.
-        same_environment: Whether the members of a set must share the environment's state.
-        max_members: Most members of a set, 1 to 3.
-        min_distance: Least base x-y distance between two members of a set [m].
+        **sets: Which sets are kept, see `tcs.scoring.SetOptions`.
 
     Returns:
         Scores and sets with the one observed state, as `LiveScorer.score`.
@@ -179,15 +152,5 @@ def score_observed(
     Raises:
         TcsError: Whatever `LiveScorer` and its `score` raise.
     """
-    scorer = LiveScorer(
-        task,
-        robot,
-        environment=environment,
-        measure=measure,
-        jobs=jobs,
-        rule=rule,
-        same_environment=same_environment,
-        max_members=max_members,
-        min_distance=min_distance,
-    )
+    scorer = LiveScorer(task, robot, environment=environment, measure=measure, jobs=jobs, **sets)
     return scorer.score(observation)

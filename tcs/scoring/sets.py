@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypedDict, Unpack
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -25,15 +26,25 @@ CELLS_PER_SLICE = 16
 keep the buffers of a slice small; large enough that a slice takes much longer than its hand-out."""
 
 
+class SetOptions(TypedDict, total=False):
+    """Which sets are kept; whatever takes `**sets` takes these."""
+
+    rule: str
+    """One of `tcs.tables.rules.RULES`. "paper", the default: singles that reach a goal, and pairs
+    whose P_M is greater than the best P_M of a single; triples whose P_M is greater than the best
+    P_M of a pair and of a single. "code2015": as hrl_base_selection did, without triples."""
+    same_environment: bool
+    """Whether the members of a set must share the state of the environment; by default not."""
+    max_members: int
+    """1 to keep singles only, 2, the default, to keep pairs too, 3 for triples. Triples take some
+    ten seconds for 5,000 candidates, 100 MB, and more for more."""
+    min_distance: float
+    """Least base x-y distance between two members of a set [m], 0.40 by default. The paper gives
+    no figure; this is that of hrl_base_selection in gt-ros-pkg/hrl-assistive."""
+
+
 def build_sets(
-    scores: ScoreTable,
-    grid: Grid,
-    *,
-    rule: str = "paper",
-    same_environment: bool = False,
-    max_members: int = 2,
-    min_distance: float = 0.40,
-    jobs: int = 2,
+    scores: ScoreTable, grid: Grid, *, jobs: int = 2, **options: Unpack[SetOptions]
 ) -> SetTable:
     """Return every set of one, two or three configurations that a rule keeps.
 
@@ -42,16 +53,8 @@ def build_sets(
     Args:
         scores: Scores of every configuration of the grid.
         grid: The grid.
-        rule: One of `tcs.tables.rules.RULES`. "paper": singles that reach a goal, and pairs whose
-            P_M is greater than the best P_M of a single; triples whose P_M is greater than the
-            best P_M of a pair and of a single. "code2015": as hrl_base_selection did, without
-            triples.
-        same_environment: Whether the members of a set must share the state of the environment.
-        max_members: 1 to keep singles only, 2 to keep pairs too, 3 for triples. Triples take some
-            ten seconds for 5,000 candidates, 100 MB, and more for more.
-        min_distance: Least base x-y distance between two members of a set [m]. The paper
-            gives no figure; 0.40 is that of hrl_base_selection in gt-ros-pkg/hrl-assistive.
         jobs: Number of threads.
+        **options: Which sets are kept, see `SetOptions`.
 
     Returns:
         The sets; without any candidate when no goal is reached anywhere.
@@ -64,7 +67,9 @@ def build_sets(
     Source:
         TCS section IV-A, eq. (1) and (4).
     """
-    check_set_options(rule, max_members, min_distance)
+    checked = checked_options(**options)
+    rule, max_members = checked["rule"], checked["max_members"]
+    same_environment, min_distance = checked["same_environment"], checked["min_distance"]
     if scores.configurations != grid.size:
         raise TcsError(
             f"Sets: the score table has {scores.configurations} configurations, the grid "
@@ -118,8 +123,14 @@ def build_sets(
     )
 
 
-def check_set_options(rule: str, max_members: int, min_distance: float) -> None:
-    """Refuse options that `build_sets` would refuse, before anything is scored.
+def checked_options(
+    *,
+    rule: str = "paper",
+    same_environment: bool = False,
+    max_members: int = 2,
+    min_distance: float = 0.40,
+) -> SetOptions:
+    """Return all options, the default for those not given, before anything is scored.
 
     Raises:
         UnknownNameError: If there is no such rule.
@@ -132,6 +143,12 @@ def check_set_options(rule: str, max_members: int, min_distance: float) -> None:
         raise TcsError("Sets: rule 'code2015' has sets of one and two; for three take 'paper'.")
     if not 0.0 <= min_distance < math.inf:
         raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
+    return {
+        "rule": rule,
+        "same_environment": same_environment,
+        "max_members": max_members,
+        "min_distance": min_distance,
+    }
 
 
 def base_cells(
