@@ -9,7 +9,7 @@ from tcs.teleop.arm import Arm
 
 
 def rate_bounds(
-    arm: Arm, joints: FloatArray, period: float, acceleration: float
+    arm: Arm, joints: FloatArray, period: float, acceleration: float | FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the rates with which no joint runs past its limits, now or later.
 
@@ -21,7 +21,7 @@ def rate_bounds(
         arm: The arm.
         joints: Joint positions [rad], shape (7,), within the limits.
         period: Time of one step [s].
-        acceleration: Greatest change of a rate [rad/s^2].
+        acceleration: Greatest change of a rate [rad/s^2], one for all joints or shape (7,).
 
     Returns:
         Lowest rates (<= 0) and highest rates (>= 0) [rad/s], shapes (7,).

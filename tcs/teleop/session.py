@@ -13,8 +13,10 @@ from tcs.teleop.arm import JOINTS, Arm
 from tcs.teleop.bounds import approach, rate_bounds
 from tcs.teleop.control import moved, pose_error
 from tcs.teleop.flags import ShortArray, flags_of
-from tcs.teleop.modes import Situation, Wish, elbow_way, wish
-from tcs.teleop.settings import Command, Mode, Settings
+from tcs.teleop.modes import wish
+from tcs.teleop.null_modes import elbow_way
+from tcs.teleop.settings import RESHAPING, Command, Mode, Settings
+from tcs.teleop.situation import Situation, Wish, situation_bounds, twist_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +102,8 @@ class Teleoperation:
         self._now = self.arm.kinematics(self._joints)
         self._target_R, self._target_p = self._now.R, self._now.p
         self._switching = False
-        self._turning: float = 0
+        self._group: int | None = None
+        self._speed = 0.0
         self._way = 1.0
         self._beyond = self.arm.beyond(self._joints)
 
@@ -121,26 +124,37 @@ class Teleoperation:
             command: What the person asks for; None if nothing was heard: the last command goes on
                 until it has been silent for `settings.timeout`.
         """
-        settings = self.settings
-        self._time += settings.period
+        self._time += self.settings.period
         why = self._refused(command)
-        asked = self._command
-        if not why and asked.mode is not None and asked.mode != self._mode:
-            self._mode = asked.mode
-            self._switching = True
-        bounds = rate_bounds(self.arm, self._joints, settings.period, settings.acceleration)
-        if why or asked.clutch:
-            self._move(np.zeros(JOINTS), *bounds)
-            self._target_R, self._target_p = self._now.R, self._now.p
-            return self._report(why)
-        if self._switching:
-            # The tool has not come to rest yet; the target waits for it, so nothing pulls it back.
-            self._target_R, self._target_p = self._now.R, self._now.p
-        wanted = self._wish(asked, *bounds)
-        if self._move(wanted.rates, *bounds):
+        held = bool(why) or self._command.clutch
+        asked = self._admitted(self._command, held)
+        rates, reason = np.zeros(JOINTS), why
+        if not held or self._speed:
+            rates, reason, self._speed = self._wish(asked)
+            reason = why or reason
+        if self._move(rates):
             self._switching = False
-        self._advance_target(asked, ended=bool(wanted.reason))
-        return self._report(wanted.reason)
+        self._advance_target(asked, stays=held or self._switching or bool(reason))
+        return self._report(reason)
+
+    def _admitted(self, command: Command, held: bool) -> Command:
+        """Return what of a command may reach the arm now.
+
+        A group that turns comes to rest before anything else begins, and so does the tool before
+        a group turns: each mode ends by its own rules, so nothing jumps and nothing slips.
+        """
+        if not self._speed:
+            self._group = command.group
+            if not held and command.mode not in (None, self._mode):
+                self._mode = command.mode
+                self._switching = True
+        other = command.mode not in (None, self._mode)
+        if not (held or other or self._switching):
+            if self._mode is Mode.POSE or command.group == self._group:
+                return command
+        if self._mode in RESHAPING:
+            return Command(group=self._group)
+        return Command() if held else command
 
     def _refused(self, command: Command | None) -> str:
         """Take a command over, or say why the arm holds still instead."""
@@ -166,16 +180,15 @@ class Teleoperation:
             why = f"start posture: {self._beyond}. The arm holds still; place it within them."
         return why
 
-    def _wish(self, asked: Command, lower: FloatArray, upper: FloatArray) -> Wish:
-        """Return the joint rates that the command asks for."""
+    def _wish(self, asked: Command) -> Wish:
+        """Return what the mode makes of a command."""
         settings = self.settings
         # The Jacobian half way through the step follows the tool's curve to second order.
         middle = self.arm.kinematics(self._joints + 0.5 * settings.period * self._rates)
-        turning = asked.sign if self._mode is Mode.POSE else 0
-        if turning and not self._turning:
-            # The way of the elbow that turns joint 1 up, as it stands when it begins to turn.
+        if self._mode is Mode.POSE and not self._speed:
+            # The way of the elbow that turns joint 1 up, as it stands before it begins to turn.
             self._way = elbow_way(middle.jacobian)
-        self._turning = turning
+        lower, upper = situation_bounds(self.arm, self._joints, settings)
         situation = Situation(
             arm=self.arm,
             settings=settings,
@@ -184,38 +197,44 @@ class Teleoperation:
             error=pose_error(self._target_R, self._target_p, self._now.R, self._now.p),
             lower=lower,
             upper=upper,
+            speed=self._speed,
             way=self._way,
         )
         return wish(self._mode, asked, situation)
 
-    def _move(self, wanted: FloatArray, lower: FloatArray, upper: FloatArray) -> bool:
+    def _move(self, wanted: FloatArray) -> bool:
         """Move on by one period; return whether the rates are those wanted."""
         settings, arm = self.settings, self.arm
         if self._beyond:
             return True
+        bounds = rate_bounds(arm, self._joints, settings.period, settings.acceleration)
         change = settings.acceleration * settings.period
-        self._rates, arrived = approach(self._rates, wanted, change, lower, upper)
+        self._rates, arrived = approach(self._rates, wanted, change, *bounds)
         # The bounds end at the limits; rounding may go past them by a hair.
         joints = self._joints + settings.period * self._rates
         self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)
         self._now = arm.kinematics(self._joints)
         return arrived
 
-    def _advance_target(self, asked: Command, *, ended: bool) -> None:
-        """Let the target go where the person wants it, on its leash; or stay with the tool."""
+    def _advance_target(self, asked: Command, *, stays: bool) -> None:
+        """Let the target go where the person wants it, on its leash.
+
+        Args:
+            asked: The command that reached the arm.
+            stays: Whether the target is where the tool is instead: while the tool comes to rest,
+                so that nothing pulls it back, and where its motion ends.
+        """
         settings, now = self.settings, self._now
-        if self._mode is Mode.POSE:
+        if self._mode in RESHAPING and not self._switching:
+            if self._mode is Mode.NULL_SPACE:
+                self._target_R = now.R
             return
-        if self._mode is Mode.NULL_SPACE:
-            self._target_R = now.R
-            return
-        if ended:
+        if stays:
             self._target_R, self._target_p = now.R, now.p
             return
-        linear = np.asarray(asked.linear, dtype=np.float64)
-        angular = np.asarray(asked.angular, dtype=np.float64)
-        self._target_p = self._target_p + linear * settings.period
-        self._target_R = moved(self._target_R, angular, settings.period)
+        twist = twist_of(asked)
+        self._target_p = self._target_p + twist[3:] * settings.period
+        self._target_R = moved(self._target_R, twist[:3], settings.period)
         error = pose_error(self._target_R, self._target_p, now.R, now.p)
         angle, way = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
         if way > settings.leash:

@@ -27,6 +27,10 @@ class Mode(StrEnum):
     """The elbow, the tool's pose held: the one degree of freedom that is left."""
 
 
+RESHAPING = (Mode.NULL_SPACE, Mode.POSE)
+"""Modes in which the arm moves and the tool stays."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
     """What the person asks for during one step.
@@ -92,7 +96,7 @@ class Settings:
 
     period: float = 0.01
     limits: Behaviour = "clamped"
-    gain: float = 10.0
+    gain: float = 20.0
     leash: float = 0.005
     leash_angle: float = 0.05
     acceleration: float = 5.0

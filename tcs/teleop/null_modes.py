@@ -1,0 +1,171 @@
+"""Modes in which the person reshapes the arm while the tool stays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import JOINTS
+from tcs.teleop.control import clamped_rates, resolved_rates, smallest_singular_value
+from tcs.teleop.groups import GroupMotion, elbow_direction, group_motion
+from tcs.teleop.settings import Command
+from tcs.teleop.situation import BRAKE, Situation, Wish, all_slower, at_limits
+
+_SLIP = 1e-4
+"""A tool that would slip faster than this [m/s] is not held: against feedback at the default gain
+it would stand 0.01 mm off."""
+_RACING = 3.0
+"""Where a joint of a group turns this many times as fast as its lead joint, all have slowed down
+by a third; before, hardly, and after, all the more."""
+_EDGE = 0.01
+"""At this share of its speed, a group has come as far as its lead joint can lead it: the others
+turn 30 times as fast."""
+
+
+def null_space(asked: Command, now: Situation) -> Wish:
+    """Turn a joint group, the tool's position held: eqs. (9) to (14)."""
+    settings, jacobian = now.settings, now.jacobian[3:]
+    back = _back(jacobian, now.error[3:], now)
+    if asked.group is None or (asked.sign == 0 and now.speed == 0.0):
+        return Wish(back)
+    group = settings.groups[asked.group]
+    lead = group[0]
+    motion = group_motion(jacobian, group, settings.group_rate)
+    if motion.slip > _SLIP:
+        return Wish(back, _stuck(lead))
+    ease = _ease(motion, settings.group_rate)
+    speed = _next_speed(asked.sign, ease * motion.rates, now)
+    if ease < _EDGE and speed and _gets_worse(group, np.sign(speed) * motion.rates, now):
+        return Wish(back, _stuck(lead))
+    turning = speed * ease * motion.rates
+    if settings.limits == "clamped":
+        turning = _around_limits(turning, back, group, now)
+    share, joint = all_slower(turning + back, now)
+    if joint >= 0:
+        return Wish(back, f"{at_limits([joint])}: its motion ends there.")
+    # A group that had to slow down for a limit turns back from the speed it has.
+    return Wish(share * (turning + back), "", share * speed)
+
+
+def pose(asked: Command, now: Situation) -> Wish:
+    """Turn the elbow, the tool's pose held: the one degree of freedom that is left."""
+    settings = now.settings
+    back = _back(now.jacobian, now.error, now)
+    if asked.sign == 0 and now.speed == 0.0:
+        return Wish(back)
+    if smallest_singular_value(now.jacobian, settings.length) < 1e-3 * settings.singular:
+        return Wish(back, "the arm is singular: the elbow has no way of its own.")
+    direction = now.way * settings.group_rate * elbow_direction(now.jacobian)
+    speed = _next_speed(asked.sign, direction, now)
+    share, joint = all_slower(speed * direction + back, now)
+    if joint >= 0:
+        return Wish(back, f"{at_limits([joint])}: the elbow's motion ends there.")
+    return Wish(share * (speed * direction + back), "", share * speed)
+
+
+def elbow_way(jacobian: FloatArray) -> float:
+    """Return the way of the elbow in which joint 1 turns up: 1 or -1."""
+    return -1.0 if elbow_direction(jacobian)[0] < 0.0 else 1.0
+
+
+def _back(jacobian: FloatArray, error: FloatArray, now: Situation) -> FloatArray:
+    """Return the rates that undo the tool's drift, by all joints that can still move.
+
+    The group alone would have to race for it where it is nearly locked.
+    """
+    settings = now.settings
+    velocity = settings.gain * error
+    rates, _ = resolved_rates(
+        jacobian,
+        velocity,
+        length=settings.length,
+        damping=settings.damping,
+        singular=settings.singular,
+    )
+    if ((rates >= now.lower) & (rates <= now.upper)).all():
+        return rates
+    return clamped_rates(
+        jacobian,
+        velocity,
+        now.lower,
+        now.upper,
+        length=settings.length,
+        damping=settings.damping,
+    )[0]
+
+
+def _next_speed(sign: float, full: FloatArray, now: Situation) -> float:
+    """Return the speed after this step, on the way to the one asked for.
+
+    The speed changes, not the joint rates: so a group that starts or stops keeps to the null
+    space, which turns while it does.
+
+    Args:
+        sign: The speed asked for, k of eq. (13).
+        full: Joint rates at k = 1 [rad/s], shape (7,).
+        now: The arm.
+    """
+    settings = now.settings
+    fastest = float(np.abs(full).max())
+    change = BRAKE * settings.acceleration * settings.period / max(fastest, 1e-9)
+    return float(np.clip(sign, now.speed - change, now.speed + change))
+
+
+def _ease(motion: GroupMotion, rate: float) -> float:
+    """Return by how much a group must slow down so that it stops where its lead joint turns back.
+
+    A tool that is held leaves the lead joint only part of its range. At the end of that part the
+    others would turn infinitely faster than it does; their speed is led to zero there instead.
+    """
+    fastest = float(np.abs(motion.rates).max()) / (rate * _RACING)
+    # Smooth, as a kink would be a jerk; 0.99 where all turn as fast as the lead joint.
+    return float(1.0 / math.sqrt(1.0 + fastest**4))
+
+
+def _gets_worse(group: tuple[int, ...], rates: FloatArray, now: Situation) -> bool:
+    """Return whether a group's motion leads on to where its lead joint turns back."""
+    # Far enough for rounding, near enough to stay on this side [rad].
+    ahead = now.joints + (1e-4 / float(np.abs(rates).max())) * rates
+    slowest = [
+        _ease(group_motion(now.arm.kinematics(joints).jacobian[3:], group, 1.0), 1.0)
+        for joints in (now.joints, ahead)
+    ]
+    return slowest[1] < slowest[0]
+
+
+def _around_limits(
+    turning: FloatArray, back: FloatArray, group: tuple[int, ...], now: Situation
+) -> FloatArray:
+    """Return a group's motion in which joints at their limits stay there, if there is one.
+
+    The lead joint is slowed down to what its own limit allows; others that are too fast are held
+    at their bounds, the worst first, and the rest of the arm takes over.
+    """
+    lead = group[0]
+    lower, upper = now.lower - back, now.upper - back
+    rate = float(np.clip(turning[lead], lower[lead], upper[lead]))
+    if rate == 0.0:
+        return turning
+    held, bound = np.zeros(JOINTS, bool), np.zeros(JOINTS)
+    found = turning
+    for _ in range(JOINTS):
+        over = np.maximum(found - upper, lower - found)
+        over[lead] = 0.0
+        over[held] = 0.0
+        joint = int(over.argmax())
+        # Rates are rounded to far below this [rad/s].
+        if over[joint] <= 1e-12:
+            return found
+        held[joint] = True
+        bound[joint] = min(max(found[joint], lower[joint]), upper[joint])
+        motion = group_motion(now.jacobian[3:], group, rate, None, held, bound)
+        if motion.slip > _SLIP or _ease(motion, abs(rate)) < _EDGE:
+            break
+        found = motion.rates
+    return turning
+
+
+def _stuck(lead: int) -> str:
+    return f"joint {lead + 1} can turn no further here without moving the tool."

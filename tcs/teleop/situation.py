@@ -1,0 +1,95 @@
+"""What a mode knows about the arm in one step, and what it answers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import Arm
+from tcs.teleop.bounds import rate_bounds, scale_within
+from tcs.teleop.settings import Command, Settings
+
+STILL = 1e-3
+"""A motion of less than this share of what was asked for counts as none."""
+BRAKE = 0.5
+"""Share of the acceleration limit that motions are planned with; the rest is left for joints that
+have to make up for others."""
+
+
+class Situation(NamedTuple):
+    """What a mode has to know about the arm."""
+
+    arm: Arm
+    settings: Settings
+    joints: FloatArray
+    """Joint positions [rad], shape (7,)."""
+    jacobian: FloatArray
+    """Of the tool, half way through the step, shape (6, 7)."""
+    error: FloatArray
+    """From the tool to its target: rotation vector, translation, shape (6,)."""
+    lower: FloatArray
+    """Lowest rates allowed by joint limits and velocities [rad/s], shape (7,)."""
+    upper: FloatArray
+    """Highest rates allowed by joint limits and velocities [rad/s], shape (7,)."""
+    speed: float
+    """Speed of the joint group in the step before: k of eq. (13) on its way, in [-1, 1]."""
+    way: float
+    """Which way the elbow turns at a positive sign: 1 along `elbow_direction`, or -1."""
+
+
+class Wish(NamedTuple):
+    """What a mode asks for.
+
+    `rates` are joint rates within limits of position and velocity [rad/s], shape (7,); `reason`
+    says why they stop short, and is empty if they do not; `speed` is the group's new speed k.
+    """
+
+    rates: FloatArray
+    reason: str = ""
+    speed: float = 0.0
+
+
+def situation_bounds(
+    arm: Arm, joints: FloatArray, settings: Settings
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates that a mode may ask for: to brake at `BRAKE`, within joint velocities."""
+    lower, upper = rate_bounds(arm, joints, settings.period, BRAKE * settings.acceleration)
+    return np.maximum(lower, -arm.velocity), np.minimum(upper, arm.velocity)
+
+
+def all_slower(rates: FloatArray, now: Situation) -> tuple[float, int]:
+    """Return by how much all joints must slow down for one of them, and which one, else -1.
+
+    Each joint brakes for its limit as hard as its share of the motion is, so that all of them
+    come to rest together: the tool keeps its way, or stays, until the very end.
+    """
+    settings = now.settings
+    fastest = float(np.abs(rates).max())
+    if fastest == 0.0:
+        return 1.0, -1
+    # A joint that hardly moves needs no bound of its own; the floor keeps the division sound.
+    shares = np.maximum(np.abs(rates) / fastest, 1e-6)
+    lower, upper = rate_bounds(
+        now.arm, now.joints, settings.period, BRAKE * settings.acceleration * shares
+    )
+    velocity = now.arm.velocity
+    share, joint = scale_within(rates, np.maximum(lower, -velocity), np.minimum(upper, velocity))
+    return share, joint if share < STILL else -1
+
+
+def twist_of(asked: Command) -> FloatArray:
+    """Return the tool velocity of a command, angular then linear [rad/s; m/s], shape (6,)."""
+    twist = np.empty(6)
+    twist[:3], twist[3:] = asked.angular, asked.linear
+    return twist
+
+
+def at_limits(joints: ArrayLike) -> str:
+    """Return words for joints, counted from 0, that are at their limits."""
+    names = [str(joint + 1) for joint in np.asarray(joints, dtype=int)]
+    if len(names) == 1:
+        return f"joint {names[0]} is at its limit"
+    return f"joints {', '.join(names)} are at their limits"
