@@ -1,0 +1,27 @@
+"""Try other robots at the same task: some that come along, and one with a spoon in its hand.
+
+`pr2_spoon.yaml` beside this file is the PR2 with one more body and another tool frame. Any robot
+whose arm has seven turning joints will do; `tcs robot new` drafts its file from a URDF.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tcs
+
+HERE = Path(__file__).resolve().parent
+
+
+def main() -> None:
+    """Score shaving with three robots."""
+    for robot in ("pr2", HERE / "pr2_spoon.yaml", "panda"):
+        file = tcs.score("shaving", environment="wheelchair", robot=robot)
+        best = tcs.summary(file)["best_single"]
+        # P_R compares robots. P_M does not: its Jacobian mixes metres and radians.
+        share = best["reachability"]
+        print(f"{file.robot['name']}: {share:.0%} of the goals from the best single place")
+
+
+if __name__ == "__main__":
+    main()

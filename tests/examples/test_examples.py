@@ -1,0 +1,50 @@
+"""Every example runs as it stands, in an empty folder, and says what its comments promise."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+
+# What each has to print, as one expression over all of its lines; and the files it leaves.
+PRINTED = {
+    "01_score_and_select": r"y 1 m, reaching 100% of the goals:\n.*base_x.*y -1 m, reaching 100%",
+    "02_own_room": r"wheelchair:\n  4,717 pairs.*kitchen:\n  [1-4],\d{3} pairs",
+    "03_own_task": r"3 goals, weights \[0.25, 0.25, 0.5\].*\[True, True, True\]",
+    "04_another_robot": r"pr2: 75%.*pr2_spoon: \d+%.*panda: \d+%",
+    "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*seen 0.010 m from "
+    r"where it is at the shift \{'person_y': -0.1\}",
+    "06_robustness": r"single: [67]\d\.\d%.*best: 9\d\.\d%.*: (9\d\.\d|100\.0)% estimated",
+    "07_explain": r"goal 0: arm_blocked, l_upper_arm_link would touch .* Raise the torso 15 cm"
+    r".*goal 3: reached\ngoal 4: too_far\.",
+    "08_capability_map": r"[1-9]\d* base poses reach both.*score 0\.[1-9]",
+    "09_live_score": r"told by a joint: 100%.*seen by a camera: 100%",
+    "10_viewer_page": r"wrote .*feeding\.html, 2\.\d MB",
+}
+WRITTEN = {
+    "01_score_and_select": ["feeding.tcs"],
+    "08_capability_map": ["tiago.tcm"],
+    "10_viewer_page": ["feeding.html"],
+}
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_example_runs(path, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(path), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert re.search(PRINTED[path.stem], printed, flags=re.S), printed
+    left = sorted(str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*") if file.is_file())
+    assert left == [f"out/examples/{name}" for name in WRITTEN.get(path.stem, [])]
+
+
+def test_numbers_have_no_gap():
+    assert [path.name[:3] for path in SCRIPTS] == [f"{n:02d}_" for n in range(1, len(SCRIPTS) + 1)]
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda path: path.name)
+def test_data_file_belongs_to_an_example(path):
+    assert any(f'"{path.name}"' in script.read_text(encoding="utf-8") for script in SCRIPTS)
