@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from tcs.errors import SelectionError
-from tcs.select.estimated import best_estimated
+from tcs.select.estimated import best_estimated, check_estimated
 from tcs.select.index import SetIndex
 from tcs.select.observed import Match, nearest_table
 from tcs.select.search import best_set
@@ -115,7 +115,8 @@ def select(
     Raises:
         SelectionError: If no goal is reached from anywhere, the current state is not finite or
             lacks an axis that costs something, `max_members` is not stored, there is no way
-            around the furniture to anywhere, or delta is above 0 and no set has an estimate.
+            around the furniture to anywhere, or delta is above 0 and no set has an estimate,
+            or no set of three where three are asked for.
         UnknownNameError: If an environment axis has no such name.
 
     Source:
@@ -134,7 +135,10 @@ def select(
     else:
         tables = source
     sets = tables.sets
-    max_members = sets.max_members if max_members is None else max_members
+    if max_members is None:
+        max_members = sets.max_members
+    elif weights.success > 0.0:
+        check_estimated(sets, tables.success, max_members)
     _check_members(max_members, sets.max_members)
     if not len(sets.candidates):
         raise SelectionError(

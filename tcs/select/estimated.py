@@ -62,6 +62,21 @@ def best_estimated(
     return best
 
 
+def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: int) -> None:
+    """Refuse to choose among sets of three by a success that was estimated for smaller ones only.
+
+    Raises:
+        SelectionError: If there are sets of three, and none has an estimate.
+    """
+    if max_members < 3 or success is None or sets.triples is None or not sets.triples.kept:
+        return
+    if not success.of_size(3).size:
+        raise SelectionError(
+            "max_members is 3 and weight delta above 0, but the success under error was estimated "
+            "for no set of three. Take max_members 2, or delta 0."
+        )
+
+
 def _utilities(
     sets: SetTable,
     success: NDArray[np.float64],

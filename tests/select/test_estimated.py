@@ -128,6 +128,21 @@ def test_delta_needs_an_estimate_of_a_set_as_small(file):
         select(only_pairs, HERE, weights=UtilityWeights(success=1.0), max_members=1)
 
 
+def test_three_members_are_not_chosen_by_estimates_of_two():
+    plain = score_file(share=0.2, options={"max_members": 3})
+    sets = plain.nominal.sets
+    assert sets.triples.kept
+    file = with_success(plain, estimated(sets, np.random.default_rng(1), 5, 20))
+    weights = UtilityWeights(success=1.0)
+    with pytest.raises(SelectionError, match=r"for no set of three\. Take max_members 2"):
+        select(file, HERE, weights=weights, max_members=3)
+    # Who does not say how many gets the best that has an estimate.
+    assert (
+        select(file, HERE, weights=weights).indices
+        == select(file, HERE, weights=weights, max_members=2).indices
+    )
+
+
 @pytest.mark.parametrize("delta", [-1.0, float("nan"), 1e10, True])
 def test_impossible_weights_are_refused(delta):
     with pytest.raises(SelectionError, match="delta"):
