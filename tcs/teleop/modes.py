@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from tcs.teleop.assist import assisted, drake
 from tcs.teleop.null_modes import null_space, pose
 from tcs.teleop.settings import Command, Mode
 from tcs.teleop.situation import Situation, Wish
@@ -13,6 +14,8 @@ _MODES: Mapping[Mode, Callable[[Command, Situation], Wish]] = {
     Mode.END_EFFECTOR: end_effector,
     Mode.NULL_SPACE: null_space,
     Mode.POSE: pose,
+    Mode.ASSISTED: assisted,
+    Mode.DRAKE: drake,
 }
 
 

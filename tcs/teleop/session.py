@@ -239,8 +239,10 @@ class Teleoperation:
         angle, way = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
         if way > settings.leash:
             self._target_p = now.p + error[3:] * (settings.leash / way)
-        if angle > settings.leash_angle:
-            self._target_R = moved(now.R, error[:3], settings.leash_angle / angle)
+        assisted = self._mode is Mode.ASSISTED
+        leash = settings.assist_leash_angle if assisted else settings.leash_angle
+        if angle > leash:
+            self._target_R = moved(now.R, error[:3], leash / angle)
 
     def _report(self, reason: str) -> Step:
         flags = flags_of(self.arm, self._joints, self._now.jacobian, self._mode, self.settings)

@@ -25,6 +25,10 @@ class Mode(StrEnum):
     """One joint group, the tool's position held (eqs. 9-14)."""
     POSE = "pose"
     """The elbow, the tool's pose held: the one degree of freedom that is left."""
+    ASSISTED = "assisted"
+    """The tool, while the arm keeps itself away from limits and singularities."""
+    DRAKE = "drake"
+    """The tool, by Drake's differential inverse kinematics: the baseline off the shelf."""
 
 
 RESHAPING = (Mode.NULL_SPACE, Mode.POSE)
@@ -91,6 +95,9 @@ class Settings:
         near_limit: A joint this close to a limit counts as at it [rad].
         length: A turn of 1 rad weighs as much as this way [m] where not all of a command can be
             followed, and in singular values.
+        assist_rate: How fast the assistance may move the posture [rad/s].
+        assist_leash_angle: How far the assisted tool may be turned off the orientation asked for
+            before that gives way [rad]; up to there, it is come back to.
         timeout: Without a command for longer than this, the input counts as lost [s].
     """
 
@@ -106,6 +113,8 @@ class Settings:
     singular: float = 0.02
     near_limit: float = 0.01
     length: float = 0.1
+    assist_rate: float = 0.3
+    assist_leash_angle: float = 1.0
     timeout: float = 0.25
 
     def __post_init__(self) -> None:
@@ -115,9 +124,9 @@ class Settings:
             TcsError: As said.
         """
         positive = ("period", "gain", "leash", "leash_angle", "acceleration", "group_rate")
-        for name in (*positive, "singular", "length", "timeout"):
+        for name in (*positive, "singular", "length", "assist_leash_angle", "timeout"):
             _check(name, getattr(self, name), above_zero=True)
-        for name in ("damping", "near_limit"):
+        for name in ("damping", "near_limit", "assist_rate"):
             _check(name, getattr(self, name), above_zero=False)
         # Feedback that corrects more than the whole error in a step swings up.
         if self.gain * self.period > 1.0:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.arm import Arm
 from tcs.teleop.bounds import rate_bounds, scale_within
 from tcs.teleop.settings import Command, Settings
@@ -66,16 +66,20 @@ def all_slower(rates: FloatArray, now: Situation) -> tuple[float, int]:
     Each joint brakes for its limit as hard as its share of the motion is, so that all of them
     come to rest together: the tool keeps its way, or stays, until the very end.
     """
-    settings = now.settings
-    fastest = float(np.abs(rates).max())
+    size = np.abs(rates)
+    fastest = float(size.max())
     if fastest == 0.0:
         return 1.0, -1
+    settings, velocity = now.settings, now.arm.velocity
+    braking = BRAKE * settings.acceleration
+    # Stopping with its share of the braking, a joint goes on for rate * fastest / (2 braking).
+    way = size * (fastest / (2.0 * braking) + settings.period)
+    room = np.where(rates > 0.0, now.arm.upper - now.joints, now.joints - now.arm.lower)
+    if (way <= room).all() and (size <= velocity).all():
+        return 1.0, -1
     # A joint that hardly moves needs no bound of its own; the floor keeps the division sound.
-    shares = np.maximum(np.abs(rates) / fastest, 1e-6)
-    lower, upper = rate_bounds(
-        now.arm, now.joints, settings.period, BRAKE * settings.acceleration * shares
-    )
-    velocity = now.arm.velocity
+    shares = np.maximum(size / fastest, 1e-6)
+    lower, upper = rate_bounds(now.arm, now.joints, settings.period, braking * shares)
     share, joint = scale_within(rates, np.maximum(lower, -velocity), np.minimum(upper, velocity))
     return share, joint if share < STILL else -1
 
@@ -93,3 +97,14 @@ def at_limits(joints: ArrayLike) -> str:
     if len(names) == 1:
         return f"joint {names[0]} is at its limit"
     return f"joints {', '.join(names)} are at their limits"
+
+
+def unmoved(asked: Command, rates: FloatArray, held: BoolArray, now: Situation) -> str:
+    """Return why the tool does not go the way it is asked to, empty if it does at least partly."""
+    twist = twist_of(asked)
+    # Turns count as ways here too, so that a command of both is judged as one.
+    weights = np.repeat((now.settings.length, 1.0), 3) ** 2
+    followed = float((now.jacobian @ rates * weights) @ twist)
+    if followed > STILL * float((twist * weights) @ twist) or not twist.any():
+        return ""
+    return f"{at_limits(np.flatnonzero(held))}: the tool cannot go that way."

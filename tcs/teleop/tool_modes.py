@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS
 from tcs.teleop.bounds import scale_within
 from tcs.teleop.control import clamped_rates, resolved_rates, smallest_singular_value
 from tcs.teleop.settings import Command
-from tcs.teleop.situation import STILL, Situation, Wish, all_slower, at_limits, twist_of
+from tcs.teleop.situation import Situation, Wish, all_slower, at_limits, twist_of, unmoved
 
 _EASE = 0.005
 """Damping where joints are held at limits [m/rad]: rates stay bounded where the others become
@@ -42,17 +42,6 @@ def end_effector(asked: Command, now: Situation) -> Wish:
         damping=_EASE,
     )
     return Wish(rates, unmoved(asked, rates, held, now))
-
-
-def unmoved(asked: Command, rates: FloatArray, held: BoolArray, now: Situation) -> str:
-    """Return why the tool does not go the way it is asked to, empty if it does at least partly."""
-    twist = twist_of(asked)
-    # Turns count as ways here too, so that a command of both is judged as one.
-    weights = np.repeat((now.settings.length, 1.0), 3) ** 2
-    followed = float((now.jacobian @ rates * weights) @ twist)
-    if followed > STILL * float((twist * weights) @ twist) or not twist.any():
-        return ""
-    return f"{at_limits(np.flatnonzero(held))}: the tool cannot go that way."
 
 
 def _until_invalid(rates: FloatArray, smallest: float, now: Situation) -> Wish:

@@ -1,0 +1,164 @@
+"""The arm that looks after itself: the tool follows, the posture keeps away from what stops it."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from pydrake.multibody.inverse_kinematics import (
+    DifferentialInverseKinematicsParameters,
+    DifferentialInverseKinematicsStatus,
+    DoDifferentialInverseKinematics,
+)
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import JOINTS, Arm
+from tcs.teleop.flags import share_of_range
+from tcs.teleop.least_squares import bounded_minimum
+from tcs.teleop.settings import Command
+from tcs.teleop.situation import Situation, Wish, twist_of, unmoved
+
+_ORIENTATION = 0.02
+"""A turn of 1 rad weighs as much as this way [m]: where not both can be had, the tool goes where it
+is asked to, and turns as little as that takes."""
+_POSTURE = 1e-3
+"""A joint's rate of 1 rad/s weighs as much as this way [m/s]: only what moves no tool is left to
+the posture; 0.01 % of the tool's motion at a singular value of 0.1 m/rad."""
+_CORRECTION = 0.3
+"""Fastest turn with which a lost orientation comes back [rad/s]: at its weight, the position gives
+way by less than 0.1 mm for it."""
+_LIMITS = 0.05
+"""How strongly limits push [rad/s]: a joint at 90 % of its way from the middle of a range of 5 rad
+is sent back at 1 rad/s, more than `assist_rate`; at 50 %, at 0.04 rad/s."""
+_ISOTROPY = 0.2
+"""How strongly isotropy pulls [rad/s] where a radian would raise its logarithm by 1."""
+_CENTRING = 0.1
+"""Gain with which Drake's centring leads the joints to their middles [1/s]: one that is 2 rad off
+moves at 0.2 rad/s."""
+
+
+def assisted(asked: Command, now: Situation) -> Wish:
+    """Move the tool, and of all ways to do so take the one that keeps the posture sound.
+
+    One least squares problem between bounds in each step: tool position first, orientation second
+    (`_ORIENTATION`), then the posture's own wish (`posture_wish`); joint limits and velocities are
+    bounds that no weight can outdo. So a joint that meets its limit first costs posture, then
+    orientation, and only at last position.
+    """
+    settings = now.settings
+    wanted = twist_of(asked)
+    back = settings.gain * now.error
+    turn = math.sqrt(back[:3] @ back[:3])
+    if turn > _CORRECTION:
+        back[:3] *= _CORRECTION / turn
+    wanted += back
+    J = now.jacobian.copy()
+    J[:3] *= _ORIENTATION
+    wanted[:3] *= _ORIENTATION
+    hessian = J.T @ J
+    hessian.flat[:: JOINTS + 1] += _POSTURE**2
+    slope = wanted @ J + _POSTURE**2 * posture_wish(
+        now.arm, now.joints, now.jacobian, settings.assist_rate
+    )
+    rates, held = bounded_minimum(hessian, slope, now.lower, now.upper)
+    return Wish(rates, unmoved(asked, rates, held, now))
+
+
+def posture_wish(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: float) -> FloatArray:
+    """Return the joint rates that would lead the posture away from limits and singularities.
+
+    The gradient of `_ISOTROPY * log(isotropy) - _LIMITS * sum 1 / (1 - x^2)`, where x in [-1, 1]
+    says how far a joint is from the middle of its range: the limit barrier of Zghal, Dubey and
+    Euler (1990), zero in the middle and endless at the limits.
+
+    Args:
+        arm: The arm.
+        joints: Joint positions [rad], shape (7,).
+        jacobian: Of the tool, shape (6, 7).
+        fastest: What the fastest joint is slowed down to [rad/s].
+
+    Returns:
+        Shape (7,).
+    """
+    x = 2.0 * share_of_range(arm, joints) - 1.0
+    half = np.where(arm.bounded, 0.5 * (arm.upper - arm.lower), np.inf)
+    # At a limit itself the barrier is endless; a millionth inside, it is only far too strong.
+    room = np.maximum(1.0 - x * x, 1e-6)
+    rates = _ISOTROPY * isotropy_gradient(jacobian) - _LIMITS * 2.0 * x / (room * room * half)
+    largest = float(np.abs(rates).max())
+    slower: FloatArray = rates * min(1.0, fastest / max(largest, 1e-300))
+    return slower
+
+
+def isotropy_gradient(jacobian: FloatArray) -> FloatArray:
+    """Return the gradient of the logarithm of kinematic isotropy by the joints [1/rad].
+
+    With isotropy det(J J^T)^(1/6) / (trace(J J^T) / 6) and D_i the change of J with joint i,
+    entry i is tr(J^+ D_i) / 3 - 2 tr(J^T D_i) / tr(J J^T). Turning joint i turns all that lies
+    beyond it: column j changes by axis_i x (both halves) if i comes before j; else only its
+    linear half changes, by axis_j x linear_i.
+
+    Args:
+        jacobian: Shape (6, 7).
+
+    Returns:
+        Shape (7,); pulls out of a singularity, without growing endless at it.
+    """
+    axes, linear = jacobian[:3], jacobian[3:]
+    square = jacobian @ jacobian.T
+    trace = float(np.trace(square))
+    # Keeps the inverse finite at a singularity.
+    square_inverse = np.linalg.inv(square + 1e-6 * trace * np.eye(6))
+    weights = square_inverse @ jacobian / 3.0 - jacobian * (2.0 / trace)
+    first, second = weights[:3], weights[3:]
+    # axis_i . (column_j x weight_j), as the triple product allows: the cross products come once.
+    turned_axes, turned_linear = _cross(axes, first), _cross(linear, second)
+    later = np.cumsum((turned_axes + turned_linear)[:, ::-1], axis=1)[:, ::-1]
+    # For j < i: linear_i . (weight_j x axis_j).
+    moved = _cross(second, axes)
+    earlier = np.cumsum(moved, axis=1) - moved
+    gradient: FloatArray = (axes * later).sum(axis=0) + (linear * earlier).sum(axis=0)
+    return gradient
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the cross products of columns, shape (3, n)."""
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def drake(asked: Command, now: Situation) -> Wish:
+    """Move the tool by Drake's own differential inverse kinematics: the baseline off the shelf.
+
+    A quadratic program that scales the tool's velocity down, in its direction, to what position
+    and velocity limits allow, and centres the joints in what is left.
+    """
+    settings = now.settings
+    parameters = _drake_parameters(now.arm, settings.period)
+    parameters.set_joint_velocity_limits((now.lower, now.upper))
+    result = DoDifferentialInverseKinematics(
+        now.joints,
+        np.zeros(JOINTS),
+        twist_of(asked) + settings.gain * now.error,
+        now.jacobian,
+        parameters,
+    )
+    if result.status == DifferentialInverseKinematicsStatus.kNoSolutionFound:
+        return Wish(np.zeros(JOINTS), "Drake finds no joint rates within the limits.")
+    # The solver keeps to the bounds within its own tolerance.
+    rates = np.clip(np.asarray(result.joint_velocities), now.lower, now.upper)
+    stuck = result.status == DifferentialInverseKinematicsStatus.kStuck
+    return Wish(rates, "Drake finds no way on: limits or a singularity." if stuck else "")
+
+
+@lru_cache(maxsize=16)
+def _drake_parameters(arm: Arm, period: float) -> DifferentialInverseKinematicsParameters:
+    """Return what stays the same from step to step."""
+    parameters = DifferentialInverseKinematicsParameters(JOINTS, JOINTS)
+    parameters.set_time_step(period)
+    parameters.set_joint_position_limits((arm.lower, arm.upper))
+    parameters.set_nominal_joint_position(np.where(arm.bounded, 0.5 * (arm.lower + arm.upper), 0.0))
+    parameters.set_joint_centering_gain(np.diag(np.where(arm.bounded, _CENTRING, 0.0)))
+    return parameters
