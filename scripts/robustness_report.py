@@ -18,9 +18,10 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.rows import default_path, score_one
 from tcs.errors import UnknownNameError
-from tcs.report import Plan, check_row, load_paper, make_folder, study_rows, write_report
+from tcs.report import Plan, check_row, load_paper, study_rows, write_report
 from tcs.robustness import robustify
 from tcs.robustness.error_model import check_draws
+from tcs.writing import make_folder
 
 ROBOT = "pr2"
 RACED_SETS, RACE_SAMPLES = 200, 256

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from tcs.errors import DataFileError, OutputError, UnknownNameError
+from tcs.writing import make_folder
 
 _PACKAGE = Path(__file__).resolve().parent
 _DATA_PARTS = ("models", "tasks")
@@ -81,12 +82,7 @@ def cache_folder(*parts: str) -> Path:
         OutputError: If the folder cannot be made.
     """
     folder = _cache_place().joinpath(*parts)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"cache folder '{folder}' cannot be made: {error.strerror}. {CACHE_ADVICE}"
-        ) from error
+    make_folder(folder, "cache folder", advice=CACHE_ADVICE)
     return folder
 
 

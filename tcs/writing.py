@@ -1,4 +1,4 @@
-"""Write files, wholly or not at all."""
+"""Write files, wholly or not at all, and the folders they go to."""
 
 from __future__ import annotations
 
@@ -48,3 +48,24 @@ def whole_file(
                 f"{what} '{path}' cannot be written: {error.strerror or error}. {advice}"
             ) from error
         raise
+
+
+def make_folder(
+    folder: Path, what: str = "folder", *, advice: str = "Name a folder that can be."
+) -> None:
+    """Make a folder, and those above it, where they are not there yet.
+
+    Args:
+        folder: The folder.
+        what: What to call it in a message.
+        advice: What to do when it cannot be made.
+
+    Raises:
+        OutputError: If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{what} '{folder}' cannot be made: {error.strerror}. {advice}"
+        ) from error

@@ -8,8 +8,8 @@ from typing import Any
 import tcs
 from tcs.cli import talk
 from tcs.cli.places import check_writable
-from tcs.errors import OutputError
 from tcs.scoring import all_rows
+from tcs.writing import make_folder
 
 
 def default_path(task: str, environment: str, robot: str) -> Path:
@@ -77,12 +77,7 @@ def score_all(
         TcsError: Whatever `tcs.score` raises. What was scored before is kept.
     """
     rows = all_rows(environment)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"folder '{folder}' cannot be made: {error.strerror}. Name a folder with --out."
-        ) from error
+    make_folder(folder, advice="Name one with --out.")
     return [
         score_one(task, room, robot, folder / default_path(task, room, robot), jobs=jobs, **sets)
         for task, room in rows

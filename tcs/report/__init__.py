@@ -8,7 +8,7 @@ from tcs.report.markdown import as_markdown
 from tcs.report.paper import Paper, load_paper
 from tcs.report.robustness import robustness_page
 from tcs.report.study import Plan, RowStudy, check_row, study_row, study_rows
-from tcs.report.write import make_folder, write_report
+from tcs.report.write import write_report
 
 __all__ = [
     "Page",
@@ -20,7 +20,6 @@ __all__ = [
     "as_markdown",
     "check_row",
     "load_paper",
-    "make_folder",
     "robustness_page",
     "study_row",
     "study_rows",

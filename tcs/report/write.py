@@ -5,31 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tcs.errors import OutputError
 from tcs.report.html import as_html
 from tcs.report.markdown import as_markdown
 from tcs.report.paper import load_paper
 from tcs.report.robustness import robustness_page
 from tcs.report.samples import samples_csv
 from tcs.report.study import Plan, RowStudy
-from tcs.writing import whole_file
+from tcs.writing import make_folder, whole_file
 
 NAMES = ("robustness.html", "robustness.md", "samples.csv")
 """What is written into the folder."""
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of a report.
-
-    Raises:
-        OutputError: If it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"folder '{folder}' cannot be made: {error.strerror}. Name another one."
-        ) from error
 
 
 def write_report(
