@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Mesh, Meshcat, Rgba, Role, Shape, Sphere
+from pydrake.geometry import Meshcat, Sphere
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import BodyIndex
 
 from tcs.draw import Kind, Stand
 from tcs.report.pictures import base_outline, room_parts
-from tcs.robots.meshes import mesh_triangles
 from tcs.scene import Scene, goal_poses
-from tcs.scene.contacts import Group
 from tcs.tables import Reason
 from tcs.tasks import Task
 from tcs.view.answers import COLOURS, Answers
 from tcs.view.floor import Floor
+from tcs.view.shapes import Drawn, draw_ground, draw_shapes, rgba, robot_shapes
 
 FloatArray = NDArray[np.float64]
 Arrow = tuple[int, Reason]
@@ -34,18 +30,8 @@ _BALL = 0.018
 _ARROW = (0.16, 0.055, 0.009, 0.022)
 """Of an arrow: length, length of its head, half widths of shaft and head [m]."""
 _MEMBER = "#d7263d"
-_GREY = Rgba(0.75, 0.77, 0.8, 1.0)
-"""Of meshes that the URDF gives no colour."""
 _MAP_HEIGHT, _LINE_HEIGHT = 0.004, 0.008
 """Above the floor [m], one above the other, so that none flickers through the next."""
-_LIGHTS = {
-    "SpotLight": 0.0,
-    "PointLightNegativeX": 6.0,
-    "PointLightPositiveX": 6.0,
-    "AmbientLight": 0.9,
-    "FillLight": 0.4,
-}
-"""Strengths of Meshcat's lights: under its own ones the colours of the map fade to white."""
 _CAMERA = np.array([1.9, -1.9, 1.3])
 """From the middle of the goals [m]: all of a bed and a robot fits into the picture."""
 
@@ -75,7 +61,7 @@ class Props:
         self._scene, self._task, self._answers = scene, task, answers
         # Moves the base, which every snapshot places anew.
         self._outline = base_outline(scene)
-        self._robot = _robot_shapes(scene, meshes)
+        self._robot = robot_shapes(scene, meshes)
         self._room = _room_shapes(scene)
         self._rest = _resting_arm(scene)
 
@@ -120,27 +106,15 @@ class Props:
             compact: Whether meshes are handed over as bare triangles, which take a fifth of the
                 room of their files, but seconds to read.
         """
-        meshcat.SetProperty("/Grid", "visible", False)
-        meshcat.SetProperty("/Axes", "visible", False)
-        for light, strength in _LIGHTS.items():
-            meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", strength)
-        meshcat.SetObject("ground", Box(6.0, 6.0, 0.01), Rgba(0.93, 0.93, 0.91, 1.0))
-        meshcat.SetTransform("ground", RigidTransform([0.0, 0.0, -0.006]))
+        draw_ground(meshcat)
         for root, shapes in ((ROBOT, self._robot), (ROOM, self._room)):
-            for number, one in enumerate(shapes):
-                path = f"{root}/{int(one.body)}/{number}"
-                if compact and isinstance(one.shape, Mesh):
-                    corners, faces = _triangles(one.shape)
-                    meshcat.SetTriangleMesh(path, corners, faces, one.colour)
-                else:
-                    meshcat.SetObject(path, one.shape, one.colour)
-                meshcat.SetTransform(path, one.X_LS)
+            draw_shapes(meshcat, root, shapes, compact=compact)
         corners, faces = _arrow()
         for goal, reason in arrows:
             path = arrow_path((goal, reason))
-            meshcat.SetTriangleMesh(path, corners, faces, _rgba(COLOURS[reason]))
+            meshcat.SetTriangleMesh(path, corners, faces, rgba(COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
-        meshcat.SetObject(SHOWN, Sphere(_BALL), _rgba(Kind.CURRENT_GOAL.colour))
+        meshcat.SetObject(SHOWN, Sphere(_BALL), rgba(Kind.CURRENT_GOAL.colour))
         self._draw_members(meshcat)
         middle = np.mean([X.translation() for X in goal_poses(self._scene, self._task)], axis=0)
         meshcat.SetCameraPose(middle + _CAMERA, middle)
@@ -155,7 +129,7 @@ class Props:
             around = np.vstack([stand.polygon, stand.polygon[:1]])
             for name, line in (("outline", around), ("ahead", np.stack([middle, middle + ahead]))):
                 points = np.column_stack([line, np.full(len(line), _LINE_HEIGHT)])
-                meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, _rgba(_MEMBER))
+                meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, rgba(_MEMBER))
 
 
 def arrow_path(arrow: Arrow) -> str:
@@ -184,51 +158,14 @@ def draw_floor(meshcat: Meshcat, floor: Floor, path: str = FLOOR) -> None:
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    """One shape of a body."""
-
-    body: BodyIndex
-    shape: Shape
-    X_LS: RigidTransform
-    """Its pose in the body's frame L."""
-    colour: Rgba
-
-
-def _robot_shapes(scene: Scene, meshes: bool) -> list[_Shape]:
-    """Return what the robot is shown as.
-
-    Bodies that have no mesh, such as a tool of our own, show their collision shapes.
-    """
-    inspector = scene.built.scene_graph.model_inspector()
-    plant = scene.built.plant
-    parts = [part for part in scene.built.parts if part.group is not Group.ROOM]
-    instances = {plant.get_body(part.body).model_instance() for part in parts}
-    shapes = []
-    for geometry in inspector.GetAllGeometryIds(Role.kIllustration) if meshes else ():
-        body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
-        if body.model_instance() in instances:
-            properties = inspector.GetIllustrationProperties(geometry)
-            colour = properties.GetPropertyOrDefault("phong", "diffuse", _GREY)
-            shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
-            shapes.append(_Shape(body.index(), shape, X_LS, colour))
-    drawn = {one.body for one in shapes}
-    kinds = {Group.ARM: Kind.ARM, Group.BODY: Kind.ROBOT}
-    for part in parts:
-        if part.body not in drawn:
-            shape, X_LS = inspector.GetShape(part.geometry), inspector.GetPoseInFrame(part.geometry)
-            shapes.append(_Shape(part.body, shape, X_LS, _rgba(kinds[part.group].colour)))
-    return shapes
-
-
-def _room_shapes(scene: Scene) -> list[_Shape]:
+def _room_shapes(scene: Scene) -> list[Drawn]:
     inspector = scene.built.scene_graph.model_inspector()
     return [
-        _Shape(
+        Drawn(
             part.body,
             inspector.GetShape(part.geometry),
             inspector.GetPoseInFrame(part.geometry),
-            _rgba(kind.colour),
+            rgba(kind.colour),
         )
         for part, kind in room_parts(scene)
     ]
@@ -240,17 +177,6 @@ def _resting_arm(scene: Scene) -> FloatArray:
     told = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
     lower, upper = scene.arm_limits
     return np.asarray(np.clip(told, lower, upper))
-
-
-def _triangles(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Return corners [m], shape (3, n), and triangles, shape (3, m), of a mesh."""
-    found = mesh_triangles(Path(mesh.source().path()))
-    # Files repeat a corner for each of its triangles; Meshcat keeps it in single precision.
-    single = found.reshape(-1, 3).astype(np.float32)
-    corners, at = np.unique(single, axis=0, return_inverse=True)
-    scaled = corners.astype(np.float64) * mesh.scale3()
-    faces = at.reshape(-1, 3).astype(np.int32)
-    return np.asfortranarray(scaled.T), np.asfortranarray(faces.T)
 
 
 def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:
@@ -270,7 +196,3 @@ def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:
             faces += [[a, b, b + 4], [a, b + 4, a + 4]]
     faces += [[8 + i, 8 + (i + 1) % 4, 12] for i in range(4)]
     return np.asfortranarray(points.T), np.asfortranarray(np.array(faces, dtype=np.int32).T)
-
-
-def _rgba(colour: str) -> Rgba:
-    return Rgba(*to_rgb(colour), 1.0)
