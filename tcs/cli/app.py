@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import capability, options, pictures, reports, robots, robustness, talk, view
+from tcs.cli import capability, options, pictures, report, reports, robots, robustness, talk, view
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -18,7 +18,6 @@ app = typer.Typer(
 )
 app.add_typer(robots.app, name="robot")
 app.add_typer(capability.app, name="capability")
-
 
 
 def main() -> None:
@@ -327,4 +326,5 @@ for command in (robustness.evaluate, robustness.robustify, view.view):
     app.command()(command)
 app.command("map")(pictures.draw_map)
 app.command("picture")(pictures.draw_picture)
+app.command()(report.report)
 app.command("map-check")(capability.map_check)

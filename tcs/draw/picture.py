@@ -77,7 +77,7 @@ def draw_scene(views: Sequence[View], *, title: str) -> Figure:
 
     Args:
         views: What to show, left to right.
-        title: First line, for a person.
+        title: First line, for a person; "" for none.
     """
     figure = Figure(figsize=(6.6 * len(views), 6.6), layout="constrained")
     panels = figure.subplots(1, len(views), squeeze=False)[0]
@@ -85,7 +85,8 @@ def draw_scene(views: Sequence[View], *, title: str) -> Figure:
         axes.imshow(_rendered(view), interpolation="antialiased")
         axes.set_axis_off()
         axes.set_title(view.caption, fontsize=11)
-    figure.suptitle(title, fontsize=13)
+    if title:
+        figure.suptitle(title, fontsize=13)
     shown = {solid.kind for view in views for solid in view.solids}
     handles = [
         Patch(facecolor=kind.colour, edgecolor="#555555", lw=0.5, label=kind.label)

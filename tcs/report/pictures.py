@@ -143,6 +143,35 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
     return draw_scene(views, title=f"{title_of(job)}\n{shown.subtitle}")
 
 
+def member_figure(file: ScoreFile, shown: Shown, number: int) -> Figure:
+    """Return two pictures of the robot at one member of the set: all of it, and what the arm does.
+
+    Args:
+        file: A score file.
+        shown: The set.
+        number: Number of the member, from 0.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job, scene = stage(file, shown)
+    views = [_view(file, job, scene, shown, number, is_close=close) for close in (False, True)]
+    return draw_scene(views, title="")
+
+
+def serves(file: ScoreFile, shown: Shown, number: int) -> tuple[int, ...]:
+    """Return the goals at which one member of the set is better than the others, ascending.
+
+    Args:
+        file: A score file.
+        shown: The set.
+        number: Number of the member, from 0.
+    """
+    isotropy = file.tables[shown.table].scores.isotropy[list(shown.indices)]
+    mine = (isotropy.argmax(axis=0) == number) & (isotropy[number] > 0.0)
+    return tuple(np.flatnonzero(mine).tolist())
+
+
 def stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
     """Return what a file was scored from, and its scene; refuse other models than those."""
     job, scene, _ = reopen(file)
@@ -162,32 +191,37 @@ def _set_room(scene: Scene, members: tuple[InitialConfiguration, ...]) -> None:
         scene.set_joint(name, value)
 
 
-def _view(file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int) -> View:
-    """Return the view of one member."""
+def _view(
+    file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int, *, is_close: bool = False
+) -> View:
+    """Return the view of one member: of robot and person, or of the arm and the goals alone."""
     member, h = shown.members[number], shown.indices[number]
     scores = file.tables[shown.table].scores
-    isotropy = scores.isotropy[list(shown.indices)]
-    serves = np.flatnonzero((isotropy.argmax(axis=0) == number) & (isotropy[number] > 0.0))
+    served = serves(file, shown, number)
     _set_room(scene, (member,))
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)
-    current = int(serves[np.argmax(isotropy[number, serves])]) if serves.size else None
+    current = max(served, key=lambda g: float(scores.isotropy[h, g]), default=None)
     joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)
     solids = [*_robot(scene), *room_solids(scene), *_goals(scene, job, current)]
     # The bed may go on beyond the picture; whoever is helped may not.
-    subject = [solid.corners for solid in solids if solid.kind is not Kind.FURNITURE]
+    left_out = {Kind.FURNITURE, Kind.PERSON, Kind.ROBOT} if is_close else {Kind.FURNITURE}
+    subject = [solid.corners for solid in solids if solid.kind not in left_out]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
     base = np.array([member.base_x, member.base_y, 0.0])
     # Across the line from robot to person, from both sides: neither stands before the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
-    listed = ", ".join(str(g) for g in serves) or "none"
+    listed = ", ".join(str(g) for g in served) or "none"
+    caption = f"stop {number + 1}, best for goals {listed}; arm at goal {current}"
+    if is_close:
+        caption = f"the same, nearer: the arm at goal {current}"
     return View(
         solids,
         np.concatenate(subject),
         tuple(along + math.radians(turn) for turn in (70.0, -70.0)),
-        f"stop {number + 1}, best for goals {listed}; arm at goal {current}",
+        caption,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -163,6 +163,24 @@ def verify(
         shortfall_checked=len(shortfall),
         mean_shortfall=float(np.mean(shortfall)) if shortfall else 0.0,
     )
+
+
+def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -> list[Finding]:
+    """Return what Drake says of the stored solutions of certain reached pairs.
+
+    Args:
+        file: A score file.
+        table: Number of the table.
+        pairs: Configurations of that table, each with a goal that it reaches.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job, scene, lowered = reopen(file)
+    measure = file.metadata["measure"]
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
+    return check.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
 
 
 Pairs = list[tuple[int, int]]
