@@ -143,7 +143,7 @@ def import_text(
         free_lifts=np.full(len(rows), 0xFFFFFFFF, np.uint32),
         manipulability_scale=float(table[:, 0].max(initial=0.0)) or 1.0,
         metadata={
-            "robot": reach.robot.name,
+            "robot": reach.found_as,
             "tool": reach.robot.tool_frame,
             "view_rule": view_rule,
             "imported_from": path.name,

@@ -110,7 +110,7 @@ def finished_map(
         free_lifts=reach.free_lifts(np.asarray(joints[order], dtype=np.float64)),
         manipulability_scale=manipulability_scale(reach),
         metadata={
-            "robot": reach.robot.name,
+            "robot": reach.found_as,
             "tool": reach.robot.tool_frame,
             "arm_joints": list(reach.robot.arm_joints),
             "measure": reach.measure,

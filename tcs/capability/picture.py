@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -71,7 +72,8 @@ def map_figure(capability: CapabilityMap, *, tilt: int = 0, height: float | None
         grasps=np.zeros((1, 3)) if pitch == 0.0 else np.zeros((0, 3)),
         caption=f"{len(poses):,} base poses\n{said}",
     )
-    robot = capability.metadata.get("robot", "")
+    # A robot of the user's own is remembered by the path of its file.
+    robot = Path(str(capability.metadata.get("robot", ""))).stem
     return draw_base_poses([view], title=f"{capability.kind} of {robot}, seen from the tool")
 
 

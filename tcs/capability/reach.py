@@ -53,7 +53,7 @@ class Reach:
 
     def __init__(
         self, robot: RobotFile, *, lift: float | None = None, step: float = 0.05,
-        measure: str = MEASURE,
+        measure: str = MEASURE, found_as: str | None = None,
     ) -> None:  # fmt: skip
         """Lower the robot at `lift` and at all lifts that are whole steps away from it.
 
@@ -62,6 +62,7 @@ class Reach:
             lift: The lift that maps are made at [m]; None is the middle of its range.
             step: Distance of the lifts looked at [m].
             measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
+            found_as: Name or path by which maps remember the robot; None is its name.
 
         Raises:
             RobotError: If the robot's model cannot be used.
@@ -70,6 +71,8 @@ class Reach:
             UnknownNameError: If there is no measure of that name.
         """
         self.robot, self.measure = robot, measure
+        self.found_as = robot.name if found_as is None else found_as
+        """How to find the robot again: its name, or the path of its file."""
         self.scene = Scene(SceneSpec(robot, _empty_floor()))
         low, high = self.scene.built.torso_limits
         self.lift = 0.5 * (low + high) if lift is None else lift

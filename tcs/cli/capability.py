@@ -11,6 +11,7 @@ import typer
 from tcs.cli import capability_reports as reports
 from tcs.cli import capability_work as work
 from tcs.cli import options, talk
+from tcs.cli.capability_setup import Setup
 
 app = typer.Typer(
     help="Capability maps: from which base poses an end-effector pose is reached.",
@@ -21,6 +22,10 @@ _Map = Annotated[Path, typer.Argument(metavar="MAP", help="A capability map.")]
 _Out = Annotated[Path, typer.Option(help="Map to write.")]
 _Text = Annotated[
     Path | None, typer.Option(help="Also write it as text: score x y z R11 .. R33, a line each.")
+]
+_MapsRobot = Annotated[
+    str | None,
+    typer.Option(help="Name or YAML file of the robot.", show_default="the map's own"),
 ]
 _Radius = Annotated[
     float | None,
@@ -75,7 +80,7 @@ def from_ik(
     as_json: options.Json = False,
 ) -> None:
     """Make a map by inverse kinematics of every cell around the tool."""
-    robot_setup = work.Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
     with talk.progress_bar("cells") as on_progress:
         result = work.from_ik(
             robot_setup, out, text, kind=kind, radius=radius, view=view, jobs=jobs,
@@ -124,7 +129,7 @@ def record(
 
     The simulated hand keeps the tool at --height, 0.41 m if none is given.
     """
-    robot_setup = work.Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
     hand = work.SimulatedHand(seconds, scale, centre, seed, save_csv)
     result = work.record(
         robot_setup, out, text, csv, hand, height=height, view=view, drop_bad=drop_bad
@@ -155,7 +160,7 @@ def from_bag(
     as_json: options.Json = False,
 ) -> None:
     """Make a map (ITCM) from the joint states in ROS bags; needs the extra `bags` of tcs."""
-    robot_setup = work.Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
     result = work.from_bags(
         robot_setup, out, text, bags, topic=topic, height=height, view=view, drop_bad=drop_bad
     )
@@ -200,6 +205,7 @@ def merge_maps(
         tuple[float, float, float],
         typer.Option(metavar="X Y YAW_DEG", help="Where the task's frame is in that room."),
     ] = (0.0, 0.0, 0.0),
+    robot: _MapsRobot = None,
     out: Annotated[
         Path | None, typer.Option(help="CSV of every base pose: x, y, yaw_deg, lift, score.")
     ] = None,
@@ -230,7 +236,7 @@ def merge_maps(
         talk.print_result(result, reports.report_stops, as_json=as_json)
         return
     at = (task_at[0], task_at[1], math.radians(task_at[2]))
-    room = None if environment is None else work.Room(environment, at)
+    room = None if environment is None else work.Room(environment, at, robot)
     result = work.merge(
         capability, asked, lift=lift, scale=scale, room=room, out=out, picture=picture
     )
@@ -262,7 +268,12 @@ def map_check(
             show_default="one that would be made with these options",
         ),
     ] = None,
-    robot: options.Robot = "tiago",
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Name or YAML file of a robot.", show_default="the map's own; without MAP tiago"
+        ),
+    ] = None,
     lift: _Lift = None,
     grasps: Annotated[
         list[str] | None, typer.Option(help="side, top or all.", show_default="each of them")
@@ -277,9 +288,9 @@ def map_check(
     as_json: options.Json = False,
 ) -> None:
     """Compare a map's answers on random tool poses with inverse kinematics itself."""
-    robot_setup = work.Setup(robot, tool, lift, step, turns, "side", _MEASURE)
+    robot_setup = Setup(robot or "tiago", tool, lift, step, turns, "side", _MEASURE)
     result: dict[str, Any] = work.check(
-        capability, robot_setup, tuple(grasps or ()), radius=radius, queries=queries, seed=seed,
-        jobs=jobs,
+        capability, robot_setup, tuple(grasps or ()), robot=robot, radius=radius, queries=queries,
+        seed=seed, jobs=jobs,
     )  # fmt: skip
     talk.print_result(result, reports.report_check, as_json=as_json)

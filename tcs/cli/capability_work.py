@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from tcs.cli.capability_setup import Setup, robot_of
 from tcs.errors import StoreError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -17,47 +18,6 @@ if TYPE_CHECKING:
     from tcs.capability.from_recording import Recorded
 
 TASKS = ("pick-and-place", "linear", "curved")
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """Robot and grid that a map is made for."""
-
-    robot: str
-    tool: str | None
-    lift: float | None
-    step: float
-    turns: int
-    grasps: str
-    measure: str
-
-    def reach(self) -> Reach:
-        """Return the robot on an empty floor.
-
-        Raises:
-            UnknownNameError: If the tool is none of its frames.
-        """
-        from tcs.capability import Reach
-        from tcs.robots import load_robot
-
-        robot = load_robot(self.robot)
-        if self.tool is not None:
-            known = {
-                *robot.model().links,
-                *(extra.name for extra in (*robot.frames, *robot.bodies)),
-            }
-            if self.tool not in known:
-                raise UnknownNameError(
-                    "tool frame", self.tool, known, where=f"robot '{robot.name}'"
-                )
-            robot = robot.model_copy(update={"tool_frame": self.tool})
-        return Reach(robot, lift=self.lift, step=self.step, measure=self.measure)
-
-    def grid(self) -> MapGrid:
-        """Return the grid."""
-        from tcs.capability import MapGrid
-
-        return MapGrid.of(self.step, self.turns, self.grasps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +83,8 @@ class Room:
     environment: str
     at: tuple[float, float, float]
     """Where the task frame is in W: x, y [m] and heading [rad]."""
+    robot: str | None
+    """Name or file of the robot; None is the one that the map remembers."""
 
 
 def from_ik(
@@ -240,7 +202,7 @@ def merge(
         from tcs.draw import save_figure
 
         save_figure(picture, task_figure(found))
-    left = {} if room is None else _left_by(room, capability, found)
+    left = {} if room is None else _left_by(path, room, capability, found)
     return {
         **left,
         "map": found.name,
@@ -293,10 +255,13 @@ def show(path: Path, out: Path, *, tilt: int, height: float | None) -> dict[str,
 
 
 def check(
-    path: Path | None, setup: Setup, grasps: tuple[str, ...], *, radius: float | None, queries: int,
-    seed: int, jobs: int,
+    path: Path | None, setup: Setup, grasps: tuple[str, ...], *, robot: str | None,
+    radius: float | None, queries: int, seed: int, jobs: int,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compare a map, or one that is yet to be made, with inverse kinematics."""
+    """Compare a map, or one that is yet to be made, with inverse kinematics.
+
+    The robot of a map is the one that it remembers, unless `robot` names one.
+    """
     from dataclasses import replace
 
     from tcs.capability import MapGrid, check_map, check_stored, load_map
@@ -317,7 +282,7 @@ def check(
             "kinematics reaches. Check one made by `tcs capability from-ik`."
         )
     made = replace(
-        setup, robot=str(capability.metadata["robot"]), tool=str(capability.metadata["tool"]),
+        setup, robot=robot_of(path, capability, robot), tool=str(capability.metadata["tool"]),
         lift=capability.lift, step=capability.grid.step,
     )  # fmt: skip
     reach = made.reach()
@@ -335,13 +300,13 @@ def check(
     return {"map": str(path), **shown, "grasps": rows}
 
 
-def _left_by(room: Room, capability: CapabilityMap, found: TaskMap) -> dict[str, Any]:
+def _left_by(path: Path, room: Room, capability: CapabilityMap, found: TaskMap) -> dict[str, Any]:
     """Return the best base pose that a room leaves, and how many better ones it takes away."""
     from tcs.capability.surroundings import Surroundings
     from tcs.robots import load_robot
     from tcs.scene import load_environment
 
-    robot = load_robot(str(capability.metadata["robot"]))
+    robot = load_robot(robot_of(path, capability, room.robot))
     robot = robot.model_copy(update={"tool_frame": str(capability.metadata["tool"])})
     around = Surroundings(robot, load_environment(room.environment), room.at)
     base, taken = around.best(found)

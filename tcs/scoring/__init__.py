@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tcs.scoring.job import Job, load_job, score, summary
+from tcs.scoring.job import Job, load_job, reference, score, summary
 from tcs.scoring.live import LiveScorer, score_observed
 from tcs.scoring.reopen import reopen
 from tcs.scoring.rows import all_rows
@@ -19,6 +19,7 @@ __all__ = [
     "all_rows",
     "build_sets",
     "load_job",
+    "reference",
     "reopen",
     "score",
     "score_observed",

@@ -225,14 +225,19 @@ def score_scene(
 def references(job: Job, task: object, environment: object, robot: object) -> dict[str, str]:
     """Return how the data files of a job are found again, from what it was loaded by."""
     return {
-        "task": _reference(task, job.task.name),
-        "environment": _reference(environment, job.spec.environment.name),
-        "robot": _reference(robot, job.spec.robot.name),
+        "task": reference(task, job.task.name),
+        "environment": reference(environment, job.spec.environment.name),
+        "robot": reference(robot, job.spec.robot.name),
     }
 
 
-def _reference(given: object, name: str) -> str:
-    """Return how to find a data file again: its name, or its absolute path."""
+def reference(given: object, name: str) -> str:
+    """Return how to find a data file again: its name, or its absolute path.
+
+    Args:
+        given: What it was loaded by: a name, a path, or the loaded thing itself.
+        name: What it calls itself.
+    """
     if isinstance(given, Path) or (isinstance(given, str) and given != name):
         return str(Path(given).absolute())
     return name

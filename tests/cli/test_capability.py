@@ -202,3 +202,62 @@ def test_an_unknown_task_or_file_is_one_line(made, tcs_command, tmp_path):
     ran = tcs_command("capability", "show", tmp_path / "none.tcm", "--out", tmp_path / "a.png")
     assert ran.code == 1
     assert "Capability map" in ran.err
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    """A robot file of the user's own, and a map that was made with it."""
+    from typer.testing import CliRunner
+
+    from tcs.cli.app import app
+
+    folder = tmp_path_factory.mktemp("own")
+    robot, path = folder / "mine.yaml", folder / "icm.tcm"
+    robot.write_text("based_on: tiago\nname: mine\n")
+    words = ["from-ik", "--robot", robot, "--kind", "ICM", "--out", path, *COARSE]
+    assert CliRunner().invoke(app, ["capability", *map(str, words)]).exit_code == 0
+    return robot, path
+
+
+IN_A_ROOM = ("--task", "pick-and-place", "--height", 0.65, "--environment", "wheelchair")
+FAR_OFF = ("--task-at", 6.0, 6.0, 0.0)
+
+
+@pytest.fixture
+def moved(own, tmp_path):
+    """The map, and its robot's file, which now lies elsewhere."""
+    robot, path = own
+    elsewhere = tmp_path / "elsewhere.yaml"
+    robot.rename(elsewhere)
+    yield elsewhere, path
+    elsewhere.rename(robot)
+
+
+def test_a_map_remembers_the_file_of_a_robot_of_ones_own(own, tcs_command, tmp_path):
+    robot, path = own
+    assert load_map(path).metadata["robot"] == str(robot)
+    assert set(tcs_command("map-check", path, "--queries", 300, "--json").json["grasps"]) == {
+        "side", "top",
+    }  # fmt: skip
+    ran = tcs_command("capability", "merge", path, *IN_A_ROOM, *FAR_OFF, "--json")
+    assert ran.json["left"] == ran.json["best"]
+    picture = tmp_path / "map.svg"
+    assert tcs_command("capability", "show", path, "--out", picture).code == 0
+
+
+def test_a_robot_file_that_has_moved_is_asked_for(moved, tcs_command):
+    elsewhere, path = moved
+    for words in (("map-check", path), ("capability", "merge", path, *IN_A_ROOM, *FAR_OFF)):
+        ran = tcs_command(*words)
+        assert ran.code == 1
+        assert ran.err.count("\n") == 1
+        assert "Say where its file is with --robot FILE" in ran.err
+        assert tcs_command(*words, "--robot", elsewhere).code == 0
+
+
+def test_map_check_refuses_a_robot_that_the_map_was_not_made_for(own, tcs_command, tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text("based_on: tiago\nname: mine\nlimits: hard\n")
+    ran = tcs_command("map-check", own[1], "--robot", other)
+    assert ran.code == 1
+    assert "another model of robot" in ran.err
