@@ -22,9 +22,10 @@ from tcs.teleop.situation import Situation, Wish, twist_of, unmoved
 _ORIENTATION = 0.02
 """A turn of 1 rad weighs as much as this way [m]: where not both can be had, the tool goes where it
 is asked to, and turns as little as that takes."""
-_POSTURE = 1e-3
-"""A joint's rate of 1 rad/s weighs as much as this way [m/s]: only what moves no tool is left to
-the posture; 0.01 % of the tool's motion at a singular value of 0.1 m/rad."""
+_POSTURE = 0.01
+"""A joint's rate of 1 rad/s weighs as much as this velocity [m/s]: where it comes to a choice, the
+tool gives up 1 % of its motion at a singular value of 0.1 m/rad, which the feedback makes up for,
+and half of its turning at 0.5 rad/rad."""
 _CORRECTION = 0.3
 """Fastest turn with which a lost orientation comes back [rad/s]: at its weight, the position gives
 way by less than 0.1 mm for it."""
