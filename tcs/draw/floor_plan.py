@@ -183,7 +183,7 @@ def what_is_what(room: Sequence[Solid], *, robot: bool) -> list[Artist]:
     handles.append(Patch(facecolor=BLOCKED, label="robot cannot stand here"))
     handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="no goal in reach"))
     if robot:
-        label = "base of the robot, to scale; arrow: its heading"
+        label = "robot's base to scale, and its heading"
         handles.append(Patch(facecolor="none", edgecolor=MEMBER, lw=2.0, label=label))
     return handles
 

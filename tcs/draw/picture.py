@@ -40,7 +40,8 @@ _SAME_PLANE = 0.004
 _SAME_WAY = 0.9
 """Cosine of the angle up to which two surfaces look one way: neighbouring facets of a round shape
 with sixteen corners are 22.5 deg apart."""
-_GOALS = (Kind.GOAL, Kind.CURRENT_GOAL)
+_GOALS = {Kind.GOAL: 1.0, Kind.CURRENT_GOAL: 5.0}
+"""How much it counts that a goal is seen; the tool hides most of the one it is at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,8 @@ class View:
     subject: FloatArray
     """Points that have to be in the picture, which is as close as that allows [m], (n, 3)."""
     azimuths: tuple[float, ...]
-    """Directions from which to look [rad]; the one that shows most of the goals is taken."""
+    """Directions from which to look [rad]; the one that shows most of the goals is taken, above all
+    of the goal that is shown."""
     caption: str
 
 
@@ -101,12 +103,12 @@ def _rendered(view: View) -> FloatArray:
     """Return the picture from the direction that shows most of the goals, shape (h, w, 3)."""
     triangles = np.concatenate([solid.triangles for solid in view.solids])
     owner = np.repeat(np.arange(len(view.solids)), [len(solid.triangles) for solid in view.solids])
-    of_goal = np.array([solid.kind in _GOALS for solid in view.solids])[owner]
-    best, most = None, -1
+    weight = np.array([_GOALS.get(solid.kind, 0.0) for solid in view.solids])[owner]
+    best, most = None, -1.0
     for azimuth in view.azimuths:
         camera = _camera(view, azimuth)
         raster = _rasterised(triangles, camera)
-        seen = int(of_goal[raster.triangle[raster.triangle >= 0]].sum())
+        seen = float(weight[raster.triangle[raster.triangle >= 0]].sum())
         if seen > most:
             best, most = (camera, raster), seen
     if best is None:

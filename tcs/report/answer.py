@@ -57,6 +57,8 @@ class Answer:
     """What it was scored from."""
     shown: Shown
     """The set that the report is about."""
+    max_members: int | None
+    """Most members that it was to have, if that was asked for."""
     verification: Verification
     """What re-checking random pairs of the file found."""
     findings: Mapping[int, Finding]
@@ -67,7 +69,7 @@ class Answer:
     states: bytes | None
     """From above for each state of the environment, PNG; None where there is one only."""
     views: tuple[bytes, ...]
-    """Each member from two sides, PNG."""
+    """Each member, and the tool at a goal from nearby, PNG."""
     seconds: float
     """How long all of this took, wall clock."""
 
@@ -190,6 +192,7 @@ def answer_of(
         file=file,
         job=job,
         shown=shown,
+        max_members=max_members,
         verification=verify(
             file, pairs=check.pairs, dense=check.dense, seed=check.seed, on_progress=on_progress
         ),

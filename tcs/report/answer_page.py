@@ -48,8 +48,8 @@ def answer_page(answer: Answer, *, command: str) -> Page:
         Section("How to make it again", _made(answer, command)),
     ]
     return Page(
-        title=f"Where to stand: {answer.job.task.title}",
-        lead=f"{spec.environment.title}. {spec.robot.title}.",
+        title=answer.job.task.title,
+        lead=f"Where should the robot stand? {spec.environment.title}. {spec.robot.title}.",
         sections=sections,
         foot=f"tcs {versions()[0][1]}, {today()}.",
     )
@@ -63,7 +63,7 @@ def _summary(answer: Answer) -> list[Block]:
         said = [f"None of the {goals} goals is reached from anywhere on the grid."]
         return [Bullets([*said, *_hopeless(answer), _soundness(answer), LIMITS])]
     reached = goals - len(answer.unreached)
-    places = "one place" if members == 1 else f"{members} places together"
+    places = ("one place", "two places together", "three places together")[members - 1]
     said = [
         f"From {places} the robot reaches {reached} of {goals} goals (P_R "
         f"{percent(reachability)} %); P_M is {manipulability:.3f} ({answer.measure})."
@@ -73,14 +73,21 @@ def _summary(answer: Answer) -> list[Block]:
         said.append(f"Not reached: {listed}. Why, and what would help: see Goal by goal.")
     if answer.shown.here is not None:
         here = place_words(answer.shown.here)
-        said.append(f"It is the set to choose for a robot that is now at {here}.")
+        said.append(f"At the default weights it is the set to choose for a robot at {here}.")
     else:
-        said.append("It is the set with the greatest P_R + P_M, wherever the robot is now.")
+        of_all = "" if answer.max_members is None else f" of at most {answer.max_members}"
+        said.append(
+            f"It is the set{of_all} with the greatest P_R + P_M, wherever the robot is now."
+        )
     state = answer.file.observed_states[answer.shown.table]
     if state:
         shown = shown_state(answer.file.observed_axes, state)
-        listed = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in shown.items())
-        said.append(f"Scored for {listed}.")
+        listed = ", ".join(_found(name, value) for name, value in shown.items())
+        tables = len(answer.file.tables)
+        said.append(
+            f"It holds where this is found: {listed}"
+            + (f"; the file answers for {tables} such states." if tables > 1 else ".")
+        )
     said += _success_in_short(answer)
     return [Bullets([*said, _soundness(answer), LIMITS]), stops_table(answer)]
 
@@ -125,6 +132,16 @@ def _success_in_short(answer: Answer) -> list[str]:
     ]
 
 
+def _found(name: str, value: float) -> str:
+    """Return a value of an observed axis in words.
+
+    >>> _found("head_tilt_deg", 5.0)
+    'head tilt 5 deg'
+    """
+    unit = "deg" if name.endswith("_deg") else "m"
+    return f"{name.removesuffix('_deg').replace('_', ' ')} {value:g} {unit}"
+
+
 def _map(answer: Answer) -> list[Block]:
     return [
         Picture(
@@ -159,7 +176,7 @@ def _views(answer: Answer) -> list[Block]:
             Picture(
                 view,
                 "png",
-                f"The robot at stop {number} with its arm at a goal, from two sides.",
+                f"The robot at stop {number} with its arm at a goal, and the tool there, nearer.",
                 f"Stop {number}, best for goals {listed}. The robot is drawn as the shapes that "
                 "contacts are checked with; they enclose it. Arrows end where the tool has to be.",
             )

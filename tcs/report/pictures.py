@@ -33,6 +33,8 @@ from tcs.tables import InitialConfiguration
 
 _ARROW = (0.15, 0.06, 0.010, 0.026)
 """Of a goal's arrow: length, length of its head, half width of shaft and head [m]."""
+_AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
+"""Corners of what is shown around the tool [m]: a hand, and the part of the body it is at."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
 
 
 def member_figure(file: ScoreFile, shown: Shown, number: int) -> Figure:
-    """Return two pictures of the robot at one member of the set: all of it, and what the arm does.
+    """Return two pictures of the robot at one member of the set: all of it, and the tool nearby.
 
     Args:
         file: A score file.
@@ -194,7 +196,7 @@ def _set_room(scene: Scene, members: tuple[InitialConfiguration, ...]) -> None:
 def _view(
     file: ScoreFile, job: Job, scene: Scene, shown: Shown, number: int, *, is_close: bool = False
 ) -> View:
-    """Return the view of one member: of robot and person, or of the arm and the goals alone."""
+    """Return the view of one member: of robot and person, or of the tool at its goal alone."""
     member, h = shown.members[number], shown.indices[number]
     scores = file.tables[shown.table].scores
     served = serves(file, shown, number)
@@ -206,21 +208,22 @@ def _view(
     if joints is not None:
         scene.set_arm(joints)
     solids = [*_robot(scene), *room_solids(scene), *_goals(scene, job, current)]
-    # The bed may go on beyond the picture; whoever is helped may not.
-    left_out = {Kind.FURNITURE, Kind.PERSON, Kind.ROBOT} if is_close else {Kind.FURNITURE}
-    subject = [solid.corners for solid in solids if solid.kind not in left_out]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
+    # The bed may go on beyond the picture; whoever is helped may not.
+    shown_whole = [solid.corners for solid in solids if solid.kind is not Kind.FURNITURE]
+    subject, turns = np.concatenate(shown_whole), [70.0, -70.0]
     base = np.array([member.base_x, member.base_y, 0.0])
     # Across the line from robot to person, from both sides: neither stands before the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
     listed = ", ".join(str(g) for g in served) or "none"
     caption = f"stop {number + 1}, best for goals {listed}; arm at goal {current}"
-    if is_close:
-        caption = f"the same, nearer: the arm at goal {current}"
+    if is_close and current is not None:
+        subject, turns = goals[current] + _AROUND_A_GOAL, [60.0, -60.0, 120.0, -120.0]
+        caption = f"the tool at goal {current}"
     return View(
         solids,
-        np.concatenate(subject),
-        tuple(along + math.radians(turn) for turn in (70.0, -70.0)),
+        subject,
+        tuple(along + math.radians(turn) for turn in turns),
         caption,
     )
 
