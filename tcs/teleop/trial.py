@@ -1,0 +1,258 @@
+"""One trial: a scripted operator follows the line with one controller, and all is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import Arm
+from tcs.teleop.lines import Course
+from tcs.teleop.metrics import (
+    completion_time,
+    effort,
+    resampled,
+    spectral_arc_length,
+    steering_angle,
+    steering_translation,
+    trajectory_accuracy,
+)
+from tcs.teleop.operators import Approach, Habits, ScriptedOperator, Traits
+from tcs.teleop.run import NO_GROUP, Run
+from tcs.teleop.session import Step, Teleoperation
+from tcs.teleop.settings import Command, Mode, Settings
+
+GOAL_RADIUS = 0.02
+"""Of the sphere at the end of the line [m]; the paper draws one and does not say how large."""
+TIME_LIMIT = 120.0
+"""Of a trial [s] (paper, experiment information, part 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A controller, and what an operator can do with it when the arm stops."""
+
+    name: str
+    title: str
+    mode: Mode
+    approach: Approach
+    settings: Settings
+
+    @property
+    def mark(self) -> str:
+        """How the paper's tables call it, e.g. "EE"."""
+        return _MARKS[self.name]
+
+
+END_EFFECTOR = Condition(
+    "end-effector", "end-effector control", Mode.END_EFFECTOR, Approach.HAND,
+    Settings(limits="paper"),
+)  # fmt: skip
+NOVEL = Condition(
+    "novel", "novel controller", Mode.END_EFFECTOR, Approach.GROUP, Settings(limits="paper")
+)
+ASSISTED = Condition(
+    "assisted", "automatic assistance", Mode.ASSISTED, Approach.HAND, Settings(limits="clamped")
+)
+CONDITIONS = (END_EFFECTOR, NOVEL, ASSISTED)
+_MARKS = {"end-effector": "EE", "novel": "NV", "assisted": "AS"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What a trial comes to; the mean of several where it says so."""
+
+    accuracy: float
+    """Greatest distance between barycentre and line [m]."""
+    time: float
+    """Until the end was reached; the time limit where it was not [s]."""
+    effort: float
+    """Mean absolute work on the device from sample to sample [J]."""
+    steering_angle: float
+    """[rad]."""
+    steering_translation: float
+    """[m]."""
+    arc_length: float
+    """Spectral arc length of the hand's speed."""
+    stops: float
+    """How often the arm came to a stop."""
+    turned: float
+    """How far joint 1 was turned through its group [rad]."""
+    finished: float
+    """1 where the end was reached in time, else 0."""
+    planes_met: float
+    """Of the 30."""
+
+
+MEASURES = tuple(Measured.__dataclass_fields__)
+
+
+def run_trial(
+    arm: Arm,
+    course: Course,
+    condition: Condition,
+    traits: Traits,
+    habits: Habits,
+    rng: np.random.Generator,
+    *,
+    time_limit: float = TIME_LIMIT,
+    metadata: Mapping[str, Any] | None = None,
+) -> Run:
+    """Return what an operator and an arm do until the end is reached or the time is over.
+
+    Args:
+        arm: The arm.
+        course: Line and start posture.
+        condition: The controller.
+        traits: What the operator is like.
+        habits: What has helped so far with this controller; kept up to date.
+        rng: Where chance comes from.
+        time_limit: When the trial is ended [s].
+        metadata: What else the run is to say about itself.
+
+    Raises:
+        TcsError: If the start posture is beyond a limit, is not at the line's start, or the line's
+            end is out of reach.
+    """
+    check_course(arm, course)
+    session = Teleoperation(arm, course.joints, condition.settings, condition.mode)
+    operator = ScriptedOperator(
+        traits, habits, course.line, approach=condition.approach, mode=condition.mode,
+        settings=condition.settings, rng=rng,
+    )  # fmt: skip
+    command = Command()
+    step = session.step(command)
+    rows = [(command, step)]
+    end = np.asarray(course.line.end)
+    while step.time < time_limit and np.linalg.norm(step.p - end) > GOAL_RADIUS:
+        command = operator.command(step)
+        step = session.step(command)
+        rows.append((command, step))
+    said = {
+        "robot": arm.name,
+        "lift": arm.lift,
+        "condition": condition.name,
+        "operator_kind": "scripted",
+        "line_start": list(course.line.start),
+        "line_end": list(course.line.end),
+    }
+    return run_of(arm, rows, {**said, **(metadata or {})})
+
+
+def check_course(arm: Arm, course: Course) -> None:
+    """Refuse a line that the arm cannot start on, or whose end is farther than it is long.
+
+    Raises:
+        TcsError: As said.
+    """
+    outside = arm.beyond(course.joints)
+    if outside:
+        raise TcsError(f"start posture: {outside}. Give one within them.")
+    tool = arm.link_poses(course.joints)[-1, :3, 3]
+    off = float(np.linalg.norm(tool - course.line.start))
+    if off > GOAL_RADIUS:
+        raise TcsError(
+            f"start posture: the tool is {off:.3f} m from the line's start; it must be within "
+            f"{GOAL_RADIUS:g} m. Give a posture that holds the tool there."
+        )
+    shoulder = arm.frames[0, :3, 3]
+    length = float(np.linalg.norm(arm.frames[1:, :3, 3], axis=1).sum())
+    for what, point in (("start", course.line.start), ("end", course.line.end)):
+        away = float(np.linalg.norm(shoulder - point))
+        if away > length:
+            raise TcsError(
+                f"line out of reach: its {what} is {away:.2f} m from the first joint of "
+                f"'{arm.name}', whose arm is {length:.2f} m long. Give a shorter line, or find one "
+                "with `find_course`."
+            )
+
+
+def run_of(arm: Arm, rows: list[tuple[Command, Step]], metadata: Mapping[str, Any]) -> Run:
+    """Return commands, and the steps they led to, as a run.
+
+    Args:
+        arm: The arm.
+        rows: Each command with the step after it; two at least.
+        metadata: What the run is to say about itself.
+    """
+    from scipy.spatial.transform import Rotation
+
+    commands, steps = [row[0] for row in rows], [row[1] for row in rows]
+
+    def column(values: list[Any], kind: Any = np.float64) -> Any:
+        return np.array(values, dtype=kind)
+
+    return Run(
+        joint_names=tuple(arm.joints),
+        time=column([step.time for step in steps]),
+        joints=column([step.joints for step in steps]),
+        rates=column([step.rates for step in steps]),
+        position=column([step.p for step in steps]),
+        quaternion=Rotation.from_matrix([step.R for step in steps]).as_quat(scalar_first=True),
+        linear=column([command.linear for command in commands]),
+        angular=column([command.angular for command in commands]),
+        group=column([_group(command) for command in commands], np.int64),
+        sign=column([command.sign for command in commands], np.int64),
+        clutch=column([command.clutch for command in commands], np.bool_),
+        mode=np.array([step.mode.value for step in steps]),
+        limits=column([step.limits for step in steps], np.int64),
+        singular=column([step.singular for step in steps], np.bool_),
+        stopped=column([step.stopped for step in steps], np.bool_),
+        metadata=metadata,
+    )
+
+
+def _group(command: Command) -> int:
+    return NO_GROUP if command.group is None else command.group
+
+
+def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> Measured:
+    """Return what a trial comes to.
+
+    Steering is filtered and resampled as the ITCM thesis does; effort is not, as the null-space
+    paper reads it off the device.
+
+    Args:
+        run: The trial.
+        course: What was to be followed.
+        time_limit: What counts as its time where the end was not reached [s].
+    """
+    line = course.line
+    path = trajectory_accuracy(run.position, line)
+    took = completion_time(run.time, run.position, line, radius=GOAL_RADIUS)
+    hand, angles = run.hand()
+    _, steered = resampled(run.time, np.hstack([hand, np.unwrap(angles, axis=0)]))
+    time, smooth = resampled(run.time, hand)
+    speed = np.linalg.norm(np.diff(smooth, axis=0), axis=1) / np.diff(time)
+    stops = np.flatnonzero(np.diff(run.stopped.astype(int)) == 1)
+    turning = (run.group == 0) & ~run.clutch
+    return Measured(
+        accuracy=path.worst,
+        time=time_limit if took is None else took,
+        effort=effort(run.time, hand),
+        steering_angle=steering_angle(steered[:, 3:]),
+        steering_translation=steering_translation(steered[:, :3]),
+        arc_length=spectral_arc_length(speed, 1.0 / float(time[1] - time[0])),
+        stops=float(len(stops)),
+        turned=float(np.abs(run.rates[turning, 0]).sum() * run.step),
+        finished=0.0 if took is None else 1.0,
+        planes_met=float(path.planes_met),
+    )
+
+
+def mean_of(trials: list[Measured]) -> Measured:
+    """Return the mean of each measure over trials."""
+    means: dict[str, float] = {
+        name: float(np.mean([getattr(trial, name) for trial in trials])) for name in MEASURES
+    }
+    return Measured(**means)
+
+
+def path_of(run: Run, count: int = 200) -> FloatArray:
+    """Return some points of the tool's path at even times, for a picture [m], shape (count, 3)."""
+    rows = np.linspace(0, len(run) - 1, min(count, len(run))).astype(int)
+    return np.asarray(run.position[rows])
