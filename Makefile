@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint format benchmark benchmark-robots benchmark-peers clean
+.PHONY: help demo test test-all lint docs format benchmark benchmark-robots benchmark-peers clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -33,6 +33,11 @@ lint: $(STAMP)  ## Format, lint, types and import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(STAMP)  ## Build the site into out/docs, every warning an error; needs no internet
+	@mkdir -p $(OUT)
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs $(OUT)/docs
+	@echo "wrote $(OUT)/docs/index.html"
+
 format: $(STAMP)  ## Rewrite the code in house format and fix what can be fixed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -54,7 +59,7 @@ benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the sam
 clean:  ## Remove everything the other targets made
 	rm -rf $(VENV) $(OUT) build dist
 	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
-	find tcs tests scripts benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+	find tcs tests scripts benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
 # Installed again only when pyproject.toml changes; the checkout itself is what gets imported.
 $(STAMP): pyproject.toml

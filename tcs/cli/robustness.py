@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -143,7 +144,8 @@ def report_robustified(result: Mapping[str, Any]) -> None:
                 "; ".join(_place(member) for member in best["members"]),
             )
     out.print(table)
-    out.print(f"wrote {result['file']}; weigh it with tcs select --delta")
+    out.print(f"wrote {result['file']}. To weigh it, where X Y YAW_DEG is where the robot is now:")
+    typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")
 
 
 def _place(member: Mapping[str, float]) -> str:

@@ -1,0 +1,27 @@
+"""Docstrings as they are written here, made ready for Napoleon."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sphinx.application import Sphinx
+
+
+def make_ready(
+    app: Sphinx, what: str, name: str, value: Any, options: Any, lines: list[str]
+) -> None:
+    """Keep colons in the descriptions of attributes, and bars, from being taken for markup.
+
+    Napoleon takes what stands before the first colon of an attribute's first line for its type.
+    Ours have their types in annotations, and colons in their sentences: an empty comment goes
+    first. A bar opens a substitution for Sphinx; ours stand for absolute values.
+    """
+    lines[:] = [line if "`" in line else line.replace("|", r"\|") for line in lines]
+    if what in ("attribute", "data", "property") and lines:
+        lines[:0] = ["..", ""]
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Tell Sphinx to call us before Napoleon, which comes at 500."""
+    app.connect("autodoc-process-docstring", make_ready, priority=400)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,131 @@
+"""The site builds without a warning, opens offline, and leads from equations to functions."""
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import FunctionType
+
+import pytest
+
+import tcs
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+DOCS = CHECKOUT / "docs"
+# No room of their own that others import from: the command line, and single modules.
+WITHOUT_PAGE = {"cli"}
+
+
+def build(source: Path, out: Path) -> subprocess.CompletedProcess[str]:
+    """Build as `make docs` does, with a proxy that leads nowhere: nothing may be fetched."""
+    command = "-m sphinx --quiet --fail-on-warning --keep-going --builder html".split()
+    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
+    return subprocess.run(
+        [sys.executable, *command, "--conf-dir", str(DOCS), str(source), str(out)],
+        env={**os.environ, **nowhere},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("site")
+    done = build(DOCS, out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def pages(site: Path) -> list[Path]:
+    return [path for path in site.rglob("*.html") if "_modules" not in path.parts]
+
+
+def test_every_page_of_the_docs_is_there(site):
+    for source in DOCS.rglob("*.md"):
+        assert (site / source.relative_to(DOCS)).with_suffix(".html").is_file()
+
+
+def test_pages_load_nothing_from_elsewhere(site):
+    assert len(pages(site)) > 20
+    for path in [*site.rglob("*.html"), *site.rglob("*.css")]:
+        text = path.read_text(encoding="utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe|source)[^>]* src=[\"']([^\"']+)", text)
+        loaded += re.findall(
+            r"<link (?![^>]*rel=\"(?:index|search|next|prev)\")[^>]*href=\"([^\"]+)", text
+        )
+        loaded += re.findall(r"(?:@import|url\()\s*[\"']?((?:https?:)?//[^\"')]+)", text)
+        assert [target for target in loaded if re.match(r"(https?:)?//", target)] == [], path
+
+
+def test_equations_are_set(site):
+    text = (site / "method.html").read_text(encoding="utf-8")
+    assert text.count("<math ") >= 6
+    assert "$$" not in re.sub(r"<pre>.*?</pre>", "", text, flags=re.S)
+    # The sixth root of eq. (2), with its index.
+    assert "<mroot>" in text
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "tables.html#tcs.tables.tc_reachability",
+        "kernel.html#tcs.kernel.measure.isotropy_at",
+        "kernel.html#tcs.kernel.lanes.solve_lanes",
+        "kernel.html#tcs.kernel.pairs.score_pair",
+        "tables.html#tcs.tables.tc_manipulability",
+        "select.html#tcs.select.utility",
+        "select.html#tcs.select.shortest_tour",
+        "select.html#tcs.select.select",
+        "kernel.html#tcs.kernel.measure.limit_penalty",
+    ],
+)
+def test_equation_leads_to_its_function(site, target):
+    assert f'href="api/{target}"' in (site / "method.html").read_text(encoding="utf-8")
+    page, anchor = target.split("#")
+    assert f'id="{anchor}"' in (site / "api" / page).read_text(encoding="utf-8")
+
+
+def test_every_promised_name_leads_to_its_description(site):
+    text = (site / "api" / "tcs.html").read_text(encoding="utf-8")
+    for name in sorted(set(tcs.__all__) - {"__version__"}):
+        assert re.search(
+            rf'<a class="reference internal" href="[^"]+" title="[^"]+">'
+            rf'<code[^>]*><span class="pre">tcs\.{name}</span>',
+            text,
+        ), name
+
+
+def rooms() -> list[str]:
+    found = {path.parent.name for path in (CHECKOUT / "tcs").glob("*/__init__.py")}
+    return sorted(found - WITHOUT_PAGE)
+
+
+@pytest.mark.parametrize("room", rooms())
+def test_every_name_of_a_room_is_described(site, room):
+    text = (site / "api" / f"{room}.html").read_text(encoding="utf-8")
+    there = vars(importlib.import_module(f"tcs.{room}"))
+    # Constants and names of types have no home of their own that Sphinx could find.
+    kinds = (type, FunctionType)
+    names = [name for name in there.get("__all__", []) if isinstance(there[name], kinds)]
+    assert [name for name in names if f'id="tcs.{room}.{name}"' not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("`tcs.tables.tc_reachabilty`", "target not found: tcs.tables.tc_reachabilty"),
+        ("`tcs.store.lode(path)`", "target not found: tcs.store.lode"),
+        ("[the method](method.md)", "target not found: 'method.md'"),
+        ("[here](#nowhere)", "target not found: 'nowhere'"),
+        ("![a map](images/no.png)", "image file not readable: images/no.png"),
+    ],
+)
+def test_a_link_that_leads_nowhere_fails_the_build(tmp_path, line, complaint):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.md").write_text(f"# A page\n\n{line}\n", encoding="utf-8")
+    done = build(tmp_path / "docs", tmp_path / "out")
+    assert done.returncode != 0
+    assert complaint in done.stderr
