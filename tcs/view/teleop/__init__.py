@@ -1,0 +1,9 @@
+"""The driven arm in Drake's Meshcat: live, played back, and as a page to pass on."""
+
+from __future__ import annotations
+
+from tcs.view.teleop.live import LivePage
+from tcs.view.teleop.stage import Stage
+from tcs.view.teleop.start import start_posture
+
+__all__ = ["LivePage", "Stage", "start_posture"]
