@@ -34,6 +34,8 @@ _LIMITS = 0.05
 is sent back at 1 rad/s, more than `assist_rate`; at 50 %, at 0.04 rad/s."""
 _ISOTROPY = 0.2
 """How strongly isotropy pulls [rad/s] where a radian would raise its logarithm by 1."""
+_URGENT = 3.0
+"""How much faster than `assist_rate` a limit may push where that costs orientation."""
 _CENTRING = 0.1
 """Gain with which Drake's centring leads the joints to their middles [1/s]: one that is 2 rad off
 moves at 0.2 rad/s."""
@@ -48,20 +50,21 @@ def assisted(asked: Command, now: Situation) -> Wish:
     orientation, and only at last position.
     """
     settings = now.settings
-    wanted = twist_of(asked)
+    twist = twist_of(asked)
     back = settings.gain * now.error
     turn = math.sqrt(back[:3] @ back[:3])
     if turn > _CORRECTION:
         back[:3] *= _CORRECTION / turn
-    wanted += back
+    wanted = twist + back
     J = now.jacobian.copy()
     J[:3] *= _ORIENTATION
     wanted[:3] *= _ORIENTATION
     hessian = J.T @ J
     hessian.flat[:: JOINTS + 1] += _POSTURE**2
-    slope = wanted @ J + _POSTURE**2 * posture_wish(
-        now.arm, now.joints, now.jacobian, settings.assist_rate
-    )
+    slope = wanted @ J
+    # An arm that nobody drives does not move by itself.
+    if twist.any():
+        slope += _POSTURE**2 * posture_wish(now.arm, now.joints, now.jacobian, settings.assist_rate)
     rates, held = bounded_minimum(hessian, slope, now.lower, now.upper)
     return Wish(rates, unmoved(asked, rates, held, now))
 
@@ -77,7 +80,8 @@ def posture_wish(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: fl
         arm: The arm.
         joints: Joint positions [rad], shape (7,).
         jacobian: Of the tool, shape (6, 7).
-        fastest: What the fastest joint is slowed down to [rad/s].
+        fastest: What the fastest joint is slowed down to in the part of the motion that no tool
+            feels [rad/s]; the rest goes no faster than `_URGENT` times that.
 
     Returns:
         Shape (7,).
@@ -87,8 +91,12 @@ def posture_wish(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: fl
     # At a limit itself the barrier is endless; a millionth inside, it is only far too strong.
     room = np.maximum(1.0 - x * x, 1e-6)
     rates = _ISOTROPY * isotropy_gradient(jacobian) - _LIMITS * 2.0 * x / (room * room * half)
+    free = np.linalg.svd(jacobian)[2][-1]
+    unfelt = abs(float(free @ rates)) * float(np.abs(free).max())
     largest = float(np.abs(rates).max())
-    slower: FloatArray = rates * min(1.0, fastest / max(largest, 1e-300))
+    slower: FloatArray = rates * min(
+        1.0, fastest / max(unfelt, 1e-300), _URGENT * fastest / max(largest, 1e-300)
+    )
     return slower
 
 

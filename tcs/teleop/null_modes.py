@@ -11,7 +11,7 @@ from tcs.teleop.arm import JOINTS
 from tcs.teleop.control import clamped_rates, resolved_rates, smallest_singular_value
 from tcs.teleop.groups import GroupMotion, elbow_direction, group_motion
 from tcs.teleop.settings import Command
-from tcs.teleop.situation import BRAKE, Situation, Wish, all_slower, at_limits
+from tcs.teleop.situation import PLANNED, Situation, Wish, all_slower, at_limits
 
 _SLIP = 1e-4
 """A tool that would slip faster than this [m/s] is not held: against feedback at the default gain
@@ -36,17 +36,18 @@ def null_space(asked: Command, now: Situation) -> Wish:
     if motion.slip > _SLIP:
         return Wish(back, _stuck(lead))
     ease = _ease(motion, settings.group_rate)
-    speed = _next_speed(asked.sign, ease * motion.rates, now)
+    full = ease * motion.rates
+    speed = _next_speed(asked.sign, full, now)
     if ease < _EDGE and speed and _gets_worse(group, np.sign(speed) * motion.rates, now):
         return Wish(back, _stuck(lead))
-    turning = speed * ease * motion.rates
+    turning = speed * full
     if settings.limits == "clamped":
         turning = _around_limits(turning, back, group, now)
     share, joint = all_slower(turning + back, now)
     if joint >= 0:
         return Wish(back, f"{at_limits([joint])}: its motion ends there.")
     # A group that had to slow down for a limit turns back from the speed it has.
-    return Wish(share * (turning + back), "", share * speed)
+    return Wish(share * (turning + back), "", share * speed, full)
 
 
 def pose(asked: Command, now: Situation) -> Wish:
@@ -62,7 +63,7 @@ def pose(asked: Command, now: Situation) -> Wish:
     share, joint = all_slower(speed * direction + back, now)
     if joint >= 0:
         return Wish(back, f"{at_limits([joint])}: the elbow's motion ends there.")
-    return Wish(share * (speed * direction + back), "", share * speed)
+    return Wish(share * (speed * direction + back), "", share * speed, direction)
 
 
 def elbow_way(jacobian: FloatArray) -> float:
@@ -100,7 +101,8 @@ def _next_speed(sign: float, full: FloatArray, now: Situation) -> float:
     """Return the speed after this step, on the way to the one asked for.
 
     The speed changes, not the joint rates: so a group that starts or stops keeps to the null
-    space, which turns while it does.
+    space, which bends while it does. Where it bends so sharply that joints would have to change
+    their rates too fast to follow, the group slows down.
 
     Args:
         sign: The speed asked for, k of eq. (13).
@@ -108,9 +110,18 @@ def _next_speed(sign: float, full: FloatArray, now: Situation) -> float:
         now: The arm.
     """
     settings = now.settings
-    fastest = float(np.abs(full).max())
-    change = BRAKE * settings.acceleration * settings.period / max(fastest, 1e-9)
-    return float(np.clip(sign, now.speed - change, now.speed + change))
+    change = PLANNED * settings.acceleration * settings.period
+    fastest = max(float(np.abs(full).max()), 1e-9)
+    wanted = float(sign)
+    if now.turning is not None:
+        bend = abs(now.speed) * float(np.abs(full - now.turning).max())
+        # Bending takes the square of the speed: once for the way, once for the rates themselves.
+        if bend > change:
+            most = abs(now.speed) * math.sqrt(change / bend)
+            wanted = min(max(wanted, -most), most)
+    # Slower may be urgent; faster never is.
+    step = change / fastest * (2.0 if abs(wanted) < abs(now.speed) else 1.0)
+    return min(max(wanted, now.speed - step), now.speed + step)
 
 
 def _ease(motion: GroupMotion, rate: float) -> float:

@@ -104,7 +104,8 @@ class Teleoperation:
         self._switching = False
         self._group: int | None = None
         self._speed = 0.0
-        self._way = 1.0
+        self._turning: FloatArray | None = None
+        self._way: float | None = None
         self._beyond = self.arm.beyond(self._joints)
 
     @property
@@ -130,7 +131,7 @@ class Teleoperation:
         asked = self._admitted(self._command, held)
         rates, reason = np.zeros(JOINTS), why
         if not held or self._speed:
-            rates, reason, self._speed = self._wish(asked)
+            rates, reason, self._speed, self._turning = self._wish(asked)
             reason = why or reason
         if self._move(rates):
             self._switching = False
@@ -185,9 +186,9 @@ class Teleoperation:
         settings = self.settings
         # The Jacobian half way through the step follows the tool's curve to second order.
         middle = self.arm.kinematics(self._joints + 0.5 * settings.period * self._rates)
-        if self._mode is Mode.POSE and not self._speed:
-            # The way of the elbow that turns joint 1 up, as it stands before it begins to turn.
-            self._way = elbow_way(middle.jacobian)
+        if self._way is None or not (self._speed or asked.sign):
+            # The way of the elbow that turns joint 1 up when it begins to turn.
+            self._way = elbow_way(middle.jacobian) if self._mode is Mode.POSE else None
         lower, upper = situation_bounds(self.arm, self._joints, settings)
         situation = Situation(
             arm=self.arm,
@@ -198,7 +199,8 @@ class Teleoperation:
             lower=lower,
             upper=upper,
             speed=self._speed,
-            way=self._way,
+            turning=self._turning,
+            way=self._way or 1.0,
         )
         return wish(self._mode, asked, situation)
 

@@ -106,11 +106,11 @@ class Settings:
     gain: float = 20.0
     leash: float = 0.005
     leash_angle: float = 0.05
-    acceleration: float = 5.0
+    acceleration: float = 10.0
     group_rate: float = 0.4
     groups: tuple[tuple[int, ...], ...] = ((0, 1, 2), (1, 3, 5), (0, 3, 4), (6,))
-    damping: float = 0.02
-    singular: float = 0.02
+    damping: float = 0.01
+    singular: float = 0.01
     near_limit: float = 0.01
     length: float = 0.1
     assist_rate: float = 0.3

@@ -14,9 +14,9 @@ from tcs.teleop.settings import Command, Settings
 
 STILL = 1e-3
 """A motion of less than this share of what was asked for counts as none."""
-BRAKE = 0.5
-"""Share of the acceleration limit that motions are planned with; the rest is left for joints that
-have to make up for others."""
+PLANNED = 0.25
+"""Share of the acceleration limit that each part of a motion is planned with: speeding up, bending,
+braking for a limit. They may come together, and one joint may have to make up for others."""
 
 
 class Situation(NamedTuple):
@@ -36,6 +36,8 @@ class Situation(NamedTuple):
     """Highest rates allowed by joint limits and velocities [rad/s], shape (7,)."""
     speed: float
     """Speed of the joint group in the step before: k of eq. (13) on its way, in [-1, 1]."""
+    turning: FloatArray | None
+    """Joint rates of the group at speed 1 in the step before [rad/s], shape (7,), if it moved."""
     way: float
     """Which way the elbow turns at a positive sign: 1 along `elbow_direction`, or -1."""
 
@@ -44,19 +46,21 @@ class Wish(NamedTuple):
     """What a mode asks for.
 
     `rates` are joint rates within limits of position and velocity [rad/s], shape (7,); `reason`
-    says why they stop short, and is empty if they do not; `speed` is the group's new speed k.
+    says why they stop short, and is empty if they do not; `speed` is the group's new speed k, and
+    `turning` its joint rates at speed 1 [rad/s].
     """
 
     rates: FloatArray
     reason: str = ""
     speed: float = 0.0
+    turning: FloatArray | None = None
 
 
 def situation_bounds(
     arm: Arm, joints: FloatArray, settings: Settings
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the rates that a mode may ask for: to brake at `BRAKE`, within joint velocities."""
-    lower, upper = rate_bounds(arm, joints, settings.period, BRAKE * settings.acceleration)
+    """Return the rates that a mode may ask for: to brake at `PLANNED`, within joint velocities."""
+    lower, upper = rate_bounds(arm, joints, settings.period, PLANNED * settings.acceleration)
     return np.maximum(lower, -arm.velocity), np.minimum(upper, arm.velocity)
 
 
@@ -71,7 +75,7 @@ def all_slower(rates: FloatArray, now: Situation) -> tuple[float, int]:
     if fastest == 0.0:
         return 1.0, -1
     settings, velocity = now.settings, now.arm.velocity
-    braking = BRAKE * settings.acceleration
+    braking = PLANNED * settings.acceleration
     # Stopping with its share of the braking, a joint goes on for rate * fastest / (2 braking).
     way = size * (fastest / (2.0 * braking) + settings.period)
     room = np.where(rates > 0.0, now.arm.upper - now.joints, now.joints - now.arm.lower)

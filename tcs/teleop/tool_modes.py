@@ -14,6 +14,12 @@ from tcs.teleop.situation import Situation, Wish, all_slower, at_limits, twist_o
 _EASE = 0.005
 """Damping where joints are held at limits [m/rad]: rates stay bounded where the others become
 singular; 1 % of the motion at a singular value of 0.05, which the feedback makes up for."""
+_NEAR = 3.0
+"""At this many times the singular value that ends the motion, joints begin to slow down."""
+_NEAR_RATE = 1.0
+"""Greatest joint rate there [rad/s]: it takes a tenth of a second to stop from."""
+_BEYOND = 0.9
+"""Share of that singular value at which the slowing down would end: the motion ends before."""
 
 
 def end_effector(asked: Command, now: Situation) -> Wish:
@@ -49,14 +55,26 @@ def _until_invalid(rates: FloatArray, smallest: float, now: Situation) -> Wish:
 
     A motion that leads away from there goes on.
     """
+    nearness = smallest / now.settings.singular
+    if nearness < _NEAR and rates.any() and _gets_more_singular(rates, now):
+        if nearness < 1.0:
+            return Wish(np.zeros(JOINTS), "the arm is singular: motion ends there.")
+        # Near a singularity a slow tool takes fast joints: they slow down on the way, or they
+        # would race through it before they could stop.
+        most = _NEAR_RATE * (nearness - _BEYOND) / (_NEAR - _BEYOND)
+        rates = rates * min(1.0, most / float(np.abs(rates).max()))
     share, joint = all_slower(rates, now)
     if joint >= 0:
         return Wish(np.zeros(JOINTS), f"{at_limits([joint])}: motion ends there.")
-    rates = rates * share
-    if smallest < now.settings.singular and rates.any():
-        after = now.arm.kinematics(now.joints + now.settings.period * rates).jacobian
-        here = now.arm.kinematics(now.joints).jacobian
-        length = now.settings.length
-        if smallest_singular_value(after, length) < smallest_singular_value(here, length):
-            return Wish(np.zeros(JOINTS), "the arm is singular: motion ends there.")
-    return Wish(rates)
+    return Wish(rates * share)
+
+
+def _gets_more_singular(rates: FloatArray, now: Situation) -> bool:
+    """Return whether a motion leads on to a singularity."""
+    # Far enough for rounding, near enough to stay on this side [rad].
+    ahead = now.joints + (1e-4 / float(np.abs(rates).max())) * rates
+    here, there = (
+        smallest_singular_value(now.arm.kinematics(joints).jacobian, now.settings.length)
+        for joints in (now.joints, ahead)
+    )
+    return there < here
