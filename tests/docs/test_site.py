@@ -64,8 +64,9 @@ def test_equations_are_set(site):
     text = (site / "method.html").read_text(encoding="utf-8")
     assert text.count("<math ") >= 6
     assert "$$" not in re.sub(r"<pre>.*?</pre>", "", text, flags=re.S)
-    # The sixth root of eq. (2), with its index.
-    assert "<mroot>" in text
+    # What the converter does not know stays as it was written, with its backslash.
+    equations = re.findall(r"<math .*?</math>", text, flags=re.S)
+    assert [equation for equation in equations if "\\" in equation or "&#x0005C;" in equation] == []
 
 
 @pytest.mark.parametrize(

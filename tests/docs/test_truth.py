@@ -1,0 +1,93 @@
+"""Keys, names and defaults that the docs list are those of the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tcs.kernel.dexterity import MEASURES
+from tcs.reasons import explain, fix_weights
+from tcs.select import TravelWeights, UtilityWeights
+from tcs.space import Grid
+from tcs.store.packing import pack
+from tcs.tables import Reason
+from tcs.view.answers import COLOUR_NAMES
+from tests.store.example import score_file
+from tests.store.test_success import with_estimates
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def page(name: str) -> str:
+    return (DOCS / f"{name}.md").read_text(encoding="utf-8")
+
+
+def rows(text: str, first: str) -> list[list[str]]:
+    """Return the cells of the table whose first line begins so, title and rule left out."""
+    lines = text[text.index(first) :].splitlines()
+    body = lines[2:]
+    end = next((i for i, line in enumerate(body) if not line.startswith("|")), len(body))
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in body[:end]]
+
+
+def names(cells: list[list[str]]) -> list[str]:
+    return [name for row in cells for name in re.findall(r"`([\w-]+)`", row[0])]
+
+
+@pytest.mark.parametrize("part", ["sets", "scores", "success"])
+def test_parts_of_a_score_file(part):
+    listed = names(rows(page("files"), f"| `{part}` | type"))
+    assert sorted(listed) == sorted(pack(with_estimates())["tables"][0][part])
+
+
+def test_top_level_of_a_score_file():
+    text = page("files")
+    text = text[text.index("Top level:") : text.index("`success` is none")]
+    for key in pack(score_file()):
+        assert f"`{key}`" in text, key
+
+
+def test_json_of_an_explanation():
+    listed = names(rows(page("explaining"), "| key | value |"))
+    # The command adds the name of the measure.
+    assert sorted(listed) == sorted([*explain(score_file(), 0).to_json(), "measure"])
+
+
+def test_costs_of_changes():
+    weights = fix_weights(Grid.from_dict(score_file().grid))
+    cells = rows(page("explaining"), "| change | cost | why |")
+    costs = {change: float(cost) for change, cost, _ in cells}
+    assert costs["driving, per metre"] == weights.metre
+    assert costs["turning, per radian"] == weights.turn
+    assert costs["torso, per metre"] == weights.torso
+
+
+def test_default_weights():
+    text = page("selection")
+    told = {row[0]: row for row in rows(text, "| symbol | meaning | default |")}
+    weights = UtilityWeights()
+    for symbol, value in [
+        ("alpha", weights.reachability),
+        ("beta", weights.manipulability),
+        ("gamma", weights.travel),
+        ("delta", weights.success),
+    ]:
+        assert float(told[symbol][2]) == value
+    travel = TravelWeights()
+    for row in rows(text, "| motion | weight | default |"):
+        field = re.fullmatch(r"`TravelWeights\.(\w+)`", row[1])[1]
+        assert float(row[2]) == (getattr(travel, field) or 0.0)
+
+
+def test_measures():
+    assert names(rows(page("method"), "| name | value | function |")) == list(MEASURES)
+
+
+def test_reasons():
+    listed = names(rows(page("method"), "| reason | meaning |"))
+    assert listed == [reason.name.lower() for reason in Reason]
+
+
+def test_colours_of_verdicts():
+    told = [row[0] for row in rows(page("viewer"), "| colour | goal |")]
+    assert told == [COLOUR_NAMES[reason] for reason in Reason]
