@@ -7,7 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import capability, options, pictures, report, reports, robots, robustness, talk, view
+from tcs.cli import (
+    capability,
+    options,
+    pictures,
+    report,
+    reports,
+    robots,
+    robustness,
+    talk,
+    teleop,
+    view,
+)
 
 app = typer.Typer(
     cls=talk.Commands,
@@ -18,6 +29,7 @@ app = typer.Typer(
 )
 app.add_typer(robots.app, name="robot")
 app.add_typer(capability.app, name="capability")
+app.add_typer(teleop.app, name="teleop")
 
 
 def main() -> None:

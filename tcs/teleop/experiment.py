@@ -113,6 +113,8 @@ class Drive:
     trials: tuple[Measured, ...]
     paths: tuple[FloatArray, ...]
     """Of the tool in each trial that counts [m], shapes (k, 3)."""
+    postures: tuple[FloatArray, ...]
+    """Of the arm in each trial that counts, ten a second [rad], shapes (k, 7)."""
 
     @property
     def mean(self) -> Measured:
@@ -221,7 +223,7 @@ def _drive(
 ) -> Drive:
     """Return what one operator does with one controller."""
     habits = Habits()
-    measured, paths = [], []
+    measured, paths, postures = [], [], []
     number = plan.conditions.index(condition)
     for trial in range(plan.training + plan.trials):
         counts = trial >= plan.training
@@ -239,6 +241,7 @@ def _drive(
         measured.append(measure(run, course, time_limit=plan.time_limit))
         if counts:
             paths.append(path_of(run))
+            postures.append(run.joints[:: max(1, round(0.1 / run.step))].copy())
             if runs is not None:
                 save_run(runs / run_name(run, runs_as), run)
     return Drive(
@@ -247,6 +250,7 @@ def _drive(
         tuple(measured[: plan.training]),
         tuple(measured[plan.training :]),
         tuple(paths),
+        tuple(postures),
     )
 
 

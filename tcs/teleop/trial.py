@@ -72,6 +72,8 @@ class Measured:
     """Until the end was reached; the time limit where it was not [s]."""
     effort: float
     """Mean absolute work on the device from sample to sample [J]."""
+    work: float
+    """The sum of it over the trial [J]: what rests of the hand do not dilute."""
     steering_angle: float
     """[rad]."""
     steering_translation: float
@@ -230,10 +232,12 @@ def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> Meas
     speed = np.linalg.norm(np.diff(smooth, axis=0), axis=1) / np.diff(time)
     stops = np.flatnonzero(np.diff(run.stopped.astype(int)) == 1)
     turning = (run.group == 0) & ~run.clutch
+    mean_work = effort(run.time, hand)
     return Measured(
         accuracy=path.worst,
         time=time_limit if took is None else took,
-        effort=effort(run.time, hand),
+        effort=mean_work,
+        work=mean_work * (len(run) - 2),
         steering_angle=steering_angle(steered[:, 3:]),
         steering_translation=steering_translation(steered[:, :3]),
         arc_length=spectral_arc_length(speed, 1.0 / float(time[1] - time[0])),
