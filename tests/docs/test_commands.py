@@ -41,6 +41,38 @@ def test_line_is_understood(line):
     command.make_context(str(command.name), words)
 
 
+def options_of(command) -> set[str]:
+    below = getattr(command, "commands", {}).values()
+    own = {o for parameter in command.params for o in (*parameter.opts, *parameter.secondary_opts)}
+    return own.union({"--help"}, *map(options_of, below))
+
+
+def options_of_scripts() -> set[str]:
+    files = [*(CHECKOUT / "scripts").glob("*.py"), *(CHECKOUT / "benchmarks").glob("*.py")]
+    found = [re.findall(r'"(--[a-z-]+)"', path.read_text(encoding="utf-8")) for path in files]
+    return {option for options in found for option in options}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_options_named_in_a_sentence_are_there(page):
+    known = options_of(typer.main.get_command(app)) | options_of_scripts()
+    spans = re.findall(r"`([^`\n]+)`", page.read_text(encoding="utf-8"))
+    named = {option for span in spans for option in re.findall(r"(?<!\S)--[a-z][a-z-]*", span)}
+    assert named - known == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_named_in_a_sentence_are_there(page):
+    spans = re.findall(r"`tcs\s+([a-z-]+)([^`]*)`", page.read_text(encoding="utf-8"))
+    commands = typer.main.get_command(app).commands
+    for verb, rest in spans:
+        assert verb in commands, verb
+        command = commands[verb]
+        for word in rest.split():
+            command = getattr(command, "commands", {}).get(word, command)
+        assert set(re.findall(r"(?<!\S)--[a-z][a-z-]*", rest)) <= options_of(command), (verb, rest)
+
+
 def test_an_unknown_option_is_refused():
     with pytest.raises(Exception, match="No such option: --enviroment"):
         test_line_is_understood("tcs score shaving --enviroment wheelchair")
