@@ -90,9 +90,10 @@ def posture_wish(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: fl
     half = np.where(arm.bounded, 0.5 * (arm.upper - arm.lower), np.inf)
     # At a limit itself the barrier is endless; a millionth inside, it is only far too strong.
     room = np.maximum(1.0 - x * x, 1e-6)
-    rates = _ISOTROPY * isotropy_gradient(jacobian) - _LIMITS * 2.0 * x / (room * room * half)
-    free = np.linalg.svd(jacobian)[2][-1]
-    unfelt = abs(float(free @ rates)) * float(np.abs(free).max())
+    inverse = _square_inverse(jacobian)
+    pull = isotropy_gradient(jacobian, inverse)
+    rates = _ISOTROPY * pull - (2.0 * _LIMITS) * x / (room * room * half)
+    unfelt = float(np.abs(rates - (inverse @ (jacobian @ rates)) @ jacobian).max())
     largest = float(np.abs(rates).max())
     slower: FloatArray = rates * min(
         1.0, fastest / max(unfelt, 1e-300), _URGENT * fastest / max(largest, 1e-300)
@@ -100,7 +101,7 @@ def posture_wish(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: fl
     return slower
 
 
-def isotropy_gradient(jacobian: FloatArray) -> FloatArray:
+def isotropy_gradient(jacobian: FloatArray, inverse: FloatArray | None = None) -> FloatArray:
     """Return the gradient of the logarithm of kinematic isotropy by the joints [1/rad].
 
     With isotropy det(J J^T)^(1/6) / (trace(J J^T) / 6) and D_i the change of J with joint i,
@@ -110,16 +111,16 @@ def isotropy_gradient(jacobian: FloatArray) -> FloatArray:
 
     Args:
         jacobian: Shape (6, 7).
+        inverse: That of J J^T, shape (6, 6); None works it out.
 
     Returns:
         Shape (7,); pulls out of a singularity, without growing endless at it.
     """
     axes, linear = jacobian[:3], jacobian[3:]
-    square = jacobian @ jacobian.T
-    trace = float(np.trace(square))
-    # Keeps the inverse finite at a singularity.
-    square_inverse = np.linalg.inv(square + 1e-6 * trace * np.eye(6))
-    weights = square_inverse @ jacobian / 3.0 - jacobian * (2.0 / trace)
+    if inverse is None:
+        inverse = _square_inverse(jacobian)
+    flat = jacobian.ravel()
+    weights = inverse @ jacobian / 3.0 - jacobian * (2.0 / float(flat @ flat))
     first, second = weights[:3], weights[3:]
     # axis_i . (column_j x weight_j), as the triple product allows: the cross products come once.
     turned_axes, turned_linear = _cross(axes, first), _cross(linear, second)
@@ -131,11 +132,20 @@ def isotropy_gradient(jacobian: FloatArray) -> FloatArray:
     return gradient
 
 
+def _square_inverse(jacobian: FloatArray) -> FloatArray:
+    """Return the inverse of J J^T, eased by a millionth so that it is finite at a singularity."""
+    square = jacobian @ jacobian.T
+    square.flat[::7] += 1e-6 * square.flat[::7].sum()
+    return np.asarray(np.linalg.inv(square), dtype=np.float64)
+
+
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the cross products of columns, shape (3, n)."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    product = np.empty_like(a)
+    product[0] = a[1] * b[2] - a[2] * b[1]
+    product[1] = a[2] * b[0] - a[0] * b[2]
+    product[2] = a[0] * b[1] - a[1] * b[0]
+    return product
 
 
 def drake(asked: Command, now: Situation) -> Wish:

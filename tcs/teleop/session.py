@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS, Arm
-from tcs.teleop.bounds import approach, rate_bounds
+from tcs.teleop.bounds import approach, rate_bounds, stops_in_time
 from tcs.teleop.control import moved, pose_error
 from tcs.teleop.flags import ShortArray, flags_of
 from tcs.teleop.modes import wish
@@ -209,9 +209,12 @@ class Teleoperation:
         settings, arm = self.settings, self.arm
         if self._beyond:
             return True
-        bounds = rate_bounds(arm, self._joints, settings.period, settings.acceleration)
-        change = settings.acceleration * settings.period
-        self._rates, arrived = approach(self._rates, wanted, change, *bounds)
+        period, acceleration = settings.period, settings.acceleration
+        self._rates, arrived = approach(self._rates, wanted, acceleration * period)
+        if not stops_in_time(arm, self._joints, self._rates, period, acceleration):
+            # A joint that has to brake for its limit does so even where the others take longer.
+            bounds = rate_bounds(arm, self._joints, period, acceleration)
+            self._rates = np.clip(self._rates, *bounds)
         # The bounds end at the limits; rounding may go past them by a hair.
         joints = self._joints + settings.period * self._rates
         self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)

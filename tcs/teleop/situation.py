@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.arm import Arm
-from tcs.teleop.bounds import rate_bounds, scale_within
+from tcs.teleop.bounds import rate_bounds, scale_within, stops_in_time
 from tcs.teleop.settings import Command, Settings
 
 STILL = 1e-3
@@ -75,15 +75,12 @@ def all_slower(rates: FloatArray, now: Situation) -> tuple[float, int]:
     if fastest == 0.0:
         return 1.0, -1
     settings, velocity = now.settings, now.arm.velocity
-    braking = PLANNED * settings.acceleration
-    # Stopping with its share of the braking, a joint goes on for rate * fastest / (2 braking).
-    way = size * (fastest / (2.0 * braking) + settings.period)
-    room = np.where(rates > 0.0, now.arm.upper - now.joints, now.joints - now.arm.lower)
-    if (way <= room).all() and (size <= velocity).all():
-        return 1.0, -1
     # A joint that hardly moves needs no bound of its own; the floor keeps the division sound.
-    shares = np.maximum(size / fastest, 1e-6)
-    lower, upper = rate_bounds(now.arm, now.joints, settings.period, braking * shares)
+    braking = PLANNED * settings.acceleration * np.maximum(size / fastest, 1e-6)
+    in_time = stops_in_time(now.arm, now.joints, rates, settings.period, braking)
+    if in_time and (size <= velocity).all():
+        return 1.0, -1
+    lower, upper = rate_bounds(now.arm, now.joints, settings.period, braking)
     share, joint = scale_within(rates, np.maximum(lower, -velocity), np.minimum(upper, velocity))
     return share, joint if share < STILL else -1
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tcs.teleop import load_arm
-from tcs.teleop.bounds import approach, rate_bounds, scale_within
+from tcs.teleop.bounds import approach, rate_bounds, scale_within, stops_in_time
 
 PERIOD, ACCELERATION = 0.01, 5.0
 CHANGE = PERIOD * ACCELERATION
@@ -22,7 +22,10 @@ def test_a_joint_that_races_for_its_limit_stops_there_in_time(iiwa, start, befor
     rates = np.clip(rates, lower, upper)
     for _ in range(600):
         lower, upper = rate_bounds(iiwa, joints, period, ACCELERATION)
-        after, _ = approach(rates, np.full(7, 3.0), change, lower, upper)
+        after, _ = approach(rates, np.full(7, 3.0), change)
+        if stops_in_time(iiwa, joints, after, period, ACCELERATION):
+            assert ((after >= lower) & (after <= upper)).all()
+        after = np.clip(after, lower, upper)
         # Sums of rates are rounded to 1e-15.
         assert np.abs(after - rates).max() <= change + 1e-12
         joints, rates = joints + period * after, after
@@ -68,17 +71,26 @@ def test_all_joints_slow_down_alike():
 
 def test_rates_go_straight_from_one_motion_to_the_next():
     before, wanted = np.zeros(7), np.array([1.0, -0.5, 0, 0, 0, 0, 0])
-    free = np.full(7, np.inf)
-    after, arrived = approach(before, wanted, 0.05, -free, free)
+    after, arrived = approach(before, wanted, 0.05)
     assert not arrived
     np.testing.assert_allclose(after, 0.05 * wanted)
-    after, arrived = approach(after, 1.04 * after, 0.05, -free, free)
+    after, arrived = approach(after, 1.04 * after, 0.05)
     assert arrived
 
 
 @pytest.mark.parametrize("rate", [0.3, -0.3])
 def test_a_joint_at_its_limit_stays(iiwa, rate):
-    at = iiwa.upper if rate > 0 else iiwa.lower
-    bounds = rate_bounds(iiwa, at.copy(), PERIOD, ACCELERATION)
-    after, _ = approach(np.zeros(7), np.full(7, rate), 0.5, *bounds)
-    assert not after.any()
+    at = (iiwa.upper if rate > 0 else iiwa.lower).copy()
+    assert not np.clip(np.full(7, rate), *rate_bounds(iiwa, at, PERIOD, ACCELERATION)).any()
+    assert not stops_in_time(iiwa, at, np.full(7, rate), PERIOD, ACCELERATION)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_whoever_is_said_to_stop_in_time_is_within_the_bounds(iiwa, seed):
+    rng = np.random.default_rng(seed)
+    joints = iiwa.upper - rng.exponential(0.1, 7)
+    rates, acceleration = rng.normal(size=7), rng.uniform(0.1, 10.0, 7)
+    lower, upper = rate_bounds(iiwa, joints, PERIOD, acceleration)
+    for one in np.diag(rates):
+        if stops_in_time(iiwa, joints, one, PERIOD, acceleration):
+            assert ((one >= lower) & (one <= upper)).all()

@@ -1,0 +1,131 @@
+"""Measure the control loop of teleoperation: its time, how it holds the tool, how smoothly it runs.
+
+Usage: python benchmarks/teleop.py [--steps 2000] [--robots iiwa7 pr2 ...] [--seed 0]
+
+Times are of one whole step of `Teleoperation` in Python, by the processor's own clock and by the
+wall: command in, joints, flags and reason out. Nothing here is a test: tests never depend on time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+
+import numpy as np
+from table import header, row
+
+from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation, load_arm
+
+ROBOTS = ("iiwa7", "pr2", "tiago", "panda")
+READY = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
+"""A posture of the iiwa in the middle of its workspace, elbow up [rad]."""
+SWEEP = np.radians(60.0)
+
+
+def main() -> None:
+    """Measure and print everything."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=2000, help="steps in each mode")
+    parser.add_argument("--robots", nargs="*", default=ROBOTS, metavar="ROBOT")
+    parser.add_argument("--seed", type=int, default=0, help="of the random commands")
+    options = parser.parse_args()
+    header()
+    row("seed", str(options.seed))
+    for robot in options.robots:
+        arm = load_arm(robot)
+        for mode in Mode:
+            times(arm, mode, options.steps, options.seed)
+    print()
+    arm = load_arm("iiwa7")
+    for limits in ("paper", "clamped"):
+        sweep(arm, Settings(limits=limits))
+    print()
+    for robot in options.robots:
+        for limits in ("paper", "clamped"):
+            switches(load_arm(robot), Settings(limits=limits), options.steps, options.seed)
+
+
+def times(arm: Arm, mode: Mode, steps: int, seed: int) -> None:
+    """Measure one step of a mode under commands that change, from postures all over the range."""
+    rng = np.random.default_rng(seed)
+    wall, cpu = [], []
+    for joints in arm.random_joints(rng, max(1, steps // 100)):
+        session = Teleoperation(arm, joints, mode=mode)
+        for _ in range(4):
+            command = random_command(rng, None)
+            for _ in range(25):
+                begun, busy = time.perf_counter(), time.process_time()
+                session.step(command)
+                wall.append(1e6 * (time.perf_counter() - begun))
+                cpu.append(1e6 * (time.process_time() - busy))
+    ninth = statistics.quantiles(wall, n=100)[98]
+    row(
+        f"{arm.name}, {mode}: one step",
+        f"{statistics.median(wall):.0f} us median, {ninth:.0f} us 99th percentile, processor "
+        f"{statistics.median(cpu):.0f} us ({len(wall)} steps)",
+    )
+
+
+def sweep(arm: Arm, settings: Settings) -> None:
+    """Print how far the tool moves while joint 1 sweeps 60 degrees and back, start to stop."""
+    session = Teleoperation(arm, READY, settings, Mode.NULL_SPACE)
+    here = session.step(Command())
+    while here.joints[0] > -SWEEP / 2:
+        here = session.step(Command(group=0, sign=-1))
+    start, gone = here, []
+    for sign in (1, -1):
+        while sign * here.joints[0] < SWEEP / 2 and not here.stopped:
+            here = session.step(Command(group=0, sign=sign))
+            gone.append(drift(here, start))
+        for _ in range(100):
+            here = session.step(Command(group=0))
+            gone.append(drift(here, start))
+    row(
+        f"{arm.name}, {settings.limits}: joint 1 by 60 deg",
+        f"tool off by {1e3 * max(gone):.5f} mm at most, {1e3 * gone[-1]:.6f} mm in the end "
+        f"({len(gone)} steps)",
+    )
+
+
+def switches(arm: Arm, settings: Settings, steps: int, seed: int) -> None:
+    """Print the largest change of a joint rate under random commands and switches of mode."""
+    rng = np.random.default_rng(seed)
+    largest, count = 0.0, 0
+    for joints in 0.9 * arm.random_joints(rng, max(1, steps // 200)):
+        if arm.beyond(joints):
+            continue
+        session, before, mode = Teleoperation(arm, joints, settings), np.zeros(7), None
+        for _ in range(10):
+            command = random_command(rng, list(Mode)[rng.integers(len(Mode))])
+            count += command.mode != mode
+            mode = command.mode
+            for _ in range(20):
+                step = session.step(command)
+                largest = max(largest, float(np.abs(step.rates - before).max()))
+                before = step.rates
+    bound = settings.acceleration * settings.period
+    row(
+        f"{arm.name}, {settings.limits}: joint rates",
+        f"change by {largest:.6f} rad/s in a step at most, bound {bound:g} ({count} switches)",
+    )
+
+
+def random_command(rng: np.random.Generator, mode: Mode | None) -> Command:
+    """Return a brisk command of any kind."""
+    return Command(
+        linear=tuple(0.2 * rng.normal(size=3)),
+        angular=tuple(0.5 * rng.normal(size=3)),
+        group=int(rng.integers(4)),
+        sign=int(rng.choice([-1, 1])),
+        mode=mode,
+    )
+
+
+def drift(step: Step, start: Step) -> float:
+    """Return how far the tool is from where it was [m]."""
+    return float(np.linalg.norm(step.p - start.p))
+
+
+if __name__ == "__main__":
+    main()
