@@ -6,6 +6,7 @@ pass through one another; so depth is compared pixel by pixel here.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,6 +25,8 @@ _SIZE = (1500, 1300)
 """Width and height of a view in pixels, before two by two are made one."""
 _FOCAL = 3.5
 """Focal length over half the picture's height: from some 5 m away, a person and a robot fill it."""
+_LETTERS = 56
+"""How many letters of the title fit above a view."""
 _FILLED = 0.94
 """How much of the picture its subject may take up."""
 _NEAREST = 0.5
@@ -35,6 +38,8 @@ _SKY = np.array([1.0, 1.0, 1.0])
 _LIGHTS = ((np.array([0.35, 0.8, 0.5]), 0.50), (np.array([-0.8, 0.1, 0.6]), 0.25))
 """Directions towards the lights (right, up, towards the camera), and their strengths."""
 _AMBIENT = 0.42
+_UNHIDDEN = 0.6
+"""How much of robot and person a view has to show, beside the view that shows most of them."""
 _SAME_PLANE = 0.004
 """How far a point may be off the plane of its neighbour [m] if both are of one surface."""
 _SAME_WAY = 0.9
@@ -54,7 +59,7 @@ class View:
     """Points that have to be in the picture, which is as close as that allows [m], (n, 3)."""
     azimuths: tuple[float, ...]
     """Directions from which to look [rad]; the one that shows most of the goals is taken, above all
-    of the goal that is shown."""
+    of the goal that is shown, unless something hides who reaches for it."""
     caption: str
 
 
@@ -88,14 +93,17 @@ def draw_scene(views: Sequence[View], *, title: str) -> Figure:
         axes.set_axis_off()
         axes.set_title(view.caption, fontsize=11)
     if title:
-        figure.suptitle(title, fontsize=13)
+        width = _LETTERS * len(views)
+        lines = [line for part in title.splitlines() for line in textwrap.wrap(part, width)]
+        figure.suptitle("\n".join(lines), fontsize=13)
     shown = {solid.kind for view in views for solid in view.solids}
     handles = [
         Patch(facecolor=kind.colour, edgecolor="#555555", lw=0.5, label=kind.label)
         for kind in Kind
         if kind in shown
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
+    columns = min(3 * len(views), 6)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
     return figure
 
 
@@ -104,16 +112,17 @@ def _rendered(view: View) -> FloatArray:
     triangles = np.concatenate([solid.triangles for solid in view.solids])
     owner = np.repeat(np.arange(len(view.solids)), [len(solid.triangles) for solid in view.solids])
     weight = np.array([_GOALS.get(solid.kind, 0.0) for solid in view.solids])[owner]
-    best, most = None, -1.0
+    is_subject = np.array([solid.kind is not Kind.FURNITURE for solid in view.solids])[owner]
+    taken = []
     for azimuth in view.azimuths:
         camera = _camera(view, azimuth)
         raster = _rasterised(triangles, camera)
-        seen = float(weight[raster.triangle[raster.triangle >= 0]].sum())
-        if seen > most:
-            best, most = (camera, raster), seen
-    if best is None:
-        return np.broadcast_to(_SKY, (_SIZE[1] // 2, _SIZE[0] // 2, 3))
-    image = _shaded(view, triangles, owner, *best)
+        seen = raster.triangle[raster.triangle >= 0]
+        taken.append((float(weight[seen].sum()), int(is_subject[seen].sum()), camera, raster))
+    # From behind a wall a goal may be seen past its edge, and nothing of who reaches for it.
+    clear = _UNHIDDEN * max(subject for _, subject, _, _ in taken)
+    *_, camera, raster = max((one for one in taken if one[1] >= clear), key=lambda one: one[0])
+    image = _shaded(view, triangles, owner, camera, raster)
     # Two by two pixels become one: smooth edges.
     return np.asarray(image.reshape(_SIZE[1] // 2, 2, _SIZE[0] // 2, 2, 3).mean(axis=(1, 3)))
 
@@ -182,8 +191,9 @@ def _shaded(
     view: View, triangles: FloatArray, owner: IntArray, camera: _Camera, raster: _Raster
 ) -> FloatArray:
     """Return the colours of all pixels, shape (height, width, 3)."""
-    image = _floor(camera)
     hit = raster.triangle >= 0
+    image = np.empty((*hit.shape, 3))
+    image[~hit] = _floor(camera, np.argwhere(~hit))
     number = raster.triangle[hit]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -208,36 +218,50 @@ def _edges(owner: IntArray, normals: FloatArray, raster: _Raster) -> NDArray[np.
     """
     number = np.maximum(raster.triangle, 0)
     solid = np.where(raster.triangle >= 0, owner[number], -1)
-    normal = normals[number]
-    # Where nothing is, something is far away.
-    away = 1.0 / np.maximum(raster.depth, 1e-3)
-    point = _rays() * away[..., None]
     edge = np.zeros(solid.shape, dtype=np.bool_)
-    for here, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        off = np.einsum("ijk,ijk->ij", normal[here], point[here] - point[before])
-        bend = np.einsum("ijk,ijk->ij", normal[here], normal[before])
+    for step in ((0, 1), (1, 0)):
+        differs = solid[step[0] :, step[1] :] != solid[: -step[0] or None, : -step[1] or None]
+        before = np.argwhere(differs)
+        here = before + step
+        normal, apart = [], np.zeros((len(here), 3))
+        for pixels, sign in ((here, 1.0), (before, -1.0)):
+            at = tuple(pixels.T)
+            normal.append(normals[number[at]])
+            # Where nothing is, something is far away.
+            away = 1.0 / np.maximum(raster.depth[at], 1e-3)
+            apart += sign * _rays(pixels) * away[:, None]
+        off = np.einsum("ij,ij->i", normal[0], apart)
+        bend = np.einsum("ij,ij->i", normal[0], normal[1])
         is_one_surface = (np.abs(off) < _SAME_PLANE) & (bend > _SAME_WAY)
-        edge[here] |= (solid[here] != solid[before]) & ~is_one_surface
+        edge[tuple(here[~is_one_surface].T)] = True
     return edge
 
 
-def _rays() -> FloatArray:
-    """Return what each pixel looks along, in the camera's axes, shape (height, width, 3)."""
-    width, height = _SIZE
-    x = (np.arange(width) + 0.5 - width / 2.0) / (_FOCAL * height / 2.0)
-    y = -(np.arange(height) + 0.5 - height / 2.0) / (_FOCAL * height / 2.0)
-    return np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1)
+def _rays(pixels: IntArray) -> FloatArray:
+    """Return what pixels look along, in the camera's axes, shape (n, 3).
+
+    Args:
+        pixels: Row and column of each, shape (n, 2).
+    """
+    middle = np.array([_SIZE[1], _SIZE[0]]) / 2.0
+    up_right = (pixels + 0.5 - middle) * [-1.0, 1.0] / (_FOCAL * middle[0])
+    return np.column_stack([up_right[:, 1], up_right[:, 0], np.full(len(pixels), -1.0)])
 
 
-def _floor(camera: _Camera) -> FloatArray:
-    """Return the empty floor with a line every half metre, shape (height, width, 3)."""
-    rays = _rays() @ camera.R
-    down = -rays[..., 2]
+def _floor(camera: _Camera, pixels: IntArray) -> FloatArray:
+    """Return the colours of the empty floor, with a line every half metre, shape (n, 3).
+
+    Args:
+        camera: The camera.
+        pixels: Row and column of each pixel, shape (n, 2).
+    """
+    rays = _rays(pixels) @ camera.R
+    down = -rays[:, 2]
     reach = camera.p[2] / np.maximum(down, 1e-6)
-    spots = camera.p[:2] + reach[..., None] * rays[..., :2]
+    spots = camera.p[:2] + reach[:, None] * rays[:, :2]
     # A line is as wide as a pixel is on the floor there, but never less than 8 mm.
     half = np.maximum(0.004, 1.2 * reach / (_FOCAL * _SIZE[1] / 2.0))
-    off = np.abs(np.mod(spots + 0.25, 0.5) - 0.25).min(axis=-1)
-    image = np.where((off < half)[..., None], _LINE, _FLOOR)
-    fade = np.clip((reach - 5.0) / 3.0, 0.0, 1.0)[..., None]
-    return np.asarray(np.where(down[..., None] > 0.0, image * (1 - fade) + _SKY * fade, _SKY))
+    off = np.abs(np.mod(spots + 0.25, 0.5) - 0.25).min(axis=1)
+    colours = np.where((off < half)[:, None], _LINE, _FLOOR)
+    fade = np.clip((reach - 5.0) / 3.0, 0.0, 1.0)[:, None]
+    return np.asarray(np.where(down[:, None] > 0.0, colours * (1 - fade) + _SKY * fade, _SKY))

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from tcs.draw import as_png
 from tcs.reasons import Distribution, Explanation, explain
-from tcs.report.pictures import Shown, map_figure, member_figure, serves
+from tcs.report.pictures import Shown, map_figure, member_figure, serves, stage
 from tcs.report.states import has_states, states_figure
-from tcs.scoring import Job, Verification, reopen, verify
+from tcs.scoring import Job, Verification, verify
 from tcs.scoring.verify import Finding, check_pairs
 from tcs.store import Scored, ScoreFile, load_scores
 from tcs.tables import InitialConfiguration, Reason, SuccessTable
@@ -179,7 +179,7 @@ def answer_of(
     begun, check = time.perf_counter(), check or Check()
     file = load_scores(path)
     shown = Shown.of(file, here, max_members, observed)
-    job, _, _ = reopen(file)
+    staged = stage(file, shown)
     served = {
         goal: shown.indices[number]
         for goal, number in enumerate(servers(file, shown))
@@ -190,7 +190,7 @@ def answer_of(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         file=file,
-        job=job,
+        job=staged[0],
         shown=shown,
         max_members=max_members,
         verification=verify(
@@ -198,10 +198,13 @@ def answer_of(
         ),
         findings=dict(zip(served, findings, strict=True)),
         check=check,
-        map=as_png(map_figure(file, shown), _DPI),
-        states=as_png(states_figure(file, shown), _DPI) if has_states(file) else None,
+        map=as_png(map_figure(file, shown, staged), _DPI, colours=None),
+        states=as_png(states_figure(file, shown, staged=staged), _DPI, colours=None)
+        if has_states(file)
+        else None,
         views=tuple(
-            as_png(member_figure(file, shown, number), _DPI) for number in range(len(shown.members))
+            as_png(member_figure(file, shown, number, staged), _DPI)
+            for number in range(len(shown.members))
         ),
         seconds=time.perf_counter() - begun,
     )

@@ -108,13 +108,22 @@ def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int,
     return select(tables, anywhere, weights=free, max_members=max_members).indices
 
 
-def map_figure(file: ScoreFile, shown: Shown) -> Figure:
+Stage = tuple[Job, Scene]
+"""What a file was scored from, and its scene as the set is to be found."""
+
+
+def map_figure(file: ScoreFile, shown: Shown, staged: Stage | None = None) -> Figure:
     """Return the map of a score file.
+
+    Args:
+        file: A score file.
+        shown: The set to mark.
+        staged: `stage` of both, where there is one already; its scene is moved about.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = stage(file, shown)
+    job, scene = staged or stage(file, shown)
     base = base_outline(scene)
     _set_room(scene, shown.members)
     return draw_map(
@@ -145,18 +154,21 @@ def scene_figure(file: ScoreFile, shown: Shown) -> Figure:
     return draw_scene(views, title=f"{title_of(job)}\n{shown.subtitle}")
 
 
-def member_figure(file: ScoreFile, shown: Shown, number: int) -> Figure:
+def member_figure(
+    file: ScoreFile, shown: Shown, number: int, staged: Stage | None = None
+) -> Figure:
     """Return two pictures of the robot at one member of the set: all of it, and the tool nearby.
 
     Args:
         file: A score file.
         shown: The set.
         number: Number of the member, from 0.
+        staged: `stage` of both, where there is one already; its scene is moved about.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = stage(file, shown)
+    job, scene = staged or stage(file, shown)
     views = [_view(file, job, scene, shown, number, is_close=close) for close in (False, True)]
     return draw_scene(views, title="")
 
@@ -174,7 +186,7 @@ def serves(file: ScoreFile, shown: Shown, number: int) -> tuple[int, ...]:
     return tuple(np.flatnonzero(mine).tolist())
 
 
-def stage(file: ScoreFile, shown: Shown) -> tuple[Job, Scene]:
+def stage(file: ScoreFile, shown: Shown) -> Stage:
     """Return what a file was scored from, and its scene; refuse other models than those."""
     job, scene, _ = reopen(file)
     for name, value in file.observed_states[shown.table].items():

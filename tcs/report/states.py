@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from tcs.draw import PlaceMap, Stand, StatePanel, draw_states
 from tcs.draw.states import Score
 from tcs.errors import SelectionError
-from tcs.report.pictures import Shown, base_outline, room_solids, stage, title_of
+from tcs.report.pictures import Shown, Stage, base_outline, room_solids, stage, title_of
 from tcs.space import Axis, Grid
 from tcs.store import ScoreFile
 
@@ -23,7 +23,9 @@ def has_states(file: ScoreFile) -> bool:
     return 1 < math.prod(Grid.from_dict(file.grid).environment_shape) <= MOST_PANELS
 
 
-def states_figure(file: ScoreFile, shown: Shown, score: Score = "reachability") -> Figure:
+def states_figure(
+    file: ScoreFile, shown: Shown, score: Score = "reachability", staged: Stage | None = None
+) -> Figure:
     """Return the map of each state of the environment, rows by columns, in one scale.
 
     Columns are the values of the environment's last axis, rows those of the others, the greatest
@@ -33,6 +35,7 @@ def states_figure(file: ScoreFile, shown: Shown, score: Score = "reachability") 
         file: A score file.
         shown: The set to mark, each member in the panel of the state it wants.
         score: What to colour the places by.
+        staged: `stage` of both, where there is one already; its scene is moved about.
 
     Raises:
         SelectionError: If the environment has one state only, or too many to draw.
@@ -51,7 +54,7 @@ def states_figure(file: ScoreFile, shown: Shown, score: Score = "reachability") 
             f"the environment has {states} states, of which {MOST_PANELS} at most can be drawn on "
             "one page. Draw the map without --states."
         )
-    job, scene = stage(file, shown)
+    job, scene = staged or stage(file, shown)
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
     stands = [Stand(member, base) for member in shown.members]

@@ -1,0 +1,236 @@
+"""Make the pictures and the text of docs/gallery.md: Figures 1 and 6 of the TCS paper, re-made.
+
+    python scripts/gallery.py --scores out/scores
+
+Score files are taken from the folder named by --scores; rows that are not there are scored first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+import tcs
+from tcs.cli import talk
+from tcs.cli.places import place
+from tcs.cli.rows import default_path, score_one
+from tcs.draw import as_png
+from tcs.draw.floor_plan import described
+from tcs.report import check_row
+from tcs.report.pictures import Shown, map_figure, member_figure, scene_figure
+from tcs.report.states import states_figure
+from tcs.scoring import all_rows
+from tcs.store import ScoreFile
+from tcs.writing import whole_file
+
+ROBOT = "pr2"
+HERE = (1.4, -1.2, 180.0)
+"""Where the robot comes from in the README's map (x [m], y [m], heading [deg])."""
+_DPI = 76
+"""Of pictures in space: as wide as a page of text."""
+_MAP_DPI = 110
+LETTERS = {
+    ("shaving", "wheelchair"): "a",
+    ("feeding", "wheelchair"): "b",
+    ("brushing", "wheelchair"): "c",
+    ("shaving", "bed"): "d, e",
+    ("shaving", "bed-no-wall"): "f",
+    ("bathing", "bed"): "g, h",
+    ("scratching_upper_arm_left", "bed"): "i",
+    ("scratching_upper_arm_right", "bed"): "j",
+    ("scratching_forearm_left", "bed"): "k",
+    ("scratching_forearm_right", "bed"): "l",
+    ("scratching_thigh_left", "bed"): "m",
+    ("scratching_thigh_right", "bed"): "n",
+    ("scratching_chest", "bed"): "o",
+}
+"""Panels of Figure 6, as its caption has them."""
+INTRODUCTION = """\
+# Gallery
+
+Every picture here is drawn by tcs from score files, without a display; `python scripts/gallery.py`
+scores what is missing and makes this page and its pictures again. The robot is drawn as the shapes
+that contacts are checked with, which enclose its links. Yellow arrows are the goals, each ending
+where the tool has to be; the red one is the goal that the arm is at. What is drawn can be looked at
+from all sides with `tcs view FILE`, and `tcs report FILE --out page.html` tells all about it.
+
+The person, the furniture, the goals and the grids are those of the TCS paper (Kapusta, Park and
+Kemp, IROS 2015), as [the scene](scene.md) has them; the arm is solved by our own inverse
+kinematics, and contacts are checked with shapes instead of meshes, so places differ from the
+paper's. Shown is the set with the greatest P_R + P_M, wherever the robot is now. The
+paper shows a second place for shaving and bathing on the bed only: by its printed rule two places
+are kept when their P_M is greater than that of one, by however little, but its code asked for a
+hundredth more (`tcs score --rules code2015`).
+"""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A picture of the gallery, and what is said of it."""
+
+    name: str
+    figure: Figure
+    dpi: float
+    heading: str
+    text: str
+    alternative: str
+    """What is to be seen, for who cannot see it."""
+
+
+def main() -> int:
+    """Make the gallery; return the exit code."""
+    options = parse()
+    try:
+        return run(options)
+    except tcs.TcsError as error:
+        talk.say(str(error))
+    except KeyboardInterrupt:
+        talk.say("interrupted; no half-written file is left.")
+        return 130
+    return 1
+
+
+def parse() -> argparse.Namespace:
+    """Return the command line's options."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scores", type=Path, default=Path("out/scores"), help="score files")
+    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of gallery.md")
+    parser.add_argument("--jobs", type=int, default=2, help="threads, where a row is scored")
+    return parser.parse_args()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Score what is missing, draw, write the page."""
+    images = options.out / "images"
+    for folder in (images, options.scores):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise tcs.TcsError(f"folder '{folder}' cannot be made: {error.strerror}.") from error
+    files = {row: score_file(row, options) for row in all_rows()}
+    text = INTRODUCTION
+    drawn = [from_behind(files), *(scene_of(row, files[row]) for row in LETTERS), *maps(files)]
+    sizes = []
+    for one in drawn:
+        content = as_png(one.figure, one.dpi, colours=None if one.dpi == _MAP_DPI else 256)
+        write(images / f"{one.name}.png", content)
+        sizes.append(len(content))
+        said = textwrap.fill(one.text, 100, break_on_hyphens=False)
+        picture = f"![{one.alternative}](images/{one.name}.png)"
+        text += f"\n## {one.heading}\n\n{picture}\n\n{said}\n"
+    write(options.out / "gallery.md", text.encode())
+    print(f"wrote {options.out / 'gallery.md'} and {len(drawn)} pictures, {sum(sizes):,} bytes")
+    return 0
+
+
+def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
+    """Return the score file of a row, scored now if it is not there."""
+    path = options.scores / default_path(*row, ROBOT)
+    if not path.exists():
+        score_one(*row, ROBOT, path, jobs=options.jobs)
+    file = tcs.load(path)
+    check_row(path, file, *row, ROBOT)
+    return file
+
+
+def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
+    """Return the paper's Figure 1: shaving in a bed without a wall, from one place."""
+    free, walled = files["shaving", "bed-no-wall"], files["shaving", "bed"]
+    shown = Shown.of(free, None, max_members=1)
+    alone = free.nominal.sets.scores_of(shown.indices)
+    behind = walled.nominal.sets.scores_of(walled.nominal.sets.best_single)
+    at = shown.members[0]
+    where = "behind the head end of the bed" if at.base_x < 0.0 else "beside the bed"
+    rest = "flat" if abs(dict(at.environment)["head_rest"]) < 1e-9 else "raised"
+    text = (
+        'The paper: "when trying to shave a user in a configurable bed, the robot can reach '
+        'shaving poses well from behind the bed with the head rest lying flat". Here, without a '
+        f"wall, the best single place is {where}, with the head rest {rest} ({described(at)}); "
+        f"from it {alone[0]:.0%} of the goals are reached, P_M {alone[1]:.3f}. With the wall that "
+        f"place is lost, and the best single place reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
+    )
+    return Drawn(
+        "gallery-figure-1",
+        member_figure(free, shown, 0),
+        _DPI,
+        "Figure 1: shaving from behind the bed",
+        text,
+        f"The robot {where}, its arm at the face of a person who lies in bed.",
+    )
+
+
+def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
+    """Return a row of Figure 6: the robot at each place of the set with the best scores."""
+    shown = Shown.of(file, None)
+    sets = file.nominal.sets
+    reachability, manipulability = sets.scores_of(tuple(sorted(shown.indices)))
+    title = row[0].replace("_", " ").capitalize()
+    stops = "; ".join(f"stop {i}: {described(at)}" for i, at in enumerate(shown.members, start=1))
+    single = sets.scores_of(sets.best_single)
+    beside = (
+        f" The best single place reaches {single[0]:.0%}, P_M {single[1]:.3f}."
+        if len(shown.members) > 1
+        else ""
+    )
+    text = (
+        f"{reachability:.0%} of the goals, P_M {manipulability:.3f} "
+        f"({file.metadata['measure']}); {stops}.{beside}"
+    )
+    return Drawn(
+        f"gallery-{row[0]}-{row[1]}",
+        scene_figure(file, shown),
+        _DPI,
+        f"Figure 6 ({LETTERS[row]}): {title}, {row[1]}",
+        text,
+        f"The robot at each place of the best set for {title.lower()}, its arm at a goal.",
+    )
+
+
+def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
+    """Return the pictures from above: the README's map, and one for each state of the bed."""
+    chair, bed = files["shaving", "wheelchair"], files["bathing", "bed"]
+    chosen = Shown.of(chair, place(HERE))
+    command = "tcs map shaving-wheelchair-pr2.tcs --out map.png --here 1.4 -1.2 180"
+    return [
+        Drawn(
+            "map",
+            map_figure(chair, chosen),
+            _MAP_DPI,
+            "From above",
+            f"Shaving in the wheelchair, drawn by `{command}`.",
+            "A wheelchair and the person in it from above, with the places where the robot can "
+            "stand coloured by what they are worth.",
+        ),
+        Drawn(
+            "states",
+            states_figure(bed, Shown.of(bed, None)),
+            _MAP_DPI,
+            "For each state of the bed",
+            "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed height "
+            "by head rest, in one colour scale. Both stops want the same state, and are marked in "
+            "its panel."
+            if _want_one_state(bed)
+            else "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed "
+            "height by head rest, in one colour scale. Each stop is marked in the panel it wants.",
+            "Twelve maps of the floor around a bed, one for each bed height and head rest.",
+        ),
+    ]
+
+
+def _want_one_state(file: ScoreFile) -> bool:
+    return len({at.environment for at in Shown.of(file, None).members}) == 1
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file, wholly or not at all."""
+    with whole_file(path, "Gallery") as stream:
+        stream.write(content)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

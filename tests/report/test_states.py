@@ -1,0 +1,95 @@
+"""A map for each state of a bed, from a real but small score file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.errors import SelectionError
+from tcs.report.pictures import Shown
+from tcs.report.states import has_states, states_figure
+from tcs.scoring import score
+from tests.draw.test_map import words
+from tests.store.example import score_file
+from tests.tables.small import small_grid
+
+SMALL_BED = """
+based_on: bed
+name: small-bed
+title: The bed, seen from a few places
+observed: {}
+grid:
+  bed_height: {unit: m, start: 0, step: 0.1, count: 3}
+  head_rest: {unit: deg, start: 0, step: 70, count: 2}
+  base_x: {unit: m, start: 0.5, step: 0.2, count: 5}
+  base_y: {unit: m, start: -0.8, step: 1.6, count: 2}
+  base_yaw: {unit: deg, start: 0, step: 90, count: 4}
+  torso: {unit: m, start: 0.3, step: 0.1, count: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    room = tmp_path_factory.mktemp("bed") / "small-bed.yaml"
+    room.write_text(SMALL_BED)
+    return score("scratching_chest", room)
+
+
+def test_each_panel_shows_its_own_state(file):
+    shown = Shown.of(file, None)
+    figure = states_figure(file, shown)
+    panels = figure.axes[:6]
+    scores = file.nominal.scores
+    # States in C order: bed height, then head rest; the highest bed is on top.
+    by_state = scores.reachability().reshape(3, 2, 5, 2, 4)[::-1].max(axis=-1).reshape(6, 5, 2)
+    assert len({one.tobytes() for one in by_state}) > 3
+    for axes, expected in zip(panels, by_state, strict=True):
+        drawn = np.ma.getdata(axes.collections[1].get_array())
+        np.testing.assert_allclose(drawn, 100.0 * expected.T, atol=1e-9)
+    assert panels[0].get_ylabel().startswith("bed height 0.20 m")
+    assert panels[4].get_ylabel().startswith("bed height 0.00 m")
+    assert [axes.texts[-1].get_text() for axes in panels[:2]] == ["head rest 0°", "head rest 70°"]
+
+
+def test_members_stand_in_the_panel_of_the_state_they_want(file):
+    shown = Shown.of(file, None)
+    figure = states_figure(file, shown, "manipulability")
+    for number, member in enumerate(shown.members, start=1):
+        wanted = dict(member.environment)
+        row = 2 - round(wanted["bed_height"] / 0.1)
+        column = round(np.degrees(wanted["head_rest"]) / 70)
+        marked = [
+            i
+            for i, axes in enumerate(figure.axes[:6])
+            if str(number) in [text.get_text() for text in axes.texts]
+        ]
+        assert marked == [2 * row + column]
+
+
+def test_the_person_is_drawn_as_the_head_rest_has_them(file):
+    figure = states_figure(file, Shown.of(file, None))
+    flat, raised = (
+        [p.vertices for p in axes.collections[2].get_paths()] for axes in figure.axes[:2]
+    )
+    # The head comes forward as the rest goes up.
+    assert not all(np.allclose(a, b) for a, b in zip(flat, raised, strict=False))
+
+
+def test_a_room_without_states_has_one_map():
+    file = score_file(grid=small_grid(nx=3, ny=2))
+    assert not has_states(file)
+    with pytest.raises(SelectionError, match=r"has nothing to set.*without --states"):
+        states_figure(file, Shown.of(file, None))
+
+
+def test_too_many_states_are_refused():
+    file = score_file(grid=small_grid(nx=2, ny=2, yaws=1, torsos=1, bed=21, head=3))
+    assert not has_states(file)
+    with pytest.raises(SelectionError, match="63 states, of which 60 at most"):
+        states_figure(file, Shown.of(file, None))
+
+
+def test_words_of_a_panel(file):
+    said = words(states_figure(file, Shown.of(file, None)))
+    for word in ("best place", "head rest 70°", "person", "Each place: best of all headings."):
+        assert word in said
