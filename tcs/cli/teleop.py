@@ -7,12 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tcs.cli import options, talk
+from tcs.cli import options, talk, teleop_live
 
-app = typer.Typer(
-    help="Drive a redundant arm: its tool, or its posture while the tool stays.",
-    no_args_is_help=True,
-)
+app = typer.Typer()
+app.callback(invoke_without_command=True)(teleop_live.live)
+app.command()(teleop_live.replay)
 
 
 @app.command()

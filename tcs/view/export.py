@@ -128,9 +128,20 @@ def _panel(title: str, lines: list[str]) -> str:
         f"&#9632;</span> {one.name.lower().replace('_', ' ')}</span>"
         for one in Reason
     )
+    return overlay(title, lines, f"<p>{colours}</p>")
+
+
+def overlay(title: str, lines: Sequence[str], more: str = "") -> str:
+    """Return title and lines of text as HTML that lies over the picture.
+
+    Args:
+        title: First line, in bold.
+        lines: Further lines.
+        more: HTML below them, taken as it is.
+    """
     said = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
     return (
         "<style>#tcs{position:fixed;left:0;top:0;max-width:44em;margin:8px;padding:6px 10px;"
         "background:#ffffffdd;font:13px sans-serif;color:#222}#tcs p{margin:3px 0}</style>"
-        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{said}<p>{colours}</p></div>'
+        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{said}{more}</div>'
     )

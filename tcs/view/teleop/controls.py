@@ -119,6 +119,8 @@ class Heard:
     """What to do instead of what was just tried; may be empty."""
     back: bool = False
     """Whether the arm is to be put back to where it began."""
+    watched: bool = True
+    """Whether a browser looks at the page."""
 
 
 @dataclass
@@ -166,7 +168,8 @@ class Hand:
             if any(reading.sliders[name] for name in RATE_SLIDERS):
                 self.source.zero()
         if lost or back or STOP in pressed:
-            return Heard(Command(mode=self.mode, clutch=bool(lost) or self.clutch), lost, back=back)
+            command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
+            return Heard(command, lost, back=back, watched=reading.watched)
         return Heard(self._command(reading, asked, now), hint=self._hint_at(now))
 
     def _pressed(self, reading: Reading, now: float) -> dict[str, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable
 
@@ -20,7 +21,7 @@ from tcs.view.teleop.controls import (
 )
 from tcs.view.teleop.gamepad import pad_of
 from tcs.view.teleop.pace import Pace, Times
-from tcs.view.teleop.panel import Panel, readout
+from tcs.view.teleop.panel import Panel, mode_line, readout, state_facts
 from tcs.view.teleop.stage import TARGET, TOOL, Stage, Trail, pose_of
 
 FloatArray = NDArray[np.float64]
@@ -104,7 +105,8 @@ class LivePage:
             settings: How commands become motion.
             modes: What a person can change between; the first one comes first.
             tell: Called with a line of text whenever the arm stops for another reason.
-            on_step: Called after each step with the command and what came of it.
+            on_step: Called after each step with the command and what came of it, once a browser
+                has looked at the page.
 
         Raises:
             TcsError: If the start posture is not seven finite numbers.
@@ -114,12 +116,14 @@ class LivePage:
             MeshcatControls(meshcat, len(settings.groups)), modes, len(settings.groups)
         )
         self.steps, self.pictures, self.worked = Times(), Times(), Times()
+        self.dropped = 0
         self._meshcat, self._stage, self._arm = meshcat, stage, arm
         self._start = np.array(start, dtype=np.float64)
         self._tell, self._on_step = tell, on_step
         self._told = ""
         self._said, self._said_until = "", 0.0
         self._touching = ""
+        self._seen = False
         self._shown = 0
         stage.set_up(meshcat, arm.kinematics(self._start).p)
         self._panel = Panel(meshcat, arm)
@@ -140,13 +144,16 @@ class LivePage:
         now = time.perf_counter()
         self.steps.add(now - listened)
         self.worked.add(now - begun)
-        reason = heard.lost or self.last.reason
+        if heard.lost:
+            self.last = dataclasses.replace(self.last, stopped=True, reason=heard.lost)
+        reason = self.last.reason
         if reason:
             self._said, self._said_until = reason, now + _SAID_FOR
             if reason != self._told:
                 self._tell(reason)
         self._told = reason
-        if self._on_step is not None:
+        self._seen = self._seen or heard.watched
+        if self._seen and self._on_step is not None:
             self._on_step(heard.command, self.last)
         return self.last
 
@@ -167,28 +174,27 @@ class LivePage:
         self._panel.show(readout(self._arm, last.joints, last.limits, last.singular, mode, said))
         self.pictures.add(time.perf_counter() - begun)
 
-    def run(self, duration: float | None = None) -> Pace:
-        """Drive the arm for so long [s], or until interrupted; return how the steps were paced."""
+    def run(self, duration: float | None = None) -> None:
+        """Drive the arm for so long [s], or until interrupted."""
         pace = Pace(self.session.settings.period)
         end = None if duration is None else time.monotonic() + duration
         since = 0
         while end is None or time.monotonic() < end:
-            for _ in range(pace.wait()):
+            due, late = pace.wait()
+            self.dropped += late
+            for _ in range(due):
                 self.step()
                 since += 1
             if since >= SHOW_EVERY:
                 since = 0
                 self.show()
-        return pace
 
     def mode_line(self) -> str:
         """Return what commands move, in one line."""
-        line = f"{self.last.mode} mode"
-        if self.last.mode is Mode.NULL_SPACE:
-            group = self.session.settings.groups[self.hand.group]
-            joints = " ".join(str(joint + 1) for joint in group)
-            line += f", group {self.hand.group + 1} (joints {joints})"
-        return f"{line}; clutch in" if self._heard.command.clutch else line
+        number = self.hand.group
+        chosen = self.last.mode is Mode.NULL_SPACE
+        group = self.session.settings.groups[number] if chosen else None
+        return mode_line(self.last.mode, group, number, self._heard.command.clutch)
 
     def said(self, now: float) -> str:
         """Return what the person is told: why the arm stops, or what else there is to know.
@@ -198,15 +204,7 @@ class LivePage:
         """
         if now < self._said_until:
             return self._said
-        last = self.last
-        at = [
-            f"joint {i + 1} ({'upper' if flag > 0 else 'lower'})"
-            for i, flag in enumerate(last.limits)
-            if flag
-        ]
-        facts = [f"at its limit: {', '.join(at)}"] if at else []
-        if last.singular:
-            facts.append("singular posture")
+        facts = [state_facts(self.last.limits, self.last.singular)]
         if self._touching:
             facts.append(f"{self._touching} (nothing prevents that)")
-        return self._heard.hint or "; ".join(facts)
+        return self._heard.hint or "; ".join(one for one in facts if one)

@@ -35,10 +35,9 @@ class Pace:
         self._period, self._clock, self._sleep = period, clock, sleep
         self._begun = clock()
         self._steps = 0
-        self.dropped = 0
 
-    def wait(self) -> int:
-        """Wait until a step is due, and return how many are: 1, or more if the loop is late."""
+    def wait(self) -> tuple[int, int]:
+        """Wait until a step is due; return how many to take, 1 or more, and how many to drop."""
         ahead = self._begun + (self._steps + 1) * self._period - self._clock()
         if ahead > 0.0:
             self._sleep(ahead)
@@ -46,9 +45,8 @@ class Pace:
         # A sleep may end a hair early; the step is due all the same.
         due = max(due, 1)
         taken = min(due, MOST_AT_ONCE)
-        self.dropped += due - taken
         self._steps += due
-        return taken
+        return taken, due - taken
 
 
 @dataclass
@@ -63,6 +61,11 @@ class Times:
         self.taken.append(seconds)
         if len(self.taken) > 2 * _KEPT:
             del self.taken[:_KEPT]
+
+    @property
+    def count(self) -> int:
+        """How many of them are kept."""
+        return len(self.taken)
 
     def summary(self) -> str:
         """Return median and 99th percentile as words."""

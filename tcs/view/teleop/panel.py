@@ -33,15 +33,15 @@ _DISTANCE = 0.05
 """From the camera [m]: behind its nearest plane (0.01 m), before anything that one looks at."""
 _HALF_HEIGHT = math.tan(math.radians(37.5))
 """Half the height of what Meshcat's camera sees at a distance of 1; it sees 75 degrees."""
-_WIDTH, _BOTTOM, _TOP = 1.56, -0.97, -0.53
+_WIDTH, _BOTTOM, _TOP = 1.56, -0.92, -0.48
 """Of the panel; it fits into every window that is not much higher than wide."""
 _BAR = (0.185, 0.04)
 """Width and height of a bar."""
 _PITCH = _WIDTH / 7.0
-_BARS_AT, _NAMES_AT, _ENDS_AT = -0.865, -0.815, -0.945
+_BARS_AT, _NAMES_AT, _ENDS_AT = -0.815, -0.765, -0.895
 _MARK = 0.012
 """Width of the mark where the joint stands: seen where the bar has no length."""
-_LINE_AT = {"mode": -0.6, "said": -0.675}
+_LINE_AT = {"mode": -0.55, "said": -0.625}
 _FONT, _SMALL = 0.044, 0.034
 _MOST_LETTERS = int((_WIDTH - 0.06) / (_FONT * ADVANCE))
 _KEPT = 40
@@ -83,6 +83,40 @@ def readout(
     other = SINGULAR if singular else FREE
     states = tuple(LIMIT if flag else other for flag in limits)
     return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, said)
+
+
+def state_facts(limits: ShortArray, singular: bool) -> str:
+    """Return which joints are at a limit and whether the posture is singular, as words.
+
+    >>> state_facts(np.array([0, 1, 0, -1, 0, 0, 0]), True)
+    'at its limit: joint 2 (upper), joint 4 (lower); singular posture'
+    """
+    at = [
+        f"joint {i + 1} ({'upper' if flag > 0 else 'lower'})"
+        for i, flag in enumerate(limits)
+        if flag
+    ]
+    facts = [f"at its limit: {', '.join(at)}"] if at else []
+    return "; ".join([*facts, "singular posture"] if singular else facts)
+
+
+def mode_line(mode: str, group: tuple[int, ...] | None, number: int, clutch: bool) -> str:
+    """Return what commands move, in one line.
+
+    Args:
+        mode: Name of the mode.
+        group: Joints of the group that is chosen, counted from 0; None where there is none.
+        number: Number of that group, counted from 0.
+        clutch: Whether the clutch parts arm and person.
+
+    >>> mode_line("null-space", (0, 1, 2), 0, False)
+    'null-space mode, group 1 (joints 1 2 3)'
+    """
+    line = f"{mode} mode"
+    if group is not None:
+        joints = " ".join(str(joint + 1) for joint in group)
+        line += f", group {number + 1} (joints {joints})"
+    return f"{line}; clutch in" if clutch else line
 
 
 class Panel:

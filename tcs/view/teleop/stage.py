@@ -66,19 +66,23 @@ class Stage:
         }
         self._still = {body: still[body] for body in bodies - self._moving}
 
-    def set_up(self, meshcat: Meshcat, tool: FloatArray, *, compact: bool = False) -> None:
+    def set_up(
+        self, meshcat: Meshcat, tool: FloatArray, *, target: bool = True, compact: bool = False
+    ) -> None:
         """Give Meshcat everything there is.
 
         Args:
             meshcat: An empty one.
             tool: Where the tool is at first, in the base [m], shape (3,).
+            target: Whether there is a target to show; a recorded run does not say where it was.
             compact: Whether meshes are handed over as bare triangles.
         """
         draw_ground(meshcat)
         draw_shapes(meshcat, ROBOT, self._shapes, compact=compact)
         for body, X_WL in self._still.items():
             meshcat.SetTransform(_body(body), X_WL)
-        for path, (length, width) in ((TARGET, _TARGET_AXIS), (TOOL, _TOOL_AXIS)):
+        triads = {TOOL: _TOOL_AXIS} | ({TARGET: _TARGET_AXIS} if target else {})
+        for path, (length, width) in triads.items():
             for i, colour in enumerate(_AXES):
                 size = np.full(3, width)
                 size[i] = length
