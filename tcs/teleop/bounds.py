@@ -7,6 +7,9 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
 
+_STILL = 1e-9
+"""A joint at this rate [rad/s] stands still: a thousand times the rounding of any motion."""
+
 
 def rate_bounds(
     arm: Arm, joints: FloatArray, period: float, acceleration: float | FloatArray
@@ -73,7 +76,8 @@ def scale_within(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> tup
         A factor in [0, 1], and the joint that asks for it, -1 at factor 1.
     """
     bound = np.where(rates > 0.0, upper, lower)
-    too_fast = np.abs(rates) > np.abs(bound)
+    # A joint at its limit that is not meant to move must not stop the others by its rounding.
+    too_fast = np.abs(rates) > np.abs(bound) + _STILL
     if not too_fast.any():
         return 1.0, -1
     factors = np.ones_like(rates)

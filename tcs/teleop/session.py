@@ -146,8 +146,8 @@ class Teleoperation:
         """
         if not self._speed:
             self._group = command.group
-            if not held and command.mode not in (None, self._mode):
-                self._mode = command.mode
+            if not held and command.mode is not None and command.mode != self._mode:
+                self._mode = Mode(command.mode)
                 self._switching = True
         other = command.mode not in (None, self._mode)
         if not (held or other or self._switching):

@@ -33,6 +33,8 @@ class Mode(StrEnum):
 
 RESHAPING = (Mode.NULL_SPACE, Mode.POSE)
 """Modes in which the arm moves and the tool stays."""
+FASTEST = 100.0
+"""Commands beyond this [m/s or rad/s] are no hand's, but a fault's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,15 +65,21 @@ class Command:
             groups: How many joint groups there are.
         """
         for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
-            values = np.asarray(getattr(self, name), dtype=np.float64)
+            try:
+                values = np.asarray(getattr(self, name), dtype=np.float64)
+            except (TypeError, ValueError):
+                values = np.empty(0)
             if values.shape != (3,):
-                return f"its {name} velocity must be 3 numbers [{unit}], not {values.shape}"
-            if not math.isfinite(values[0] + values[1] + values[2]):
-                return f"its {name} velocity is not finite"
+                return f"its {name} velocity must be 3 numbers [{unit}]"
+            # Written so that "not a number" is refused as well.
+            if not np.abs(values).max() <= FASTEST:
+                return f"its {name} velocity must be finite, and {FASTEST:g} {unit} at most"
         if self.sign not in (-1, 0, 1):
             return f"its sign must be -1, 0 or 1, not {self.sign}"
-        if self.group is not None and not 0 <= self.group < groups:
+        if self.group is not None and self.group not in range(groups):
             return f"there is no joint group {self.group}, only 0 to {groups - 1}"
+        if self.mode not in (None, *Mode):
+            return f"there is no mode {self.mode!r}, only {', '.join(Mode)}"
         return ""
 
 

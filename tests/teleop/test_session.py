@@ -66,6 +66,16 @@ class TestEndEffector:
         # It gathers speed in 0.05 s.
         assert back[-1].p[0] - last.p[0] > 0.045
 
+    @pytest.mark.parametrize("limits", BOTH)
+    def test_a_joint_at_its_limit_that_is_not_needed_stops_nothing(self, iiwa, ready, limits):
+        joints = ready.copy()
+        joints[6] = iiwa.upper[6]
+        for mode in (Mode.END_EFFECTOR, Mode.NULL_SPACE):
+            session = Teleoperation(iiwa, joints, Settings(limits=limits), mode)
+            steps = drive(session, Command(linear=(0.05, 0, 0.05), group=1, sign=-1), 0.5)
+            assert not any(step.stopped for step in steps)
+            assert np.abs(steps[-1].joints - joints)[:6].max() > 0.02
+
     def test_clamped_leaves_the_joint_at_its_limit_and_goes_on(self, iiwa):
         # Elbow nearly at its limit, the rest bent so that six joints can do it all.
         joints = np.array([0.3, 0.4, 0.6, -2.05, -0.7, 0.8, 0.0])
@@ -108,7 +118,7 @@ class TestNullSpace:
     ):
         session = Teleoperation(iiwa, ready + 0.1, Settings(limits=limits), Mode.NULL_SPACE)
         start = session.step(Command())
-        steps = drive(session, Command(group=group, sign=sign), 12.0)
+        steps = drive(session, Command(group=group, sign=sign), 9.0)
         assert off(steps, start.p) < 1e-4
         assert steps[-1].stopped
         assert steps[-1].reason
@@ -290,16 +300,22 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("command", "said"),
         [
-            (Command(linear=(np.nan, 0, 0)), "its linear velocity is not finite"),
-            (Command(angular=(0, np.inf, 0)), "its angular velocity is not finite"),
-            (Command(linear=(0, 0)), "its linear velocity must be 3 numbers"),
+            (Command(linear=(np.nan, 0, 0)), "its linear velocity must be finite, and 100 m/s at"),
+            (Command(angular=(0, np.inf, 0)), "its angular velocity must be finite, and 100 rad/s"),
+            (Command(linear=(0, 0, -1e9)), "its linear velocity must be finite, and 100 m/s at"),
+            (Command(linear=(0, 0)), "its linear velocity must be 3 numbers [m/s]"),
+            (Command(angular="fast"), "its angular velocity must be 3 numbers [rad/s]"),
+            (
+                Command(mode="elbow"),
+                "there is no mode 'elbow', only end-effector, null-space, pose",
+            ),
             (Command(group=4, sign=1), "there is no joint group 4, only 0 to 3"),
             (Command(group=0, sign=2), "its sign must be -1, 0 or 1, not 2"),
             (Command(group=0, sign=np.nan), "its sign must be -1, 0 or 1, not nan"),
         ],
-        ids=["nan", "inf", "short", "group", "sign", "nan sign"],
+        ids=["nan", "inf", "huge", "short", "text", "mode", "group", "sign", "nan sign"],
     )
-    @pytest.mark.parametrize("mode", list(Mode))
+    @pytest.mark.parametrize("mode", [Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.ASSISTED])
     def test_the_arm_holds_still_and_says_why(self, iiwa, ready, mode, command, said):
         session = Teleoperation(iiwa, ready, mode=mode)
         drive(session, Command(linear=(0.1, 0, 0), group=0, sign=1), 1.0)
