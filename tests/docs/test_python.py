@@ -1,0 +1,32 @@
+"""The Python of the docs runs as it stands there, one block after the other."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+import tcs
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = [
+    path for path in sorted(DOCS.glob("*.md")) if "```python" in path.read_text(encoding="utf-8")
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S)
+    # Files that a block reads: any will do, so one that is made in a second.
+    for name in re.findall(r'tcs\.load\("(.+?)"\)', "".join(blocks)):
+        tcs.save(name, tcs.score("feeding"))
+    # What the sentence before a block has introduced.
+    pose = {"base_x": 1.4, "base_y": -1.2, "base_yaw": math.pi, "torso": 0.0}
+    names = {"tcs": tcs, "here": tcs.InitialConfiguration(**pose)}
+    for block in blocks:
+        exec(compile(block, str(page), "exec"), names)
+
+
+def test_there_are_blocks():
+    assert len(PAGES) >= 3
