@@ -80,6 +80,7 @@ def report(
         "measure": answer.measure,
         "unreached_goals": list(answer.unreached),
         "verification": answer.verification.to_json(),
+        "shown_checked": len(answer.findings),
         "shown_false": [goal for goal, finding in answer.findings.items() if not finding.is_true],
         "is_sound": answer.is_sound,
         "seconds": answer.seconds,
@@ -118,6 +119,7 @@ def _report(result: dict[str, Any]) -> None:
     """Print what was written, and the verdict."""
     for name, size in zip(result["files"], result["bytes"], strict=True):
         typer.echo(f"wrote {name}: {size / 1e6:.2f} MB")
-    checked = result["verification"]["checked"]
+    checked, shown = result["verification"]["checked"], result["shown_checked"]
     sound = "every answer holds" if result["is_sound"] else "SOME ANSWERS ARE FALSE"
-    typer.echo(f"those shown and {checked:,} others re-checked with Drake: {sound}")
+    if checked or shown:
+        typer.echo(f"{shown} answers shown and {checked:,} others re-checked with Drake: {sound}")

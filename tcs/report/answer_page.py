@@ -93,13 +93,25 @@ def _summary(answer: Answer) -> list[Block]:
 
 
 def _hopeless(answer: Answer) -> list[str]:
-    """Return for each goal what stopped the configurations that came nearest to reaching it."""
-    said = []
+    """Return what stopped the configurations that came nearest to reaching a goal."""
+    found: dict[str, list[int]] = {}
     for goal, spread in enumerate(answer.distributions):
-        if spread.farthest is not None:
-            why = REASONS[spread.farthest.reason]
-            said.append(f"Goal {goal}: nearest came {spread.farthest.stopped:,}: {why}.")
-    return said
+        if spread.reached == 0 and spread.farthest is not None:
+            found.setdefault(REASONS[spread.farthest.reason], []).append(goal)
+    return [
+        f"{_numbered(goals)}: reached from nowhere on the grid; what came nearest was stopped by "
+        f"this: {why}."
+        for why, goals in found.items()
+    ]
+
+
+def _numbered(goals: Sequence[int]) -> str:
+    """Return goals by their numbers.
+
+    >>> _numbered([2]), _numbered([0, 3])
+    ('Goal 2', 'Goals 0, 3')
+    """
+    return f"Goal{'s' if len(goals) > 1 else ''} {', '.join(map(str, goals))}"
 
 
 def _soundness(answer: Answer) -> str:
@@ -109,13 +121,21 @@ def _soundness(answer: Answer) -> str:
             "SOME ANSWERS OF THE FILE ARE FALSE: do not use it. What is wrong is told under Goal "
             "by goal and Checked again."
         )
-    shown = (
-        f"each of the {len(answer.findings)} postures shown here and " if answer.findings else ""
-    )
-    return (
-        f"Drake confirms {shown}all of {found.checked:,} stored answers drawn at random; of "
-        f"{found.dense_checked:,} unreached ones {found.missed:,} turned out to be reachable."
-    )
+    said = []
+    if found.checked:
+        shown = f"each of the {len(answer.findings)} postures shown here and "
+        said.append(
+            f"Drake confirms {shown if answer.findings else ''}all of {found.checked:,} stored "
+            "answers drawn at random"
+        )
+    elif answer.findings:
+        said.append(f"Drake confirms each of the {len(answer.findings)} postures shown here")
+    if found.dense_checked:
+        said.append(
+            f"of {found.dense_checked:,} unreached pairs drawn at random {found.missed:,} turned "
+            "out to be reachable"
+        )
+    return f"{'; '.join(said) or 'Nothing was re-checked with Drake'}."
 
 
 def _success_in_short(answer: Answer) -> list[str]:
@@ -186,16 +206,11 @@ def _views(answer: Answer) -> list[Block]:
 
 def _goals(answer: Answer) -> list[Block]:
     blocks: list[Block] = [goals_table(answer)]
-    for goal in answer.unreached:
-        found = answer.explanation(goal)
-        if found.fix is None:
-            farthest = found.distribution.farthest
-            why = f": {REASONS[farthest.reason]}" if farthest is not None else ""
-            blocks.append(Text(f"Goal {goal} is reached from nowhere on the grid{why}."))
-        elif answer.shown.members:
-            blocks.append(
-                Text(f"Goal {goal} would be reached from stop 1 so: {found.fix.sentence}")
-            )
+    blocks += [Text(said) for said in _hopeless(answer)]
+    for goal in answer.unreached if answer.shown.members else ():
+        fix = answer.explanation(goal).fix
+        if fix is not None:
+            blocks.append(Text(f"Goal {goal} would be reached from stop 1 so: {fix.sentence}"))
     if answer.shown.members:
         blocks.append(Folded("Arm joints", [joints_table(answer)]))
     return blocks

@@ -26,11 +26,22 @@ from tcs.report.answer_tables import (
     verification_table,
 )
 from tcs.report.reproduce import robustify_command, score_command
+from tcs.scoring import score
 from tcs.store import Scored, load_scores, save_scores
 from tcs.tables import InitialConfiguration, Reason
 from tests.report.test_page import Reader
 from tests.report.test_robustness_report import column
 
+FAR_ROOM = """
+based_on: wheelchair
+name: far-room
+title: Somewhere else
+grid:
+  base_x: {unit: m, start: 5, step: 0.1, count: 3}
+  base_y: {unit: m, start: 5, step: 0.1, count: 2}
+  base_yaw: {unit: deg, start: 0, step: 90, count: 4}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 1}
+"""
 CHECK = Check(pairs=12, dense=6, seed=3)
 
 
@@ -143,16 +154,21 @@ def test_the_set_is_the_one_to_choose_from_here(score_path):
     assert "the set to choose for a robot at x 0.6 m, y 0.7 m, heading 0 deg" in said
 
 
-def test_a_false_answer_is_told(score_path, tmp_path):
+@pytest.fixture(scope="module")
+def false_path(score_path, tmp_path_factory):
+    """The file with the postures of all pairs a degree off at one joint."""
     file = load_scores(score_path)
     scores = file.nominal.scores
-    path = tmp_path / "false.tcs"
-    # The postures of all pairs, each a degree off at one joint.
+    path = tmp_path_factory.mktemp("false") / "false.tcs"
     joints = scores.arm_joints + np.float32([0, 0, 0, math.radians(1.0), 0, 0, 0])
     wrong = dataclasses.replace(scores, arm_joints=joints)
     table = Scored.of(wrong, file.nominal.sets)
     save_scores(path, dataclasses.replace(file, tables=(table,)))
-    found = answer_of(path, check=CHECK)
+    return path
+
+
+def test_a_false_answer_is_told(false_path):
+    found = answer_of(false_path, check=CHECK)
     assert not found.is_sound
     assert set(column(goals_table(found), "Drake")) == {"REFUSES IT"}
     assert column(verification_table(found), "Found")[1] == "12"
@@ -237,3 +253,26 @@ def test_on_the_command_line(score_path, tmp_path):
     assert told["verification"]["checked"] == 3
     assert out.read_text().startswith("<!doctype html>")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.md"]
+
+
+def test_nothing_in_reach_is_a_page_too(tmp_path):
+    room = tmp_path / "far.yaml"
+    room.write_text(FAR_ROOM)
+    path = tmp_path / "far.tcs"
+    save_scores(path, score("shaving", room))
+    found = answer_of(path, check=CHECK)
+    assert found.is_sound
+    said = as_markdown(answer_page(found, command="c"))
+    assert "None of the 8 goals is reached from anywhere" in said
+    assert said.count("what came nearest was stopped by this: too far for the arm.") == 2
+    assert "Nothing was re-checked with Drake." in said
+    assert found.views == ()
+
+
+def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
+    out = tmp_path / "page.md"
+    words = ("report", false_path, "--out", out, "--pairs", 2, "--dense", 0)
+    ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert ran.exit_code == 1
+    assert "some answers in" in ran.stderr
+    assert "SOME ANSWERS OF THE FILE ARE FALSE" in out.read_text()
