@@ -47,7 +47,9 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("script", ["live.py", "robots.py", "rows.py", "run.py", "selection.py"])
+@pytest.mark.parametrize(
+    "script", ["live.py", "robots.py", "rows.py", "run.py", "selection.py", "teleop.py"]
+)
 def test_each_script_says_how_it_is_used(script):
     command = [sys.executable, str(FOLDER / script), "--help"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

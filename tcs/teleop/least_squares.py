@@ -6,6 +6,8 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 
+_GUESSES = 6
+"""Rounds after which guessing has gone in circles: fewer do nearly always."""
 _ROUNDS = 50
 """Far more changes of the active set than seven joints ever need; each lowers the cost."""
 
@@ -15,10 +17,9 @@ def bounded_minimum(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the x between bounds that minimises x^T H x / 2 - g^T x.
 
-    An active set method (Lawson and Hanson, Solving Least Squares Problems, chapter 23, for bounds
-    on both sides): solve for the free variables; go towards the solution up to the first bound on
-    the way and hold that variable there; once all free ones are inside, let go of the held one
-    that pulls inwards most; stop when none does.
+    Which variables are at a bound is guessed and mended all at once first (the primal-dual active
+    set of Hintermüller, Ito and Kunisch, 2003): mostly two or three rounds. Where that goes in
+    circles, an active set that changes by one variable at a time cannot.
 
     Args:
         hessian: H, positive definite, shape (n, n).
@@ -30,12 +31,40 @@ def bounded_minimum(
         x, shape (n,), and which variables are held at a bound, shape (n,).
     """
     x = np.asarray(np.linalg.solve(hessian, slope), dtype=np.float64)
-    side = np.zeros(len(x), np.int8)
-    if ((x >= lower) & (x <= upper)).all():
-        return x, side != 0
-    x = np.clip(np.zeros_like(x), lower, upper)
+    below, above = x < lower, x > upper
+    if not (below.any() or above.any()):
+        return x, below
     # A pull weaker than this is rounding, of the size that the cost itself is rounded by.
     slack = 1e-12 * (1.0 + float(np.abs(slope).max()))
+    for _ in range(_GUESSES):
+        held = below | above
+        bound = np.where(below, lower, np.where(above, upper, 0.0))
+        reduced = np.where(held[:, None] | held, 0.0, hessian)
+        reduced.flat[:: len(x) + 1] += held
+        x = np.linalg.solve(reduced, np.where(held, bound, slope - hessian @ bound))
+        x[held] = bound[held]
+        pull = slope - hessian @ x
+        # A free one may have gone past a bound; a held one stays while it is pulled outwards.
+        now_below = np.where(below, pull < slack, ~above & (x < lower))
+        now_above = np.where(above, pull > -slack, ~below & (x > upper))
+        if (now_below == below).all() and (now_above == above).all():
+            return x, held
+        below, above = now_below, now_above
+    return _one_by_one(hessian, slope, lower, upper, slack)
+
+
+def _one_by_one(
+    hessian: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray, slack: float
+) -> tuple[FloatArray, BoolArray]:
+    """Return what `bounded_minimum` does, by steps each of which lowers the cost.
+
+    Solve for the free variables; go towards the solution up to the first bound on the way and hold
+    that variable there; once all free ones are inside, let go of the held one that pulls inwards
+    most; stop when none does (Lawson and Hanson, Solving Least Squares Problems, chapter 23, for
+    bounds on both sides).
+    """
+    side = np.zeros(len(slope), np.int8)
+    x = np.clip(np.zeros_like(slope), lower, upper)
     for _ in range(_ROUNDS):
         free = np.flatnonzero(side == 0)
         if len(free):

@@ -12,6 +12,7 @@ PERIOD, ACCELERATION = 0.01, 5.0
 CHANGE = PERIOD * ACCELERATION
 
 
+@settings(max_examples=25, deadline=None)
 @given(
     start=st.floats(-2.0, 2.0), before=st.floats(-3.0, 3.0), period=st.sampled_from([0.01, 0.02])
 )

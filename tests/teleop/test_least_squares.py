@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
+from tcs.teleop import least_squares
 from tcs.teleop.least_squares import bounded_minimum
 
 
@@ -18,11 +20,14 @@ def problem(seed, rows):
     return A, b, lower, upper
 
 
+@pytest.mark.parametrize("guesses", [6, 0], ids=["all at once", "one by one"])
 @given(seed=st.integers(0, 10**6), rows=st.integers(3, 12))
-def test_the_least_of_all_sums_between_the_bounds_is_found(seed, rows):
+def test_the_least_of_all_sums_between_the_bounds_is_found(seed, rows, guesses):
     A, b, lower, upper = problem(seed, rows)
     ease = 1e-3
-    x, held = bounded_minimum(A.T @ A + ease * np.eye(7), A.T @ b, lower, upper)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(least_squares, "_GUESSES", guesses)
+        x, held = bounded_minimum(A.T @ A + ease * np.eye(7), A.T @ b, lower, upper)
     assert ((x >= lower) & (x <= upper)).all()
     assert ((x == lower) | (x == upper))[held].all()
     # What decides that it is the least: free ones lie in a hollow, held ones are pulled outwards.
@@ -51,3 +56,12 @@ def test_a_start_without_bounds_in_the_way_is_the_plain_solution():
     x, held = bounded_minimum(H, np.ones(7), np.full(7, -np.inf), np.full(7, np.inf))
     np.testing.assert_allclose(H @ x, np.ones(7), atol=1e-12)
     assert not held.any()
+
+
+def test_a_variable_that_may_not_move_stays():
+    A = np.random.default_rng(2).normal(size=(9, 7))
+    lower, upper = np.full(7, -0.1), np.full(7, 0.1)
+    lower[3] = upper[3] = 0.0
+    x, held = bounded_minimum(A.T @ A, A.T @ np.ones(9), lower, upper)
+    assert x[3] == 0.0
+    assert held[3]
