@@ -31,17 +31,15 @@ from tcs.store import Scored, load_scores, save_scores
 from tcs.tables import InitialConfiguration, Reason
 from tests.report.test_page import Reader
 from tests.report.test_robustness_report import column
+from tests.rooms import write_room
 
-FAR_ROOM = """
-based_on: wheelchair
-name: far-room
-title: Somewhere else
-grid:
-  base_x: {unit: m, start: 5, step: 0.1, count: 3}
-  base_y: {unit: m, start: 5, step: 0.1, count: 2}
-  base_yaw: {unit: deg, start: 0, step: 90, count: 4}
-  torso: {unit: m, start: 0.15, step: 0.15, count: 1}
-"""
+FAR = {
+    "base_x": (5, 0.1, 3),
+    "base_y": (5, 0.1, 2),
+    "base_yaw": (0, 90, 4),
+    "torso": (0.15, 0.15, 1),
+}
+"""Where nothing is in reach."""
 CHECK = Check(pairs=12, dense=6, seed=3)
 
 
@@ -256,10 +254,8 @@ def test_on_the_command_line(score_path, tmp_path):
 
 
 def test_nothing_in_reach_is_a_page_too(tmp_path):
-    room = tmp_path / "far.yaml"
-    room.write_text(FAR_ROOM)
     path = tmp_path / "far.tcs"
-    save_scores(path, score("shaving", room))
+    save_scores(path, score("shaving", write_room(tmp_path, "far", FAR)))
     found = answer_of(path, check=CHECK)
     assert found.is_sound
     said = as_markdown(answer_page(found, command="c"))

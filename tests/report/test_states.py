@@ -10,28 +10,24 @@ from tcs.report.pictures import Shown
 from tcs.report.states import has_states, states_figure
 from tcs.scoring import score
 from tests.draw.test_map import words
+from tests.rooms import write_room
 from tests.store.example import score_file
 from tests.tables.small import small_grid
 
-SMALL_BED = """
-based_on: bed
-name: small-bed
-title: The bed, seen from a few places
-observed: {}
-grid:
-  bed_height: {unit: m, start: 0, step: 0.1, count: 3}
-  head_rest: {unit: deg, start: 0, step: 70, count: 2}
-  base_x: {unit: m, start: 0.5, step: 0.2, count: 5}
-  base_y: {unit: m, start: -0.8, step: 1.6, count: 2}
-  base_yaw: {unit: deg, start: 0, step: 90, count: 4}
-  torso: {unit: m, start: 0.3, step: 0.1, count: 1}
-"""
+SMALL_BED = {
+    "bed_height": (0, 0.1, 3),
+    "head_rest": (0, 70, 2),
+    "base_x": (0.5, 0.2, 5),
+    "base_y": (-0.8, 1.6, 2),
+    "base_yaw": (0, 90, 4),
+    "torso": (0.3, 0.1, 1),
+}
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    room = tmp_path_factory.mktemp("bed") / "small-bed.yaml"
-    room.write_text(SMALL_BED)
+    folder = tmp_path_factory.mktemp("bed")
+    room = write_room(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
     return score("scratching_chest", room)
 
 
