@@ -3,6 +3,7 @@
 import csv
 import itertools
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,14 @@ from tcs.errors import RobotError, UnknownNameError
 from tcs.paths import data_folder
 from tcs.robots import load_robot, read_urdf, robot_names
 from tcs.robots.extras import model_with_extras
+from tcs.robots.geometry import body_triangles
 from tcs.robots.packages import resolve_uri
 from tcs.robots.pose import pose_in_root
+from tcs.robots.self_collision import SelfCollision, sample_positions
 from tcs.robots.urdf import Joint
 
 FOLDER = data_folder() / "models" / "robots"
+BAXTER = "package://example-robot-data/robots/baxter_description/urdf/baxter.urdf"
 PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
 
 
@@ -54,6 +58,7 @@ def test_tool_looks_out_of_the_hand_along_its_x(name):
         ("pr2_right", "r_gripper_l_finger_link", "r_gripper_r_finger_link"),
         ("tiago", "gripper_right_finger_link", "gripper_left_finger_link"),
         ("panda", "panda_leftfinger", "panda_rightfinger"),
+        ("baxter", "l_gripper_l_finger_tip", "l_gripper_r_finger_tip"),
     ],
 )
 def test_fingers_open_along_the_tools_y(name, one, other):
@@ -138,6 +143,49 @@ def test_panda_is_that_of_the_package_on_a_pedestal():
         mine = [(g.mesh, g.xyz, g.rpy, g.size) for g in ours.links[link] if g.mesh]
         assert mine == [(g.mesh, g.xyz, g.rpy, g.size) for g in geometries if g.role == "visual"]
     assert set(ours.links) - set(original.links) == {"base_footprint", "mobile_base", "column"}
+
+
+def test_baxter_is_that_of_the_package_on_the_floor():
+    ours = read_urdf(FOLDER / "baxter.urdf")
+    original = read_urdf(resolve_uri(BAXTER, Path()))
+    kept = {name: joint for name, joint in original.joints.items() if joint.child in ours.links}
+    for name, joint in kept.items():
+        # Some fixed joints there name an axis, or a speed.
+        idle = {} if joint.is_movable else {"axis": joint.axis, "velocity": joint.velocity}
+        assert replace(ours.joints[name], **idle) == joint
+    assert set(ours.joints) - set(kept) == {"base_joint"}
+    for link in set(ours.links) - {"base_footprint"}:
+        shown = [g for g in original.links[link] if g.role == "visual"]
+        assert [(g.mesh, g.xyz, g.rpy, g.size) for g in ours.links[link]] == [
+            (g.mesh, g.xyz, g.rpy, g.size) for g in shown
+        ]
+    # Whatever is left out shows no mesh.
+    left_out = set(original.links) - set(ours.links)
+    assert not any(g.mesh for link in left_out for g in original.links[link])
+    lowest = body_triangles(ours)["pedestal"][..., 2].min() + ours.joints["base_joint"].xyz[2]
+    assert 0 <= lowest < 0.002
+
+
+def test_baxters_arm_is_checked_against_its_torso_and_pedestal():
+    off = {frozenset(pair) for pair in load_robot("baxter").disabled_pairs}
+    for part in ("upper_elbow", "lower_elbow", "upper_forearm", "lower_forearm", "wrist"):
+        for trunk in ("torso", "pedestal", "right_upper_shoulder"):
+            assert frozenset((f"left_{part}", trunk)) not in off
+
+
+def test_baxters_torso_leaves_its_arm_most_of_its_room():
+    """Shapes as wide as its handles would forbid twice as many postures."""
+    robot = load_robot("baxter")
+    moved = {body for body in robot.model().links if body.startswith(("left_", "l_"))}
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    judge, standing = SelfCollision(robot), robot.joint_positions()
+    free = 0
+    for sample in sample_positions(robot, 300, seed=3):
+        posture = standing | {name: sample[name] for name in robot.arm_joints}
+        touching = judge.touching(posture)
+        free += not any(frozenset(pair) not in off and moved & set(pair) for pair in touching)
+    # Measured 0.67 of 600; surfaces leave 0.72. Four standard errors of 300 are 0.11.
+    assert free / 300 > 0.56
 
 
 def swapped(text):
