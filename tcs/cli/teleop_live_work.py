@@ -18,12 +18,11 @@ from tcs.cli import talk
 from tcs.cli.places import check_writable
 from tcs.errors import DataFileError, TcsError
 from tcs.robots import RobotFile, load_robot
-from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
+from tcs.teleop import Arm, Mode, Settings, load_arm
 from tcs.teleop.run import check_format, load_run, save_run
 from tcs.teleop.settings import Behaviour
-from tcs.teleop.trial import run_of
 from tcs.view import open_meshcat
-from tcs.view.teleop import Film, LivePage, Replay, Stage, replay_page, start_posture
+from tcs.view.teleop import Film, LivePage, Recorder, Replay, Stage, replay_page, start_posture
 from tcs.writing import whole_file
 
 MODES: Mapping[str, tuple[Mode, ...]] = {
@@ -67,7 +66,7 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
     meshcat = open_meshcat(port)
     stage = Stage(arm, meshes=True)
     settings = Settings(limits=asked.behaviour)
-    rows: list[tuple[Command, Step]] = []
+    recorder = Recorder(arm)
     page = LivePage(
         meshcat,
         stage,
@@ -76,7 +75,7 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
         settings=settings,
         modes=MODES[asked.condition],
         tell=typer.echo,
-        on_step=None if asked.save is None else lambda *row: rows.append(row),
+        on_step=None if asked.save is None else recorder.add,
     )
     talk.say(f"{robot.title}, {asked.condition}, limits as in {asked.behaviour}. {_KEYS}")
     talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
@@ -89,7 +88,7 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
         talk.say(f"closed after {time.perf_counter() - begun:.0f} s.")
     finally:
         if asked.save is not None:
-            _save(asked.save, asked, arm, rows)
+            _save(asked.save, asked, arm, recorder)
     late = f"; {page.dropped} steps dropped, as the loop was late" if page.dropped else ""
     talk.say(
         f"{page.steps.count} control steps: {page.steps.summary()}; {page.pictures.count} "
@@ -113,11 +112,8 @@ def _middle(robot: RobotFile) -> float:
     return float(np.mean(robot.joint_limits()[robot.torso_joint]))
 
 
-def _save(path: Path, asked: Asked, arm: Arm, rows: list[tuple[Command, Step]]) -> None:
+def _save(path: Path, asked: Asked, arm: Arm, recorder: Recorder) -> None:
     """Write what was driven, if it is a run."""
-    if len(rows) < 2:
-        talk.say(f"no browser has looked, so nothing was driven: '{path}' is not written.")
-        return
     said = {
         "tcs": tcs.__version__,
         "robot": asked.robot,
@@ -126,8 +122,12 @@ def _save(path: Path, asked: Asked, arm: Arm, rows: list[tuple[Command, Step]]) 
         "limits": asked.behaviour,
         "operator_kind": "whoever drove the live page",
     }
-    save_run(path, run_of(arm, rows, said))
-    typer.echo(f"wrote {path}: {len(rows)} samples, {rows[-1][1].time:.1f} s")
+    run = recorder.run(said)
+    if run is None:
+        talk.say(f"no browser has looked, so nothing was driven: '{path}' is not written.")
+        return
+    save_run(path, run)
+    typer.echo(f"wrote {path}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
 
 
 def _film(path: Path, robot: str | None) -> tuple[Film, RobotFile]:
