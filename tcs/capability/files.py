@@ -131,7 +131,8 @@ def import_text(
     _, first = np.unique(grid.keys(near.cells)[order], return_index=True)
     rows = order[first]
     cells = near.cells[rows]
-    seen = visibility(head_view(reach.scene, reach.lift), grid.tool_in_base(cells)[1], view_rule)
+    view = head_view(reach.scene, reach.lift, reach.head)
+    seen = visibility(view, grid.tool_in_base(cells)[1], view_rule)
     return CapabilityMap(
         kind=kind,
         grid=grid,

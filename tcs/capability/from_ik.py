@@ -139,9 +139,9 @@ def seen_from(reach: Reach, grid: MapGrid, kind: str, view_rule: str) -> View | 
             f"the lift has {len(reach.lifts)} levels of {grid.step:g} m; a map holds {MAX_LIFTS} "
             "at most. Take a larger step."
         )
-    if kind == ICM and reach.robot.name not in head_names():
+    if kind == ICM and reach.head is None and reach.robot.name not in head_names():
         return None
-    return head_view(reach.scene, reach.lift)
+    return head_view(reach.scene, reach.lift, reach.head)
 
 
 def manipulability_scale(reach: Reach) -> float:

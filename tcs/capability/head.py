@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +12,7 @@ from pydantic import Field
 from tcs.documents import Document, PositiveNumber, checked, read_mapping
 from tcs.errors import RobotError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
-from tcs.paths import shipped_files
+from tcs.paths import named_file, shipped_files
 from tcs.robots import RobotFile
 from tcs.scene import Scene
 
@@ -49,40 +50,44 @@ def head_names() -> tuple[str, ...]:
     return tuple(shipped_files("models/heads/*.yaml"))
 
 
-def load_head(robot: RobotFile) -> HeadFile:
+def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
     """Return the head of a robot.
 
+    Args:
+        robot: The robot.
+        head: Name of a head that ships, or path of a head file; None is the robot's name.
+
     Raises:
-        UnknownNameError: If no head of that robot ships, or its file names an unknown key.
+        UnknownNameError: If no head of that name ships, or its file names an unknown key.
         RobotError: If the file cannot be used, or names what the robot does not have.
     """
     files = shipped_files("models/heads/*.yaml")
-    if robot.name not in files:
-        raise UnknownNameError("head", robot.name, files, where=f"robot '{robot.name}'")
-    path = files[robot.name]
+    asked = robot.name if head is None else head
+    path = named_file("head", asked, files, where=f"robot '{robot.name}'")
     where = f"head file '{path}'"
     content = read_mapping(path, where, RobotError, known=HeadFile.model_fields)
-    head = checked(content, HeadFile, where, RobotError)
+    found = checked(content, HeadFile, where, RobotError)
     model = robot.model()
     for kind, name, known in (
-        ("link", head.camera_frame, model.links),
-        ("joint", head.pan_joint, model.joints),
-        ("joint", head.tilt_joint, model.joints),
+        ("link", found.camera_frame, model.links),
+        ("joint", found.pan_joint, model.joints),
+        ("joint", found.tilt_joint, model.joints),
     ):
         if name not in known:
             raise UnknownNameError(kind, name, known, where=where)
-    return head
+    return found
 
 
-def head_view(scene: Scene, lift: float) -> View:
+def head_view(scene: Scene, lift: float, head_file: str | Path | None = None) -> View:
     """Return what the head camera of a scene's robot sees.
 
     Args:
         scene: The robot; its state is left as it was.
         lift: Height of the torso [m].
+        head_file: Name or path of the head; None is the robot's name.
 
     Raises:
-        UnknownNameError: If no head of that robot ships.
+        UnknownNameError: If no head of that name ships.
         RobotError: If the head file cannot be used.
 
     Source:
@@ -90,7 +95,7 @@ def head_view(scene: Scene, lift: float) -> View:
         of view beyond.
     """
     robot = scene.spec.robot
-    head = load_head(robot)
+    head = load_head(robot, head_file)
     joints = robot.model().joints
     before = scene.positions()
     try:

@@ -53,7 +53,7 @@ class Reach:
 
     def __init__(
         self, robot: RobotFile, *, lift: float | None = None, step: float = 0.05,
-        measure: str = MEASURE, found_as: str | None = None,
+        measure: str = MEASURE, found_as: str | None = None, head: str | None = None,
     ) -> None:  # fmt: skip
         """Lower the robot at `lift` and at all lifts that are whole steps away from it.
 
@@ -63,6 +63,7 @@ class Reach:
             step: Distance of the lifts looked at [m].
             measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
             found_as: Name or path by which maps remember the robot; None is its name.
+            head: Name or path of the head that looks on; None is the robot's name.
 
         Raises:
             RobotError: If the robot's model cannot be used.
@@ -71,6 +72,8 @@ class Reach:
             UnknownNameError: If there is no measure of that name.
         """
         self.robot, self.measure = robot, measure
+        self.head = head
+        """Name or path of the head that looks on; None is the robot's name."""
         self.found_as = robot.name if found_as is None else found_as
         """How to find the robot again: its name, or the path of its file."""
         self.scene = Scene(SceneSpec(robot, _empty_floor()))

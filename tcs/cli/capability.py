@@ -37,6 +37,12 @@ _Radius = Annotated[
 _Tool = Annotated[
     str | None, typer.Option(help="Another frame of the robot as the tool.", show_default="its own")
 ]
+_Head = Annotated[
+    str | None,
+    typer.Option(
+        help="Name or YAML file of the head that looks on.", show_default="the robot's own"
+    ),
+]
 _Lift = Annotated[
     float | None,
     typer.Option(help="Torso lift of the map, in metres.", show_default="the middle of its range"),
@@ -75,12 +81,13 @@ def from_ik(
     tool: _Tool = None,
     measure: _Measure = _MEASURE,
     view: _View = "corrected",
+    head: _Head = None,
     jobs: options.Jobs = 2,
     text: _Text = None,
     as_json: options.Json = False,
 ) -> None:
     """Make a map by inverse kinematics of every cell around the tool."""
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
     with talk.progress_bar("cells") as on_progress:
         result = work.from_ik(
             robot_setup, out, text, kind=kind, radius=radius, view=view, jobs=jobs,
@@ -109,6 +116,7 @@ def record(
     tool: _Tool = None,
     measure: _Measure = _MEASURE,
     view: _View = "corrected",
+    head: _Head = None,
     drop_bad: _DropBad = False,
     seconds: Annotated[float, typer.Option(help="Simulated: how long.")] = 3200.0,
     scale: Annotated[
@@ -129,7 +137,7 @@ def record(
 
     The simulated hand keeps the tool at --height, 0.41 m if none is given.
     """
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
     hand = work.SimulatedHand(seconds, scale, centre, seed, save_csv)
     result = work.record(
         robot_setup, out, text, csv, hand, height=height, view=view, drop_bad=drop_bad
@@ -155,12 +163,13 @@ def from_bag(
     tool: _Tool = None,
     measure: _Measure = _MEASURE,
     view: _View = "corrected",
+    head: _Head = None,
     drop_bad: _DropBad = False,
     text: _Text = None,
     as_json: options.Json = False,
 ) -> None:
     """Make a map (ITCM) from the joint states in ROS bags; needs the extra `bags` of tcs."""
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure)
+    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
     result = work.from_bags(
         robot_setup, out, text, bags, topic=topic, height=height, view=view, drop_bad=drop_bad
     )

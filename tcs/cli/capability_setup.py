@@ -23,6 +23,7 @@ class Setup:
     turns: int
     grasps: str
     measure: str
+    head: str | None = None
 
     def reach(self) -> Reach:
         """Return the robot on an empty floor.
@@ -46,7 +47,10 @@ class Setup:
                     "tool frame", self.tool, known, where=f"robot '{robot.name}'"
                 )
             robot = robot.model_copy(update={"tool_frame": self.tool})
-        return Reach(robot, lift=self.lift, step=self.step, measure=self.measure, found_as=found_as)
+        return Reach(
+            robot, lift=self.lift, step=self.step, measure=self.measure, found_as=found_as,
+            head=self.head,
+        )  # fmt: skip
 
     def grid(self) -> MapGrid:
         """Return the grid."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.capability import load_map
+from tcs.paths import data_folder
 
 COARSE = ("--step", 0.1, "--turns", 8, "--lift", 0.15)
 
@@ -243,6 +244,28 @@ def test_a_map_remembers_the_file_of_a_robot_of_ones_own(own, tcs_command, tmp_p
     assert ran.json["left"] == ran.json["best"]
     picture = tmp_path / "map.svg"
     assert tcs_command("capability", "show", path, "--out", picture).code == 0
+
+
+def test_a_robot_of_ones_own_is_looked_on_by_the_head_that_is_named(own, tcs_command, tmp_path):
+    robot, _ = own
+    out, plain = tmp_path / "own.tcm", tmp_path / "tiago.tcm"
+    ran = tcs_command("capability", "from-ik", "--robot", robot, "--out", out, *COARSE)
+    assert ran.code == 1
+    assert "unknown head 'mine'" in ran.err
+    head = tmp_path / "head.yaml"
+    shipped = data_folder() / "models" / "heads" / "tiago.yaml"
+    head.write_text(shipped.read_text().replace("fov_deg: 58", "fov_deg: 20"))
+    seen = {}
+    for name, words in (("mine", ("--robot", robot, "--head", "tiago")), ("tiago", ())):
+        path = out if words else plain
+        assert tcs_command("capability", "from-ik", *words, "--out", path, *COARSE).code == 0
+        seen[name] = load_map(path).visibility
+    np.testing.assert_array_equal(seen["mine"], seen["tiago"])
+    assert tcs_command("capability", "from-ik", "--head", head, "--out", out, *COARSE).code == 0
+    # A camera that sees less to either side; straight ahead nothing changes.
+    narrow = load_map(out).visibility
+    assert (narrow <= seen["tiago"]).all()
+    assert (narrow < seen["tiago"]).any()
 
 
 def test_a_robot_file_that_has_moved_is_asked_for(moved, tcs_command):
