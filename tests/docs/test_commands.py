@@ -1,5 +1,6 @@
 """Every command line of the README and the docs is one that `tcs` understands."""
 
+import functools
 import re
 import shlex
 from pathlib import Path
@@ -39,6 +40,11 @@ def test_line_is_understood(line):
         command = command.commands[words.pop(0)]
     # Parses, and refuses what it does not know or lacks; nothing is run.
     command.make_context(str(command.name), words)
+
+
+@functools.cache
+def tcs_command():
+    return typer.main.get_command(app)
 
 
 def options_of(command) -> set[str]:
