@@ -1,42 +1,17 @@
 """The site builds without a warning, opens offline, and leads from equations to functions."""
 
 import importlib
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import FunctionType
 
 import pytest
 
 import tcs
+from tests.docs.building import CHECKOUT, DOCS, build
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-DOCS = CHECKOUT / "docs"
 # No room of their own that others import from: the command line, and single modules.
 WITHOUT_PAGE = {"cli"}
-
-
-def build(source: Path, out: Path) -> subprocess.CompletedProcess[str]:
-    """Build as `make docs` does, with a proxy that leads nowhere: nothing may be fetched."""
-    command = "-m sphinx --quiet --fail-on-warning --keep-going --builder html".split()
-    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
-    return subprocess.run(
-        [sys.executable, *command, "--conf-dir", str(DOCS), str(source), str(out)],
-        env={**os.environ, **nowhere},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory) -> Path:
-    out = tmp_path_factory.mktemp("site")
-    done = build(DOCS, out)
-    assert done.returncode == 0, done.stderr
-    return out
 
 
 def pages(site: Path) -> list[Path]:
