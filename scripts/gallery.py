@@ -8,6 +8,7 @@ Score files are taken from the folder named by --scores; rows that are not there
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import textwrap
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ from tcs.report.pictures import Shown, map_figure, member_figure, scene_figure
 from tcs.report.states import states_figure
 from tcs.scoring import all_rows
 from tcs.store import ScoreFile
-from tcs.writing import whole_file
+from tcs.writing import make_folder, whole_file
 
 ROBOT = "pr2"
 HERE = (1.4, -1.2, 180.0)
@@ -107,11 +108,8 @@ def parse() -> argparse.Namespace:
 def run(options: argparse.Namespace) -> int:
     """Score what is missing, draw, write the page."""
     images = options.out / "images"
-    for folder in (images, options.scores):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise tcs.TcsError(f"folder '{folder}' cannot be made: {error.strerror}.") from error
+    make_folder(images)
+    make_folder(options.scores)
     files = {row: score_file(row, options) for row in all_rows()}
     text = INTRODUCTION
     drawn = [from_behind(files), *(scene_of(row, files[row]) for row in LETTERS), *maps(files)]
@@ -120,12 +118,22 @@ def run(options: argparse.Namespace) -> int:
         content = as_png(one.figure, one.dpi, colours=None if one.dpi == _MAP_DPI else 256)
         write(images / f"{one.name}.png", content)
         sizes.append(len(content))
-        said = textwrap.fill(one.text, 100, break_on_hyphens=False)
+        said = in_lines(one.text)
         picture = f"![{one.alternative}](images/{one.name}.png)"
         text += f"\n## {one.heading}\n\n{picture}\n\n{said}\n"
     write(options.out / "gallery.md", text.encode())
     print(f"wrote {options.out / 'gallery.md'} and {len(drawn)} pictures, {sum(sizes):,} bytes")
     return 0
+
+
+def in_lines(text: str) -> str:
+    """Return a paragraph in lines of at most 100 letters; a command stays in one.
+
+    >>> in_lines("x" * 90 + " `tcs list --json`").splitlines()[1]
+    '`tcs list --json`'
+    """
+    kept = re.sub("`[^`]*`", lambda code: code[0].replace(" ", "\0"), text)
+    return textwrap.fill(kept, 100, break_on_hyphens=False).replace("\0", " ")
 
 
 def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
@@ -202,7 +210,10 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
             map_figure(chair, chosen),
             _MAP_DPI,
             "From above",
-            f"Shaving in the wheelchair, drawn by `{command}`.",
+            f"Shaving in the wheelchair, drawn by `{command}`. Bases are to scale, their arrows "
+            "are the headings. A place shows the best that a robot standing there can do by "
+            "itself: two places together do more. Colours are told apart with any kind of "
+            "colour vision; tests simulate protanopia, deuteranopia and tritanopia.",
             "A wheelchair and the person in it from above, with the places where the robot can "
             "stand coloured by what they are worth.",
         ),

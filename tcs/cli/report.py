@@ -54,8 +54,7 @@ def report(
         check_writable(path)
 
     import tcs
-    from tcs.report.answer import Check, answer_of
-    from tcs.report.answer_page import answer_page
+    from tcs.report import Check, answer_of, answer_page
 
     found = observed_settings(observed or (), tcs.load(file).observed_axes)
     with talk.progress_bar("pairs re-checked") as on_progress:

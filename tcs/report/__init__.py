@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tcs.report.answer import Answer, Check, answer_of
+from tcs.report.answer_page import answer_page
 from tcs.report.blocks import Page, Section
 from tcs.report.html import as_html
 from tcs.report.markdown import as_markdown
@@ -11,11 +13,15 @@ from tcs.report.study import Plan, RowStudy, check_row, study_row, study_rows
 from tcs.report.write import write_report
 
 __all__ = [
+    "Answer",
+    "Check",
     "Page",
     "Paper",
     "Plan",
     "RowStudy",
     "Section",
+    "answer_of",
+    "answer_page",
     "as_html",
     "as_markdown",
     "check_row",

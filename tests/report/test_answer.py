@@ -13,9 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tcs.cli.app import app
-from tcs.report import as_html, as_markdown
-from tcs.report.answer import Check, answer_of
-from tcs.report.answer_page import answer_page
+from tcs.report import Check, answer_of, answer_page, as_html, as_markdown
 from tcs.report.answer_tables import (
     goals_table,
     joints_table,
