@@ -80,7 +80,7 @@ def report(
         "unreached_goals": list(answer.unreached),
         "verification": answer.verification.to_json(),
         "shown_checked": len(answer.findings),
-        "shown_false": [goal for goal, finding in answer.findings.items() if not finding.is_true],
+        "shown_false": [goal for goal in answer.findings if not answer.is_confirmed(goal)],
         "is_sound": answer.is_sound,
         "seconds": answer.seconds,
     }

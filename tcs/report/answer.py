@@ -14,7 +14,7 @@ from tcs.reasons import Distribution, Explanation, explain
 from tcs.report.pictures import Shown, map_figure, member_figure, serves, stage
 from tcs.report.states import has_states, states_figure
 from tcs.scoring import Job, Verification, verify
-from tcs.scoring.verify import Finding, check_pairs
+from tcs.scoring.verify import ISOTROPY_BAR, Finding, check_pairs
 from tcs.store import Scored, ScoreFile, load_scores
 from tcs.tables import InitialConfiguration, Reason, SuccessTable
 
@@ -119,8 +119,12 @@ class Answer:
     @property
     def is_sound(self) -> bool:
         """Whether no answer was found false, of the file or of those shown."""
-        shown = all(finding.is_true for finding in self.findings.values())
-        return self.verification.is_sound and shown
+        return self.verification.is_sound and all(map(self.is_confirmed, self.findings))
+
+    def is_confirmed(self, goal: int) -> bool:
+        """Return whether Drake confirms the posture shown at a goal, and its measure."""
+        finding = self.findings[goal]
+        return finding.is_true and finding.isotropy_error <= ISOTROPY_BAR
 
     @cached_property
     def server(self) -> tuple[int | None, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -250,7 +251,7 @@ def _success(answer: Answer) -> list[Block]:
     if table is None or made is None:
         return [
             Text("Nothing is estimated in this file. This estimates it, for the best sets:"),
-            Code(f"tcs robustify {answer.path}"),
+            Code(shlex.join(["tcs", "robustify", str(answer.path)])),
         ]
     widths = "; ".join(_error(joint, error) for joint, error in made["errors"].items())
     base = "the base must stay free" if made["check_base"] else "the base is not checked again"
@@ -266,8 +267,8 @@ def _success(answer: Answer) -> list[Block]:
         if answer.success.row_of(tuple(sorted(answer.shown.indices))) is None:
             blocks.append(
                 Text(
-                    "The set shown here was none of those that raced. This tries it: "
-                    f"tcs evaluate {answer.path}"
+                    "The set shown here was none of those that raced; tcs evaluate tries the best "
+                    "set of a file."
                 )
             )
     return blocks
@@ -278,6 +279,11 @@ def _error(joint: str, error: dict[str, Any]) -> str:
     unit = "deg" if key.endswith("_deg") else "m"
     sign = "standard deviation" if error["distribution"] == "normal" else "uniform ±"
     return f"{joint.replace('_', ' ')} ({sign} {width:g} {unit})"
+
+
+def _configurations(answer: Answer) -> str:
+    size, tables = answer.job.grid.size, len(answer.file.tables)
+    return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} tables"
 
 
 def _made(answer: Answer, command: str) -> list[Block]:
@@ -291,7 +297,7 @@ def _made(answer: Answer, command: str) -> list[Block]:
         ("Robot", metadata["robot"]),
         ("Scene", f"SHA-256 {metadata['scene_digest']}; the models of today are the same"),
         ("Inverse kinematics", answer.verification.ik),
-        ("Configurations", f"{answer.job.grid.size:,} in each of {len(file.tables)} tables"),
+        ("Configurations", _configurations(answer)),
         ("Sets kept", f"rule {answer.scored.sets.rule}, {answer.scored.sets.sets:,} in this table"),
         ("Time to score", f"{timings['total_seconds']:.1f} s when the file was made"),
     )

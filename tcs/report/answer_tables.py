@@ -252,10 +252,9 @@ def _verdict(verdict: Verdict, *, is_used: bool) -> Cell:
 
 def _confirmed(answer: Answer, goal: int) -> Cell:
     """Return what Drake says of the posture at a goal that the report shows."""
-    finding = answer.findings.get(goal)
-    if finding is None:
+    if goal not in answer.findings:
         return Cell("–", "quiet")
-    return Cell("confirms it") if finding.is_true else Cell("REFUSES IT", "bad")
+    return Cell("confirms it") if answer.is_confirmed(goal) else Cell("REFUSES IT", "bad")
 
 
 def _listed(answer: Answer, stop: int) -> str:

@@ -188,7 +188,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     found = answer_of(path, check=Check(pairs=0, dense=0))
     assert found.verification.is_sound
     assert not found.is_sound
-    assert [g for g, one in found.findings.items() if not one.is_true] == [goal]
+    assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
 
 
 def test_what_was_rechecked_is_told(answer):
@@ -270,3 +270,25 @@ def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
     assert ran.exit_code == 1
     assert "some answers in" in ran.stderr
     assert "SOME ANSWERS OF THE FILE ARE FALSE" in out.read_text()
+
+
+def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path):
+    file = load_scores(score_path)
+    scores = file.nominal.scores
+    better = np.where(scores.reached, scores.isotropy + np.float32(1e-3), scores.isotropy)
+    table = Scored.of(
+        dataclasses.replace(scores, isotropy=better),
+        dataclasses.replace(
+            file.nominal.sets,
+            isotropy=np.where(
+                file.nominal.sets.reached,
+                file.nominal.sets.isotropy + np.float32(1e-3),
+                file.nominal.sets.isotropy,
+            ),
+        ),
+    )
+    path = tmp_path / "better.tcs"
+    save_scores(path, dataclasses.replace(file, tables=(table,)))
+    found = answer_of(path, check=Check(pairs=0, dense=0))
+    assert all(one.is_true for one in found.findings.values())
+    assert not found.is_sound
