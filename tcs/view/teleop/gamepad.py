@@ -136,5 +136,11 @@ class Gamepad:
 
 
 def pad_of(index: int | None, axes: Sequence[float], buttons: Sequence[float]) -> Pad | None:
-    """Return what Meshcat tells of a gamepad; None if it has none."""
-    return None if index is None else Pad(tuple(axes), tuple(buttons))
+    """Return what Meshcat tells of a gamepad; None if it has none.
+
+    When a gamepad goes, the browser sends an empty message; Meshcat then keeps the last index and
+    tells of neither axes nor buttons.
+    """
+    if index is None or not (len(axes) or len(buttons)):
+        return None
+    return Pad(tuple(axes), tuple(buttons))

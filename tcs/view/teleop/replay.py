@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -167,8 +168,8 @@ def replay_page(
         notes: Further lines.
     """
     rate = min(_RATE, _MOST_PICTURES / max(film.length, 1e-9))
-    count = max(2, round(film.length * rate) + 1)
-    samples = [film.sample(second) for second in np.linspace(0.0, film.length, count)]
+    count = math.ceil(film.length * rate) + 1
+    samples = [film.sample(number / rate) for number in range(count)]
     stage.set_up(meshcat, film.run.position[0], target=False, compact=True)
     draw_path(meshcat, film.run.position)
     panel = Panel(meshcat, film.arm)

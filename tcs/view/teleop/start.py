@@ -45,8 +45,8 @@ def start_posture(arm: Arm, stage: Stage) -> FloatArray:
         if best > 0.0 and stage.contacts() is None:
             return np.array(joints)
     # An arm that never points ahead begins in the middle of its range.
-    middle: FloatArray = np.where(arm.bounded, 0.5 * (arm.lower + arm.upper), 0.0)
-    return middle
+    low, high = (np.where(arm.bounded, ends, 0.0) for ends in (arm.lower, arm.upper))
+    return np.asarray(0.5 * (low + high))
 
 
 def _area(arm: Arm) -> tuple[FloatArray, FloatArray]:

@@ -25,6 +25,8 @@ def heeded():
 
 def test_meshcat_without_a_gamepad_gives_none():
     assert pad_of(None, (), ()) is None
+    # What Meshcat tells after a gamepad has gone.
+    assert pad_of(0, [], []) is None
     assert pad_of(1, [0.5], [1.0]) == Pad((0.5,), (1.0,))
 
 

@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError
+from tcs.teleop import Mode, Settings, load_arm
+from tcs.view import open_meshcat
+from tcs.view.teleop import LivePage, Recorder, Stage, start_posture
+from tcs.view.teleop.controls import BACK, NEXT_MODE, TURN_UP, buttons, sliders
+from tcs.view.teleop.live import key_name
+from tcs.view.teleop.panel import LIMIT, SINGULAR, readout
+from tests.view.teleop.conftest import MODES
+
+FORWARD, DOWN = "move x [m/s]", "move z [m/s]"
+
+
+def drive(page, steps):
+    for _ in range(steps):
+        page.step()
+
+
+def test_a_slider_moves_the_tool(page, desk):
+    before = page.last.p.copy()
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 50)
+    moved = page.last.p - before
+    # Half a second at 0.1 m/s, less what it takes to start.
+    assert 0.03 < moved[0] <= 0.05
+    assert np.abs(moved[1:]).max() < 1e-3
+
+
+def test_a_group_turns_while_the_tool_stays(page, desk):
+    desk.press(NEXT_MODE)
+    drive(page, 1)
+    before, elbow = page.last.p.copy(), page.session.arm.link_poses(page.last.joints)[3, :3, 3]
+    assert page.last.mode is Mode.NULL_SPACE
+    for _ in range(20):
+        desk.press(TURN_UP)
+        drive(page, 5)
+    after = page.session.arm.link_poses(page.last.joints)[3, :3, 3]
+    # The bound on the tool is 0.1 mm.
+    assert np.linalg.norm(page.last.p - before) < 1e-4
+    assert np.linalg.norm(after - elbow) > 0.02
+
+
+def test_back_to_the_start(page, desk, ready):
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 50)
+    desk.press(BACK)
+    drive(page, 2)
+    np.testing.assert_array_equal(page.last.joints, ready)
+    assert not page.last.rates.any()
+
+
+def test_a_lost_browser_is_told_once_and_recorded_as_a_stop(page, desk, told):
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 20)
+    desk.watched = False
+    drive(page, 200)
+    assert page.last.stopped
+    assert not page.last.rates.any()
+    assert told == ["no browser looks at this page: the arm holds still until one does."]
+
+
+def test_what_is_said_stays_to_be_read(page, desk):
+    desk.watched = False
+    drive(page, 1)
+    said = page.last.reason
+    desk.watched = True
+    drive(page, 1)
+    assert page.last.reason == ""
+    begun = page._said_until
+    assert page.said(begun - 0.01) == said
+    assert page.said(begun + 0.01) == ""
+
+
+def test_a_limit_turns_its_bar_red_and_names_the_joint(page, desk, iiwa):
+    desk.sliders[DOWN] = -0.25
+    drive(page, 400)
+    page.show()
+    at = np.flatnonzero(page.last.limits)
+    assert len(at)
+    now = readout(iiwa, page.last.joints, page.last.limits, page.last.singular, "", "")
+    assert all(now.states[i] == LIMIT for i in at)
+    assert f"joint {at[0] + 1}" in page.said(page._said_until + 1.0)
+
+
+def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
+    desk.sliders[FORWARD] = 0.25
+    drive(page, 400)
+    assert page.last.singular
+    now = readout(iiwa, page.last.joints, page.last.limits, True, "", "")
+    assert SINGULAR in now.states
+    assert "singular" in page.said(page._said_until + 1.0)
+
+
+def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, desk):
+    recorder = Recorder(iiwa)
+    page = LivePage(
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=lambda _: None,
+        on_step=recorder.add,
+    )  # fmt: skip
+    page.hand.source = desk
+    desk.watched = False
+    drive(page, 5)
+    assert recorder.run({}) is None
+    desk.watched = True
+    drive(page, 5)
+    assert len(recorder.run({})) == 5
+
+
+def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
+    from tcs.teleop import Command, Teleoperation
+    from tcs.teleop.trial import run_of
+    from tcs.view.teleop import recorder as module
+
+    monkeypatch.setattr(module, "_BLOCK", 10)
+    session = Teleoperation(iiwa, ready)
+    asked = [Command(linear=(0.1, 0.0, 0.0)), Command(mode=Mode.NULL_SPACE, group=0, sign=1)]
+    rows = [(asked[i > 20], session.step(asked[i > 20])) for i in range(33)]
+    found = Recorder(iiwa)
+    for row in rows:
+        found.add(*row)
+    assert len(found) == 33
+    run, whole = found.run({"robot": "iiwa7"}), run_of(iiwa, rows, {})
+    assert run.metadata == {"robot": "iiwa7"}
+    for name in ("time", "joints", "position", "quaternion", "linear", "group", "mode", "limits"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(whole, name), err_msg=name)
+
+
+def test_the_page_has_all_its_controls(page, meshcat):
+    names = {f"{name} ({key_name(key)})" for name, key in buttons(4).items()}
+    assert set(meshcat.GetButtonNames()) >= names
+    assert set(meshcat.GetSliderNames()) >= set(sliders())
+
+
+@pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
+def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
+    arm = load_arm(name, lift=0.1)
+    stage = Stage(arm, meshes=False)
+    start = start_posture(arm, stage)
+    assert arm.beyond(start) == ""
+    stage.poses(start)
+    assert stage.contacts() is None
+    np.testing.assert_array_equal(start, start_posture(arm, stage))
+    page = LivePage(
+        meshcat, stage, arm, start, settings=Settings(), modes=MODES, tell=lambda _: None
+    )
+    before = page.last.p.copy()
+    assert before[0] > arm.frames[0, 0, 3]
+    assert not page.last.singular
+    page.hand.source = None
+    for way in np.vstack([np.eye(3), -np.eye(3)]):
+        page.session.place(start)
+        for _ in range(60):
+            last = page.session.step(_towards(0.1 * way))
+        assert (last.p - before) @ way > 0.03, f"{name} is blocked along {way}"
+
+
+def _towards(linear):
+    from tcs.teleop import Command
+
+    return Command(linear=linear)
+
+
+def test_stage_moves_what_hangs_on_the_arm_and_nothing_else(iiwa_stage, iiwa, ready):
+    poses = iiwa_stage.poses(ready)
+    # Seven links; column and base stand still.
+    assert len(poses) == 7
+    tool = iiwa.kinematics(ready).p
+    farthest = max(poses.values(), key=lambda one: one.translation()[0]).translation()
+    # The last link's frame lies within its flange's length of the tool.
+    assert np.linalg.norm(farthest - tool) < 0.1
+
+
+def test_a_posture_that_touches_itself_is_told(page, iiwa_stage, iiwa, ready):
+    folded = ready.copy()
+    folded[[1, 3]] = 2.0, -2.0
+    page.session.place(folded)
+    drive(page, 1)
+    for _ in range(8):
+        page.show()
+    assert "touches" in page.said(page._said_until + 1.0)
+
+
+def test_a_port_that_is_taken_is_told(shared_meshcat):
+    with pytest.raises(OutputError, match=f"port {shared_meshcat.port()}"):
+        open_meshcat(shared_meshcat.port())
+
+
+def test_a_run_at_the_pace_of_the_clock(page):
+    page.run(duration=0.3)
+    # 30 steps in 0.3 s; a busy machine may drop some, and a step may fall on either end.
+    assert page.steps.count + page.dropped in range(28, 34)
+    assert page.pictures.count >= 2
+
+
+def test_an_arm_that_never_points_ahead_begins_in_the_middle(iiwa, iiwa_stage, monkeypatch):
+    monkeypatch.setattr("tcs.view.teleop.start._AHEAD", 1.1)
+    np.testing.assert_allclose(start_posture(iiwa, iiwa_stage), np.zeros(7), atol=1e-12)
