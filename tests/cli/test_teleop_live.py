@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tcs.teleop import Command, Teleoperation, load_arm
+from tcs.teleop.run import load_run, save_run
+from tcs.teleop.trial import run_of
+
+READY_DEG = (0, 34, 0, -80, 0, 57, 0)
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A run of the iiwa, 1 s long."""
+    arm = load_arm("iiwa7")
+    session = Teleoperation(arm, np.radians(READY_DEG))
+    command = Command(linear=(0.1, 0.0, 0.0))
+    rows = [(command, session.step(command)) for _ in range(100)]
+    path = tmp_path_factory.mktemp("run") / "run.csv"
+    save_run(path, run_of(arm, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"}))
+    return path
+
+
+def refused(ran, *words):
+    """Whether it ended in one line with these words."""
+    return ran.code == 1 and ran.err.count("\n") == 1 and all(word in ran.err for word in words)
+
+
+def test_unknown_robot_is_told(tcs_command):
+    assert refused(tcs_command("teleop", "--robot", "nobody", "--no-browser"), "nobody", "iiwa7")
+
+
+def test_a_start_beyond_the_limits_is_told_before_anything_opens(tcs_command):
+    start = (0, 0, 0, 130, 0, 0, 0)
+    ran = tcs_command("teleop", "--start-deg", *start, "--no-browser")
+    assert refused(ran, "joint 4", "2.2689", "--start-deg")
+
+
+def test_an_arm_of_six_joints_is_told(tcs_command, tmp_path):
+    import yaml
+
+    models = Path(__file__).resolve().parents[2] / "models" / "robots"
+    content = yaml.safe_load((models / "iiwa7.yaml").read_text())
+    content["arm_joints"].pop()
+    content["name"] = "six"
+    for name in ("urdf", "primitives"):
+        content[name] = str(models / content[name])
+    path = tmp_path / "six.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert refused(tcs_command("teleop", "--robot", path, "--no-browser"), "six.yaml", "arm_joints")
+
+
+@pytest.mark.parametrize("name", ["run.txt", "none/run.csv"])
+def test_a_run_that_cannot_be_written_is_told_before_anything_opens(tcs_command, tmp_path, name):
+    ran = tcs_command("teleop", "--save", tmp_path / name, "--no-browser")
+    assert refused(ran, str(tmp_path / name))
+
+
+def test_options_of_the_live_page_do_not_get_lost_before_a_command(tcs_command, saved):
+    ran = tcs_command("teleop", "--robot", "pr2", "replay", saved)
+    assert ran.code == 2
+    assert "live page" in ran.err
+
+
+def test_a_port_that_is_taken_is_told(tcs_command):
+    with socket.socket() as taken:
+        taken.bind(("localhost", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        ran = tcs_command("teleop", "--port", port, "--no-browser", "--duration", 0)
+    assert refused(ran, f"port {port}")
+
+
+def test_nothing_is_written_where_nobody_has_looked(tcs_command, tmp_path):
+    path = tmp_path / "run.csv"
+    ran = tcs_command("teleop", "--no-browser", "--duration", 0.2, "--save", path)
+    assert ran.code == 0
+    assert "nothing was driven" in ran.err
+    assert "control steps: median" in ran.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_is_written_as_a_page(tcs_command, saved, tmp_path):
+    page = tmp_path / "run.html"
+    ran = tcs_command("teleop", "replay", saved, "--export", page, "--json")
+    assert ran.code == 0
+    assert ran.json["bytes"] == page.stat().st_size < 5e6
+    assert ran.json["samples"] == 100
+    assert "controller novel" in page.read_text()
+
+
+def test_a_run_is_played_back(tcs_command, saved):
+    ran = tcs_command("teleop", "replay", saved, "--no-browser", "--duration", 0.2)
+    assert ran.code == 0
+    assert "100 samples; controller novel" in ran.out
+    assert "http://localhost:" in ran.err
+
+
+def test_runs_that_cannot_be_played_are_told(tcs_command, saved, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("time,x\n0,1\n")
+    nobody = tmp_path / "nobody.csv"
+    nobody.write_text(saved.read_text().replace('""robot""', '""belongs to""'))
+    lifted = tmp_path / "lifted.csv"
+    lifted.write_text(saved.read_text().replace('""lift"": 0.0', '""lift"": ""up""'))
+    assert refused(tcs_command("teleop", "replay", tmp_path / "none.csv"), "none.csv")
+    assert refused(tcs_command("teleop", "replay", broken), "broken.csv", "missing")
+    assert refused(tcs_command("teleop", "replay", nobody), "nobody.csv", "--robot")
+    assert refused(tcs_command("teleop", "replay", lifted), "lifted.csv", "'up'")
+    ran = tcs_command("teleop", "replay", saved, "--robot", "panda")
+    assert refused(ran, saved.name, "panda", "--robot")
+
+
+def test_meshes_and_json_are_for_pages_only(tcs_command, saved):
+    for option in ("--meshes", "--json"):
+        ran = tcs_command("teleop", "replay", saved, option)
+        assert ran.code == 2
+        assert "--export" in ran.err
+
+
+@contextmanager
+def looking(port):
+    """Look at a page as a browser would: hold a websocket open, and read what comes."""
+    request = (
+        f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Version: 13\r\n\r\n"
+    )
+    with socket.create_connection(("localhost", port)) as eye:
+        eye.sendall(request.encode())
+
+        def read():
+            while eye.recv(65536):
+                pass
+
+        thread = threading.Thread(target=read)
+        thread.start()
+        try:
+            yield
+        finally:
+            eye.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
+@pytest.mark.slow
+def test_ctrl_c_writes_what_was_driven(tmp_path):
+    path = tmp_path / "run.csv"
+    with socket.socket() as free:
+        free.bind(("localhost", 0))
+        port = free.getsockname()[1]
+    words = ["teleop", "--no-browser", "--port", str(port), "--save", str(path)]
+    words += ["--start-deg", *map(str, READY_DEG)]
+    code = "from tcs.cli import main; main()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True
+    ) as running:
+        for line in running.stderr:
+            if "open http" in line:
+                break
+        with looking(port):
+            time.sleep(1.5)
+            running.send_signal(signal.SIGINT)
+            running.wait(30)
+        said = running.stderr.read()
+    assert running.returncode == 0
+    assert "closed after" in said
+    run = load_run(path)
+    assert len(run) > 20
+    assert run.metadata["robot"] == "iiwa7"
+    np.testing.assert_allclose(run.joints[0], np.radians(READY_DEG), atol=1e-9)
+    assert [one.name for one in tmp_path.iterdir()] == ["run.csv"]
