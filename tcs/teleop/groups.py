@@ -8,6 +8,7 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.arm import JOINTS
+from tcs.teleop.least_squares import bounded_minimum
 
 HELD = 1e-9
 """A group holds the tool alone when it leaves less than this over of a metre [m per rad of the
@@ -19,6 +20,15 @@ joint moves at 0.5 m/rad, they would have to turn 250 times as fast as it does."
 _EASED = 0.3
 """How much a follower's rate counts against an outside joint's where the followers can do
 nothing."""
+
+_HOLDING = 1e6
+"""What a velocity of the tool of 1 m/s costs against a rate of the lead joint that is 1 rad/s off:
+a lead joint kept from turning at 0.4 rad/s pulls at the tool by less than 0.01 mm/s."""
+_RESTING = 1e-3
+"""What a rate of 1 rad/s outside the group costs against the same: the lead joint slows down by a
+thousandth where one of them has to turn as fast."""
+_EASED_WITHIN = 0.01
+"""What a rate of a follower costs against one outside the group."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +115,40 @@ def group_motion(
         wanted = wanted - jacobian[:, both] @ rates[both]
         exact = False
     return GroupMotion(rates, bool(exact), float(np.linalg.norm(wanted)))
+
+
+def bounded_group_motion(
+    jacobian: FloatArray,
+    group: tuple[int, ...],
+    rate: float,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> tuple[FloatArray, BoolArray]:
+    """Return the motion of a joint group in the null space between bounds of the joint rates.
+
+    As `group_motion`, with weights in place of strict order, because bounds want one minimum:
+    holding the tool (`_HOLDING`), then the lead joint's rate (1), then rest outside the group
+    (`_RESTING`), then within it. Where the tool cannot be held at that rate, the lead joint slows
+    down; the minimum changes steadily with posture and bounds.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        group: Joints of the group, counted from 0, its lead joint first.
+        rate: Rate of the lead joint [rad/s].
+        lower: Lowest rates, at most 0 [rad/s], shape (7,).
+        upper: Highest rates, at least 0 [rad/s], shape (7,).
+
+    Returns:
+        Joint rates [rad/s], shape (7,), and which joints are held at a bound, shape (7,).
+    """
+    weights = np.full(JOINTS, _RESTING)
+    weights[list(group)] = _RESTING * _EASED_WITHIN
+    weights[group[0]] = 1.0
+    hessian = _HOLDING * (jacobian.T @ jacobian)
+    hessian.flat[:: JOINTS + 1] += weights
+    slope = np.zeros(JOINTS)
+    slope[group[0]] = rate
+    return bounded_minimum(hessian, slope, lower, upper)
 
 
 def null_space_basis(jacobian: FloatArray, groups: tuple[tuple[int, ...], ...]) -> FloatArray:

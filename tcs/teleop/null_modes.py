@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.teleop.arm import JOINTS
 from tcs.teleop.control import clamped_rates, resolved_rates, smallest_singular_value
-from tcs.teleop.groups import GroupMotion, elbow_direction, group_motion
+from tcs.teleop.groups import bounded_group_motion, elbow_direction, group_motion
 from tcs.teleop.settings import Command
-from tcs.teleop.situation import PLANNED, Situation, Wish, all_slower, at_limits
+from tcs.teleop.situation import PLANNED, STILL, Situation, Wish, all_slower, at_limits
 
 _SLIP = 1e-4
 """A tool that would slip faster than this [m/s] is not held: against feedback at the default gain
@@ -19,35 +18,39 @@ it would stand 0.01 mm off."""
 _RACING = 3.0
 """Where a joint of a group turns this many times as fast as its lead joint, all have slowed down
 by a third; before, hardly, and after, all the more."""
+_AT_LIMIT = 1e-5
+"""A joint this close to its limit has come to rest there [rad]: nobody sees the difference."""
 _EDGE = 0.01
 """At this share of its speed, a group has come as far as its lead joint can lead it: the others
 turn 30 times as fast."""
 
 
 def null_space(asked: Command, now: Situation) -> Wish:
-    """Turn a joint group, the tool's position held: eqs. (9) to (14)."""
+    """Turn a joint group, the tool's position held: eqs. (9) to (14).
+
+    At a limit the group comes to rest, all its joints together. `clamped` goes on from there
+    with that joint held, if the rest of the arm can hold the tool.
+    """
     settings, jacobian = now.settings, now.jacobian[3:]
     back = _back(jacobian, now.error[3:], now)
     if asked.group is None or (asked.sign == 0 and now.speed == 0.0):
         return Wish(back)
     group = settings.groups[asked.group]
     lead = group[0]
-    motion = group_motion(jacobian, group, settings.group_rate)
-    if motion.slip > _SLIP:
-        return Wish(back, _stuck(lead))
-    ease = _ease(motion, settings.group_rate)
-    full = ease * motion.rates
+    way = float(np.sign(now.speed or asked.sign))
+    rates, held, slip = _turning(jacobian, group, way, now)
+    if slip > _SLIP or abs(rates[lead]) < STILL * settings.group_rate:
+        return Wish(back, f"{at_limits(held)}: its motion ends there." if held else _stuck(lead))
+    ease = _ease(rates, lead)
+    full = ease * way * rates
     speed = _next_speed(asked.sign, full, now)
-    if ease < _EDGE and speed and _gets_worse(group, np.sign(speed) * motion.rates, now):
+    if ease < _EDGE and speed * way > 0.0 and _gets_worse(group, way, rates, now):
         return Wish(back, _stuck(lead))
-    turning = speed * full
-    if settings.limits == "clamped":
-        turning = _around_limits(turning, back, group, now)
-    share, joint = all_slower(turning + back, now)
+    share, joint = all_slower(speed * full + back, now)
     if joint >= 0:
         return Wish(back, f"{at_limits([joint])}: its motion ends there.")
     # A group that had to slow down for a limit turns back from the speed it has.
-    return Wish(share * (turning + back), "", share * speed, full)
+    return Wish(share * (speed * full + back), "", share * speed, full)
 
 
 def pose(asked: Command, now: Situation) -> Wish:
@@ -85,7 +88,7 @@ def _back(jacobian: FloatArray, error: FloatArray, now: Situation) -> FloatArray
         damping=settings.damping,
         singular=settings.singular,
     )
-    if ((rates >= now.lower) & (rates <= now.upper)).all():
+    if _within(rates, now):
         return rates
     return clamped_rates(
         jacobian,
@@ -95,6 +98,11 @@ def _back(jacobian: FloatArray, error: FloatArray, now: Situation) -> FloatArray
         length=settings.length,
         damping=settings.damping,
     )[0]
+
+
+def _within(rates: FloatArray, now: Situation) -> bool:
+    """Return whether joint rates are within limits of position and velocity."""
+    return bool(((rates >= now.lower) & (rates <= now.upper)).all())
 
 
 def _next_speed(sign: float, full: FloatArray, now: Situation) -> float:
@@ -124,58 +132,47 @@ def _next_speed(sign: float, full: FloatArray, now: Situation) -> float:
     return min(max(wanted, now.speed - step), now.speed + step)
 
 
-def _ease(motion: GroupMotion, rate: float) -> float:
+def _turning(
+    jacobian: FloatArray, group: tuple[int, ...], way: float, now: Situation
+) -> tuple[FloatArray, list[int], float]:
+    """Return the joint rates of a group that turns one way at full speed, the tool held.
+
+    Returns:
+        Rates [rad/s], shape (7,), the joints that stay at their limits for it, and how fast the
+        tool slips for all that [m/s].
+    """
+    settings, arm = now.settings, now.arm
+    motion = group_motion(jacobian, group, way * settings.group_rate)
+    if settings.limits == "paper" or motion.slip > _SLIP:
+        return motion.rates, [], motion.slip
+    lower = np.where(now.joints - arm.lower <= _AT_LIMIT, 0.0, -np.inf)
+    upper = np.where(arm.upper - now.joints <= _AT_LIMIT, 0.0, np.inf)
+    if ((motion.rates >= lower) & (motion.rates <= upper)).all():
+        return motion.rates, [], motion.slip
+    rates, held = bounded_group_motion(jacobian, group, way * settings.group_rate, lower, upper)
+    return rates, np.flatnonzero(held).tolist(), float(np.linalg.norm(jacobian @ rates))
+
+
+def _ease(rates: FloatArray, lead: int) -> float:
     """Return by how much a group must slow down so that it stops where its lead joint turns back.
 
     A tool that is held leaves the lead joint only part of its range. At the end of that part the
     others would turn infinitely faster than it does; their speed is led to zero there instead.
     """
-    fastest = float(np.abs(motion.rates).max()) / (rate * _RACING)
+    faster = float(np.abs(rates).max()) / (abs(float(rates[lead])) * _RACING)
     # Smooth, as a kink would be a jerk; 0.99 where all turn as fast as the lead joint.
-    return float(1.0 / math.sqrt(1.0 + fastest**4))
+    return float(1.0 / math.sqrt(1.0 + faster**4))
 
 
-def _gets_worse(group: tuple[int, ...], rates: FloatArray, now: Situation) -> bool:
+def _gets_worse(group: tuple[int, ...], way: float, rates: FloatArray, now: Situation) -> bool:
     """Return whether a group's motion leads on to where its lead joint turns back."""
     # Far enough for rounding, near enough to stay on this side [rad].
     ahead = now.joints + (1e-4 / float(np.abs(rates).max())) * rates
-    slowest = [
-        _ease(group_motion(now.arm.kinematics(joints).jacobian[3:], group, 1.0), 1.0)
-        for joints in (now.joints, ahead)
-    ]
-    return slowest[1] < slowest[0]
-
-
-def _around_limits(
-    turning: FloatArray, back: FloatArray, group: tuple[int, ...], now: Situation
-) -> FloatArray:
-    """Return a group's motion in which joints at their limits stay there, if there is one.
-
-    The lead joint is slowed down to what its own limit allows; others that are too fast are held
-    at their bounds, the worst first, and the rest of the arm takes over.
-    """
-    lead = group[0]
-    lower, upper = now.lower - back, now.upper - back
-    rate = float(np.clip(turning[lead], lower[lead], upper[lead]))
-    if rate == 0.0:
-        return turning
-    held, bound = np.zeros(JOINTS, bool), np.zeros(JOINTS)
-    found = turning
-    for _ in range(JOINTS):
-        over = np.maximum(found - upper, lower - found)
-        over[lead] = 0.0
-        over[held] = 0.0
-        joint = int(over.argmax())
-        # Rates are rounded to far below this [rad/s].
-        if over[joint] <= 1e-12:
-            return found
-        held[joint] = True
-        bound[joint] = min(max(found[joint], lower[joint]), upper[joint])
-        motion = group_motion(now.jacobian[3:], group, rate, None, held, bound)
-        if motion.slip > _SLIP or _ease(motion, abs(rate)) < _EDGE:
-            break
-        found = motion.rates
-    return turning
+    ease = []
+    for joints in (now.joints, ahead):
+        jacobian = now.arm.kinematics(joints).jacobian[3:]
+        ease.append(_ease(_turning(jacobian, group, way, now)[0], group[0]))
+    return ease[1] < ease[0]
 
 
 def _stuck(lead: int) -> str:
