@@ -155,7 +155,9 @@ def _operators(experiment: Experiment) -> list[Block]:
             [
                 field.name.replace("_", " "),
                 number(getattr(Traits(), field.name)),
-                f"{number(min(values))} to {number(max(values))}",
+                number(values[0])
+                if len({*values}) == 1
+                else f"{number(min(values))} to {number(max(values))}",
             ]
         )
     return [

@@ -135,8 +135,8 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
         ),
         Text(
             "Steering is that of the hand that drives the tool; while the other hand turns the "
-            "joint group, it rests. Rests lengthen the spectral arc: with the novel controller the "
-            "hand moves less, but in more pieces."
+            "joint group, it rests, and rests lengthen the spectral arc. Operators turn the hand "
+            "only when they try something: with the novel controller they never have to."
         ),
     ]
 

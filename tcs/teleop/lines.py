@@ -53,8 +53,8 @@ _STILL = 1e-9
 """A joint that moves less than this in a step keeps still [rad]."""
 _MARGIN = 0.85
 """Start postures keep within this share of the joints' ranges about their middles."""
-_TRIED = 200_000
-"""Start postures after which the search gives up: a few minutes."""
+_TRIED = 100_000
+"""Start postures after which the search gives up: a minute or two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
     Args:
         arm: The arm.
         seed: Of the start postures.
-        settings: What counts as at a limit and as singular.
+        settings: What counts as singular.
 
     Raises:
         TcsError: If no line is found.
@@ -258,10 +258,9 @@ class _Walk:
 
     def _ends(self, joints: FloatArray, change: FloatArray) -> int:
         """Return a joint that would go beyond its limit, -1 if none would."""
-        near = self.settings.near_limit
         after = joints + change
         # A joint that keeps still but for rounding does not run into its limit.
-        beyond = ((after > self.arm.upper - near) & (change > _STILL)) | (
-            (after < self.arm.lower + near) & (change < -_STILL)
+        beyond = ((after > self.arm.upper) & (change > _STILL)) | (
+            (after < self.arm.lower) & (change < -_STILL)
         )
         return int(np.argmax(beyond)) if beyond.any() else -1

@@ -195,7 +195,7 @@ class ScriptedOperator:
         elif self._phase is _Phase.TRY:
             spin, aim = self._motion[:3] / self._lasts, self._motion[3:] / self._lasts
             if over or stopped:
-                self._end_try(seen, stopped=stopped)
+                self._end_try(step, stopped=stopped)
         elif self._phase is _Phase.TURN:
             if over or stopped:
                 self._end_turn(stopped=stopped)
@@ -259,7 +259,8 @@ class ScriptedOperator:
                 turn, way = (float(np.linalg.norm(part)) for part in np.split(self._motion, 2))
                 pace = self._traits.speed
                 lasts = max(way / pace, turn / (pace * self._traits.turn_per_metre))
-                self._begin(_Phase.TRY, lasts)
+                # What helped may have been next to nothing: it takes a moment all the same.
+                self._begin(_Phase.TRY, max(lasts, self._traits.muscle))
         elif self._phase is _Phase.TO_GROUP:
             self._begin(_Phase.TURN, abs(self._turn) / self._settings.group_rate)
         else:
@@ -281,16 +282,17 @@ class ScriptedOperator:
             return self._habits.turns[self._obstacle]
         traits = self._traits
         more = min(_FARTHEST_TURN, traits.first_turn * traits.growth ** (self._tries - 1))
-        if self._turn:
+        if self._turn and abs(self._turned) + more <= math.pi:
             return math.copysign(more, self._turn)
-        # Nothing tried yet, or that way is closed: then back, and as far on the other side.
+        # Nothing tried yet, or that way is closed, or half a turn has not helped: then back, and on
+        # to the other side.
         way = -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
         return float(way * (abs(self._turned) + more))
 
-    def _end_try(self, seen: Step, *, stopped: bool) -> None:
+    def _end_try(self, now: Step, *, stopped: bool) -> None:
         """Look whether the arm goes on from here; think again where the try itself was stopped."""
         assert self._where is not None
-        self._moved = pose_error(seen.R, seen.p, self._where.R, self._where.p)
+        self._moved = pose_error(now.R, now.p, self._where.R, self._where.p)
         if stopped:
             self._begin(_Phase.THINK, self._traits.thinking)
         else:

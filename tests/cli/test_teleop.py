@@ -1,0 +1,54 @@
+"""`tcs teleop`: what it writes, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+
+def test_unknown_robots_and_formats_are_refused_in_a_line(tcs_command, tmp_path):
+    ran = tcs_command("teleop", "experiment", "--robot", "iwa7", "--out", tmp_path / "out")
+    assert ran.code == 1
+    assert "Did you mean 'iiwa7'?" in ran.err
+    ran = tcs_command("teleop", "experiment", "--runs", "--runs-as", "xlsx", "--out", tmp_path)
+    assert ran.code == 1
+    assert ".csv or .parquet" in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+def test_too_few_operators_are_a_misuse(tcs_command, tmp_path):
+    ran = tcs_command("teleop", "experiment", "--operators", 2, "--out", tmp_path)
+    assert ran.code == 2
+
+
+def test_a_folder_that_cannot_be_made_is_told_before_the_work(tcs_command, tmp_path):
+    (tmp_path / "file").write_text("")
+    ran = tcs_command("teleop", "experiment", "--out", tmp_path / "file" / "out")
+    assert ran.code == 1
+    assert "cannot be made" in ran.err
+
+
+@pytest.mark.slow
+def test_a_small_experiment(tcs_command, tmp_path):
+    words = ["--operators", 3, "--training", 1, "--trials", 1, "--jobs", 1, "--runs"]
+    ran = tcs_command("teleop", "experiment", *words, "--out", tmp_path / "out", "--json")
+    assert ran.code == 0
+    result = ran.json
+    assert result["scripted"] is True
+    assert set(result["medians"]) == {"end-effector", "novel", "assisted"}
+    assert result["tests"]["accuracy"]["count"] == 3
+    assert result["maps"] is None
+    for name in ("experiment.html", "experiment.md", "trials.csv", "line.json"):
+        assert (tmp_path / "out" / name).stat().st_size > 100
+    assert len(list((tmp_path / "out" / "runs").glob("*.csv"))) == 9
+    with (tmp_path / "out" / "trials.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 18
+    times = [
+        float(r["time"]) for r in rows if r["controller"] == "novel" and r["training"] == "False"
+    ]
+    assert sorted(times)[1] == pytest.approx(result["medians"]["novel"]["time"])
+    ran = tcs_command("teleop", "experiment", *words[:-1], "--out", tmp_path / "again")
+    assert ran.code == 0
+    assert "3 scripted operators, not people" in ran.out
