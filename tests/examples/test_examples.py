@@ -23,6 +23,8 @@ PRINTED = {
     "08_capability_map": r"[1-9]\d* base poses reach both.*score 0\.[1-9]",
     "09_live_score": r"told by a joint: 100%.*seen by a camera: 100%",
     "10_viewer_page": r"wrote .*feeding\.html, 2\.\d MB",
+    "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*tool off by 0\.0\d\d mm\n"
+    r"8\.\d s, 1\.5\d m up",
 }
 WRITTEN = {
     "01_score_and_select": ["feeding.tcs"],
@@ -43,6 +45,12 @@ def test_example_runs(path, tmp_path, monkeypatch, capsys):
 
 def test_numbers_have_no_gap():
     assert [path.name[:3] for path in SCRIPTS] == [f"{n:02d}_" for n in range(1, len(SCRIPTS) + 1)]
+
+
+def test_the_docs_show_all():
+    page = (EXAMPLES.parent / "docs" / "examples.md").read_text(encoding="utf-8")
+    shown = re.findall(r"\.\./examples/(\S+)", page)
+    assert sorted(shown) == sorted(path.name for path in EXAMPLES.iterdir() if path.is_file())
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda path: path.name)

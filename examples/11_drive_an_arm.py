@@ -1,0 +1,48 @@
+"""Drive a seven-joint arm by its tool until a joint stops it, reshape it, and go on.
+
+With seven joints the tool can stay where it is while the arm moves. That frees a joint that has
+come to its limit. Everything here is simulated; nothing is sent to a robot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.teleop import Command, Mode, Settings, Step, Teleoperation, load_arm
+
+UP = Command(linear=(0.0, 0.0, 0.1), mode=Mode.END_EFFECTOR)
+"""The tool straight up at 10 cm/s."""
+
+
+def drive_up(session: Teleoperation) -> Step:
+    """Move the tool up until the arm stops and says why; one step is 10 ms."""
+    step = session.step(UP)
+    while not step.stopped:
+        step = session.step(UP)
+    print(f"{step.time:.1f} s, {step.p[2]:.2f} m up: {step.reason}")
+    return step
+
+
+def main() -> None:
+    """Drive the tool of an iiwa up, turn joints 2, 4 and 6 about it, and drive on."""
+    # "paper": a motion ends at the first joint limit. By default the other joints go on.
+    settings = Settings(limits="paper")
+    session = Teleoperation(load_arm("iiwa7"), [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0], settings)
+    drive_up(session)
+
+    # Let the arm come to rest, then turn its second joint group one way for a second and a half.
+    for _ in range(50):
+        before = session.step(Command())
+    for _ in range(150):
+        after = session.step(Command(mode=Mode.NULL_SPACE, group=1, sign=-1))
+    drift = 1000.0 * np.linalg.norm(after.p - before.p)
+    turned = np.degrees(after.joints - before.joints)
+    print(
+        f"joints turned by {np.round(turned).astype(int).tolist()} deg, tool off by {drift:.3f} mm"
+    )
+
+    drive_up(session)
+
+
+if __name__ == "__main__":
+    main()
