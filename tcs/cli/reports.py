@@ -181,6 +181,9 @@ def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
     recall = f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"
     if not found["dense_checked"]:
         recall = "not estimated: no unreached pair was scanned"
+    left = f"{found['mean_shortfall']:.1e}"
+    if not found["shortfall_checked"]:
+        left = "not estimated: no reached pair was scanned"
     rows = (
         ("reached pairs re-checked with Drake", f"{found['checked']:,}"),
         ("  of them false", f"{found['false_reached']:,}"),
@@ -192,7 +195,7 @@ def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
         ("  of them reachable after all", f"{found['missed']:,}"),
         ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
         ("recall", recall),
-        (f"mean {found['measure']} left behind", f"{found['mean_shortfall']:.1e}"),
+        (f"mean {found['measure']} left behind", left),
         ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
     )
     table = new_table("check", ">found")

@@ -172,6 +172,7 @@ def verification_table(answer: Answer) -> Table:
         if found.dense_checked
         else "not estimated"
     )
+    left = f"{found.mean_shortfall:.1e}" if found.shortfall_checked else "not estimated"
     wrong = found.false_reached + found.unconfirmed_hits
     rows: list[list[Cell | str]] = [
         ["Stored answers re-checked with Drake, drawn at random", f"{found.checked:,}"],
@@ -184,7 +185,7 @@ def verification_table(answer: Answer) -> Table:
         ["of them reachable after all", f"{found.missed:,}"],
         ["solutions of the scan that Drake refuses", str(found.unconfirmed_hits)],
         ["Share of what can be reached that is stored as reached", recall],
-        [f"mean {found.measure} left behind", f"{found.mean_shortfall:.1e}"],
+        [f"mean {found.measure} left behind", left],
     ]
     sound = "every answer holds" if found.is_sound else f"SOME ANSWERS ARE FALSE ({wrong})"
     rows.append(["Verdict", Cell(sound, _tone(found.is_sound))])

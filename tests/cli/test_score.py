@@ -67,6 +67,16 @@ def test_verify_finds_a_sound_file_sound(tcs_command, corner_file):
     assert found["false_reached"] == found["limit_violations"] == 0
 
 
+def test_verify_gives_no_figure_for_what_it_did_not_scan(tcs_command, corner_file):
+    ran = tcs_command("verify", corner_file, "--pairs", 5, "--dense", 0)
+    assert ran.code == 0
+    printed = " ".join(ran.out.split())
+    assert "recall not estimated: no unreached pair was scanned" in printed
+    assert "isotropy left behind not estimated: no reached pair was scanned" in printed
+    scanned = tcs_command("verify", corner_file, "--pairs", 5, "--dense", 6)
+    assert "not estimated" not in scanned.out
+
+
 def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
     file = tcs.load(corner_file)
     joints = file.nominal.scores.arm_joints.copy()

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.errors import TaskError, UnknownNameError
+from tcs.errors import TaskError, TcsError, UnknownNameError
 from tcs.scoring import load_job, score, summary, sweep
 from tcs.store import load_scores, save_scores
 from tcs.tasks import load_task
@@ -30,6 +30,15 @@ def test_scores_do_not_depend_on_the_number_of_threads(small_job):
     for name in ("reason", "isotropy", "pair", "arm_joints"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert one.pair_names == two.pair_names
+
+
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_no_threads_are_refused(small_job, jobs):
+    lowered = small_job.lowered(small_job.scene())
+    with pytest.raises(TcsError, match=f"^jobs is {jobs}; must be 1 or more threads"):
+        sweep(lowered, small_job.task.weights, jobs=jobs)
+    with pytest.raises(TcsError, match=f"^jobs is {jobs}; must be 1 or more threads"):
+        score("feeding", jobs=jobs)
 
 
 def test_blocked_pairs_name_the_bodies_in_contact(small_file):
