@@ -66,7 +66,7 @@ def experiment(
     from tcs.teleop.arm import load_arm
     from tcs.teleop.experiment import Plan, run_experiment
     from tcs.teleop.lines import find_course
-    from tcs.teleop.maps import maps_of
+    from tcs.teleop.maps import check_robot, maps_of
     from tcs.teleop.run import check_format
     from tcs.writing import make_folder, whole_file
 
@@ -84,6 +84,8 @@ def experiment(
         make_folder(runs)
     robot = load_robot(asked.robot)
     arm = load_arm(robot, lift=_middle(robot) if asked.lift is None else asked.lift)
+    if asked.maps:
+        check_robot(arm)
     course = find_course(arm, asked.line_seed)
     done = run_experiment(
         arm, course, plan, runs=runs, runs_as=asked.runs_as or ".csv", jobs=jobs,

@@ -24,8 +24,12 @@ from tcs.capability import (
     merge,
     recording_of,
 )
+from tcs.capability.from_ik import seen_from
 from tcs.capability.grid import TILT, Z
+from tcs.capability.map import ITCM
+from tcs.capability.visibility import CORRECTED
 from tcs.errors import SelectionError
+from tcs.teleop.arm import Arm
 from tcs.teleop.experiment import Experiment
 
 STEP, TURNS = 0.05, 16
@@ -66,6 +70,19 @@ class DrivenMaps:
     """The same [rad]."""
 
 
+def check_robot(arm: Arm) -> None:
+    """Refuse an arm whose recordings can become no map, before they are made.
+
+    Raises:
+        UnknownNameError: If the robot has no head file.
+    """
+    seen_from(_reach(arm), MapGrid.of(STEP, TURNS), ITCM, CORRECTED)
+
+
+def _reach(arm: Arm) -> Reach:
+    return Reach(arm.robot, lift=arm.lift, step=STEP)
+
+
 def maps_of(experiment: Experiment) -> DrivenMaps:
     """Return the map of each controller.
 
@@ -80,7 +97,7 @@ def maps_of(experiment: Experiment) -> DrivenMaps:
         DataFileError: If a recording cannot become a map.
     """
     arm = experiment.arm
-    reach = Reach(arm.robot, lift=arm.lift, step=STEP)
+    reach = _reach(arm)
     grid = MapGrid.of(STEP, TURNS, "all")
     found = {}
     for condition, drives in experiment.drives.items():

@@ -17,6 +17,13 @@ def test_unknown_robots_and_formats_are_refused_in_a_line(tcs_command, tmp_path)
     assert len(ran.err.strip().splitlines()) == 1
 
 
+def test_maps_of_a_robot_without_a_head_are_refused_before_the_work(tcs_command, tmp_path):
+    ran = tcs_command("teleop", "experiment", "--maps", "--out", tmp_path / "out")
+    assert ran.code == 1
+    assert "head" in ran.err
+    assert "iiwa7" in ran.err
+
+
 def test_too_few_operators_are_a_misuse(tcs_command, tmp_path):
     ran = tcs_command("teleop", "experiment", "--operators", 2, "--out", tmp_path)
     assert ran.code == 2
