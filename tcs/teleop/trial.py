@@ -42,11 +42,6 @@ class Condition:
     approach: Approach
     settings: Settings
 
-    @property
-    def mark(self) -> str:
-        """How the paper's tables call it, e.g. "EE"."""
-        return _MARKS[self.name]
-
 
 END_EFFECTOR = Condition(
     "end-effector", "end-effector control", Mode.END_EFFECTOR, Approach.HAND,
@@ -59,7 +54,6 @@ ASSISTED = Condition(
     "assisted", "automatic assistance", Mode.ASSISTED, Approach.HAND, Settings(limits="clamped")
 )
 CONDITIONS = (END_EFFECTOR, NOVEL, ASSISTED)
-_MARKS = {"end-effector": "EE", "novel": "NV", "assisted": "AS"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
