@@ -35,7 +35,8 @@ lint: $(STAMP)  ## Format, lint, types and import rules
 
 docs: $(STAMP)  ## Build the site into out/docs, every warning an error; needs no internet
 	@mkdir -p $(OUT)
-	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs $(OUT)/docs
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html \
+	  --doctree-dir $(OUT)/doctrees docs $(OUT)/docs
 	@echo "wrote $(OUT)/docs/index.html"
 
 format: $(STAMP)  ## Rewrite the code in house format and fix what can be fixed
