@@ -18,8 +18,15 @@ PAGES = [CHECKOUT / "README.md", *sorted((CHECKOUT / "docs").rglob("*.md"))]
 def command_lines() -> list:
     found = []
     for page in PAGES:
-        blocks = re.findall(r"```(?:sh)?\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S)
-        lines = "".join(blocks).replace("\\\n", " ").splitlines()
+        # Blocks of every language are matched, so that the end of one is not taken for the start
+        # of another.
+        text = page.read_text(encoding="utf-8")
+        blocks = re.findall(r"^ *```(\w*)[^\n]*\n(.*?)^ *```", text, flags=re.S | re.M)
+        lines = (
+            "".join(block for kind, block in blocks if kind in ("", "sh"))
+            .replace("\\\n", " ")
+            .splitlines()
+        )
         found += [
             pytest.param(line, id=f"{page.stem}: {line}")
             for line in map(str.strip, lines)
@@ -36,7 +43,7 @@ def test_there_are_lines():
 def test_line_is_understood(line):
     command = typer.main.get_command(app)
     _, *words = shlex.split(line, comments=True)
-    while hasattr(command, "commands"):
+    while words and hasattr(command, "commands") and not words[0].startswith("-"):
         command = command.commands[words.pop(0)]
     # Parses, and refuses what it does not know or lacks; nothing is run.
     command.make_context(str(command.name), words)
