@@ -15,6 +15,8 @@ from tcs.capability import (
     pick_and_place_task,
     split,
 )
+from tcs.capability.merge import position_scores, usable_lifts
+from tcs.capability.volume import Box
 from tcs.errors import SelectionError
 from tests.capability.test_map import small_map
 
@@ -118,6 +120,21 @@ def test_merging_agrees_with_plain_loops(task, seed, lift):
     for key, score in slow.items():
         # Scores are kept in single precision.
         assert fast[key] == pytest.approx(score, rel=1e-6)
+
+
+@pytest.mark.parametrize("heading_deg", [0, 45, 30])
+@pytest.mark.parametrize("shift", [0.0, 0.024])
+def test_no_base_place_lies_outside_the_box_that_is_looked_at(heading_deg, shift):
+    volume = MapVolume(random_map(np.random.default_rng(0)))
+    grasp = Grasp(math.radians(heading_deg))
+    position = GraspPosition(0.1 + shift, -0.05 - shift, 0.4, (grasp,))
+    lifts = usable_lifts(volume.capability, 0.4)
+    box = volume.box_about(position.x, position.y)
+    wide = Box(box.x - 5, box.y - 5, box.width + 10, box.depth + 10)
+    found, all_there_are = (
+        int((~np.isnan(position_scores(volume, position, b, lifts)[0])).sum()) for b in (box, wide)
+    )
+    assert found == all_there_are > 1000
 
 
 def test_on_the_grid_nothing_is_rounded():
@@ -253,6 +270,38 @@ def test_a_long_line_is_split_into_as_few_stops_as_can_be(ihcm):
         for cuts in itertools.combinations(range(1, n), fewer - 1):
             ends = [0, *cuts, n]
             assert not all(reachable(a, b - 1) for a, b in itertools.pairwise(ends))
+
+
+def test_of_the_splits_into_as_few_stops_the_one_with_the_best_worst_stop_is_taken():
+    """By trying every way to cut a line on maps of random scores."""
+    told_apart = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        capability = random_map(rng)
+        # Places unevenly spaced: else every stretch of two is as good as any other.
+        places = np.cumsum(rng.integers(2, 9, 5)) * 0.05
+        task = GraspTask("t", tuple(GraspPosition(x, 0, 0.41, (Grasp(0.0),)) for x in places))
+        n = len(task.positions)
+        best = {}
+        for a, b in itertools.combinations(range(n + 1), 2):
+            try:
+                part = GraspTask("part", task.positions[a:b])
+                best[a, b] = merge(capability, part).best().score
+            except SelectionError:
+                continue
+        ways = [
+            [best.get(stretch, -1.0) for stretch in itertools.pairwise((0, *cuts, n))]
+            for count in range(n)
+            for cuts in itertools.combinations(range(1, n), count)
+        ]
+        ways = [way for way in ways if min(way) >= 0.0]
+        fewest = min(map(len, ways))
+        lowest = [min(way) for way in ways if len(way) == fewest]
+        told_apart += len(set(lowest)) > 1
+        stops = split(capability, task)
+        assert len(stops) == fewest
+        assert min(stop.base.score for stop in stops) == max(lowest)
+    assert told_apart > 0
 
 
 def test_one_stop_where_one_will_do(ihcm):

@@ -69,8 +69,23 @@ def test_a_wall_about_the_task_leaves_the_body_free_and_the_arm_not(found, tiago
         )
 
 
+def test_a_pre_grasp_does_not_make_up_for_a_grasp(ihcm, tiago):
+    """A bar where the fingers come to stand, and nothing where they wait before."""
+    task = linear_task(0.2, 2, 0.65, headings=(0.0,), pre_grasps=(0.1,), step=0.1)
+    best = merge(ihcm, task).best()
+    first = task.positions[0]
+    assert Surroundings(tiago, room()).judge(task, best).reached == (True, True)
+    block = ("bar", (0.02, 0.14, 0.04), (first.x, first.y, first.height))
+    judged = Surroundings(tiago, room(block)).judge(task, best)
+    assert not judged.body_blocked
+    assert judged.reached == (False, True)
+
+
 def test_room_and_task_may_be_moved_together(found, tiago):
-    best = found.best()
+    # A base beside the task, so that both of its coordinates matter to where it comes to stand.
+    beside = found.base_poses[np.abs(found.base_poses[:, 1]) >= 0.3]
+    best = BasePose(*map(float, beside[np.argmax(beside[:, 4])]))
+    assert abs(best.x) >= 0.2
     x, y, yaw = 1.3, -0.4, math.radians(35.0)
     c, s = math.cos(yaw), math.sin(yaw)
     moved = (x + c * best.x - s * best.y, y + s * best.x + c * best.y, 0.5)
