@@ -187,8 +187,12 @@ def verification_table(answer: Answer) -> Table:
         ["Share of what can be reached that is stored as reached", recall],
         [f"mean {found.measure} left behind", left],
     ]
-    sound = "every answer holds" if found.is_sound else f"SOME ANSWERS ARE FALSE ({wrong})"
-    rows.append(["Verdict", Cell(sound, _tone(found.is_sound))])
+    verdict = "every answer holds"
+    if not found.is_sound:
+        verdict = f"SOME ANSWERS ARE FALSE ({wrong})"
+    elif not answer.is_sound:
+        verdict = "THESE HOLD, BUT NOT ALL THAT ARE SHOWN UNDER GOAL BY GOAL"
+    rows.append(["Verdict", Cell(verdict, _tone(answer.is_sound))])
     return Table(
         f"Re-checked when this report was made, of all tables of the file, seed "
         f"{answer.check.seed}.",

@@ -189,6 +189,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     assert found.verification.is_sound
     assert not found.is_sound
     assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
+    assert column(verification_table(found), "Found")[-1].startswith("THESE HOLD, BUT NOT ALL")
 
 
 def test_what_was_rechecked_is_told(answer):
