@@ -149,6 +149,7 @@ class Teleoperation:
             if not held and command.mode is not None and command.mode != self._mode:
                 self._mode = Mode(command.mode)
                 self._switching = True
+                self._target_R, self._target_p = self._now.R, self._now.p
         other = command.mode not in (None, self._mode)
         if not (held or other or self._switching):
             if self._mode is Mode.POSE or command.group == self._group:
