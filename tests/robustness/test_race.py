@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from tcs.robustness.race import race, round_sizes
 from tcs.robustness.statistics import intervals_of
@@ -81,6 +82,43 @@ def test_no_set_behind_beyond_doubt_goes_on(rng):
     assert found.survivors.tolist() == [0]
     # Among equals those that come first go on.
     assert 0.0 < found.high[1] < 3.7 / 64
+
+
+def raced_by_loops(shares, sizes):
+    """Return how many samples each set has had and who is left, from all shares (sets, samples)."""
+    count = len(shares)
+    bound = stats.norm.isf(0.05 / (count * len(sizes)))
+    alive, had = list(range(count)), [0] * count
+    for size in sizes:
+        means = {k: shares[k, :size].mean() for k in alive}
+        leader = max(alive, key=lambda k: (means[k], -k))
+        left = []
+        for k in alive:
+            had[k] = size
+            off = shares[k, :size] - shares[leader, :size]
+            if off.mean() + bound * off.std(ddof=1) / np.sqrt(size) >= 0.0:
+                left.append(k)
+        half = sorted(left, key=lambda k: (-means[k], k))[: (len(alive) + 1) // 2]
+        alive = sorted(half)
+    return had, alive
+
+
+@pytest.mark.parametrize("ahead", [0.02, 0.1, 0.2, 0.3])
+def test_who_is_rejected_when_agrees_with_plain_loops(rng, ahead):
+    """A leader ahead of the others by more or less, so that some are behind beyond doubt."""
+    sets = np.arange(40)[:, None]
+    field = Field(rng, members=40)
+    field.chance[:] = rng.uniform(0.4, 0.6, field.chance.shape)
+    field.chance[7] = 0.6 + ahead
+    luck = np.where(
+        rng.uniform(size=field.reached.shape) < 0.5,
+        rng.uniform(size=(1, 1024, 1)), rng.uniform(size=field.reached.shape),
+    )  # fmt: skip
+    field.reached = luck < field.chance[:, None]
+    found = race(sets, WEIGHTS, 1024, field.attempt)
+    had, alive = raced_by_loops(field.shares(sets), round_sizes(1024))
+    assert found.samples.tolist() == had
+    assert found.survivors.tolist() == alive
 
 
 def test_intervals_of_survivors_hold(rng):

@@ -93,6 +93,22 @@ def test_ranks_do_not_see_the_rounding_of_shares(rng):
         assert test(first, second).p == pytest.approx(test(1.0 * ones, 1.0 * others).p, rel=1e-12)
 
 
+def test_zero_differences_take_their_ranks_as_pratt_has_it(rng):
+    """The normal approximation written out: zeros are ranked, and then left out of both sums."""
+    first, second = rng.binomial(8, 0.8, (2, 60)) / 8
+    off = first - second
+    n, zeros = off.size, int((off == 0.0).sum())
+    assert 5 < zeros < 40
+    sizes = np.abs(off)
+    ranks = np.array([(sizes < d).sum() + ((sizes == d).sum() + 1) / 2 for d in sizes])
+    mean = (n * (n + 1) - zeros * (zeros + 1)) / 4
+    variance = (n * (n + 1) * (2 * n + 1) - zeros * (zeros + 1) * (2 * zeros + 1)) / 24
+    ties = [int((sizes == d).sum()) for d in np.unique(sizes) if d > 0.0]
+    variance -= sum(t**3 - t for t in ties) / 48
+    z = abs(ranks[off > 0.0].sum() - mean) / math.sqrt(variance)
+    assert signed_rank(first, second).p == pytest.approx(math.erfc(z / math.sqrt(2)), rel=1e-9)
+
+
 def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
     luck = rng.normal(size=100)
     first, second = luck + 0.05, luck + rng.normal(0, 0.05, 100)
