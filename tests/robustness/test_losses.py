@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,67 @@ def test_a_person_lifted_away_is_too_far(chair_trials):
     assert (found.reason[0] == Reason.REACHED).any()
     assert not (found.reason[1:] == Reason.REACHED).all(axis=1).any()
     assert (found.reason[1:] == Reason.TOO_FAR).any()
+
+
+def by_hand():
+    """Four samples, three goals, two members whose outcomes are written down, and their room."""
+    reached, far, gripper, arm = (
+        Reason.REACHED, Reason.TOO_FAR, Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED,
+    )  # fmt: skip
+    # Bodies of the robot: base 0, hand 1; then a contact is robot body * 5 + other, where others
+    # are bed 0, person 1, chair 2, base 3, hand 4.
+    outcomes = [
+        SimpleNamespace(
+            reason=np.array([[reached, gripper, reached], [reached, gripper, far],
+                             [arm, gripper, reached], [reached, reached, reached]]),
+            contact=np.array([[-1, 5, -1], [-1, 5, -1], [6, 5, -1], [-1, -1, -1]]),
+        ),
+        SimpleNamespace(
+            reason=np.array([[far, gripper, far], [far, far, far],
+                             [arm, gripper, far], [far, far, far]]),
+            contact=np.array([[-1, 5, -1], [-1, -1, -1], [8, 5, -1], [-1, -1, -1]]),
+        ),
+    ]  # fmt: skip
+    best = np.any([found.reason == Reason.REACHED for found in outcomes], axis=0)
+    trials = SimpleNamespace(
+        outcome=lambda h, offsets: outcomes[h],
+        lowered=SimpleNamespace(
+            robot_bodies=("base", "hand"), room_bodies=("bed", "person", "chair")
+        ),
+        job=SimpleNamespace(task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3)),
+    )
+    evaluation = SimpleNamespace(
+        reached=best, sets=np.array([[0, 1]]), weights=np.array([0.5, 0.25, 0.25]),
+        offsets={"chair_x": np.array([0.1, 0.1, 0.2, 0.0]), "person_y": np.array([1, 1, -3, 1.0])},
+    )  # fmt: skip
+    return trials, evaluation
+
+
+def test_losses_by_hand():
+    found = losses(*by_hand())
+    told = {loss.goal: loss for loss in found.goals}
+    assert [loss.goal for loss in found.goals] == [1, 0, 2]
+    assert [told[g].success for g in range(3)] == [0.75, 0.25, 0.75]
+    # Only where the gripper is in the way from both places can no set do better: goal 1, in
+    # samples 0 and 2.
+    assert found.ceiling == pytest.approx(1.0 - 0.25 * 2 / 4)
+    assert (told[0].pair, told[0].pair_share) == (("hand", "person"), 1.0)
+    assert (told[1].pair, told[1].pair_share) == (("hand", "bed"), 1.0)
+    assert told[2].pair is None
+    assert told[0].reasons == {Reason.ARM_BLOCKED: 1.0}
+    assert told[1].reasons == {Reason.GRIPPER_BLOCKED: 1.0}
+    # Sample 2 loses goal 0: the chair is 0.2 / 0.0707 of its deviations off, the person -3 / 1.73.
+    assert told[0].joint == "chair_x"
+    assert told[0].tilt == pytest.approx(2.0 * np.sqrt(2.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_error_to_either_side_may_tell_losses_best(sign):
+    trials, evaluation = by_hand()
+    evaluation.offsets = {
+        "chair_x": np.array([0.1, -0.1, 0.05, 0.0]),
+        "person_y": sign * np.array([1.0, 1.0, -3.0, 1.0]),
+    }
+    (loss,) = (loss for loss in losses(trials, evaluation).goals if loss.goal == 0)
+    assert loss.joint == "person_y"
+    assert loss.tilt == pytest.approx(-sign * 3.0 / np.sqrt(3.0))
