@@ -27,7 +27,7 @@ a lead joint kept from turning at 0.4 rad/s pulls at the tool by less than 0.01 
 _RESTING = 1e-3
 """What a rate of 1 rad/s outside the group costs against the same: the lead joint slows down by a
 thousandth where one of them has to turn as fast."""
-_EASED_WITHIN = 0.01
+_EASED_WITHIN = 1e-3
 """What a rate of a follower costs against one outside the group."""
 
 

@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from tcs.teleop import Settings, load_arm
-from tcs.teleop.groups import elbow_direction, group_motion, null_space_basis
+from tcs.teleop.groups import (
+    bounded_group_motion,
+    elbow_direction,
+    group_motion,
+    null_space_basis,
+)
 
 GROUPS = Settings().groups
 
@@ -111,6 +116,37 @@ def test_a_group_that_cannot_hold_the_tool_says_by_how_much_it_slips(iiwa, ready
     assert motion.slip > 0.1
     assert not motion.exact
     assert not motion.rates[held].any()
+
+
+class TestBounded:
+    free = np.full(7, np.inf)
+
+    @pytest.mark.parametrize("group", GROUPS)
+    def test_without_bounds_it_is_the_motion_of_the_group(self, iiwa, ready, group):
+        J = iiwa.kinematics(ready + np.array([0.2, 0.1, 0.3, 0, 0.4, 0, 0])).jacobian[3:]
+        plain = group_motion(J, group, 0.4).rates
+        rates, held = bounded_group_motion(J, group, 0.4, -self.free, self.free)
+        assert not held.any()
+        # Weights in place of strict order: followers count a thousandth of the others, so the
+        # others help where followers race.
+        np.testing.assert_allclose(rates, plain, atol=0.1 * np.abs(plain).max())
+        assert np.linalg.norm(J @ rates) < 1e-6
+
+    def test_the_tool_stays_whatever_the_bounds_are(self, iiwa, rng):
+        slowed = 0
+        for joints in iiwa.random_joints(rng, 200):
+            J = iiwa.kinematics(joints).jacobian[3:]
+            lower = np.where(rng.random(7) < 0.5, 0.0, -np.inf)
+            upper = np.where(rng.random(7) < 0.5, 0.0, np.inf)
+            upper[0] = np.inf
+            rates, held = bounded_group_motion(J, GROUPS[0], 0.4, lower, upper)
+            assert ((rates >= lower) & (rates <= upper)).all()
+            assert not rates[held].any()
+            # What the lead joint's missing 0.4 rad/s pulls with, through a weak direction.
+            assert np.linalg.norm(J @ rates) < 1e-4
+            slowed += rates[0] < 1e-3
+        # Some bounds leave a motion, others none.
+        assert 20 < slowed < 180
 
 
 def test_joints_that_are_held_keep_their_rates(iiwa, ready):
