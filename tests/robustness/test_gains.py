@@ -69,6 +69,20 @@ def test_strata_are_drawn_from_evenly(rng):
     assert np.array_equal(_stratified(rng, pool[:7], values, 50), pool[:7])
 
 
+def test_the_interval_of_a_rank_correlation_by_hand():
+    first = np.arange(8.0)
+    second = first[[1, 0, 3, 2, 5, 4, 7, 6]]
+    rho, ci95, _ = _rank_correlation(first, second)
+    # Every rank is one off: 1 - 6 * 8 / (8 * 63).
+    assert rho == pytest.approx(1 - 48 / 504)
+    # Fisher's transformation; Bonett and Wright's variance (1 + rho^2 / 2) / (8 - 3); 97.5 % of a
+    # normal is at 1.96.
+    half = 1.959964 * np.sqrt((1 + rho**2 / 2) / 5)
+    assert ci95 == pytest.approx(
+        (np.tanh(np.arctanh(rho) - half), np.tanh(np.arctanh(rho) + half)), abs=1e-6
+    )
+
+
 def test_rank_correlation_is_spearmans_and_its_interval_holds(rng):
     first = rng.normal(size=60)
     rho, (low, high), p = _rank_correlation(first, first + rng.normal(size=60))

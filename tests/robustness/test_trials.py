@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -188,6 +189,28 @@ def test_a_joint_stops_at_its_limit(bed_file):
     found = trials.reached(high, at_limit)[0]
     assert np.array_equal(found[0], found[1])
     assert np.array_equal(found[0], found[2])
+
+
+def test_a_joint_that_is_stopped_counts_whatever_the_others_do(bed_trials):
+    member = bed_trials.scored.sets.candidates[None, :1].astype(int)
+    beyond, within = np.radians([200.0, 0.0, -200.0]), np.array([0.01, 0.01, 0.01])
+    for offsets in (
+        {"head_rest": beyond, "person_x": within},
+        {"person_x": within, "head_rest": beyond},
+    ):
+        assert bed_trials.clipped(member, offsets) == 2
+
+
+def test_a_joint_a_rounding_beyond_its_limit_stays_where_it_is(bed_trials):
+    """The last step of a grid may be; to move it back would be an error that nobody drew."""
+    believed = bed_trials._positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
+    limits = (believed + 1e-12, believed + 1.0)
+    joints = SimpleNamespace(limits=lambda name: limits)
+    scene = SimpleNamespace(built=SimpleNamespace(room_joints=joints))
+    found = dataclasses.replace(bed_trials, scene=scene)
+    positions, stopped = found._positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
+    assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]
+    assert stopped.tolist() == [False, False, True, True]
 
 
 def test_what_is_not_there_is_refused(bed_file, bed_trials):
