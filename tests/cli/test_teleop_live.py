@@ -179,3 +179,13 @@ def test_ctrl_c_writes_what_was_driven(tmp_path):
     assert run.metadata["robot"] == "iiwa7"
     np.testing.assert_allclose(run.joints[0], np.radians(READY_DEG), atol=1e-9)
     assert [one.name for one in tmp_path.iterdir()] == ["run.csv"]
+
+
+@pytest.mark.parametrize("condition", ["end-effector", "novel", "assisted", "drake"])
+def test_every_condition_opens(tcs_command, condition):
+    ran = tcs_command(
+        "teleop", "--condition", condition, "--start-deg", *READY_DEG, "--no-browser",
+        "--duration", 0.1,
+    )  # fmt: skip
+    assert ran.code == 0
+    assert f", {condition}, limits as in clamped" in ran.err

@@ -104,7 +104,7 @@ class LivePage:
             start: Where its joints stand at first [rad], shape (7,).
             settings: How commands become motion.
             modes: What a person can change between; the first one comes first.
-            tell: Called with a line of text whenever the arm stops for another reason.
+            tell: Called with a line of text whenever the arm stops anew, or for another reason.
             on_step: Called after each step with the command and what came of it, once a browser
                 has looked at the page.
 
@@ -120,7 +120,6 @@ class LivePage:
         self._meshcat, self._stage, self._arm = meshcat, stage, arm
         self._start = np.array(start, dtype=np.float64)
         self._tell, self._on_step = tell, on_step
-        self._told = ""
         self._said, self._said_until = "", 0.0
         self._touching = ""
         self._seen = False
@@ -148,10 +147,10 @@ class LivePage:
             self.last = dataclasses.replace(self.last, stopped=True, reason=heard.lost)
         reason = self.last.reason
         if reason:
-            self._said, self._said_until = reason, now + _SAID_FOR
-            if reason != self._told:
+            # What can still be read on the page is not told again.
+            if reason != self._said or now >= self._said_until:
                 self._tell(reason)
-        self._told = reason
+            self._said, self._said_until = reason, now + _SAID_FOR
         self._seen = self._seen or heard.watched
         if self._seen and self._on_step is not None:
             self._on_step(heard.command, self.last)
@@ -194,7 +193,8 @@ class LivePage:
         number = self.hand.group
         chosen = self.last.mode is Mode.NULL_SPACE
         group = self.session.settings.groups[number] if chosen else None
-        return mode_line(self.last.mode, group, number, self._heard.command.clutch)
+        clutch = self._heard.command.clutch and not self._heard.lost
+        return mode_line(self.last.mode, group, number, clutch)
 
     def said(self, now: float) -> str:
         """Return what the person is told: why the arm stops, or what else there is to know.

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from tcs.errors import OutputError
 from tcs.teleop import Mode, Settings, load_arm
 from tcs.view import open_meshcat
 from tcs.view.teleop import LivePage, Recorder, Stage, start_posture
-from tcs.view.teleop.controls import BACK, NEXT_MODE, TURN_UP, buttons, sliders
+from tcs.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
 from tcs.view.teleop.live import key_name
 from tcs.view.teleop.panel import LIMIT, SINGULAR, readout
 from tests.view.teleop.conftest import MODES
@@ -199,3 +201,60 @@ def test_a_run_at_the_pace_of_the_clock(page):
 def test_an_arm_that_never_points_ahead_begins_in_the_middle(iiwa, iiwa_stage, monkeypatch):
     monkeypatch.setattr("tcs.view.teleop.start._AHEAD", 1.1)
     np.testing.assert_allclose(start_posture(iiwa, iiwa_stage), np.zeros(7), atol=1e-12)
+
+
+def test_a_reason_that_comes_and_goes_is_told_once(page, desk, told):
+    for i in range(6):
+        desk.watched = bool(i % 2)
+        drive(page, 1)
+    assert len(told) == 1
+    page._said_until = 0.0
+    desk.watched = False
+    drive(page, 1)
+    assert len(told) == 2
+
+
+def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
+    assert page.mode_line() == "end-effector mode"
+    desk.press("clutch")
+    drive(page, 1)
+    assert page.mode_line() == "end-effector mode; clutch in"
+    desk.press("clutch")
+    desk.watched = False
+    drive(page, 1)
+    assert page.mode_line() == "end-effector mode"
+
+
+def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
+    moved = {}
+
+    class Spy:
+        def __getattr__(self, name):
+            return getattr(meshcat, name)
+
+        def SetTransform(self, path, pose):
+            moved[path] = pose
+
+    monkeypatch.setattr(page, "_meshcat", Spy())
+    desk.sliders[FORWARD] = 0.2
+    drive(page, 4)
+    page.show()
+    np.testing.assert_allclose(moved["target"].translation(), page.last.target_p, atol=1e-12)
+    np.testing.assert_allclose(moved["tool"].translation(), page.last.p, atol=1e-12)
+    # It runs ahead of a tool that has to speed up first.
+    assert (page.last.target_p - page.last.p)[0] > 1e-4
+
+
+def test_a_key_moves_the_arm_for_a_moment_of_the_clock(page, desk):
+    desk.press("ahead")
+    drive(page, 5)
+    assert np.any(page._heard.command.linear)
+    time.sleep(TAP)
+    drive(page, 1)
+    assert not np.any(page._heard.command.linear)
+
+
+def test_hints_are_said(page, desk):
+    desk.press(TURN_UP)
+    drive(page, 1)
+    assert "null-space mode" in page.said(time.perf_counter())

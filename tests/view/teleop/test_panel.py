@@ -152,3 +152,23 @@ def test_everything_hangs_on_the_camera(iiwa, meshcat):
 def test_words():
     assert state_facts(NO_LIMITS, False) == ""
     assert mode_line("pose", None, 0, True) == "pose mode; clutch in"
+
+
+def test_limits_stand_below_the_bars(spy, monkeypatch):
+    written = []
+
+    def text_mesh(text):
+        written.append(text)
+        return np.zeros((3, 3)), np.array([[0], [1], [2]], dtype=np.int32)
+
+    monkeypatch.setattr("tcs.view.teleop.panel.text_mesh", text_mesh)
+    arm = load_arm("pr2")
+    Panel(spy, arm)
+    assert [text for text in written if text.startswith("joint")] == [
+        f"joint {i}" for i in range(1, 8)
+    ]
+    assert written.count("turns on") == np.count_nonzero(~arm.bounded) == 2
+    for i in np.flatnonzero(arm.bounded):
+        assert f"{np.degrees(arm.lower[i]):+.0f}" in written
+        assert f"{np.degrees(arm.upper[i]):+.0f}" in written
+    assert not [text for text in written if "inf" in text]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RotationMatrix
 
-from tcs.view.teleop.stage import PATH, TARGET, TOOL, Trail, pose_of
+from tcs.teleop import load_arm
+from tcs.view.teleop.stage import PATH, TARGET, TOOL, Stage, Trail, pose_of
 
 
 class Spy:
@@ -95,3 +96,32 @@ def test_live_there_is_a_target_and_played_back_there_is_none(iiwa_stage, meshca
     iiwa_stage.set_up(meshcat, np.array([0.6, 0.0, 1.0]), target=False)
     assert not meshcat.HasPath(TARGET)
     assert meshcat.HasPath(TOOL)
+
+
+@pytest.mark.parametrize("name", ["pr2", "tiago", "panda"])
+def test_the_robot_stands_where_the_arm_has_it(name):
+    arm = load_arm(name, lift=0.2)
+    stage = Stage(arm, meshes=False)
+    joints = arm.random_joints(np.random.default_rng(1), 1)[0]
+    stage.poses(joints)
+    X_WT = stage._scene.tool_pose()
+    at = arm.kinematics(joints)
+    # Two ways through the same chain: rounding.
+    np.testing.assert_allclose(X_WT.translation(), at.p, atol=1e-12)
+    np.testing.assert_allclose(X_WT.rotation().matrix(), at.R, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "left"), [("pr2", True), ("pr2_right", False), ("iiwa7", False)])
+def test_arms_are_looked_at_from_their_own_side(name, left, meshcat):
+    seen = {}
+
+    class Spy:
+        def __getattr__(self, name):
+            return getattr(meshcat, name)
+
+        def SetCameraPose(self, camera, target):
+            seen.update(camera=camera, target=target)
+
+    arm = load_arm(name)
+    Stage(arm, meshes=False).set_up(Spy(), arm.kinematics(np.zeros(7)).p)
+    assert (seen["camera"][1] > seen["target"][1]) == left
