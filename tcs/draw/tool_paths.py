@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from tcs.draw.boxes import COLOURS
 
 _LINE = "#222222"
+_COLUMN = 3.1
+"""Width of a group in inches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +41,20 @@ def draw_tool_paths(
         end: Of the line [m], shape (3,).
         blocked: Share of the line at which a joint meets its limit, to be marked.
     """
-    figure = Figure(figsize=(3.1 * len(groups) + 0.6, 6.2), layout="constrained")
-    axes = figure.subplots(2, len(groups), sharex="row", sharey="row", squeeze=False)
     level = np.array([end[0] - start[0], end[1] - start[1], 0.0])
     level /= np.linalg.norm(level)
     side = np.array([-level[1], level[0], 0.0])
     views = (("to its left [m]", side), ("above [m]", np.array([0.0, 0.0, 1.0])))
+    points = np.concatenate([*(path for group in groups for path in group.paths), [start, end]])
+    along, left, above = (np.ptp(points @ way) for way in (level, side, views[1][1]))
+    # As high as the paths are wide, at the scale of the columns.
+    heights = np.clip(_COLUMN * np.array([left, above]) / along, 0.8, 4.0)
+    figure = Figure(
+        figsize=(_COLUMN * len(groups) + 0.6, float(heights.sum()) + 1.4), layout="constrained"
+    )
+    axes = figure.subplots(
+        2, len(groups), sharex="row", sharey="row", squeeze=False, height_ratios=heights
+    )
     for row, (label, up) in enumerate(views):
         for column, group in enumerate(groups):
             panel = axes[row, column]

@@ -98,8 +98,9 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
     walk = _Walk(arm, settings or Settings())
     rng = np.random.default_rng(seed)
     reach = Reach(arm.robot, lift=arm.lift)
-    middle = np.where(arm.bounded, 0.5 * (arm.lower + arm.upper), 0.0)
-    half = np.where(arm.bounded, 0.5 * (arm.upper - arm.lower), math.pi) * _MARGIN
+    lower = np.where(arm.bounded, arm.lower, -math.pi)
+    upper = np.where(arm.bounded, arm.upper, math.pi)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower) * _MARGIN
     base = arm.frames[0, :3, 3]
     for _ in range(_TRIED):
         joints = middle + half * rng.uniform(-1.0, 1.0, JOINTS)
