@@ -17,7 +17,7 @@ from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
-from sphinx.util.nodes import make_refnode
+from sphinx.util.nodes import find_pending_xref_condition, make_refnode
 
 NAME = re.compile(r"(tcs(?:\.\w+)+)(?:\(.*\))?", flags=re.S)
 
@@ -39,6 +39,18 @@ def link_names(app: Sphinx, doctree: nodes.document) -> None:
         )
         span.replace_self(link)
         link += span
+
+
+def leave_foreign_types(app: Sphinx, doctree: nodes.document) -> None:
+    """Unwrap references to types of other packages, which are described nowhere here.
+
+    Sphinx would look for each of the thousands among all names that end alike.
+    """
+    for link in list(doctree.findall(pending_xref)):
+        target = link.get("reftarget", "")
+        if link.get("reftype") == "class" and target[:1].islower() and target[:4] != "tcs.":
+            unresolved = find_pending_xref_condition(link, "*")
+            link.replace_self((unresolved or link).children)
 
 
 def object_named(name: str) -> Any:
@@ -111,6 +123,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Tell Sphinx when to look for names."""
     descriptions = Descriptions()
     app.connect("doctree-read", link_names)
+    app.connect("doctree-read", leave_foreign_types)
     app.connect("env-check-consistency", descriptions.collect)
     app.connect("missing-reference", descriptions.resolve)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
