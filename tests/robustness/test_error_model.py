@@ -89,6 +89,12 @@ def test_names_that_begin_alike_have_streams_of_their_own():
     assert len(first) == len(names)
 
 
+def test_names_of_one_checksum_have_streams_of_their_own():
+    # Two words that CRC-32 does not tell apart.
+    one, other = (named_generator(0, name).standard_normal() for name in ("plumless", "buckeroo"))
+    assert one != other
+
+
 def test_a_file_takes_the_place_of_the_environments_errors(chair_trials, tmp_path):
     path = tmp_path / "errors.yaml"
     path.write_text(

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from tcs.tables import Reason
 from tcs.view import Answers, legend
 from tcs.view.answers import COLOUR_NAMES, COLOURS
 from tests.tables.small import small_grid
-from tests.view.conftest import one_configuration
+from tests.view.conftest import made, one_configuration
 
 
 def test_verdict_is_what_the_table_holds(bed):
@@ -50,6 +52,14 @@ def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
         best = bed.scores.isotropy[list(bed.members)].max(axis=0)
         for goal in goals:
             assert bed.scores.isotropy[bed.members[number], goal] == best[goal]
+
+
+def test_a_goal_that_nobody_reaches_is_served_by_nobody():
+    answers = made(small_grid(), 4, (), share=0.3)
+    reached = answers.scores.reached
+    first = int(np.flatnonzero(reached.sum(axis=1) == 1)[0])
+    answers = dataclasses.replace(answers, members=(first,))
+    assert answers.served(0) == tuple(np.flatnonzero(reached[first]))
 
 
 def test_joints_are_those_of_the_table(bed):

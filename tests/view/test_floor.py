@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tcs.tables import Reason
+from tcs.tables import Reason, SuccessTable
 from tcs.view import floor_of
 from tcs.view.answers import COLOURS
 from tcs.view.floor import kinds
@@ -64,6 +66,29 @@ def test_success_lies_where_a_single_place_has_an_estimate(estimated):
         gap = abs(floor.places - [at.base_x, at.base_y]).max(axis=1)
         assert gap.min() < 1e-12
     assert not len(floor_of(estimated, 5, 0, "success").places)
+
+
+@pytest.mark.parametrize("kind", ["reason", "manipulability"])
+def test_a_place_is_as_wide_as_the_step_of_the_grid(bed, kind):
+    steps = [bed.grid.axis(name).step for name in ("base_x", "base_y")]
+    assert floor_of(bed, 0, 0, kind).half == tuple(step / 2 for step in steps)
+
+
+def test_success_belongs_to_its_own_state_and_has_the_colour_of_its_value(bed):
+    """The last configuration of one state, and the first of the next."""
+    per_state = bed.grid.size // 6
+    members = np.array([[per_state - 1], [per_state]], np.int32)
+    success = np.array([0.25, 0.75])
+    table = SuccessTable(
+        members=members, success=success, low=success, high=success,
+        samples=np.full(2, 100, np.int32),
+    )  # fmt: skip
+    answers = dataclasses.replace(bed, success=table)
+    for state, member, value in ((0, per_state - 1, 0.25), (1, per_state, 0.75)):
+        floor = floor_of(answers, state, 0, "success")
+        at = bed.grid.configuration(member)
+        np.testing.assert_allclose(floor.places, [[at.base_x, at.base_y]], atol=1e-12)
+        np.testing.assert_allclose(floor.colours, [matplotlib.colormaps["viridis"](value)[:3]])
 
 
 def test_success_can_be_asked_for_only_where_it_is_stored(bed, estimated):
