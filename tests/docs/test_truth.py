@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+import tcs
 from tcs.kernel.dexterity import MEASURES
 from tcs.reasons import explain, fix_weights
+from tcs.report import Check, answer_of, answer_page
 from tcs.select import TravelWeights, UtilityWeights
 from tcs.space import Grid
 from tcs.store.packing import pack
@@ -91,3 +93,14 @@ def test_reasons():
 def test_colours_of_verdicts():
     told = [row[0] for row in rows(page("viewer"), "| colour | goal |")]
     assert told == [COLOUR_NAMES[reason] for reason in Reason]
+
+
+@pytest.mark.slow
+def test_parts_of_a_report(tmp_path):
+    # A room with states has a report with every part.
+    path = tmp_path / "bed.tcs"
+    tcs.save(path, tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml"))
+    report = answer_page(answer_of(path, check=Check(pairs=1, dense=0)), command="tcs report")
+    told = [row[0] for row in rows(page("reading-a-report"), "| part of the page |")]
+    for section in report.sections:
+        assert any(part.startswith(section.title) for part in told), section.title
