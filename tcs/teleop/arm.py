@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,12 +52,13 @@ class Arm:
             steps X_Li-1,Li at zero, X_L7T. Link i turns about the z axis of Li.
     """
 
-    robot: RobotFile
+    robot: RobotFile = field(repr=False)
     lower: FloatArray
     upper: FloatArray
     velocity: FloatArray
     lift: float
-    frames: FloatArray
+    frames: FloatArray = field(repr=False)
+    _parts: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Make the arrays read-only, and split the frames into what cosine and sine multiply."""
@@ -93,7 +94,7 @@ class Arm:
         Args:
             joints: Joint positions [rad], shape (7,).
         """
-        still, cosine, sine = self._parts  # type: ignore[attr-defined]
+        still, cosine, sine = self._parts
         angles = joints.reshape(JOINTS, 1, 1)
         steps = still + cosine * np.cos(angles) + sine * np.sin(angles)
         poses = np.empty((JOINTS + 1, 4, 4))

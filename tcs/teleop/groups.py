@@ -51,8 +51,6 @@ def group_motion(
     group: tuple[int, ...],
     rate: float,
     velocity: FloatArray | None = None,
-    held: BoolArray | None = None,
-    held_rates: FloatArray | None = None,
 ) -> GroupMotion:
     """Return the motion of a joint group in the null space: N_Jp xi of eq. (11).
 
@@ -73,19 +71,14 @@ def group_motion(
         group: Joints of the group, counted from 0, its lead joint first.
         rate: Rate of the lead joint: k times the speed of the group [rad/s].
         velocity: Velocity that the tool is to have, to undo its drift [m/s], shape (3,).
-        held: Joints that stay at a rate of their own, e.g. at their limit, shape (7,).
-        held_rates: The rates of these [rad/s], shape (7,).
 
     Returns:
         The motion; `slip` says whether the tool is held.
     """
-    lead = group[0]
-    free = np.ones(JOINTS, bool) if held is None else ~held
-    rates = np.zeros(JOINTS) if held_rates is None else np.where(free, 0.0, held_rates)
-    free[lead] = False
+    lead, own = group[0], list(group[1:])
+    others = [joint for joint in range(JOINTS) if joint not in group]
+    rates = np.zeros(JOINTS)
     rates[lead] = rate
-    own = [joint for joint in group[1:] if free[joint]]
-    others = [joint for joint in range(JOINTS) if free[joint] and joint not in group]
     wanted = -(jacobian @ rates)
     if velocity is not None:
         wanted = wanted + velocity
