@@ -71,6 +71,14 @@ def live(
         float | None,
         typer.Option(help="Torso lift, in metres.", show_default="the middle of its range"),
     ] = None,
+    line: Annotated[
+        bool,
+        typer.Option(
+            "--line",
+            help="Show the experiment's line to follow, begin at its start, and tell how well it "
+            "was followed.",
+        ),
+    ] = False,
     save: Annotated[
         Path | None,
         typer.Option(metavar="RUN", help="Write what was driven when it ends: .csv or .parquet."),
@@ -90,6 +98,9 @@ def live(
             )
         return
 
+    if line and start_deg is not None:
+        raise typer.BadParameter("the line has a start of its own.", param_hint="--start-deg")
+
     from tcs.cli import teleop_live_work as work
 
     asked = work.Asked(
@@ -98,6 +109,7 @@ def live(
         condition=condition.value,
         start_deg=start_deg,
         lift=lift,
+        line=line,
         save=save,
     )
     work.drive(asked, port=port, browser=browser, duration=duration)

@@ -19,10 +19,15 @@ from tcs.cli.places import check_writable
 from tcs.errors import DataFileError, TcsError
 from tcs.robots import RobotFile, load_robot
 from tcs.teleop import Arm, Mode, Settings, load_arm
-from tcs.teleop.run import check_format, load_run, save_run
+from tcs.teleop.lines import Course, find_course
+from tcs.teleop.metrics import PLANES, Line, completion_time, trajectory_accuracy
+from tcs.teleop.run import Run, check_format, load_run, save_run
 from tcs.teleop.settings import Behaviour
+from tcs.teleop.trial import GOAL_RADIUS
 from tcs.view import open_meshcat
 from tcs.view.teleop import Film, LivePage, Recorder, Replay, Stage, replay_page, start_posture
+from tcs.view.teleop.recorder import begun_at
+from tcs.view.teleop.stage import draw_course
 from tcs.writing import whole_file
 
 MODES: Mapping[str, tuple[Mode, ...]] = {
@@ -47,6 +52,7 @@ class Asked:
     condition: str
     start_deg: tuple[float, ...] | None
     lift: float | None
+    line: bool
     save: Path | None
 
 
@@ -65,6 +71,11 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
     start = None if asked.start_deg is None else _start(arm, asked.start_deg)
     meshcat = open_meshcat(port)
     stage = Stage(arm, meshes=True)
+    course = None
+    if asked.line:
+        talk.say("looking for a line that needs the arm reshaped; that takes some seconds.")
+        course = find_course(arm)
+        start = course.joints
     settings = Settings(limits=asked.behaviour)
     recorder = Recorder(arm)
     page = LivePage(
@@ -75,8 +86,11 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
         settings=settings,
         modes=MODES[asked.condition],
         tell=typer.echo,
-        on_step=None if asked.save is None else recorder.add,
+        on_step=None if asked.save is None and course is None else recorder.add,
     )
+    if course is not None:
+        ends = np.array(course.line.start), np.array(course.line.end)
+        draw_course(meshcat, *ends, GOAL_RADIUS)
     talk.say(f"{robot.title}, {asked.condition}, limits as in {asked.behaviour}. {_KEYS}")
     talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
     if browser:
@@ -87,8 +101,11 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
     except KeyboardInterrupt:
         talk.say(f"closed after {time.perf_counter() - begun:.0f} s.")
     finally:
+        run = recorder.run(_metadata(asked, arm, course))
         if asked.save is not None:
-            _save(asked.save, asked, arm, recorder)
+            _save(asked.save, run)
+    if course is not None and run is not None:
+        typer.echo(_followed(run, course.line))
     late = f"; {page.dropped} steps dropped, as the loop was late" if page.dropped else ""
     talk.say(
         f"{page.steps.count} control steps: {page.steps.summary()}; {page.pictures.count} "
@@ -112,9 +129,9 @@ def _middle(robot: RobotFile) -> float:
     return float(np.mean(robot.joint_limits()[robot.torso_joint]))
 
 
-def _save(path: Path, asked: Asked, arm: Arm, recorder: Recorder) -> None:
-    """Write what was driven, if it is a run."""
-    said = {
+def _metadata(asked: Asked, arm: Arm, course: Course | None) -> dict[str, Any]:
+    """Return what a run says about itself."""
+    said: dict[str, Any] = {
         "tcs": tcs.__version__,
         "robot": asked.robot,
         "lift": arm.lift,
@@ -122,12 +139,32 @@ def _save(path: Path, asked: Asked, arm: Arm, recorder: Recorder) -> None:
         "limits": asked.behaviour,
         "operator_kind": "whoever drove the live page",
     }
-    run = recorder.run(said)
+    if course is not None:
+        said |= {"line_start": list(course.line.start), "line_end": list(course.line.end)}
+    return said
+
+
+def _save(path: Path, run: Run | None) -> None:
+    """Write what was driven, if it is a run."""
     if run is None:
         talk.say(f"no browser has looked, so nothing was driven: '{path}' is not written.")
         return
     save_run(path, run)
     typer.echo(f"wrote {path}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
+
+
+def _followed(run: Run, line: Line) -> str:
+    """Return how well a line was followed in the last try, as the paper measures it."""
+    time, position = run.time[begun_at(run) :], run.position[begun_at(run) :]
+    took = completion_time(time, position, line, radius=GOAL_RADIUS)
+    if took is None:
+        away = float(np.linalg.norm(position[-1] - line.end))
+        return f"the end of the line was not reached: {1e3 * away:.0f} mm are left."
+    accuracy = trajectory_accuracy(position[time - time[0] <= took], line)
+    return (
+        f"the line took {took:.1f} s; the mean path was {1e3 * accuracy.worst:.1f} mm off it at "
+        f"worst ({accuracy.planes_met} of {PLANES} planes met)."
+    )
 
 
 def _film(path: Path, robot: str | None) -> tuple[Film, RobotFile]:

@@ -12,7 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tcs.cli.teleop_live_work import _followed
 from tcs.teleop import Command, Teleoperation, load_arm
+from tcs.teleop.lines import find_course
+from tcs.teleop.metrics import Line
 from tcs.teleop.run import load_run, save_run
 from tcs.teleop.trial import run_of
 
@@ -152,21 +155,28 @@ def looking(port):
             thread.join()
 
 
-@pytest.mark.slow
-def test_ctrl_c_writes_what_was_driven(tmp_path):
-    path = tmp_path / "run.csv"
+@contextmanager
+def live_page(*words):
+    """A live page in a process of its own, and where it is."""
     with socket.socket() as free:
         free.bind(("localhost", 0))
         port = free.getsockname()[1]
-    words = ["teleop", "--no-browser", "--port", str(port), "--save", str(path)]
-    words += ["--start-deg", *map(str, READY_DEG)]
     code = "from tcs.cli import main; main()"
+    words = ("teleop", "--no-browser", "--port", port, *words)
     with subprocess.Popen(
-        [sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True
-    ) as running:
+        [sys.executable, "-c", code, *map(str, words)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
         for line in running.stderr:
             if "open http" in line:
                 break
+        yield running, port
+
+
+@pytest.mark.slow
+def test_ctrl_c_writes_what_was_driven(tmp_path):
+    path = tmp_path / "run.csv"
+    with live_page("--save", path, "--start-deg", *READY_DEG) as (running, port):
         with looking(port):
             time.sleep(1.5)
             running.send_signal(signal.SIGINT)
@@ -179,6 +189,47 @@ def test_ctrl_c_writes_what_was_driven(tmp_path):
     assert run.metadata["robot"] == "iiwa7"
     np.testing.assert_allclose(run.joints[0], np.radians(READY_DEG), atol=1e-9)
     assert [one.name for one in tmp_path.iterdir()] == ["run.csv"]
+
+
+@pytest.mark.slow
+def test_the_line_is_there_to_follow_and_stands_in_the_run(tmp_path):
+    path = tmp_path / "run.csv"
+    with live_page("--line", "--save", path, "--duration", 3) as (running, port):
+        with looking(port):
+            out = running.communicate(timeout=60)[0]
+    assert running.returncode == 0
+    course = find_course(load_arm("iiwa7"))
+    # Nobody drove: all of the line is left.
+    left = np.linalg.norm(np.subtract(course.line.end, course.line.start))
+    assert f"not reached: {1e3 * left:.0f} mm are left" in out
+    run = load_run(path)
+    assert run.metadata["line_end"] == pytest.approx(course.line.end)
+    np.testing.assert_allclose(run.joints[0], course.joints, atol=1e-9)
+
+
+def test_how_well_a_line_was_followed_is_told():
+    arm = load_arm("iiwa7")
+    session = Teleoperation(arm, np.radians(READY_DEG))
+    start = session.step().p
+    line = Line(tuple(start), (start[0], start[1] + 0.2, start[2]))
+    command = Command(linear=(0.0, 0.1, 0.0))
+    # Two seconds of waiting, and a try in vain before, are not the line's.
+    asked = [Command()] * 200 + [Command(linear=(0.1, 0.0, 0.0))] * 100
+    rows = [(one, session.step(one)) for one in asked]
+    session.place(np.radians(READY_DEG))
+    rows += [(one, session.step(one)) for one in [Command()] * 50 + [command] * 190]
+    told = _followed(run_of(arm, rows, {}), line)
+    # 0.18 m to the sphere at 0.1 m/s, and some time to speed up.
+    seconds = float(told.split("took ")[1].split(" s")[0])
+    assert 1.8 <= seconds <= 1.9
+    worst = float(told.split("was ")[1].split(" mm")[0])
+    # The last plane that is met has samples on one side only, up to 5 mm away.
+    assert worst < 5.0
+
+
+def test_a_line_has_a_start_of_its_own(tcs_command):
+    ran = tcs_command("teleop", "--line", "--start-deg", *READY_DEG, "--no-browser")
+    assert ran.code == 2
 
 
 @pytest.mark.parametrize("condition", ["end-effector", "novel", "assisted", "drake"])

@@ -16,6 +16,8 @@ _BLOCK = 6000
 """Steps after which single ones become arrays: a minute's."""
 _LEAST = 2
 """Samples that a run must have."""
+_PUT_BACK = 1e-4
+"""Joints that are farther from where their rates take them than this [rad] were put there."""
 
 
 class Recorder:
@@ -56,3 +58,18 @@ class Recorder:
             if one.name not in ("joint_names", "metadata")
         }
         return Run(self._arm.joints, **arrays, metadata=metadata)
+
+
+def begun_at(run: Run) -> int:
+    """Return the sample with which the last try of a person at a line begins.
+
+    That is the first command after the arm was last put back to where it began; the last sample if
+    none came.
+    """
+    steps = np.diff(run.joints, axis=0) - run.rates[1:] * np.diff(run.time)[:, None]
+    # A step is its rate times its time, but for the digits of a file; being put back is not.
+    put_back = np.flatnonzero(np.abs(steps).max(axis=1) > _PUT_BACK)
+    first = int(put_back[-1]) + 1 if len(put_back) else 0
+    asked = run.linear.any(axis=1) | run.angular.any(axis=1) | (run.sign != 0)
+    after = np.flatnonzero(asked[first:])
+    return first + int(after[0]) if len(after) else len(run) - 1

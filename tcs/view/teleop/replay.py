@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from tcs.errors import DataFileError
 from tcs.teleop import Arm, Mode, Settings
 from tcs.teleop.run import NO_GROUP, Run
+from tcs.teleop.trial import GOAL_RADIUS
 from tcs.view.export import overlay
 from tcs.view.teleop.panel import (
     COLOURS,
@@ -28,7 +29,7 @@ from tcs.view.teleop.panel import (
     readout,
     state_facts,
 )
-from tcs.view.teleop.stage import TOOL, Stage, draw_path, pose_of
+from tcs.view.teleop.stage import TOOL, Stage, draw_course, draw_path, pose_of
 
 FloatArray = NDArray[np.float64]
 PLACE, SPEED = "time [s]", "speed"
@@ -59,6 +60,27 @@ class Film:
                 f"its joints are {', '.join(self.run.joint_names)}, but those of robot "
                 f"'{self.arm.name}' are {', '.join(self.arm.joints)}. Name its robot with --robot."
             )
+
+    @property
+    def course(self) -> tuple[FloatArray, FloatArray] | None:
+        """Start and end of the line that was to be followed [m], if the run names them."""
+        found = []
+        for name in ("line_start", "line_end"):
+            try:
+                place = np.array(self.run.metadata.get(name), dtype=np.float64)
+            except (TypeError, ValueError):
+                return None
+            if place.shape != (3,) or not np.isfinite(place).all():
+                return None
+            found.append(place)
+        start, end = found
+        return (start, end) if (start != end).any() else None
+
+    def draw(self, meshcat: Meshcat) -> None:
+        """Draw the way of the tool, and the line that was to be followed."""
+        draw_path(meshcat, self.run.position)
+        if self.course is not None:
+            draw_course(meshcat, *self.course, GOAL_RADIUS)
 
     @property
     def length(self) -> float:
@@ -103,7 +125,7 @@ class Replay:
         """
         self._meshcat, self._stage, self.film = meshcat, stage, film
         stage.set_up(meshcat, film.run.position[0], target=False)
-        draw_path(meshcat, film.run.position)
+        film.draw(meshcat)
         self._panel = Panel(meshcat, film.arm)
         meshcat.AddButton(PLAY, "Space")
         meshcat.AddButton(AGAIN, "KeyX")
@@ -171,7 +193,7 @@ def replay_page(
     count = math.ceil(film.length * rate) + 1
     samples = [film.sample(number / rate) for number in range(count)]
     stage.set_up(meshcat, film.run.position[0], target=False, compact=True)
-    draw_path(meshcat, film.run.position)
+    film.draw(meshcat)
     panel = Panel(meshcat, film.arm)
     readouts = [film.readout(i) for i in samples]
     panel.show(readouts[0])

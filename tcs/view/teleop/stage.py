@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Meshcat, Rgba
+from pydrake.geometry import Box, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
@@ -16,7 +16,7 @@ from tcs.teleop import Arm
 from tcs.view.shapes import draw_ground, draw_shapes, rgba, robot_shapes
 
 FloatArray = NDArray[np.float64]
-ROBOT, TARGET, TOOL, PATH = "robot", "target", "tool", "path"
+ROBOT, TARGET, TOOL, PATH, COURSE = "robot", "target", "tool", "path", "course"
 """Paths of the things in Meshcat."""
 _AXES = (Rgba(0.85, 0.1, 0.1, 1.0), Rgba(0.1, 0.65, 0.1, 1.0), Rgba(0.1, 0.25, 0.9, 1.0))
 _TARGET_AXIS = (0.16, 0.006)
@@ -121,6 +121,27 @@ def pose_of(R: FloatArray, p: FloatArray) -> RigidTransform:
 
 def _body(body: BodyIndex) -> str:
     return f"{ROBOT}/{int(body)}"
+
+
+def draw_course(meshcat: Meshcat, start: FloatArray, end: FloatArray, radius: float) -> None:
+    """Draw a line to follow as the paper does: magenta, from a green sphere to a red one.
+
+    Args:
+        meshcat: Where to.
+        start: [m], shape (3,).
+        end: [m], shape (3,).
+        radius: Of the spheres [m]; who is in the red one has arrived.
+    """
+    way = np.asarray(end) - np.asarray(start)
+    length = float(np.linalg.norm(way))
+    for name, place, colour in (("start", start, "#2ca02c"), ("end", end, "#ff2020")):
+        half_seen = rgba(colour)
+        half_seen.update(a=0.5)
+        meshcat.SetObject(f"{COURSE}/{name}", Sphere(radius), half_seen)
+        meshcat.SetTransform(f"{COURSE}/{name}", RigidTransform(place))
+    meshcat.SetObject(f"{COURSE}/line", Cylinder(0.003, length), rgba("#ff00ff"))
+    along = RotationMatrix.MakeFromOneVector(way / length, 2)
+    meshcat.SetTransform(f"{COURSE}/line", RigidTransform(along, start + 0.5 * way))
 
 
 class Trail:

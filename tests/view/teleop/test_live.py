@@ -46,11 +46,16 @@ def test_a_group_turns_while_the_tool_stays(page, desk):
     assert np.linalg.norm(after - elbow) > 0.02
 
 
-def test_back_to_the_start(page, desk, ready):
+def test_back_to_the_start(page, desk, ready, meshcat):
     desk.sliders[FORWARD] = 0.1
     drive(page, 50)
+    for _ in range(5):
+        drive(page, 10)
+        page.show()
+    assert meshcat.HasPath("path")
     desk.press(BACK)
     drive(page, 2)
+    assert not meshcat.HasPath("path")
     np.testing.assert_array_equal(page.last.joints, ready)
     assert not page.last.rates.any()
 
@@ -195,7 +200,8 @@ def test_a_run_at_the_pace_of_the_clock(page):
     page.run(duration=0.3)
     # 30 steps in 0.3 s; a busy machine may drop some, and a step may fall on either end.
     assert page.steps.count + page.dropped in range(28, 34)
-    assert page.pictures.count >= 2
+    # A loop that is late takes up to 7 steps from picture to picture.
+    assert page.pictures.count - 1 >= page.steps.count // 7
 
 
 def test_an_arm_that_never_points_ahead_begins_in_the_middle(iiwa, iiwa_stage, monkeypatch):

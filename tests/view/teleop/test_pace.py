@@ -55,3 +55,12 @@ def test_times_say_median_and_late_ones():
         times.add(1e-3 * i)
     assert times.summary() == "median 50.00 ms, p99 99.00 ms"
     assert times.count == 101
+
+
+def test_of_very_many_times_the_oldest_are_forgotten(monkeypatch):
+    monkeypatch.setattr("tcs.view.teleop.pace._KEPT", 10)
+    times = Times()
+    for i in range(100):
+        times.add(float(i))
+    assert times.count <= 20
+    assert times.taken[-1] == 99.0

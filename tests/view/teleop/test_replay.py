@@ -50,6 +50,8 @@ def test_the_panel_tells_modes_limits_and_singularities(film):
     assert f"joint {joint + 1}" in film.readout(at).said
     stretched = int(np.flatnonzero(run.singular)[-1])
     assert SINGULAR in film.readout(stretched).states
+    held = dataclasses.replace(run, clutch=np.ones(len(run), bool))
+    assert Film(film.arm, held).readout(0).mode == "end-effector mode; clutch in"
     stopped = dataclasses.replace(run, stopped=np.ones(len(run), bool))
     assert Film(film.arm, stopped).readout(0).said == "stopped"
 
@@ -139,3 +141,27 @@ def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
     assert long.length > 790
     text = replay_page(open_meshcat(), iiwa_stage, long, title="long")
     assert len(text.encode()) < 10e6
+
+
+def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_stage, meshcat):
+    ends = {"line_start": [0.6, 0.2, 0.9], "line_end": [-0.1, 0.2, 0.9]}
+    film = Film(iiwa, dataclasses.replace(driven, metadata=ends))
+    np.testing.assert_array_equal(film.course[1], ends["line_end"])
+    Replay(meshcat, iiwa_stage, film)
+    assert meshcat.HasPath("course/line")
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        {},
+        {"line_start": [0.6, 0.2, 0.9]},
+        {"line_start": [0.6, 0.2, 0.9], "line_end": "there"},
+        {"line_start": [0.6, 0.2], "line_end": [0.6, 0.2]},
+        {"line_start": [0.6, 0.2, 0.9], "line_end": [0.6, 0.2, 0.9]},
+        {"line_start": [0.6, 0.2, 0.9], "line_end": [0.6, float("nan"), 0.9]},
+    ],
+    ids=["none", "no end", "a word", "flat", "no way", "nowhere"],
+)
+def test_a_run_without_a_line_shows_none(driven, iiwa, ends):
+    assert Film(iiwa, dataclasses.replace(driven, metadata=ends)).course is None

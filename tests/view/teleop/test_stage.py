@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RotationMatrix
 
 from tcs.teleop import load_arm
-from tcs.view.teleop.stage import PATH, TARGET, TOOL, Stage, Trail, pose_of
+from tcs.view.teleop.stage import PATH, TARGET, TOOL, Stage, Trail, draw_course, pose_of
 
 
 class Spy:
@@ -125,3 +125,25 @@ def test_arms_are_looked_at_from_their_own_side(name, left, meshcat):
     arm = load_arm(name)
     Stage(arm, meshes=False).set_up(Spy(), arm.kinematics(np.zeros(7)).p)
     assert (seen["camera"][1] > seen["target"][1]) == left
+
+
+def test_a_line_leads_from_the_green_sphere_to_the_red_one():
+    placed = {}
+
+    class Spy:
+        def SetObject(self, path, shape, colour):
+            self.length = getattr(shape, "length", lambda: None)() or self.length
+
+        def SetTransform(self, path, pose):
+            placed[path] = pose
+
+        length = None
+
+    spy = Spy()
+    start, end = np.array([0.6, 0.2, 0.9]), np.array([-0.1, 0.3, 0.8])
+    draw_course(spy, start, end, 0.02)
+    np.testing.assert_array_equal(placed["course/start"].translation(), start)
+    np.testing.assert_array_equal(placed["course/end"].translation(), end)
+    ends = [placed["course/line"] @ np.array([0.0, 0.0, s * spy.length / 2]) for s in (-1, 1)]
+    # A cylinder along its own z axis: rounding.
+    np.testing.assert_allclose(ends, [start, end], atol=1e-12)
