@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tcs.cli import reports, talk
+from tcs.errors import GridError
 
 if TYPE_CHECKING:
     from tcs.robots import RobotFile
@@ -83,7 +84,7 @@ def experiment(
         check_format(runs / f"run{asked.runs_as}")
         make_folder(runs)
     robot = load_robot(asked.robot)
-    arm = load_arm(robot, lift=_middle(robot) if asked.lift is None else asked.lift)
+    arm = load_arm(robot, lift=_lift(robot, asked.lift))
     if asked.maps:
         check_robot(arm)
     course = find_course(arm, asked.line_seed)
@@ -129,11 +130,22 @@ def experiment(
     }
 
 
-def _middle(robot: RobotFile) -> float:
-    """Return the middle of the torso's range [m], 0 without a torso."""
-    if robot.torso_joint is None:
-        return 0.0
-    return float(np.mean(robot.joint_limits()[robot.torso_joint]))
+def _lift(robot: RobotFile, asked: float | None) -> float:
+    """Return the lift asked for, or the middle of the torso's range [m]; 0 without a torso.
+
+    Raises:
+        GridError: If the torso cannot be there.
+    """
+    low = high = 0.0
+    if robot.torso_joint is not None:
+        low, high = robot.joint_limits()[robot.torso_joint]
+    lift = 0.5 * (low + high) if asked is None else asked
+    if not low <= lift <= high:
+        raise GridError(
+            f"robot '{robot.name}': lift {lift:g} m is out of range; its torso goes from {low:g} "
+            f"to {high:g} m."
+        )
+    return lift
 
 
 def report(result: dict[str, Any]) -> None:

@@ -24,6 +24,14 @@ def test_maps_of_a_robot_without_a_head_are_refused_before_the_work(tcs_command,
     assert "iiwa7" in ran.err
 
 
+@pytest.mark.parametrize(("robot", "lift"), [("tiago", 2.0), ("tiago", "nan"), ("iiwa7", 0.1)])
+def test_a_lift_out_of_range_is_refused(tcs_command, tmp_path, robot, lift):
+    words = ["--robot", robot, "--lift", lift, "--out", tmp_path / "out"]
+    ran = tcs_command("teleop", "experiment", *words)
+    assert ran.code == 1
+    assert "is out of range; its torso goes from" in ran.err
+
+
 def test_too_few_operators_are_a_misuse(tcs_command, tmp_path):
     ran = tcs_command("teleop", "experiment", "--operators", 2, "--out", tmp_path)
     assert ran.code == 2
