@@ -79,6 +79,8 @@ def test_a_room_without_states_has_one_map():
 
 
 def test_too_many_states_are_refused():
+    most = score_file(grid=small_grid(nx=2, ny=2, yaws=1, torsos=1, bed=20, head=3))
+    assert has_states(most)
     file = score_file(grid=small_grid(nx=2, ny=2, yaws=1, torsos=1, bed=21, head=3))
     assert not has_states(file)
     with pytest.raises(SelectionError, match="63 states, of which 60 at most"):
