@@ -27,6 +27,8 @@ PANEL = "/Cameras/default/rotated/<object>/panel"
 FREE, LIMIT, SINGULAR = "free", "limit", "singular"
 COLOURS: Mapping[str, str] = {FREE: "#2ca02c", LIMIT: "#ff2020", SINGULAR: "#ff00ff"}
 """Of a bar, as the paper has them: green, red at a limit, magenta at a singularity."""
+_TRACKS: Mapping[str, str] = {FREE: "#c8ccd4", LIMIT: "#ff9a9a", SINGULAR: "#ffa6ff"}
+"""Of what a joint has left to go: a joint at its lower limit has a bar of no length."""
 LINES = ("mode", "said")
 _INK = {"mode": "#ffffff", "said": "#ffd24d"}
 _DISTANCE = 0.05
@@ -202,10 +204,11 @@ class Panel:
         x = bar_middle(i)
         self._meshcat.SetTransform(bar(i), RigidTransform([x - 0.5 * width, _BARS_AT, 0.0]))
         middle = 0.5 * width
-        self._quad(f"bar/{i}/track", "#c8ccd4", width, height, (middle, 0.0, 0.002))
         for state, colour in COLOURS.items():
             frame = (middle, 0.0, 0.001)
             self._quad(f"bar/{i}/{state}/frame", colour, width + 0.02, height + 0.02, frame)
+            track = (middle, 0.0, 0.002)
+            self._quad(f"bar/{i}/{state}/track", _TRACKS[state], width, height, track)
             if self._bounded[i]:
                 self._quad(f"bar/{i}/{state}/fill", colour, width, height, (middle, 0.0, 0.003))
         self._quad(f"bar/{i}/mark", "#101010", _MARK, height + 0.05, (0.0, 0.0, 0.005))

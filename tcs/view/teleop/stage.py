@@ -29,7 +29,9 @@ _POINTS, _PIECES = 40, 50
 """Points of a piece of the path, and pieces that are kept: 4 m. Only the last piece is sent."""
 _CAMERA, _LOOKED_AT = np.array([-0.7, -1.25, 0.65]), np.array([0.0, 0.0, -0.25])
 """Camera, and what it looks at, from halfway between shoulder and tool [m]: forward is to the right
-and away, and the arm stands above the panel. Left arms are looked at from the left."""
+and away, and the arm stands above the panel."""
+_BESIDE = 0.02
+"""An arm whose middle is farther to the left than this [m] is looked at from the left."""
 _ROOM = EnvironmentFile(
     name="open floor",
     title="An open floor, for driving an arm about",
@@ -91,7 +93,7 @@ class Stage:
                 middle[i] = 0.5 * length
                 meshcat.SetTransform(f"{path}/{i}", RigidTransform(middle))
         middle = 0.5 * (self._shoulder + tool)
-        side = -1.0 if self._shoulder[1] > 0.0 else 1.0
+        side = -1.0 if middle[1] > _BESIDE else 1.0
         meshcat.SetCameraPose(middle + _CAMERA * [1.0, side, 1.0], middle + _LOOKED_AT)
 
     def poses(self, joints: FloatArray) -> Mapping[str, RigidTransform]:

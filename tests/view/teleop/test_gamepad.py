@@ -114,3 +114,15 @@ def test_a_gamepad_with_fewer_buttons_or_axes_is_no_error():
     for now in (0.0, 0.01, 0.02):
         asked = pad.look(Pad((0.0,), ()), now)
     assert asked.linear == (0.0, 0.0, 0.0)
+
+
+def test_a_button_pressed_while_it_comes_is_no_click():
+    pad = Gamepad()
+    assert pad.look(pushed(buttons=[0]), 0.0).clicks == ()
+    assert pad.look(pushed(buttons=[0]), 0.01).clicks == ()
+
+
+def test_a_gamepad_that_never_moved_the_arm_is_not_missed():
+    pad = Gamepad()
+    pad.look(pushed(0.0, -1.0), 0.0)
+    assert pad.look(None, 0.01).lost == ""

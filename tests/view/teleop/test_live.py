@@ -264,3 +264,20 @@ def test_hints_are_said(page, desk):
     desk.press(TURN_UP)
     drive(page, 1)
     assert "null-space mode" in page.said(time.perf_counter())
+
+
+def test_postures_that_touch_are_passed_over(iiwa, iiwa_stage):
+    class Touchy:
+        looked = 0
+
+        def poses(self, joints):
+            return iiwa_stage.poses(joints)
+
+        def contacts(self):
+            self.looked += 1
+            return ("arm", "column") if self.looked < 3 else None
+
+    stage = Touchy()
+    other = start_posture(iiwa, stage)
+    assert stage.looked == 3
+    assert not np.array_equal(other, start_posture(iiwa, iiwa_stage))

@@ -165,3 +165,19 @@ def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_stage, meshcat):
 )
 def test_a_run_without_a_line_shows_none(driven, iiwa, ends):
     assert Film(iiwa, dataclasses.replace(driven, metadata=ends)).course is None
+
+
+def test_pictures_of_a_long_run_go_to_its_end(iiwa_stage, driven, iiwa):
+    seen = []
+
+    class Noting(Film):
+        def sample(self, seconds):
+            seen.append(seconds)
+            return super().sample(seconds)
+
+    long = Noting(iiwa, dataclasses.replace(driven, time=20.0 * driven.time))
+    replay_page(open_meshcat(), iiwa_stage, long, title="long")
+    assert len(seen) <= 3002
+    # Even times, the last one less than a picture after the end.
+    assert np.ptp(np.diff(seen)) < 1e-9
+    assert long.length <= seen[-1] < long.length + seen[1]
