@@ -108,4 +108,9 @@ def unmoved(asked: Command, rates: FloatArray, held: BoolArray, now: Situation) 
     followed = float((now.jacobian @ rates * weights) @ twist)
     if followed > STILL * float((twist * weights) @ twist) or not twist.any():
         return ""
-    return f"{at_limits(np.flatnonzero(held))}: the tool cannot go that way."
+    near = now.settings.near_limit
+    at_end = (now.joints - now.arm.lower <= near) | (now.arm.upper - now.joints <= near)
+    stuck = np.flatnonzero(held & at_end)
+    if not stuck.size:
+        return "the arm is stretched as far as it goes: the tool cannot go that way."
+    return f"{at_limits(stuck)}: the tool cannot go that way."

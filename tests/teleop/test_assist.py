@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.teleop import load_arm
+from tcs.teleop import Command, Mode, Teleoperation, load_arm
 from tcs.teleop.assist import isotropy_gradient, posture_wish
 from tcs.teleop.flags import share_of_range
 
@@ -57,3 +57,9 @@ def test_shares_of_range_run_from_limit_to_limit():
     expected = np.where(arm.bounded, 1.0, 0.5)
     np.testing.assert_allclose(share_of_range(arm, upper), expected)
     np.testing.assert_allclose(share_of_range(arm, lower), 1.0 - expected)
+
+
+def test_a_stretched_arm_says_so_and_names_no_joint(iiwa, ready):
+    session = Teleoperation(iiwa, ready, mode=Mode.ASSISTED)
+    reasons = {session.step(Command(linear=(0.1, 0, 0))).reason for _ in range(900)}
+    assert reasons == {"", "the arm is stretched as far as it goes: the tool cannot go that way."}
