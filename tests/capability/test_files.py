@@ -86,6 +86,10 @@ def test_a_map_survives_the_way_through_text(ihcm, reach, tmp_path):
     np.testing.assert_allclose(back.manipulability, ihcm.manipulability, rtol=1e-6)
     np.testing.assert_allclose(back.visibility, ihcm.visibility, atol=1e-6)
     assert len(back.joints) == 0
+    # A text tells no postures, so that every lift is taken for free.
+    levels = len(back.lifts)
+    assert levels > 1
+    assert np.all(back.free_lifts & ((1 << levels) - 1) == (1 << levels) - 1)
 
 
 def test_of_two_equal_poses_the_better_score_counts(ihcm, reach, tmp_path):

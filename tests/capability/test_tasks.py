@@ -69,6 +69,31 @@ def test_the_gripper_keeps_off_the_door():
     assert headings(task.positions[-1]) == [-90, 0]
 
 
+@pytest.mark.parametrize("opening", [1.0, -1.0])
+@pytest.mark.parametrize("start_deg", [0.0, 30.0, 50.0, 75.0])
+def test_no_gripper_comes_from_behind_the_door(start_deg, opening):
+    start = math.radians(start_deg)
+    task = curved_task(0.6, start, start + opening * math.pi / 2, 9, 0.8)
+    for position in task.positions:
+        angle = math.atan2(position.y, position.x)
+        face = np.array([math.cos(angle + opening * math.pi / 2),
+                         math.sin(angle + opening * math.pi / 2)])  # fmt: skip
+        for grasp in position.grasps:
+            hand = -np.array([math.cos(grasp.heading), math.sin(grasp.heading)])
+            # At most 22.5 deg behind the plane of the door, where it is beyond its edge.
+            assert hand @ face > -math.sin(math.pi / 8) - 1e-9
+
+
+@pytest.mark.parametrize("step", [0.05, 0.1])
+def test_every_place_within_a_step_of_the_arc_may_be_asked_for(step):
+    radius, reach = 0.6, range(0, 20)
+    there_are = sum(abs(math.hypot(i, j) * step - radius) <= step for i in reach for j in reach)
+    task = curved_task(radius, 0.0, math.pi / 2, there_are, 0.8, step=step)
+    assert len(task.positions) == len(set(places(task))) == there_are
+    with pytest.raises(TaskError, match=f"has {there_are} places within a step"):
+        curved_task(radius, 0.0, math.pi / 2, there_are + 1, 0.8, step=step)
+
+
 def test_a_door_that_opens_the_other_way_mirrors_the_grasps():
     one = curved_task(0.4, 0.0, math.pi / 2, 3, 1.0)
     two = curved_task(0.4, 0.0, -math.pi / 2, 3, 1.0)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import tcs
 from tcs.errors import SelectionError, TcsError
-from tcs.robustness import Trials, evaluate, robustify, success_summary
+from tcs.robustness import Trials, estimation, evaluate, robustify, success_summary
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +31,38 @@ def test_every_table_gets_estimates_of_singles_and_pairs(chair_file, done):
     assert (made["samples"], made["seed"], made["check_base"]) == (128, 0, False)
     assert made["errors"]["person_y"] == {"distribution": "normal", "std": 0.05}
     assert made["errors_of_environment"]
+
+
+@pytest.mark.parametrize("many", [250, 50])
+def test_sets_that_reach_as_much_as_the_best_are_in_question(rng, many):
+    """All of them and nobody else; where they are few, the next best join them."""
+    reachability = np.where(np.arange(400) < many, 1.0, 0.9)
+    manipulability = rng.uniform(0.0, 0.05, 400)
+    rows = np.arange(400)[:, None]
+    found = estimation._in_question(rows, reachability, manipulability)[:, 0]
+    best = np.argsort(-(reachability + manipulability))
+    assert found.tolist() == best[: max(many, estimation.FEW)].tolist()
+
+
+def test_only_configurations_of_the_best_sets_are_screened(monkeypatch):
+    monkeypatch.setattr(estimation, "MOST_SCREENED", 4)
+    pool = np.array([[0, 1], [2, 3], [0, 4], [1, 2], [5, 6], [0, 3]])
+    tried = []
+
+    def reached(members, offsets, *, jobs):
+        tried.extend(members.tolist())
+        return np.ones((len(members), estimation.SCREENED, 2), np.bool_)
+
+    trials = SimpleNamespace(
+        errors=SimpleNamespace(draw=lambda samples, seed, stream: {}),
+        scored=SimpleNamespace(sets=SimpleNamespace(candidates=np.arange(7))),
+        reached=reached,
+        weights=np.array([0.5, 0.5]),
+    )
+    found = estimation._screened(trials, pool, 3, seed=0, jobs=1)
+    assert tried == [0, 1, 2, 3]
+    # Equal success of all, so the best scores go first.
+    assert found.tolist() == [[0, 1], [2, 3], [1, 2]]
 
 
 def test_estimates_are_means_of_evaluations(done):

@@ -38,6 +38,16 @@ def test_without_error_the_score_is_the_offline_score(which, request, rng):
     ]
 
 
+def test_each_drawn_set_meets_the_one_sample_that_is_its_own(bed_trials):
+    found = evaluate(bed_trials, samples=12, select="uniform", members=2)
+    assert found.sets.shape == (12, 2)
+    for i, members in enumerate(found.sets):
+        own = {name: values[i : i + 1] for name, values in found.offsets.items()}
+        expected = bed_trials.reached(members, own)[:, 0].any(axis=0)
+        np.testing.assert_array_equal(found.reached[i], expected)
+    assert len(np.unique(found.reached, axis=0)) > 1
+
+
 def test_a_goal_counts_when_any_member_reaches_it(bed_trials):
     both = evaluate(bed_trials, samples=40)
     alone = [evaluate(bed_trials, samples=40, select=[int(h)]) for h in both.sets[0]]
