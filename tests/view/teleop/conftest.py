@@ -43,6 +43,20 @@ def meshcat(shared_meshcat):
     shared_meshcat.DeleteAddedControls()
 
 
+class Instead:
+    """A Meshcat of which some functions are a test's own.
+
+    A class made inside a test holds its Meshcat in a cycle, which whichever thread collects
+    garbage takes apart: Drake ends the process where that is not the one that made it.
+    """
+
+    def __init__(self, meshcat, **own):
+        self.__dict__.update(own, meshcat=meshcat)
+
+    def __getattr__(self, name):
+        return getattr(self.meshcat, name)
+
+
 @dataclass
 class Desk:
     """Controls that a test moves."""

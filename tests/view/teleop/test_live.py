@@ -12,7 +12,7 @@ from tcs.view.teleop import LivePage, Recorder, Stage, start_posture
 from tcs.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
 from tcs.view.teleop.live import key_name
 from tcs.view.teleop.panel import LIMIT, SINGULAR, readout
-from tests.view.teleop.conftest import MODES
+from tests.view.teleop.conftest import MODES, Instead
 
 FORWARD, DOWN = "move x [m/s]", "move z [m/s]"
 
@@ -234,14 +234,7 @@ def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
 def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
     moved = {}
 
-    class Spy:
-        def __getattr__(self, name):
-            return getattr(meshcat, name)
-
-        def SetTransform(self, path, pose):
-            moved[path] = pose
-
-    monkeypatch.setattr(page, "_meshcat", Spy())
+    monkeypatch.setattr(page, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))
     desk.sliders[FORWARD] = 0.2
     drive(page, 4)
     page.show()

@@ -12,6 +12,7 @@ from tcs.view import open_meshcat
 from tcs.view.teleop import Film, Replay, replay_page
 from tcs.view.teleop.panel import LIMIT, SINGULAR
 from tcs.view.teleop.replay import AGAIN, PLACE, PLAY, SPEED
+from tests.view.teleop.conftest import Instead
 
 
 @pytest.fixture
@@ -80,14 +81,7 @@ def test_speed_and_buttons(replay, meshcat, monkeypatch):
     assert replay.place == pytest.approx(2.0)
     clicks = {PLAY: 0, AGAIN: 0}
 
-    class Clicked:
-        def __getattr__(self, name):
-            return getattr(meshcat, name)
-
-        def GetButtonClicks(self, name):
-            return clicks[name]
-
-    monkeypatch.setattr(replay, "_meshcat", Clicked())
+    monkeypatch.setattr(replay, "_meshcat", Instead(meshcat, GetButtonClicks=clicks.__getitem__))
     clicks[PLAY] = 1
     replay.advance(1.0)
     assert (replay.place, replay.playing) == (pytest.approx(2.0), False)
@@ -103,14 +97,7 @@ def test_speed_and_buttons(replay, meshcat, monkeypatch):
 def test_the_arm_stands_where_the_run_has_it(replay, meshcat, iiwa_stage, film, monkeypatch):
     moved = {}
 
-    class Spy:
-        def __getattr__(self, name):
-            return getattr(meshcat, name)
-
-        def SetTransform(self, path, pose):
-            moved[path] = pose
-
-    monkeypatch.setattr(replay, "_meshcat", Spy())
+    monkeypatch.setattr(replay, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))
     replay.place = 5.0
     replay.show()
     for path, pose in iiwa_stage.poses(film.run.joints[500]).items():

@@ -6,6 +6,7 @@ from pydrake.math import RotationMatrix
 
 from tcs.teleop import load_arm
 from tcs.view.teleop.stage import PATH, TARGET, TOOL, Stage, Trail, draw_course, pose_of
+from tests.view.teleop.conftest import Instead
 
 
 class Spy:
@@ -113,18 +114,12 @@ def test_the_robot_stands_where_the_arm_has_it(name):
 
 @pytest.mark.parametrize(("name", "left"), [("pr2", True), ("pr2_right", False), ("iiwa7", False)])
 def test_arms_are_looked_at_from_their_own_side(name, left, meshcat):
-    seen = {}
-
-    class Spy:
-        def __getattr__(self, name):
-            return getattr(meshcat, name)
-
-        def SetCameraPose(self, camera, target):
-            seen.update(camera=camera, target=target)
-
+    seen = []
     arm = load_arm(name)
-    Stage(arm, meshes=False).set_up(Spy(), arm.kinematics(np.zeros(7)).p)
-    assert (seen["camera"][1] > seen["target"][1]) == left
+    spy = Instead(meshcat, SetCameraPose=lambda *places: seen.append(places))
+    Stage(arm, meshes=False).set_up(spy, arm.kinematics(np.zeros(7)).p)
+    ((camera, target),) = seen
+    assert (camera[1] > target[1]) == left
 
 
 def test_a_line_leads_from_the_green_sphere_to_the_red_one():
