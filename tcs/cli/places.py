@@ -148,3 +148,14 @@ def check_writable(path: Path) -> None:
             f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "
             "writable folder."
         ) from error
+
+
+def check_page(path: Path) -> None:
+    """Refuse a page that no browser would open, or that could not be written.
+
+    Raises:
+        OutputError: If its name says that it is something else, or as `check_writable`.
+    """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(f"Page '{path}': its name must end in .html.")
+    check_writable(path)

@@ -15,7 +15,8 @@ import typer
 
 import tcs
 from tcs.cli import talk
-from tcs.cli.places import check_writable
+from tcs.cli.places import check_page, check_writable
+from tcs.cli.teleop_work import torso_lift
 from tcs.errors import DataFileError, TcsError
 from tcs.robots import RobotFile, load_robot
 from tcs.teleop import Arm, Mode, Settings, load_arm
@@ -67,7 +68,7 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
         check_format(asked.save)
         check_writable(asked.save)
     robot = load_robot(asked.robot)
-    arm = load_arm(robot, lift=_middle(robot) if asked.lift is None else asked.lift)
+    arm = load_arm(robot, lift=torso_lift(robot, asked.lift))
     start = None if asked.start_deg is None else _start(arm, asked.start_deg)
     meshcat = open_meshcat(port)
     stage = Stage(arm, meshes=True)
@@ -120,13 +121,6 @@ def _start(arm: Arm, degrees: tuple[float, ...]) -> Any:
     if outside:
         raise TcsError(f"start posture: {outside}. Give one within them with --start-deg.")
     return start
-
-
-def _middle(robot: RobotFile) -> float:
-    """Return the middle of the torso's range [m], 0 without a torso."""
-    if robot.torso_joint is None:
-        return 0.0
-    return float(np.mean(robot.joint_limits()[robot.torso_joint]))
 
 
 def _metadata(asked: Asked, arm: Arm, course: Course | None) -> dict[str, Any]:
@@ -216,7 +210,7 @@ def export(path: Path, robot: str | None, page: Path, *, meshes: bool) -> dict[s
         OutputError: If it cannot be written there.
         DataFileError: If the file holds no run of that robot.
     """
-    check_writable(page)
+    check_page(page)
     film, file = _film(path, robot)
     notes = [_summary(film)]
     if meshes:

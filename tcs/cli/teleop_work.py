@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,7 +42,7 @@ class Asked:
 
     def command(self) -> str:
         """Return the command that makes it again."""
-        words = ["tcs teleop experiment", f"--robot {self.robot}"]
+        words = ["tcs teleop experiment", f"--robot {shlex.quote(self.robot)}"]
         words += [f"--operators {self.operators} --trials {self.trials}"]
         words += [f"--training {self.training} --seed {self.seed} --line-seed {self.line_seed}"]
         if self.lift is not None:
@@ -84,7 +85,7 @@ def experiment(
         check_format(runs / f"run{asked.runs_as}")
         make_folder(runs)
     robot = load_robot(asked.robot)
-    arm = load_arm(robot, lift=_lift(robot, asked.lift))
+    arm = load_arm(robot, lift=torso_lift(robot, asked.lift))
     if asked.maps:
         check_robot(arm)
     course = find_course(arm, asked.line_seed)
@@ -130,7 +131,7 @@ def experiment(
     }
 
 
-def _lift(robot: RobotFile, asked: float | None) -> float:
+def torso_lift(robot: RobotFile, asked: float | None) -> float:
     """Return the lift asked for, or the middle of the torso's range [m]; 0 without a torso.
 
     Raises:

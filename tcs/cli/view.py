@@ -59,10 +59,10 @@ def view(
     if export is None and (meshes or as_json):
         raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
 
-    from tcs.cli.places import check_writable, place
+    from tcs.cli.places import check_page, place
 
     if export is not None:
-        check_writable(export)
+        check_page(export)
 
     from tcs.cli import view_work as work
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -174,7 +175,10 @@ def load_arm(robot: RobotFile | str | Path, *, lift: float = 0.0) -> Arm:
     Raises:
         UnknownNameError: If there is no robot of that name.
         RobotError: If the robot file or its model cannot be used.
+        TcsError: If the lift is not finite.
     """
+    if not math.isfinite(lift):
+        raise TcsError(f"lift of the torso: must be a finite number [m], not {lift}.")
     file = robot if isinstance(robot, RobotFile) else load_robot(robot)
     scene = Scene(SceneSpec(file, _NOWHERE))
     used = scene.set_torso(lift)

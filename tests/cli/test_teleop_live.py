@@ -102,6 +102,19 @@ def test_a_run_is_written_as_a_page(tcs_command, saved, tmp_path):
     assert "controller novel" in page.read_text()
 
 
+def test_a_page_of_another_name_is_not_written(tcs_command, saved, tmp_path):
+    page = tmp_path / "run.pdf"
+    ran = tcs_command("teleop", "replay", saved, "--export", page)
+    assert refused(ran, "run.pdf", ".html")
+    assert not page.exists()
+
+
+@pytest.mark.parametrize(("robot", "lift"), [("tiago", "99"), ("tiago", "nan"), ("iiwa7", "0.1")])
+def test_a_lift_that_the_torso_cannot_have_is_refused(tcs_command, robot, lift):
+    ran = tcs_command("teleop", "--robot", robot, "--lift", lift, "--no-browser", "--duration", 0.1)
+    assert refused(ran, robot, lift, "out of range")
+
+
 def test_a_run_is_played_back(tcs_command, saved):
     ran = tcs_command("teleop", "replay", saved, "--no-browser", "--duration", 0.2)
     assert ran.code == 0

@@ -16,6 +16,12 @@ def test_a_page_that_cannot_be_written_is_told_before_the_work(tcs_command, tmp_
     assert "cannot be written" in ran.err
 
 
+def test_a_page_of_another_name_is_not_written(tcs_command, small_file, tmp_path):
+    ran = tcs_command("view", small_file, "--export", tmp_path / "scene.png")
+    assert ran.code == 1
+    assert "must end in .html" in ran.err
+
+
 def test_scores_of_other_models_are_not_shown(tcs_command, small_file, tmp_path):
     page = tmp_path / "scene.html"
     ran = tcs_command("view", small_file, "--export", page)

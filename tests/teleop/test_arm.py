@@ -114,3 +114,9 @@ def test_an_arm_knows_its_robot():
     arm = load_arm("iiwa7")
     assert isinstance(arm, Arm)
     assert arm.name == "iiwa7"
+
+
+@pytest.mark.parametrize("lift", [np.nan, np.inf])
+def test_a_lift_that_is_no_number_is_refused(lift):
+    with pytest.raises(TcsError, match="lift of the torso: must be a finite number"):
+        load_arm("tiago", lift=lift)
