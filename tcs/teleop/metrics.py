@@ -26,8 +26,8 @@ CUTOFF = 50.0
 ARC_CUTOFF = 20.0
 """Up to which frequency the spectral arc length is taken [Hz] (Balasubramanian et al. 2012)."""
 _PAD_LEVEL = 4
-"""The spectrum is sampled 2**4 times as finely as the signal gives, as in the authors' code, so that
-values compare. Finer sampling ends up to 0.5 % further from zero."""
+"""The spectrum is sampled 2**4 times as finely as the signal gives, as in the authors' code, so
+that values compare. Finer sampling ends up to 0.5 % further from zero."""
 
 
 @dataclass(frozen=True, slots=True)
