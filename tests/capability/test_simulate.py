@@ -53,6 +53,24 @@ def test_the_slave_follows_where_nothing_is_in_the_way(minute):
     assert not minute.held.all()
 
 
+def test_the_hand_goes_to_both_sides_of_the_middle_of_its_box(reach, minute):
+    _, p_AT = reach.tool_poses(minute.recording.joints)
+    p_BT = p_AT @ reach.R_BA.T + reach.p_BA
+    off = p_BT[:, :2] - np.array(MINUTE.centre)
+    assert np.all(off.min(axis=0) < -0.1)
+    assert np.all(off.max(axis=0) > 0.1)
+
+
+def test_no_turn_is_smaller_than_the_tilt_in_it(reach, minute):
+    R_AT, _ = reach.tool_poses(minute.recording.joints)
+    # The hand holds the tool level, whatever its heading.
+    assert MINUTE.pitch == 0.0
+    tilt = np.arccos(np.clip((reach.R_BA @ R_AT)[:, 2, 2], -1.0, 1.0))
+    assert tilt.max() > 0.02
+    # An arc cosine is good to 1e-8 about zero.
+    assert np.all(minute.turn_error >= tilt - 1e-7)
+
+
 def test_the_tool_stays_upright_near_the_box(reach, minute):
     R_AT, p_AT = reach.tool_poses(minute.recording.joints)
     p_BT = p_AT @ reach.R_BA.T + reach.p_BA

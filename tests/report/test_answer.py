@@ -211,6 +211,10 @@ def test_estimates_of_success_are_those_of_the_file(answer):
         assert float(said.removesuffix(" %")) == pytest.approx(
             100 * success.success[row], abs=0.051
         )
+        ends = column(table, "95 %")[column(table, "Set").index(name)].split(" to ")
+        assert list(map(float, ends)) == pytest.approx(
+            [100 * success.low[row], 100 * success.high[row]], abs=0.051
+        )
     file = dataclasses.replace(
         answer.file, tables=tuple(Scored.of(t.scores, t.sets) for t in answer.file.tables)
     )

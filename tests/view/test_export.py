@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from tcs.scene import Scene
-from tcs.view import Answers, Props, open_meshcat, page, script
+from tcs.view import Answers, Props, export, open_meshcat, page, script
 from tests.view.browser import chromium
 
 
@@ -32,6 +33,53 @@ def test_page_tells_what_it_is_and_fits_into_three_megabytes(props, shaving_answ
     assert "By &lt;nobody&gt;." in text
     assert text.count("</body>") == 1
     assert len(text.encode()) < 3e6
+
+
+class Recorder:
+    """An animation that tells what it was told."""
+
+    def __init__(self, rate):
+        self.poses, self.shown = {}, {}
+
+    def SetTransform(self, frame, path, pose):
+        self.poses.setdefault(path, {})[frame] = pose.GetAsMatrix34()
+
+    def SetProperty(self, frame, path, name, visible):
+        assert name == "visible"
+        self.shown.setdefault(path, {})[frame] = visible
+
+
+def test_whatever_is_shown_stands_still_until_the_next_goal(props, shaving_answers, monkeypatch):
+    """The browser moves things in straight lines between keys: there must be none to move along."""
+    monkeypatch.setattr(export, "MeshcatAnimation", Recorder)
+    shots = [props.snapshot(step.index, step.goal) for step in script(shaving_answers)]
+    seen = [set(map(str, shot.arrows)) for shot in shots]
+    assert len({frozenset(one) for one in seen}) > 1
+    found = export._animation(shots, seen)
+    hold = export._HOLD
+    moved = 0
+    for path, keys in found.poses.items():
+        frames = sorted(keys)
+        moved += len(frames) > 2
+        for number, shot in enumerate(shots):
+            for frame in (number * hold, number * hold + hold // 2, (number + 1) * hold - 1):
+                before = max(key for key in frames if key <= frame)
+                after = min((key for key in frames if key >= frame), default=before)
+                np.testing.assert_array_equal(keys[before], shot.poses[path])
+                np.testing.assert_array_equal(keys[after], shot.poses[path])
+    assert moved > 1
+    for path, keys in found.shown.items():
+        for number, one in enumerate(seen):
+            assert keys[max(key for key in keys if key <= number * hold)] == (path in one)
+
+
+def test_captions_tell_when_each_member_is_shown(shaving_answers):
+    steps = script(shaving_answers)
+    lines = export._captions(shaving_answers, steps)
+    times = [tuple(map(float, line.split(" s:")[0].split(" to "))) for line in lines]
+    assert times[0][0] == 0.0
+    assert [start for start, _ in times[1:]] == [end for _, end in times[:-1]]
+    assert times[-1][1] == pytest.approx(len(steps) * 1.5)
 
 
 @pytest.mark.parametrize("name", ["pr2", "tiago"])
