@@ -21,6 +21,7 @@ from tcs.report.machine import machine, today, versions
 from tcs.report.reproduce import commands, estimated, place_words
 from tcs.report.words import REASONS, percent
 from tcs.store import shown_state
+from tcs.tables import SetTable
 
 LIMITS = (
     "Goals are checked one by one, with everything standing still: no approach, no way of the arm "
@@ -78,7 +79,8 @@ def _summary(answer: Answer) -> list[Block]:
     else:
         of_all = "" if answer.max_members is None else f" of at most {answer.max_members}"
         said.append(
-            f"It is the set{of_all} with the greatest P_R + P_M, wherever the robot is now."
+            f"Of the sets{of_all} that the file keeps, it is the one with the greatest P_R + P_M, "
+            "wherever the robot is now."
         )
     state = answer.file.observed_states[answer.shown.table]
     if state:
@@ -281,6 +283,12 @@ def _error(joint: str, error: dict[str, Any]) -> str:
     return f"{joint.replace('_', ' ')} ({sign} {width:g} {unit})"
 
 
+def _kept(sets: SetTable) -> str:
+    """Return which sets a table holds, and how many."""
+    apart = f", members {sets.min_distance:g} m apart or more" if sets.max_members > 1 else ""
+    return f"rule {sets.rule}{apart}, {sets.sets:,} in this table"
+
+
 def _configurations(answer: Answer) -> str:
     size, tables = answer.job.grid.size, len(answer.file.tables)
     return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} tables"
@@ -298,7 +306,7 @@ def _made(answer: Answer, command: str) -> list[Block]:
         ("Scene", f"SHA-256 {metadata['scene_digest']}; the models of today are the same"),
         ("Inverse kinematics", answer.verification.ik),
         ("Configurations", _configurations(answer)),
-        ("Sets kept", f"rule {answer.scored.sets.rule}, {answer.scored.sets.sets:,} in this table"),
+        ("Sets kept", _kept(answer.scored.sets)),
         ("Time to score", f"{timings['total_seconds']:.1f} s when the file was made"),
     )
     return [

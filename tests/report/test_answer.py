@@ -138,7 +138,7 @@ def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
         assert f"Goal {goal} would be reached from stop 1 so: " in said
     assert f"Not reached: {', '.join(map(str, single.unreached))}." in said
     assert "Nothing was re-checked" in said
-    assert "the set of at most 1 with the greatest" in said
+    assert "Of the sets of at most 1 that the file keeps, it is the one with the greatest" in said
     assert all(single.server[goal] is None for goal in single.unreached)
     assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
 
