@@ -18,10 +18,10 @@ app.command()(teleop_live.replay)
 def experiment(
     robot: options.Robot = "iiwa7",
     operators: Annotated[
-        int, typer.Option(min=3, help="Scripted operators; the paper had 26 people.")
+        int, typer.Option(min=3, max=1000, help="Scripted operators; the paper had 26 people.")
     ] = 26,
-    trials: Annotated[int, typer.Option(min=1, help="Trials that count, each.")] = 3,
-    training: Annotated[int, typer.Option(min=0, help="Trials before those, each.")] = 4,
+    trials: Annotated[int, typer.Option(min=1, max=1000, help="Trials that count, each.")] = 3,
+    training: Annotated[int, typer.Option(min=0, max=1000, help="Trials before those, each.")] = 4,
     lift: Annotated[
         float | None,
         typer.Option(help="Torso lift, in metres.", show_default="the middle of its range"),

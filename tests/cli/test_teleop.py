@@ -32,9 +32,14 @@ def test_a_lift_out_of_range_is_refused(tcs_command, tmp_path, robot, lift):
     assert "is out of range; its torso goes from" in ran.err
 
 
-def test_too_few_operators_are_a_misuse(tcs_command, tmp_path):
-    ran = tcs_command("teleop", "experiment", "--operators", 2, "--out", tmp_path)
+@pytest.mark.parametrize(
+    ("option", "count"),
+    [("--operators", 2), ("--operators", 10**12), ("--trials", 10**12), ("--training", 10**12)],
+)
+def test_fewer_or_more_than_can_be_run_are_a_misuse(tcs_command, tmp_path, option, count):
+    ran = tcs_command("teleop", "experiment", option, count, "--out", tmp_path)
     assert ran.code == 2
+    assert option in ran.err
 
 
 def test_a_folder_that_cannot_be_made_is_told_before_the_work(tcs_command, tmp_path):
