@@ -14,7 +14,7 @@ from tcs.robots import RobotFile
 from tcs.robots.enclosure import BodyEnclosure, enclosure
 from tcs.robots.geometry import body_triangles
 from tcs.robots.pose import pose_in_root
-from tcs.scene import Contact, EnvironmentFile, Scene, SceneSpec, arm_chain
+from tcs.scene import NOWHERE, Contact, Scene, SceneSpec, arm_chain
 
 MOST_EXCESS = 2.0
 """Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
@@ -26,15 +26,6 @@ MOST_LOST = 0.05
 SUNK = 0.02
 """Surfaces that reach farther below the floor than this [m] mean that the root does not lie on it;
 models of wheels sink in by millimetres."""
-
-_NOWHERE = EnvironmentFile(
-    name="nowhere",
-    title="Nothing at all",
-    origin="the robot's base",
-    source="none: there is nothing in it",
-    floor=False,
-    grid={},
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +208,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         RobotError: If a model or mesh of the robot cannot be used.
         OutputError: If the kernel's cache cannot be written.
     """
-    scene = Scene(SceneSpec(robot, _NOWHERE))
+    scene = Scene(SceneSpec(robot, NOWHERE))
     scene.set_arm(np.zeros(len(robot.arm_joints)))
     arm = arm_class(arm_chain(scene)[0])
     positions = robot.with_mimics({**robot.joint_positions(), **robot.rest})
@@ -230,7 +221,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         limits=_limits(robot),
         bodies=enclosure(robot),
         rest=rest,
-        margin=_NOWHERE.contact_margin,
+        margin=NOWHERE.contact_margin,
         lowest=_lowest(robot, positions),
         contacts=contacts,
         trip=round_trip(scene, arm.solver, samples, seed),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tcs.scene.environment import (
+    NOWHERE,
     EnvironmentFile,
     ModelEntry,
     Obstacle,
@@ -18,6 +19,7 @@ from tcs.scene.scene import Contact, Scene
 from tcs.scene.spec import SceneSpec
 
 __all__ = [
+    "NOWHERE",
     "Contact",
     "EnvironmentFile",
     "Found",

@@ -143,6 +143,17 @@ class EnvironmentFile(Document):
         return hash(self.model_dump_json())
 
 
+NOWHERE = EnvironmentFile(
+    name="nowhere",
+    title="Nothing at all",
+    origin="the robot's base",
+    source="none: there is nothing in it",
+    floor=False,
+    grid={},
+)
+"""For a robot by itself: not even a floor."""
+
+
 def environment_names() -> tuple[str, ...]:
     """Return the names of the environments that ship with `tcs`, sorted."""
     return tuple(_shipped())

@@ -12,20 +12,11 @@ import numpy as np
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.robots import RobotFile, load_robot
-from tcs.scene import EnvironmentFile, Scene, SceneSpec, arm_chain
+from tcs.scene import NOWHERE, Scene, SceneSpec, arm_chain
 
 JOINTS = 7
 UNSAID_VELOCITY = 1.0
 """Velocity limit of a joint whose URDF gives none [rad/s]: slower than any arm that ships."""
-
-_NOWHERE = EnvironmentFile(
-    name="nowhere",
-    title="Nothing at all",
-    origin="the robot's base",
-    source="none: there is nothing in it",
-    floor=False,
-    grid={},
-)
 
 
 class Kinematics(NamedTuple):
@@ -180,7 +171,7 @@ def load_arm(robot: RobotFile | str | Path, *, lift: float = 0.0) -> Arm:
     if not math.isfinite(lift):
         raise TcsError(f"lift of the torso: must be a finite number [m], not {lift}.")
     file = robot if isinstance(robot, RobotFile) else load_robot(robot)
-    scene = Scene(SceneSpec(file, _NOWHERE))
+    scene = Scene(SceneSpec(file, NOWHERE))
     used = scene.set_torso(lift)
     scene.set_arm(np.zeros(JOINTS))
     chain, _ = arm_chain(scene)

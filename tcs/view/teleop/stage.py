@@ -11,7 +11,7 @@ from pydrake.geometry import Box, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
-from tcs.scene import EnvironmentFile, Scene, SceneSpec
+from tcs.scene import NOWHERE, Scene, SceneSpec
 from tcs.teleop import Arm
 from tcs.view.shapes import draw_ground, draw_shapes, rgba, robot_shapes
 
@@ -32,14 +32,6 @@ _CAMERA, _LOOKED_AT = np.array([-0.7, -1.25, 0.65]), np.array([0.0, 0.0, -0.25])
 and away, and the arm stands above the panel."""
 _BESIDE = 0.02
 """An arm whose middle is farther to the left than this [m] is looked at from the left."""
-_ROOM = EnvironmentFile(
-    name="open floor",
-    title="An open floor, for driving an arm about",
-    origin="the robot's base",
-    source="none: there is nothing in it",
-    floor=False,
-    grid={},
-)
 
 
 class Stage:
@@ -55,7 +47,7 @@ class Stage:
         Raises:
             RobotError: If the robot's model cannot be used.
         """
-        self._scene = Scene(SceneSpec(arm.robot, _ROOM), meshes=meshes)
+        self._scene = Scene(SceneSpec(arm.robot, NOWHERE), meshes=meshes)
         self._scene.set_torso(arm.lift)
         self._shapes = robot_shapes(self._scene, meshes)
         self._shoulder = arm.frames[0, :3, 3]
