@@ -78,7 +78,8 @@ class MapGrid:
             raise GridError(f"the map's step is {self.step!r} m; must be from 0.001 to 1.")
         if self.turns % 4 or not 4 <= self.turns < 1 << _BITS[YAW]:
             raise GridError(
-                f"the map has {self.turns} headings; must be a multiple of 4, e.g. 16 for 22.5 deg."
+                f"the map has {self.turns} headings; must be a multiple of 4 from 4 to "
+                f"{(1 << _BITS[YAW]) - 4}, e.g. 16 for 22.5 deg."
             )
         if not self.tilts or len(set(self.tilts)) < len(self.tilts):
             raise GridError("the map has no tilt of the tool, or one twice.")

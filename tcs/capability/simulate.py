@@ -17,6 +17,8 @@ MASTER_BOX = (0.070, 0.160, 0.120)
 """Depth, width and height that a hand can move a Geomagic Touch in [m]: forward, left, up."""
 PERIOD = 0.02
 """Between samples [s]: joint states come at 50 Hz, ITCM thesis, Appendix C.1."""
+LONGEST = 86_400.0
+"""What may be asked for [s]: a day, 27 times the thesis's recording, fits into memory."""
 _JOINT_SPEED = 1.76
 """Most speed of any joint [rad/s]: that of TIAGo's slowest, the wrist's."""
 _LEAD = 0.10
@@ -82,10 +84,10 @@ def simulate(reach: Reach, operator: Operator, *, seed: int = 0) -> Simulated:
     """
     rng = np.random.default_rng(seed)
     numbers = (operator.seconds, operator.height, operator.scale, *operator.centre)
-    if not (np.all(np.isfinite(numbers)) and operator.seconds >= PERIOD):
+    if not (np.all(np.isfinite(numbers)) and PERIOD <= operator.seconds <= LONGEST):
         raise DataFileError(
             f"a recording of {operator.seconds:g} s at {operator.height:g} m: numbers must be "
-            f"finite, and the time at least {PERIOD:g} s."
+            f"finite, and the time from {PERIOD:g} to {LONGEST:,.0f} s."
         )
     count = round(operator.seconds / PERIOD)
     depth, width = (operator.scale * side for side in MASTER_BOX[:2])

@@ -89,7 +89,13 @@ def test_keys_sort_as_cells_do_and_come_back(rows):
 
 @pytest.mark.parametrize(
     ("step", "turns", "words"),
-    [(0.0, 16, "step"), (math.nan, 16, "step"), (0.05, 6, "multiple of 4"), (0.05, 0, "headings")],
+    [
+        (0.0, 16, "step"),
+        (math.nan, 16, "step"),
+        (0.05, 6, "multiple of 4"),
+        (0.05, 0, "headings"),
+        (0.05, 1024, "from 4 to 1020"),
+    ],
 )
 def test_impossible_grids_are_refused(step, turns, words):
     with pytest.raises(GridError, match=words):

@@ -104,7 +104,8 @@ def test_its_map_holds_only_what_inverse_kinematics_reaches(reach, minute):
     ("operator", "words"),
     [
         (Operator(centre=(9.0, 0.0)), "cannot start: no place in the box"),
-        (Operator(seconds=0.0), "at least 0.02 s"),
+        (Operator(seconds=0.0), "from 0.02 to 86,400 s"),
+        (Operator(seconds=1e12), "from 0.02 to 86,400 s"),
         (Operator(seconds=math.nan), "finite"),
         (Operator(height=math.nan), "finite"),
     ],
