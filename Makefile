@@ -7,6 +7,9 @@ STAMP := $(VENV)/.installed
 OUT := out
 # Temporary files of the tests stay in the checkout too.
 PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
+# Processes that share the tests, a file at a time: what a file sets up is made once.
+PROCESSES ?= 2
+SHARED := --numprocesses=$(PROCESSES) --dist=loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -21,11 +24,11 @@ demo: $(STAMP)  ## Score, choose, verify and draw shaving in the wheelchair; res
 
 test: lint  ## Format, lint, types, import rules, doctests and tests: what CI runs
 	@mkdir -p $(OUT)
-	$(PYTEST) -m "not slow"
+	$(PYTEST) $(SHARED) -m "not slow"
 
 test-all: lint  ## The same with the slow tests
 	@mkdir -p $(OUT)
-	$(PYTEST)
+	$(PYTEST) $(SHARED)
 
 lint: $(STAMP)  ## Format, lint, types and import rules
 	$(BIN)/ruff format --check .

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,13 @@ from tcs.robots import load_robot
 from tcs.scene import Scene, SceneSpec, load_environment, lower
 from tcs.space import Grid
 from tcs.tasks import load_task
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _interruptible():
+    """Tests interrupt on purpose, but a shell has its background jobs ignore Ctrl-C."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

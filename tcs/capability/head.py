@@ -59,10 +59,17 @@ def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
 
     Raises:
         UnknownNameError: If no head of that name ships, or its file names an unknown key.
-        RobotError: If the file cannot be used, or names what the robot does not have.
+        RobotError: If no head is named and none ships for the robot, the file cannot be used, or
+            it names what the robot does not have.
     """
     files = shipped_files("models/heads/*.yaml")
     asked = robot.name if head is None else head
+    if head is None and robot.name not in files:
+        raise RobotError(
+            f"robot '{robot.name}': no head camera of it is known, only of {', '.join(files)}. "
+            "Name one of these heads, or a head file of your own (--head), or make an ICM, which "
+            "needs none (--kind ICM)."
+        )
     path = named_file("head", asked, files, where=f"robot '{robot.name}'")
     where = f"head file '{path}'"
     content = read_mapping(path, where, RobotError, known=HeadFile.model_fields)

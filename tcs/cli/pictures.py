@@ -105,9 +105,10 @@ def _draw(
 ) -> None:
     """Draw the set chosen from here, or the best one."""
     import tcs
-    from tcs.cli.places import check_writable, observed_settings, place
+    from tcs.cli.places import check_writable, observed_settings, place_told
     from tcs.draw import check_format, save_figure
 
+    chosen_from = place_told(here, torso)
     check_format(out)
     check_writable(out)
     loaded = tcs.load(file)
@@ -115,7 +116,7 @@ def _draw(
     from tcs.report.pictures import Shown
 
     found = observed_settings(observed or (), loaded.observed_axes)
-    shown = Shown.of(loaded, place(here, torso) if here else None, max_members, found)
+    shown = Shown.of(loaded, chosen_from, max_members, found)
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
     talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

@@ -7,9 +7,30 @@ import secrets
 from collections.abc import Sequence
 from pathlib import Path
 
+import typer
+
 from tcs.errors import OutputError, SelectionError
 from tcs.space import Axis
 from tcs.tables import InitialConfiguration
+
+
+def place_told(
+    here: tuple[float, float, float] | None, torso: float
+) -> InitialConfiguration | None:
+    """Return the current state, None where nobody says where the robot is.
+
+    Args:
+        here: x [m], y [m] and heading [deg] in the environment frame, or None.
+        torso: Torso lift [m].
+
+    Raises:
+        typer.BadParameter: If there is a torso lift without a place.
+    """
+    if here is not None:
+        return place(here, torso)
+    if torso:
+        raise typer.BadParameter("needs --here.", param_hint="--torso")
+    return None
 
 
 def place(

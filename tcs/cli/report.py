@@ -47,8 +47,9 @@ def report(
     With --here about the set chosen from there, else about the one with the best scores. Answers
     are re-checked with Drake; if one is false the page says so, and the exit code is 1.
     """
-    from tcs.cli.places import check_writable, observed_settings, place
+    from tcs.cli.places import check_writable, observed_settings, place_told
 
+    chosen_from = place_told(here, torso)
     paths = _paths(out, markdown=markdown)
     for path in paths:
         check_writable(path)
@@ -60,7 +61,7 @@ def report(
     with talk.progress_bar("pairs re-checked") as on_progress:
         answer = answer_of(
             file,
-            here=place(here, torso) if here else None,
+            here=chosen_from,
             max_members=max_members,
             observed=found,
             check=Check(pairs=pairs, dense=dense, seed=seed),

@@ -76,18 +76,18 @@ def experiment(
     plan = Plan(
         operators=asked.operators, trials=asked.trials, training=asked.training, seed=asked.seed
     )
-    make_folder(asked.out)
-    for name in FILES:
-        check_writable(asked.out / name)
     runs = None
     if asked.runs_as is not None:
         runs = asked.out / "runs"
         check_format(runs / f"run{asked.runs_as}")
-        make_folder(runs)
     robot = load_robot(asked.robot)
     arm = load_arm(robot, lift=torso_lift(robot, asked.lift))
     if asked.maps:
         check_robot(arm)
+    # Only now: what is refused leaves no empty folder behind.
+    make_folder(runs or asked.out)
+    for name in FILES:
+        check_writable(asked.out / name)
     course = find_course(arm, asked.line_seed)
     done = run_experiment(
         arm, course, plan, runs=runs, runs_as=asked.runs_as or ".csv", jobs=jobs,

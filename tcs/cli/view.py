@@ -59,14 +59,14 @@ def view(
     if export is None and (meshes or as_json):
         raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
 
-    from tcs.cli.places import check_page, place
+    from tcs.cli.places import check_page, place_told
 
     if export is not None:
         check_page(export)
 
     from tcs.cli import view_work as work
 
-    chosen_from = place(here, torso) if here else None
+    chosen_from = place_told(here, torso)
     as_meshes = meshes or export is None
     staged = work.stage(file, chosen_from, max_members, observed or (), meshes=as_meshes)
     if export is not None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import DataFileError, OutputError
 from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.teleop.settings import Mode
 from tcs.writing import whole_file
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ NO_GROUP = -1
 """Stands where no joint group was asked for."""
 _UNIT_SLACK = 1e-6
 """How far from 1 a quaternion read from a file may be long: ten digits are written."""
+_FARTHEST = 1000.0
+"""A joint farther from zero than this [rad], 160 turns, is a broken file's."""
 _XYZ = ("x", "y", "z")
 _WXYZ = ("qw", "qx", "qy", "qz")
 _METADATA = "metadata"
@@ -74,8 +77,9 @@ class Run:
         """Check the shapes and make the arrays read-only.
 
         Raises:
-            DataFileError: If the arrays do not belong together, a number is not finite, the time
-                does not rise, or a quaternion is not of length 1.
+            DataFileError: If the arrays do not belong together, a number is not finite, a mode is
+                not known, a joint is turned beyond reason, the time does not rise, or a quaternion
+                is not of length 1.
         """
         n, m = len(self.time), len(self.joint_names)
         wide = {"joints": m, "rates": m, "limits": m, "quaternion": 4}
@@ -94,6 +98,19 @@ class Run:
                 row = int(np.argmax(~np.isfinite(array.reshape(n, -1)).all(axis=1)))
                 raise DataFileError(f"run, sample {row}: '{name}' is not finite.")
             array.flags.writeable = False
+        known = set(Mode)
+        for row, mode in enumerate(self.mode):
+            if mode not in known:
+                raise DataFileError(
+                    f"run, sample {row}: mode '{mode}' is none of {', '.join(Mode)}."
+                )
+        far = np.abs(self.joints) > _FARTHEST
+        if far.any():
+            row = int(np.argmax(far.any(axis=1)))
+            raise DataFileError(
+                f"run, sample {row}: a joint at {np.abs(self.joints[row]).max():g} rad; must be "
+                f"within {_FARTHEST:g}."
+            )
         if np.any(np.diff(self.time) <= 0.0):
             row = int(np.argmax(np.diff(self.time) <= 0.0)) + 1
             raise DataFileError(f"run, sample {row}: the time {self.time[row]:g} s does not rise.")

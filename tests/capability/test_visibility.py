@@ -5,7 +5,7 @@ import pytest
 
 from tcs.capability.head import View, head_names, head_view, load_head
 from tcs.capability.visibility import CORRECTED, THESIS, visibility
-from tcs.errors import UnknownNameError
+from tcs.errors import RobotError, UnknownNameError
 from tcs.robots import load_robot
 
 TIAGO = View((0.0, 0.0, 0.0), tuple(np.radians([-104.0, 104.0])), tuple(np.radians([-82.5, 67.5])))
@@ -77,7 +77,7 @@ def test_the_shipped_heads_fit_their_robots():
 
 
 def test_a_robot_without_a_head_file_is_told_so():
-    with pytest.raises(UnknownNameError, match="unknown head 'iiwa7'"):
+    with pytest.raises(RobotError, match="'iiwa7': no head camera of it is known, only of pr2"):
         load_head(load_robot("iiwa7"))
 
 

@@ -45,6 +45,7 @@ def test_scores_of_other_models_are_refused(tcs_command, small_file):
     [
         (("--score", "reachability"), "goes with --states"),
         (("--states", "--score", "success"), "must be one of reachability"),
+        (("--torso", 0.1), "needs --here"),
     ],
 )
 def test_options_that_do_not_go_together_are_misuse(tcs_command, small_file, words, said):

@@ -35,7 +35,7 @@ def made(n=40, seed=0, **changes):
         "group": rng.integers(NO_GROUP, 4, n),
         "sign": rng.integers(-1, 2, n),
         "clutch": rng.random(n) < 0.5,
-        "mode": np.where(rng.random(n) < 0.5, "a", "longer"),
+        "mode": np.where(rng.random(n) < 0.5, "pose", "end-effector"),
         "limits": rng.integers(-1, 2, (n, 7)),
         "singular": rng.random(n) < 0.5,
         "stopped": rng.random(n) < 0.5,
@@ -92,6 +92,8 @@ def test_without_its_library_parquet_says_what_to_install(tmp_path, monkeypatch)
         ({"time": np.zeros(40)}, "sample 1: the time 0 s does not rise"),
         ({"position": np.full((40, 3), np.nan)}, "sample 0: 'position' is not finite"),
         ({"quaternion": np.ones((40, 4))}, "must have length 1"),
+        ({"mode": np.full(40, "xyz")}, "sample 0: mode 'xyz' is none of end-effector, null-space"),
+        ({"joints": np.full((40, 7), 1e9)}, r"sample 0: a joint at 1e\+09 rad; must be within"),
     ],
 )
 def test_arrays_that_do_not_belong_together_are_refused(changes, said):
