@@ -3,7 +3,7 @@ import pytest
 
 from tcs.capability import MapGrid, Reach, map_from_ik
 from tcs.capability.from_ik import cells_around, manipulability_scale
-from tcs.errors import GridError, UnknownNameError
+from tcs.errors import GridError, RobotError, UnknownNameError
 from tcs.kernel.dexterity import MEASURES
 from tcs.robots import load_robot
 
@@ -119,7 +119,7 @@ def test_a_robot_without_a_head_makes_an_icm_but_no_ihcm():
     found = map_from_ik(at, grid, kind="ICM")
     assert len(found.cells)
     assert not found.visibility.any()
-    with pytest.raises(UnknownNameError, match="head"):
+    with pytest.raises(RobotError, match="no head camera"):
         map_from_ik(at, grid, kind="IHCM")
 
 
