@@ -46,8 +46,8 @@ def map_from_ik(
         on_progress: Called with cells done and in all.
 
     Raises:
-        UnknownNameError: If the robot has no head file and an IHCM is asked for, or there is no
-            such rule.
+        RobotError: If the robot has no head file and an IHCM is asked for.
+        UnknownNameError: If there is no such rule.
         GridError: If there are far too many cells or lifts.
 
     Source:
@@ -92,8 +92,8 @@ def finished_map(
         metadata: What else is to be remembered.
 
     Raises:
-        UnknownNameError: If the robot has no head file and the kind counts visibility, or there is
-            no such rule.
+        RobotError: If the robot has no head file and the kind counts visibility.
+        UnknownNameError: If there is no such rule.
         GridError: If there are more lifts than a map holds.
     """
     order = np.argsort(grid.keys(cells))
@@ -129,7 +129,8 @@ def seen_from(reach: Reach, grid: MapGrid, kind: str, view_rule: str) -> View | 
     Also refuses what no map can be made of, before the work.
 
     Raises:
-        UnknownNameError: If there is no such rule, or no head where one is needed.
+        RobotError: If there is no head file where one is needed.
+        UnknownNameError: If there is no such rule.
         GridError: If there are more lifts than a map holds.
     """
     if view_rule not in VISIBILITIES:

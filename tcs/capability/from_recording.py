@@ -75,7 +75,8 @@ def map_from_recording(
 
     Raises:
         DataFileError: If no sample is left.
-        UnknownNameError: If the robot has no head file, or there is no such rule.
+        RobotError: If the robot has no head file.
+        UnknownNameError: If there is no such rule.
         GridError: If there are more lifts than a map holds.
 
     Source:
