@@ -123,7 +123,12 @@ def _in_frame_of(
 
 def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit | None:
     """Return the boxes that the URDF draws, if there is nothing else and they are few."""
-    drawn = [(member, g) for member in members for g in surface_geometries(model, member)]
+    # Once each: what is seen and what is touched are often the same box.
+    drawn = {
+        (member, g.shape, g.size, g.xyz, g.rpy): (member, g)
+        for member in members
+        for g in surface_geometries(model, member)
+    }.values()
     if len(drawn) > target.max_shapes or any(g.shape != "box" for _, g in drawn):
         return None
     shapes, pieces = [], []
