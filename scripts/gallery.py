@@ -86,14 +86,7 @@ class Drawn:
 def main() -> int:
     """Make the gallery; return the exit code."""
     options = parse()
-    try:
-        return run(options)
-    except tcs.TcsError as error:
-        talk.say(str(error))
-    except KeyboardInterrupt:
-        talk.say("interrupted; no half-written file is left.")
-        return 130
-    return 1
+    return talk.exit_code_of(lambda: run(options))
 
 
 def parse() -> argparse.Namespace:

@@ -32,14 +32,7 @@ yet: a quarter of a minute for a row, and within a percent of the full race."""
 def main() -> int:
     """Run the study and write the report; return the exit code."""
     options = parse()
-    try:
-        return run(options)
-    except tcs.TcsError as error:
-        talk.say(str(error))
-    except KeyboardInterrupt:
-        talk.say("interrupted; no half-written file is left.")
-        return 130
-    return 1
+    return talk.exit_code_of(lambda: run(options))
 
 
 def parse() -> argparse.Namespace:

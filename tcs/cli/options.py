@@ -42,3 +42,43 @@ Members = Annotated[
         show_default="what the file holds",
     ),
 ]
+Page = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="PAGE",
+        help="Write one self-contained .html page that plays all of it, and end.",
+    ),
+]
+Meshes = Annotated[
+    bool,
+    typer.Option(
+        "--meshes",
+        help="With --export: the robot's meshes in place of its collision shapes; mind their "
+        "licence, which is told.",
+    ),
+]
+PageJson = Annotated[bool, typer.Option("--json", help="With --export: print one JSON object.")]
+Port = Annotated[
+    int | None,
+    typer.Option(
+        min=1024,
+        max=65535,
+        help="Where the browser finds the page.",
+        show_default="the first free one from 7000 on",
+    ),
+]
+Browser = Annotated[bool, typer.Option(help="Whether to open a browser.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="Close after so many seconds.", show_default="at Ctrl-C"),
+]
+
+
+def check_export(export: Path | None, *, meshes: bool, as_json: bool) -> None:
+    """Refuse what says how a page is written where none is.
+
+    Raises:
+        typer.BadParameter: If there is no `--export`.
+    """
+    if export is None and (meshes or as_json):
+        raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")

@@ -75,6 +75,18 @@ def say(text: str) -> None:
     typer.echo(f"tcs: {text}", err=True)
 
 
+def exit_code_of(work: Callable[[], int]) -> int:
+    """Do a script's work and return its exit code: 1 or 130 and a line where it goes wrong."""
+    try:
+        return work()
+    except TcsError as error:
+        say(str(error))
+    except KeyboardInterrupt:
+        say("interrupted; no half-written file is left.")
+        return 130
+    return 1
+
+
 def say_compiling() -> None:
     """Tell the user why nothing happens for a while."""
     say("compiling for this machine, up to a minute; later runs do without.")

@@ -10,21 +10,6 @@ import typer
 
 from tcs.cli import options, talk
 
-Port = Annotated[
-    int | None,
-    typer.Option(
-        min=1024,
-        max=65535,
-        help="Where the browser finds the page.",
-        show_default="the first free one from 7000 on",
-    ),
-]
-Browser = Annotated[bool, typer.Option(help="Whether to open a browser.")]
-Duration = Annotated[
-    float | None,
-    typer.Option(min=0.0, help="Close after so many seconds.", show_default="at Ctrl-C"),
-]
-
 
 class Limits(StrEnum):
     """What happens at an invalid configuration."""
@@ -83,9 +68,9 @@ def live(
         Path | None,
         typer.Option(metavar="RUN", help="Write what was driven when it ends: .csv or .parquet."),
     ] = None,
-    port: Port = None,
-    browser: Browser = True,
-    duration: Duration = None,
+    port: options.Port = None,
+    browser: options.Browser = True,
+    duration: options.Duration = None,
 ) -> None:
     """Drive an arm in the browser by keys, sliders or gamepad, or see `experiment` and `replay`."""
     if ctx.invoked_subcommand is not None:
@@ -124,31 +109,15 @@ def replay(
         str | None,
         typer.Option(help="Name or YAML file of its robot.", show_default="what the run says"),
     ] = None,
-    export: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PAGE",
-            help="Write one self-contained .html page that plays the run, and end.",
-        ),
-    ] = None,
-    meshes: Annotated[
-        bool,
-        typer.Option(
-            "--meshes",
-            help="With --export: the robot's meshes in place of its collision shapes; mind their "
-            "licence, which is told.",
-        ),
-    ] = False,
-    port: Port = None,
-    browser: Browser = True,
-    duration: Duration = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="With --export: print one JSON object.")
-    ] = False,
+    export: options.Page = None,
+    meshes: options.Meshes = False,
+    port: options.Port = None,
+    browser: options.Browser = True,
+    duration: options.Duration = None,
+    as_json: options.PageJson = False,
 ) -> None:
     """Play a saved run back in the browser, or write it as one page."""
-    if export is None and (meshes or as_json):
-        raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
+    options.check_export(export, meshes=meshes, as_json=as_json)
 
     from tcs.cli import teleop_live_work as work
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -22,42 +21,15 @@ def view(
     torso: options.Torso = 0.0,
     max_members: options.Members = None,
     observed: options.Observed = None,
-    export: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PAGE",
-            help="Write one self-contained .html page that plays through the set, and end.",
-        ),
-    ] = None,
-    meshes: Annotated[
-        bool,
-        typer.Option(
-            "--meshes",
-            help="With --export: the robot's meshes in place of its collision shapes; mind their "
-            "licence, which is told.",
-        ),
-    ] = False,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=1024,
-            max=65535,
-            help="Where the browser finds the viewer.",
-            show_default="the first free one from 7000 on",
-        ),
-    ] = None,
-    browser: Annotated[bool, typer.Option(help="Whether to open a browser.")] = True,
-    duration: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Close after so many seconds.", show_default="at Ctrl-C"),
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="With --export: print one JSON object.")
-    ] = False,
+    export: options.Page = None,
+    meshes: options.Meshes = False,
+    port: options.Port = None,
+    browser: options.Browser = True,
+    duration: options.Duration = None,
+    as_json: options.PageJson = False,
 ) -> None:
     """Look at it in the browser: step through set and goals, or stand elsewhere."""
-    if export is None and (meshes or as_json):
-        raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
+    options.check_export(export, meshes=meshes, as_json=as_json)
 
     from tcs.cli.places import check_page, place_told
 
