@@ -34,11 +34,11 @@ from tcs.capability import (
     pick_and_place_task,
     simulate,
 )
-from tcs.capability.picture import task_figure
 from tcs.capability.surroundings import Surroundings
-from tcs.draw import save_figure
-from tcs.robots import load_robot
-from tcs.scene import EnvironmentFile
+from tcs.model.robots import load_robot
+from tcs.model.scene import EnvironmentFile
+from tcs.output.draw import save_figure
+from tcs.output.draw.capability_maps import task_figure
 
 LIFT = 0.1725
 """Brings TIAGo's shoulder to 0.91 m."""

@@ -14,9 +14,9 @@ from table import row, spread
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import UNCHECKED, Problem
 from tcs.kernel.sweep import Scores, score_slice
-from tcs.scoring import sweep
-from tcs.scoring.sweep import SLICE
-from tcs.tables import Reason
+from tcs.placement.scoring import sweep
+from tcs.placement.scoring.sweep import SLICE
+from tcs.placement.tables import Reason
 
 GRID_PARTS = (8, 4, 2, 1)
 """Every how manieth base x of the grid is scored."""

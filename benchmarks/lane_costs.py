@@ -12,10 +12,10 @@ import numba
 import numpy as np
 from peer_problems import Pair
 
+from tcs.kernel.analytic.ik import wrist_goal
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.ik import wrist_goal
-from tcs.kernel.lanes import solve_lanes
-from tcs.kernel.solver import ArmSolver
 
 LANES = 48
 ROUNDS = 20

@@ -15,9 +15,9 @@ import time
 import numpy as np
 from table import header, row, spread
 
-from tcs.scoring import LiveScorer, all_rows, score
-from tcs.select import nearest_table
-from tcs.store import ScoreFile
+from tcs.placement.scoring import LiveScorer, all_rows, score
+from tcs.placement.selection import nearest_table
+from tcs.placement.store import ScoreFile
 
 WHEELCHAIR = "wheelchair"
 

@@ -41,7 +41,7 @@ from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 from pydrake.solvers import SnoptSolver
 
 from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, Shapes
-from tcs.scene import LoweredScene
+from tcs.model.scene import LoweredScene
 
 INSIDE_POSITION, INSIDE_ROTATION = 5e-4, 5e-3
 """Half of what the judge allows [m, rad]: corners of a box and SNOPT's own tolerance fit too."""

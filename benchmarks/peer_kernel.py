@@ -7,16 +7,16 @@ import time
 import numpy as np
 from peer_problems import Answer, Bench, Pair
 
+from tcs.kernel.analytic.search import Search, new_search
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import Search, new_search
 
 # `score_slice` is this with memory of its own, but not compiled itself: from Python, a call costs
 # more than a pair.
 from tcs.kernel.sweep import Scores, _score_slice
-from tcs.tables import Reason
+from tcs.placement.tables import Reason
 
 REPEATS = 32
 """How often a pair is solved in one call for its own time: the clock does not tell microseconds."""

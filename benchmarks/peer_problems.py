@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import gripper_contacts
-from tcs.scene import LoweredScene, Scene, goal_poses
-from tcs.scoring import load_job, sweep
-from tcs.scoring.job import Job
-from tcs.tables import Reason, ScoreTable
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.model.scene import LoweredScene, Scene, goal_poses
+from tcs.placement.scoring import load_job, sweep
+from tcs.placement.scoring.job import Job
+from tcs.placement.tables import Reason, ScoreTable
 
 TASK, ENVIRONMENT, ROBOT = "shaving", "wheelchair", "pr2"
 IN_REACH = (Reason.REACHED, Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)

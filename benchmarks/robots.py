@@ -17,8 +17,8 @@ import time
 
 from table import header, row, spread
 
-from tcs.robots import robot_names
-from tcs.scoring import load_job, score, sweep, verify
+from tcs.model.robots import robot_names
+from tcs.placement.scoring import load_job, score, sweep, verify
 
 ENVIRONMENT = "wheelchair"
 RECALL = 0.998

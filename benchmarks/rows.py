@@ -21,7 +21,7 @@ from pathlib import Path
 from table import header, row, spread
 
 import tcs
-from tcs.scoring import load_job, sweep
+from tcs.placement.scoring import load_job, sweep
 
 LOADS = 5
 

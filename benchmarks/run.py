@@ -20,12 +20,13 @@ from pathlib import Path
 import numpy as np
 from table import header, row, spread
 
-from tcs.kernel import reference_pairs
 from tcs.kernel.problem import build_problem
-from tcs.scoring import build_sets, load_job, score, sweep, verify, warm_up
-from tcs.select import SelectionTables, select
-from tcs.store import load_scores, save_scores
-from tcs.tables import InitialConfiguration, Reason
+from tcs.kernel.verification import reference_pairs
+from tcs.model.grid import InitialConfiguration
+from tcs.placement.scoring import build_sets, load_job, score, sweep, verify, warm_up
+from tcs.placement.selection import SelectionTables, select
+from tcs.placement.store import load_scores, save_scores
+from tcs.placement.tables import Reason
 
 REFERENCE_PAIRS = 12
 PLACES = 1000

@@ -19,12 +19,12 @@ import numpy as np
 from table import header, row
 
 from tcs.errors import SelectionError
-from tcs.scoring import build_sets
-from tcs.select import SelectionTables, TravelWeights, UtilityWeights, select, utility
-from tcs.select.travel import legs_from
-from tcs.space import Grid
-from tcs.store import load_scores
-from tcs.tables import InitialConfiguration, Reason, ScoreTable, SetTable
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.scoring import build_sets
+from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, select, utility
+from tcs.placement.selection.travel import legs_from
+from tcs.placement.store import load_scores
+from tcs.placement.tables import Reason, ScoreTable, SetTable
 
 GOALS = 14
 CANDIDATES_AT_ONCE = 16

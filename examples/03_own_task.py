@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import tcs
-from tcs.tasks import load_task
+from tcs.model.tasks import load_task
 
 HERE = Path(__file__).resolve().parent
 

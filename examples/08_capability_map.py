@@ -18,7 +18,7 @@ from tcs.capability import (
     pick_and_place_task,
     save_map,
 )
-from tcs.robots import load_robot
+from tcs.model.robots import load_robot
 
 
 def main(folder: Path = Path("out/examples")) -> None:

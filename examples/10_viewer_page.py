@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import tcs
-from tcs.scoring import reopen
-from tcs.view import Answers, Props, open_meshcat, page
+from tcs.output.view import Answers, Props, open_meshcat, page
+from tcs.placement.scoring import reopen
 
 
 def main(folder: Path = Path("out/examples")) -> None:

@@ -16,9 +16,9 @@ import tcs
 from tcs.cli.places import place
 from tcs.cli.reports import choice_as_json, report_choice, report_scores, report_verification
 from tcs.cli.talk import progress_bar
-from tcs.draw import save_figure
-from tcs.report.pictures import Shown, map_figure, scene_figure
-from tcs.scoring import load_job
+from tcs.output.draw import save_figure
+from tcs.output.report.pictures import Shown, map_figure, scene_figure
+from tcs.placement.scoring import load_job
 
 TASK, ENVIRONMENT, ROBOT = "shaving", "wheelchair", "pr2"
 PLACES = ((1.4, -1.2, 180.0), (-1.2, 0.9, 0.0))

@@ -14,10 +14,10 @@ from pathlib import Path
 import yaml
 
 from tcs.errors import TcsError
-from tcs.paths import data_folder
-from tcs.robots import RobotFile, load_robot, write_primitives
-from tcs.robots.disabled_pairs import propose_disabled_pairs
-from tcs.robots.fit_robot import fit_robot
+from tcs.files.paths import data_folder
+from tcs.model.robots import RobotFile, load_robot, write_primitives
+from tcs.model.robots.disabled_pairs import propose_disabled_pairs
+from tcs.model.robots.fit_robot import fit_robot
 
 
 def main() -> int:

@@ -20,14 +20,14 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.places import place
 from tcs.cli.rows import default_path, score_one
-from tcs.draw import as_png
-from tcs.draw.floor_plan import described
-from tcs.report import check_row
-from tcs.report.pictures import Shown, map_figure, member_figure, scene_figure
-from tcs.report.states import states_figure
-from tcs.scoring import all_rows
-from tcs.store import ScoreFile
-from tcs.writing import make_folder, whole_file
+from tcs.files.writing import make_folder, whole_file
+from tcs.output.draw import as_png
+from tcs.output.draw.floor_plan import described
+from tcs.output.report import check_row
+from tcs.output.report.pictures import Shown, map_figure, member_figure, scene_figure
+from tcs.output.report.states import states_figure
+from tcs.placement.scoring import all_rows
+from tcs.placement.store import ScoreFile
 
 ROBOT = "pr2"
 HERE = (1.4, -1.2, 180.0)

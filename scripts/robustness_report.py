@@ -18,10 +18,10 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.rows import default_path, score_one
 from tcs.errors import UnknownNameError
-from tcs.report import Plan, check_row, load_paper, study_rows, write_report
-from tcs.robustness import robustify
-from tcs.robustness.error_model import check_draws
-from tcs.writing import make_folder
+from tcs.files.writing import make_folder
+from tcs.output.report import Plan, check_row, load_paper, study_rows, write_report
+from tcs.placement.robustness import robustify
+from tcs.placement.robustness.error_model import check_draws
 
 ROBOT = "pr2"
 RACED_SETS, RACE_SAMPLES = 200, 256

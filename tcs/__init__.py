@@ -10,22 +10,27 @@ Everything in `__all__` is a promise to users. Names are loaded when they are fi
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tcs.errors import TcsError
-    from tcs.reasons import Explanation, explain
-    from tcs.robustness import Evaluation, evaluate, robustify
-    from tcs.scene import Observation
-    from tcs.scoring import LiveScorer, Verification, score, score_observed, summary, verify
-    from tcs.select import Choice, TravelWeights, UtilityWeights, select
-    from tcs.store import ScoreFile
-    from tcs.store import load_scores as load
-    from tcs.store import save_scores as save
-    from tcs.tables import InitialConfiguration
+    from tcs.model.grid import InitialConfiguration
+    from tcs.model.scene import Observation
+    from tcs.placement.reasons import Explanation, explain
+    from tcs.placement.robustness import Evaluation, evaluate, robustify
+    from tcs.placement.scoring import (
+        LiveScorer,
+        Verification,
+        score,
+        score_observed,
+        summary,
+        verify,
+    )
+    from tcs.placement.selection import Choice, TravelWeights, UtilityWeights, select
+    from tcs.placement.store import ScoreFile
+    from tcs.placement.store import load_scores as load
+    from tcs.placement.store import save_scores as save
 
     __version__: str
 
@@ -55,41 +60,40 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Choice": ("tcs.select", "Choice"),
-    "Evaluation": ("tcs.robustness", "Evaluation"),
-    "Explanation": ("tcs.reasons", "Explanation"),
-    "InitialConfiguration": ("tcs.tables", "InitialConfiguration"),
-    "LiveScorer": ("tcs.scoring", "LiveScorer"),
-    "Observation": ("tcs.scene", "Observation"),
-    "ScoreFile": ("tcs.store", "ScoreFile"),
+    "Choice": ("tcs.placement.selection", "Choice"),
+    "Evaluation": ("tcs.placement.robustness", "Evaluation"),
+    "Explanation": ("tcs.placement.reasons", "Explanation"),
+    "InitialConfiguration": ("tcs.model.grid", "InitialConfiguration"),
+    "LiveScorer": ("tcs.placement.scoring", "LiveScorer"),
+    "Observation": ("tcs.model.scene", "Observation"),
+    "ScoreFile": ("tcs.placement.store", "ScoreFile"),
     "TcsError": ("tcs.errors", "TcsError"),
-    "TravelWeights": ("tcs.select", "TravelWeights"),
-    "UtilityWeights": ("tcs.select", "UtilityWeights"),
-    "Verification": ("tcs.scoring", "Verification"),
-    "evaluate": ("tcs.robustness", "evaluate"),
-    "explain": ("tcs.reasons", "explain"),
-    "load": ("tcs.store", "load_scores"),
-    "robustify": ("tcs.robustness", "robustify"),
-    "save": ("tcs.store", "save_scores"),
-    "score": ("tcs.scoring", "score"),
-    "score_observed": ("tcs.scoring", "score_observed"),
-    "summary": ("tcs.scoring", "summary"),
-    "verify": ("tcs.scoring", "verify"),
+    "TravelWeights": ("tcs.placement.selection", "TravelWeights"),
+    "UtilityWeights": ("tcs.placement.selection", "UtilityWeights"),
+    "Verification": ("tcs.placement.scoring", "Verification"),
+    "evaluate": ("tcs.placement.robustness", "evaluate"),
+    "explain": ("tcs.placement.reasons", "explain"),
+    "load": ("tcs.placement.store", "load_scores"),
+    "robustify": ("tcs.placement.robustness", "robustify"),
+    "save": ("tcs.placement.store", "save_scores"),
+    "score": ("tcs.placement.scoring", "score"),
+    "score_observed": ("tcs.placement.scoring", "score_observed"),
+    "summary": ("tcs.placement.scoring", "summary"),
+    "select": ("tcs.placement.selection", "select"),
+    "verify": ("tcs.placement.scoring", "verify"),
 }
-"""For each name the room it lives in, and what it is called there."""
+"""The module and attribute that each public name is loaded from."""
 
 
 def __getattr__(name: str) -> Any:
-    """Return a name of `__all__`, loading the room it lives in."""
+    """Return a name of `__all__`, loading its module."""
     if name == "__version__":
         from importlib.metadata import version
 
         value: Any = version("tcs")
-    elif name == "select":
-        return import_module("tcs.select")
     elif name in _HOMES:
-        room, there = _HOMES[name]
-        value = getattr(import_module(room), there)
+        module, attribute = _HOMES[name]
+        value = getattr(import_module(module), attribute)
     else:
         raise AttributeError(f"module 'tcs' has no attribute '{name}'")
     globals()[name] = value
@@ -98,24 +102,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-class _CallableRoom(ModuleType):
-    """The room `tcs.select`, which can be called like the function it is named after."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """Return what `tcs.select.select` returns."""
-        return self.select(*arguments, **options)
-
-
-class _Package(ModuleType):
-    """This package: `tcs.select` is both a room and a promised function."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        # The import system binds a room to the package it has just loaded it for.
-        if name == "select" and type(value) is ModuleType:
-            value.__class__ = _CallableRoom
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

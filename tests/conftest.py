@@ -7,10 +7,10 @@ import signal
 import numpy as np
 import pytest
 
-from tcs.robots import load_robot
-from tcs.scene import Scene, SceneSpec, load_environment, lower
-from tcs.space import Grid
-from tcs.tasks import load_task
+from tcs.model.grid import Grid
+from tcs.model.robots import load_robot
+from tcs.model.scene import Scene, SceneSpec, load_environment, lower
+from tcs.model.tasks import load_task
 
 
 @pytest.fixture(autouse=True, scope="session")

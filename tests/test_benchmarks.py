@@ -11,8 +11,8 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from tcs.kernel.reference import link_poses
-from tcs.scoring import load_job
+from tcs.kernel.verification.reference import link_poses
+from tcs.placement.scoring import load_job
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 # Python reads None as "there is no such module".

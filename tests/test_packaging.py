@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tcs.tasks import task_names
+from tcs.model.tasks import task_names
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -90,7 +90,10 @@ def test_wheel_carries_every_data_file_and_module(wheel):
     assert data_files()
     assert {f"tcs/_data/{name}" for name in data_files()} <= names
     modules = {str(path.relative_to(CHECKOUT)) for path in (CHECKOUT / "tcs").rglob("*.py")}
-    assert modules | {"tcs/py.typed", "tcs/report/page.css", "tcs/report/paper.yaml"} <= names
+    assert (
+        modules | {"tcs/py.typed", "tcs/output/report/page.css", "tcs/output/report/paper.yaml"}
+        <= names
+    )
 
 
 def test_wheel_carries_nothing_else(wheel):
@@ -103,7 +106,8 @@ def test_wheel_works_away_from_the_checkout(wheel, tmp_path):
     site = tmp_path / "site"
     run("-m", "pip", "install", "--quiet", "--no-deps", "--target", site, wheel)
     code = (
-        "from tcs.paths import data_folder; from tcs.tasks import load_task, task_names\n"
+        "from tcs.files.paths import data_folder\n"
+        "from tcs.model.tasks import load_task, task_names\n"
         "print(data_folder()); print(*task_names()); print(len(load_task('shaving').goals))"
     )
     lines = run("-c", code, cwd=tmp_path, path=site).splitlines()

@@ -1,8 +1,8 @@
 """Names of the package in code spans become links to the API, and wrong names fail the build.
 
-A span such as `tcs.select`, `tcs.tables.ScoreTable.reached` or `tcs.load("x.tcs")` reads well
-wherever the Markdown is shown. On the site it leads to the object's description. The same object
-may be named by its room or by its module; both lead to the one description there is.
+A span such as `tcs.select`, `tcs.placement.tables.ScoreTable.reached` or `tcs.load("x.tcs")` reads
+well wherever the Markdown is shown. On the site it leads to the object's description. The same
+object may be named by its package or by its module; both lead to the one description there is.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 
 from tcs.capability.recording import Recording, recording_of
 from tcs.errors import DataFileError
-from tcs.robots import RobotFile
+from tcs.model.robots import RobotFile
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

@@ -18,11 +18,11 @@ from tcs.capability.map import FIXED, ITCM, CapabilityMap
 from tcs.capability.reach import Reach
 from tcs.capability.visibility import CORRECTED, visibility
 from tcs.errors import DataFileError, StoreFormatError, TcsError
+from tcs.files.compression import fold, unfolded
+from tcs.files.plain import plain
+from tcs.files.reader import explained, read_joblib
+from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
-from tcs.store.folding import fold, unfolded
-from tcs.store.plain import plain
-from tcs.store.reader import explained, read_joblib
-from tcs.writing import whole_file
 
 FORMAT = "tcs capability map"
 FORMAT_VERSION = 1

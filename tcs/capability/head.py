@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
-from tcs.documents import Document, PositiveNumber, checked, read_mapping
 from tcs.errors import RobotError, UnknownNameError
+from tcs.files.documents import Document, PositiveNumber, checked, read_mapping
+from tcs.files.paths import named_file, shipped_files
 from tcs.kernel.arrays import FloatArray
-from tcs.paths import named_file, shipped_files
-from tcs.robots import RobotFile
-from tcs.scene import Scene
+from tcs.model.robots import RobotFile
+from tcs.model.scene import Scene
 
 
 class HeadFile(Document):

@@ -11,16 +11,16 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import GridError
+from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.contacts import new_workspace
 from tcs.kernel.follow import Control, Hand, follow
-from tcs.kernel.pairs import REACHED
 from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
-from tcs.robots import RobotFile
-from tcs.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower
-from tcs.space import Axis, Grid
+from tcs.model.grid import Axis, Grid
+from tcs.model.robots import RobotFile
+from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower
 
 MEASURE = "inverse-condition-limited-thesis"
 """The thesis's manipulability: sigma_min / sigma_max, eq. (20), times the penalty, eq. (21)."""

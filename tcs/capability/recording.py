@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import DataFileError
+from tcs.files.writing import whole_file
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.robots import RobotFile
-from tcs.writing import whole_file
+from tcs.model.robots import RobotFile
 
 LIMIT_SLACK = 2e-3
 """How far past a limit an encoder may read [rad or m]: some times the resolution of a cheap one."""

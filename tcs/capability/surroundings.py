@@ -11,13 +11,13 @@ import numpy as np
 from tcs.capability.merge import BasePose, TaskMap
 from tcs.capability.tasks import GraspTask
 from tcs.errors import SelectionError
+from tcs.kernel.analytic.pairs import BODY_BLOCKED, REACHED
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.pairs import BODY_BLOCKED, REACHED
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
-from tcs.robots import RobotFile
-from tcs.scene import EnvironmentFile, Scene, SceneSpec, lower
-from tcs.space import Axis, Grid
+from tcs.model.grid import Axis, Grid
+from tcs.model.robots import RobotFile
+from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, lower
 
 MOST_TRIED = 2000
 """Base poses that are looked at, best first, before the search gives up."""

@@ -260,8 +260,8 @@ def explain(
     import tcs
     from tcs.cli.explanations import report_explanation
     from tcs.cli.places import axis_values, observed_settings, place
-    from tcs.reasons import fix_weights
-    from tcs.space import Grid
+    from tcs.model.grid import Grid
+    from tcs.placement.reasons import fix_weights
 
     loaded = tcs.load(file)
     explanation = tcs.explain(

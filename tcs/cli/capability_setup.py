@@ -32,8 +32,8 @@ class Setup:
             UnknownNameError: If the tool is none of its frames.
         """
         from tcs.capability import Reach
-        from tcs.robots import load_robot
-        from tcs.scoring import reference
+        from tcs.model.robots import load_robot
+        from tcs.placement.scoring import reference
 
         robot = load_robot(self.robot)
         found_as = reference(self.robot, robot.name)
@@ -61,7 +61,7 @@ class Setup:
 
 def robot_of(path: Path, capability: CapabilityMap, asked: str | None) -> str:
     """Return the name or file of a map's robot: the one asked for, or the one it remembers."""
-    from tcs.robots import robot_names
+    from tcs.model.robots import robot_names
 
     if asked is not None:
         return asked

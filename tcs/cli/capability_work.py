@@ -186,7 +186,7 @@ def merge(
     if out is not None:
         import numpy as np
 
-        from tcs.writing import whole_file
+        from tcs.files.writing import whole_file
 
         poses = found.base_poses.copy()
         poses[:, 2] = np.degrees(poses[:, 2])
@@ -194,12 +194,12 @@ def merge(
             header = "x,y,yaw_deg,lift,score"
             np.savetxt(stream, poses, fmt="%.9g", delimiter=",", header=header, comments="")
     if picture is not None and picture.suffix == ".html":
-        from tcs.capability.page import task_page
+        from tcs.output.view.base_poses import task_page
 
         task_page(picture, found)
     elif picture is not None:
-        from tcs.capability.picture import task_figure
-        from tcs.draw import save_figure
+        from tcs.output.draw import save_figure
+        from tcs.output.draw.capability_maps import task_figure
 
         save_figure(picture, task_figure(found))
     left = {} if room is None else _left_by(path, room, capability, found)
@@ -240,15 +240,15 @@ def show(path: Path, out: Path, *, tilt: int, height: float | None) -> dict[str,
     if out.suffix == ".html":
         import numpy as np
 
-        from tcs.capability.page import write_page
-        from tcs.capability.picture import layer
+        from tcs.output.draw.capability_maps import layer
+        from tcs.output.view.base_poses import write_page
 
         poses, shown = layer(capability, tilt=tilt, height=height)
         tools = [(capability.grid.R_ET[tilt], np.array([0.0, 0.0, shown]))]
         write_page(out, poses, length=0.42 * capability.grid.step, tools=tools)
     else:
-        from tcs.capability.picture import map_figure
-        from tcs.draw import save_figure
+        from tcs.output.draw import save_figure
+        from tcs.output.draw.capability_maps import map_figure
 
         save_figure(out, map_figure(capability, tilt=tilt, height=height))
     return {"file": str(out)}
@@ -303,8 +303,8 @@ def check(
 def _left_by(path: Path, room: Room, capability: CapabilityMap, found: TaskMap) -> dict[str, Any]:
     """Return the best base pose that a room leaves, and how many better ones it takes away."""
     from tcs.capability.surroundings import Surroundings
-    from tcs.robots import load_robot
-    from tcs.scene import load_environment
+    from tcs.model.robots import load_robot
+    from tcs.model.scene import load_environment
 
     robot = load_robot(robot_of(path, capability, room.robot))
     robot = robot.model_copy(update={"tool_frame": str(capability.metadata["tool"])})
@@ -356,7 +356,7 @@ def _check_picture(path: Path | None) -> None:
     if path is None:
         return
     if path.suffix != ".html":
-        from tcs.draw import check_format
+        from tcs.output.draw import check_format
 
         check_format(path)
     _check_outputs(path)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from tcs.documents import read_mapping
 from tcs.errors import DataFileError
-from tcs.paths import data_folder
+from tcs.files.documents import read_mapping
+from tcs.files.paths import data_folder
 
 _BASED_ON = "based_on"
 """Key of an environment file that takes over from another one whatever it does not say itself."""

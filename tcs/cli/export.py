@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tcs.space import Grid
-from tcs.store import Scored, ScoreFile, shown_state
-from tcs.tables import Reason
-from tcs.writing import whole_file
+from tcs.files.writing import whole_file
+from tcs.model.grid import Grid
+from tcs.placement.store import Scored, ScoreFile, shown_state
+from tcs.placement.tables import Reason
 
 
 def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:

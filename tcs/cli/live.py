@@ -12,8 +12,8 @@ from tcs.cli import reports, talk
 from tcs.cli.places import check_writable, frame_places, observed_settings, settings
 from tcs.cli.rows import default_path, saved_summary
 from tcs.cli.talk import paper
-from tcs.scene import EnvironmentFile, load_environment
-from tcs.space import Axis
+from tcs.model.grid import Axis
+from tcs.model.scene import EnvironmentFile, load_environment
 
 
 def live_path(task: str, environment: str, robot: str) -> Path:

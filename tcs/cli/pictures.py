@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     # `tcs list` gets by without drawing.
     from matplotlib.figure import Figure
 
-    from tcs.report.pictures import Shown
-    from tcs.store import ScoreFile
+    from tcs.output.report.pictures import Shown
+    from tcs.placement.store import ScoreFile
 
 _SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
 SCORES = ("reachability", "manipulability")
@@ -56,13 +56,13 @@ def draw_map(
 
     def figure(loaded: ScoreFile, shown: Shown) -> Figure:
         if states:
-            from tcs.report.states import states_figure
+            from tcs.output.report.states import states_figure
 
             by_manipulability = score == "manipulability"
             return states_figure(
                 loaded, shown, "manipulability" if by_manipulability else "reachability"
             )
-        from tcs.report.pictures import map_figure
+        from tcs.output.report.pictures import map_figure
 
         return map_figure(loaded, shown)
 
@@ -81,7 +81,7 @@ def draw_picture(
     """Draw the robot where it is to stand, its arm at a goal, from its collision shapes."""
 
     def figure(loaded: ScoreFile, shown: Shown) -> Figure:
-        from tcs.report.pictures import scene_figure
+        from tcs.output.report.pictures import scene_figure
 
         return scene_figure(loaded, shown)
 
@@ -106,14 +106,14 @@ def _draw(
     """Draw the set chosen from here, or the best one."""
     import tcs
     from tcs.cli.places import check_writable, observed_settings, place_told
-    from tcs.draw import check_format, save_figure
+    from tcs.output.draw import check_format, save_figure
 
     chosen_from = place_told(here, torso)
     check_format(out)
     check_writable(out)
     loaded = tcs.load(file)
 
-    from tcs.report.pictures import Shown
+    from tcs.output.report.pictures import Shown
 
     found = observed_settings(observed or (), loaded.observed_axes)
     shown = Shown.of(loaded, chosen_from, max_members, found)

@@ -10,8 +10,7 @@ from pathlib import Path
 import typer
 
 from tcs.errors import OutputError, SelectionError
-from tcs.space import Axis
-from tcs.tables import InitialConfiguration
+from tcs.model.grid import Axis, InitialConfiguration
 
 
 def place_told(

@@ -14,7 +14,7 @@ from tcs.errors import OutputError
 
 if TYPE_CHECKING:
     # `tcs list` gets by without drawing.
-    from tcs.report import Page
+    from tcs.output.report import Page
 
 ENDINGS = (".html", ".md")
 
@@ -55,7 +55,7 @@ def report(
         check_writable(path)
 
     import tcs
-    from tcs.report import Check, answer_of, answer_page
+    from tcs.output.report import Check, answer_of, answer_page
 
     found = observed_settings(observed or (), tcs.load(file).observed_axes)
     with talk.progress_bar("pairs re-checked") as on_progress:
@@ -105,8 +105,8 @@ def _paths(out: Path, *, markdown: bool) -> list[Path]:
 
 def _write(path: Path, page: Page) -> int:
     """Write a page in the form that its name asks for, and return its size in bytes."""
-    from tcs.report import as_html, as_markdown
-    from tcs.writing import whole_file
+    from tcs.files.writing import whole_file
+    from tcs.output.report import as_html, as_markdown
 
     form = as_html if path.suffix.lower() == ".html" else as_markdown
     content = form(page).encode()

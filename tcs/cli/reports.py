@@ -12,8 +12,8 @@ from tcs.cli.talk import paper
 
 if TYPE_CHECKING:
     # Listing what ships has no use for the arrays of a choice.
-    from tcs.select import Choice, Match
-from tcs.store import shown_state
+    from tcs.placement.selection import Choice, Match
+from tcs.placement.store import shown_state
 
 REASONS = {
     "reached": "reached",

@@ -31,7 +31,7 @@ def new(
 ) -> None:
     """Draft a robot file from any URDF, with its collision shapes in a CSV file beside it."""
     from tcs.cli.places import check_writable
-    from tcs.robots.draft import check_free, draft_robot, write_draft
+    from tcs.model.robots.draft import check_free, draft_robot, write_draft
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
     check_writable(check_free(path))
@@ -70,8 +70,8 @@ def check(
     as_json: options.Json = False,
 ) -> None:
     """Check a robot up: arm class, limits, shapes, self-collision, IK; exit 1 if it is unfit."""
-    from tcs.checkup import check_up
-    from tcs.robots import load_robot
+    from tcs.model.checkup import check_up
+    from tcs.model.robots import load_robot
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
     talk.print_result(found.to_json(), _report_check, as_json=as_json)

@@ -103,7 +103,7 @@ def robustify(
     """
     import tcs
     from tcs.cli.places import check_writable
-    from tcs.robustness import success_summary
+    from tcs.placement.robustness import success_summary
 
     path = out or file
     check_writable(path)
@@ -156,7 +156,7 @@ def _table(loaded: Any, observed: list[str] | None) -> int | None:
     """Return the number of the table nearest to what is observed, None where nothing is."""
     if not observed:
         return None
-    from tcs.select.observed import nearest_table
+    from tcs.placement.selection.observed import nearest_table
 
     settings = observed_settings(observed, loaded.observed_axes)
     return nearest_table(loaded, observed=settings).index

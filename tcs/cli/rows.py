@@ -8,8 +8,8 @@ from typing import Any
 import tcs
 from tcs.cli import talk
 from tcs.cli.places import check_writable
-from tcs.scoring import all_rows
-from tcs.writing import make_folder
+from tcs.files.writing import make_folder
+from tcs.placement.scoring import all_rows
 
 
 def default_path(task: str, environment: str, robot: str) -> Path:

@@ -18,18 +18,26 @@ from tcs.cli import talk
 from tcs.cli.places import check_page, check_writable
 from tcs.cli.teleop_work import torso_lift
 from tcs.errors import DataFileError, TcsError
-from tcs.robots import RobotFile, load_robot
+from tcs.files.writing import whole_file
+from tcs.model.robots import RobotFile, load_robot
+from tcs.output.view import open_meshcat
+from tcs.output.view.teleop import (
+    Film,
+    LivePage,
+    Recorder,
+    Replay,
+    Stage,
+    replay_page,
+    start_posture,
+)
+from tcs.output.view.teleop.recorder import begun_at
+from tcs.output.view.teleop.stage import draw_course
 from tcs.teleop import Arm, Mode, Settings, load_arm
 from tcs.teleop.lines import Course, find_course
 from tcs.teleop.metrics import PLANES, Line, completion_time, trajectory_accuracy
 from tcs.teleop.run import Run, check_format, load_run, save_run
 from tcs.teleop.settings import Behaviour
 from tcs.teleop.trial import GOAL_RADIUS
-from tcs.view import open_meshcat
-from tcs.view.teleop import Film, LivePage, Recorder, Replay, Stage, replay_page, start_posture
-from tcs.view.teleop.recorder import begun_at
-from tcs.view.teleop.stage import draw_course
-from tcs.writing import whole_file
 
 MODES: Mapping[str, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),

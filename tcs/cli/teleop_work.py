@@ -18,7 +18,7 @@ from tcs.cli import reports, talk
 from tcs.errors import GridError
 
 if TYPE_CHECKING:
-    from tcs.robots import RobotFile
+    from tcs.model.robots import RobotFile
     from tcs.teleop.experiment import Experiment
     from tcs.teleop.maps import DrivenMaps
 
@@ -62,15 +62,15 @@ def experiment(
     """
     from tcs.capability import save_map
     from tcs.cli.places import check_writable
-    from tcs.report import as_html, as_markdown
-    from tcs.report.teleop import experiment_page
-    from tcs.robots import load_robot
+    from tcs.files.writing import make_folder, whole_file
+    from tcs.model.robots import load_robot
+    from tcs.output.report import as_html, as_markdown
+    from tcs.output.report.teleop import experiment_page
     from tcs.teleop.arm import load_arm
     from tcs.teleop.experiment import Plan, run_experiment
     from tcs.teleop.lines import find_course
     from tcs.teleop.maps import check_robot, maps_of
     from tcs.teleop.run import check_format
-    from tcs.writing import make_folder, whole_file
 
     began = time.monotonic()
     plan = Plan(
@@ -151,7 +151,7 @@ def torso_lift(robot: RobotFile, asked: float | None) -> float:
 
 def report(result: dict[str, Any]) -> None:
     """Print medians, tests and what was written."""
-    from tcs.report.teleop_tables import NAMES, SCALE
+    from tcs.output.report.teleop_tables import NAMES, SCALE
     from tcs.teleop.experiment import SCRIPTED
 
     out = talk.paper()

@@ -14,11 +14,11 @@ import typer
 import tcs
 from tcs.cli import talk
 from tcs.cli.places import observed_settings
-from tcs.report.pictures import Shown, title_of
-from tcs.scoring import reopen
-from tcs.tables import InitialConfiguration
-from tcs.view import Answers, Props, Viewer, legend, open_meshcat, page
-from tcs.writing import whole_file
+from tcs.files.writing import whole_file
+from tcs.model.grid import InitialConfiguration
+from tcs.output.report.pictures import Shown, title_of
+from tcs.output.view import Answers, Props, Viewer, legend, open_meshcat, page
+from tcs.placement.scoring import reopen
 
 
 @dataclass(frozen=True, eq=False)

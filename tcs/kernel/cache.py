@@ -22,7 +22,7 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from tcs.errors import OutputError
-from tcs.paths import cache_folder
+from tcs.files.paths import cache_folder
 
 _log = logging.getLogger(__name__)
 _Function = TypeVar("_Function", bound=Callable[..., Any])

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -24,6 +23,7 @@ from tcs.kernel.measure import jacobian
 from tcs.kernel.postures import HERE, tool_pose
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import room_in_arm_base, stand
+from tcs.kernel.views import borrowed
 
 
 class Control(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit, whole
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -18,6 +17,7 @@ from tcs.kernel.contacts import (
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import room_in_arm_base, stand
+from tcs.kernel.views import borrowed
 
 HERE = whole(0)
 """The one place, environment state or goal of a problem that has no more."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.kernel.analytic.solver import ArmSolver, any_solver
 from tcs.kernel.arrays import (
     BoolArray,
     Chain,
@@ -18,7 +19,6 @@ from tcs.kernel.arrays import (
 )
 from tcs.kernel.collide import BALL, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
-from tcs.kernel.solver import ArmSolver, any_solver
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is never checked."""

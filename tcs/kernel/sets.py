@@ -1,7 +1,7 @@
 """Pairs of configurations: how many are kept between two base cells, and how good they get.
 
-Every sum runs over the goals in order, as in `tcs.tables.equations`, so that a pair has the
-same score here and online, to the last bit. Rounding is monotone: a score computed from
+Every sum runs over the goals in order, as in `tcs.placement.tables.equations`, so that a pair has
+the same score here and online, to the last bit. Rounding is monotone: a score computed from
 greater isotropies is never smaller, so bounds computed by the same sum need no slack.
 """
 

@@ -7,9 +7,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.kernel.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
+from tcs.kernel.analytic.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
+from tcs.kernel.analytic.ik import wrist_goal
+from tcs.kernel.analytic.pairs import (
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED,
+    JOINT_LIMITS,
+    REACHED,
+    TOO_FAR,
+    score_pair,
+)
+from tcs.kernel.analytic.search import Search, new_search
+from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -21,20 +31,10 @@ from tcs.kernel.contacts import (
     gripper_room_contact,
     new_workspace,
 )
-from tcs.kernel.ik import wrist_goal
 from tcs.kernel.measure import measure_at, rounded_inward
-from tcs.kernel.pairs import (
-    BODY_BLOCKED,
-    GRIPPER_BLOCKED,
-    JOINT_LIMITS,
-    REACHED,
-    TOO_FAR,
-    score_pair,
-)
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import Search, new_search
-from tcs.kernel.solver import is_outside
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
+from tcs.kernel.views import borrowed
 
 
 class Scores(NamedTuple):

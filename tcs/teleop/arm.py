@@ -11,8 +11,8 @@ import numpy as np
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.robots import RobotFile, load_robot
-from tcs.scene import NOWHERE, Scene, SceneSpec, arm_chain
+from tcs.model.robots import RobotFile, load_robot
+from tcs.model.scene import NOWHERE, Scene, SceneSpec, arm_chain
 
 JOINTS = 7
 UNSAID_VELOCITY = 1.0

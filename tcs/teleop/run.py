@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import DataFileError, OutputError
+from tcs.files.writing import whole_file
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.settings import Mode
-from tcs.writing import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd

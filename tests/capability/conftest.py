@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tcs.capability import MapGrid, Reach, map_from_ik
-from tcs.robots import load_robot
+from tcs.model.robots import load_robot
 
 LIFT = 0.15
 

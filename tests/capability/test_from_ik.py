@@ -5,7 +5,7 @@ from tcs.capability import MapGrid, Reach, map_from_ik
 from tcs.capability.from_ik import cells_around, manipulability_scale
 from tcs.errors import GridError, RobotError, UnknownNameError
 from tcs.kernel.dexterity import MEASURES
-from tcs.robots import load_robot
+from tcs.model.robots import load_robot
 
 
 def test_a_reached_cell_is_confirmed_by_drake(ihcm, reach, rng):

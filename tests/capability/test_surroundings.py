@@ -8,7 +8,7 @@ from tcs.capability import linear_task, merge
 from tcs.capability.merge import BasePose
 from tcs.capability.surroundings import Surroundings
 from tcs.errors import SelectionError
-from tcs.scene import EnvironmentFile
+from tcs.model.scene import EnvironmentFile
 
 TASK = linear_task(0.2, 2, 0.65, pre_grasps=(0.1,), step=0.1)
 

@@ -6,7 +6,7 @@ import pytest
 from tcs.capability.head import View, head_names, head_view, load_head
 from tcs.capability.visibility import CORRECTED, THESIS, visibility
 from tcs.errors import RobotError, UnknownNameError
-from tcs.robots import load_robot
+from tcs.model.robots import load_robot
 
 TIAGO = View((0.0, 0.0, 0.0), tuple(np.radians([-104.0, 104.0])), tuple(np.radians([-82.5, 67.5])))
 

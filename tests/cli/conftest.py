@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 import tcs
 from tcs.cli.app import app
-from tcs.store import save_scores
+from tcs.placement.store import save_scores
+from tests.placement.store.example import METADATA, score_file
 from tests.rooms import CORNER, write_room
-from tests.store.example import METADATA, score_file
 
 TIMINGS = dict.fromkeys(
     ("compile_seconds", "scoring_seconds", "sets_seconds", "total_seconds"), 0.5

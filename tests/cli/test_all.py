@@ -6,7 +6,7 @@ import pytest
 
 import tcs
 from tcs.cli import reports
-from tests.store.example import METADATA, score_file
+from tests.placement.store.example import METADATA, score_file
 
 ROWS = {
     *((task, "wheelchair") for task in ("shaving", "feeding", "brushing")),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.capability import load_map
-from tcs.paths import data_folder
+from tcs.files.paths import data_folder
 
 COARSE = ("--step", 0.1, "--turns", 8, "--lift", 0.15)
 

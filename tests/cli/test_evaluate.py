@@ -10,8 +10,8 @@ import time
 import pytest
 
 import tcs
-from tcs.robustness import success_summary
-from tests.store.example import score_file
+from tcs.placement.robustness import success_summary
+from tests.placement.store.example import score_file
 
 ROOM = """
 based_on: wheelchair

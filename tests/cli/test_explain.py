@@ -1,10 +1,10 @@
 import pytest
 
 import tcs
-from tcs.reasons import fix_weights
-from tcs.tables import Reason
-from tests.store.example import SHIFT, score_file
-from tests.tables.small import small_grid
+from tcs.placement.reasons import fix_weights
+from tcs.placement.tables import Reason
+from tests.placement.store.example import SHIFT, score_file
+from tests.placement.tables.small import small_grid
 
 GRID = small_grid(nx=4, ny=3, yaws=4, torsos=2, bed=2, head=2)
 AT = ("--at", "bed_height=0.03", "--at", "head_rest_deg=30")

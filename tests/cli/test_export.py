@@ -3,9 +3,9 @@ import pandas as pd
 import pytest
 
 import tcs
-from tcs.space import Grid
-from tcs.tables import Reason
-from tests.store.example import score_file
+from tcs.model.grid import Grid
+from tcs.placement.tables import Reason
+from tests.placement.store.example import score_file
 
 
 def test_table_holds_the_scores(tcs_command, small_file, tmp_path):

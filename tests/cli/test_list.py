@@ -1,6 +1,6 @@
-from tcs.robots import load_robot, robot_names
-from tcs.scene import environment_names, load_environment
-from tcs.tasks import load_task, task_names
+from tcs.model.robots import load_robot, robot_names
+from tcs.model.scene import environment_names, load_environment
+from tcs.model.tasks import load_task, task_names
 
 
 def test_list_knows_what_ships(tcs_command):

@@ -9,8 +9,8 @@ import typer.main
 
 import tcs
 from tcs.cli.app import app
-from tcs.scene import load_environment
-from tests.store.example import score_file
+from tcs.model.scene import load_environment
+from tests.placement.store.example import score_file
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")

@@ -1,6 +1,6 @@
 import pytest
 
-from tests.robots.made_up import urdf
+from tests.model.robots.made_up import urdf
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tcs
-from tcs.paths import data_folder
+from tcs.files.paths import data_folder
 from tests.rooms import CORNER, write_room
 
 
@@ -82,7 +82,9 @@ def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
     joints = file.nominal.scores.arm_joints.copy()
     joints[:, 0] += np.float32(0.01)
     scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
-    forged = dataclasses.replace(file, tables=(tcs.store.Scored.of(scores, file.nominal.sets),))
+    forged = dataclasses.replace(
+        file, tables=(tcs.placement.store.Scored.of(scores, file.nominal.sets),)
+    )
     path = tmp_path / "forged.tcs"
     tcs.save(path, forged)
     ran = tcs_command("verify", path, "--pairs", 5, "--dense", 0, "--json")

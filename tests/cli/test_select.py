@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tcs
-from tcs.store import Scored
-from tests.store.example import SHIFT, score_file
+from tcs.placement.store import Scored
+from tests.placement.store.example import SHIFT, score_file
 
 HERE = ("--here", "0.5", "-1", "90")
 

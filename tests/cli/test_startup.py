@@ -28,6 +28,8 @@ def test_a_heavy_library_would_be_noticed(process):
 
 
 def test_reading_a_robot_loads_nothing_that_only_fitting_needs(process):
-    ran = process("--version", before=f"{TELL}\nimport tcs.robots\ntcs.robots.load_robot('pr2')")
+    ran = process(
+        "--version", before=f"{TELL}\nimport tcs.model.robots\ntcs.model.robots.load_robot('pr2')"
+    )
     assert ran.code == 0
     assert ran.err.strip() == "[]"

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.docs.building import DOCS
-from tests.view.browser import chromium
+from tests.output.view.browser import chromium
 
 PHONE, DESKTOP = 390, 1280
 """Widths of a common phone and of a small laptop [px]."""

@@ -47,14 +47,14 @@ def test_equations_are_set(site):
 @pytest.mark.parametrize(
     "target",
     [
-        "tables.html#tcs.tables.tc_reachability",
+        "tables.html#tcs.placement.tables.tc_reachability",
         "kernel.html#tcs.kernel.measure.isotropy_at",
-        "kernel.html#tcs.kernel.lanes.solve_lanes",
-        "kernel.html#tcs.kernel.pairs.score_pair",
-        "tables.html#tcs.tables.tc_manipulability",
-        "select.html#tcs.select.utility",
-        "select.html#tcs.select.shortest_tour",
-        "select.html#tcs.select.select",
+        "kernel.html#tcs.kernel.analytic.lanes.solve_lanes",
+        "kernel.html#tcs.kernel.analytic.pairs.score_pair",
+        "tables.html#tcs.placement.tables.tc_manipulability",
+        "select.html#tcs.placement.selection.utility",
+        "select.html#tcs.placement.selection.shortest_tour",
+        "select.html#tcs.placement.selection.select",
         "kernel.html#tcs.kernel.measure.limit_penalty",
     ],
 )
@@ -91,8 +91,8 @@ def test_every_name_of_a_room_is_described(site, room):
 
 def test_links_that_lead_nowhere_fail_the_build(tmp_path):
     wrong = {
-        "`tcs.tables.tc_reachabilty`": "target not found: tcs.tables.tc_reachabilty",
-        "`tcs.store.lode(path)`": "target not found: tcs.store.lode",
+        "`tcs.errors.TcsEror`": "target not found: tcs.errors.TcsEror",
+        "`tcs.placement.store.lode(path)`": "target not found: tcs.placement.store.lode",
         "[the method](method.md)": "target not found: 'method.md'",
         "[here](#nowhere)": "target not found: 'nowhere'",
         "![a map](images/no.png)": "image file not readable: images/no.png",

@@ -7,15 +7,15 @@ import pytest
 
 import tcs
 from tcs.kernel.dexterity import MEASURES
-from tcs.reasons import explain, fix_weights
-from tcs.report import Check, answer_of, answer_page
-from tcs.select import TravelWeights, UtilityWeights
-from tcs.space import Grid
-from tcs.store.packing import pack
-from tcs.tables import Reason
-from tcs.view.answers import COLOUR_NAMES
-from tests.store.example import score_file
-from tests.store.test_success import with_estimates
+from tcs.model.grid import Grid
+from tcs.output.report import Check, answer_of, answer_page
+from tcs.output.view.answers import COLOUR_NAMES
+from tcs.placement.reasons import explain, fix_weights
+from tcs.placement.selection import TravelWeights, UtilityWeights
+from tcs.placement.store.packing import pack
+from tcs.placement.tables import Reason
+from tests.placement.store.example import score_file
+from tests.placement.store.test_success import with_estimates
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

@@ -11,8 +11,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from tcs.kernel.arrays import Chain
-from tcs.robots.kinematic import kinematic_urdf
-from tcs.scene.chain import Axis, link_frames
+from tcs.model.robots.kinematic import kinematic_urdf
+from tcs.model.scene.chain import Axis, link_frames
 
 _ROBOTS = "package://example-robot-data/robots"
 _PR2 = "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll"

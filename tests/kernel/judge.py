@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel import reference_pairs
-from tcs.kernel.pairs import ARM_BLOCKED, REACHED
-from tcs.kernel.reference import free_joint
+from tcs.kernel.analytic.pairs import ARM_BLOCKED, REACHED
+from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification.reference import free_joint
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm
 

@@ -22,7 +22,7 @@ from scipy.optimize import lsq_linear
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
 from tcs.kernel.collide import balls_meet, closer, move, pack
-from tcs.kernel.reference import distance
+from tcs.kernel.verification.reference import distance
 from tests.kernel.shapes import KINDS, about, as_shapes, placed, random_size, right_angles, rotation
 
 PAIRS = list(itertools.combinations_with_replacement(KINDS, 2))

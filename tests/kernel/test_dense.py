@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel import reference_pairs
-from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
-from tcs.kernel.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
+from tcs.kernel.analytic.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import free_joint, isotropy, jacobian
+from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.reference import free_joint, isotropy, jacobian
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 

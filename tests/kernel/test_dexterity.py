@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tcs.errors import UnknownNameError
-from tcs.kernel import reference
 from tcs.kernel.dexterity import MEASURES, NORMALISED, THESIS, UNLIMITED, dexterity
 from tcs.kernel.measure import (
     eigenvalue_from,
@@ -18,6 +17,7 @@ from tcs.kernel.measure import (
     tridiagonalise,
 )
 from tcs.kernel.problem import build_problem
+from tcs.kernel.verification import reference
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_joints, rotation, turned_by
 from tests.kernel.toy import toy_grid, toy_scene

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcs.kernel import reference
 from tcs.kernel.measure import isotropy_at, jacobian, rounded_inward
+from tcs.kernel.verification import reference
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, random_joints, turned_by
 

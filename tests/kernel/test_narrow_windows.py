@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
-from tcs.kernel.pairs import REACHED
+from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
-from tcs.scoring import load_job
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.placement.scoring import load_job
 
 # Configuration and goal of scratching the right thigh. The PR2's shoulder lift leaves its lower
 # limit just before the wrist flex meets its own: windows of 4e-4 to 2.5e-3 rad.

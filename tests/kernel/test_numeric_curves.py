@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel import reference
 from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY
 from tcs.kernel.numeric.arm import FULL_TURN, WIDER, figures_at, numeric_arm
 from tcs.kernel.numeric.curves import new_curves, point_between, slack_of, trace
@@ -20,7 +19,8 @@ from tcs.kernel.numeric.newton import (
 )
 from tcs.kernel.numeric.search import is_within_span
 from tcs.kernel.numeric.solutions import numeric_solutions
-from tcs.kernel.reference import link_poses
+from tcs.kernel.verification import reference
+from tcs.kernel.verification.reference import link_poses
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, offset_arm, random_joints, straight_arm, turned_by
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.kernel.dense import dense_scan
-from tcs.kernel.pairs import (
+from tcs.kernel.analytic.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
     GRIPPER_BLOCKED,
@@ -19,9 +18,10 @@ from tcs.kernel.pairs import (
     REACHED,
     TOO_FAR,
 )
+from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import isotropy, jacobian
-from tcs.kernel.solver import is_outside
+from tcs.kernel.verification.dense import dense_scan
+from tcs.kernel.verification.reference import isotropy, jacobian
 from tests.kernel.arms import drake_arm
 from tests.kernel.judge import chain_of, is_true
 from tests.kernel.shapes import offset_arm, random_arm
@@ -184,7 +184,7 @@ SCRIPT = """
 import sys
 import numpy as np
 from tcs.kernel.problem import build_problem
-from tcs.kernel import sweep, dense
+from tcs.kernel import sweep\nfrom tcs.kernel.verification import dense
 from tests.kernel.shapes import random_arm
 from tests.kernel.toy import toy_grid, toy_scene
 build_problem(toy_scene(random_arm(np.random.default_rng(0)), 0), toy_grid())

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.ik import lane_joints, wrist_goal
-from tcs.kernel.lanes import solve_lanes
+from tcs.kernel.analytic.ik import lane_joints, wrist_goal
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.measure import isotropy_at
-from tcs.kernel.reference import free_joint, link_poses, solutions
-from tcs.kernel.solver import arm_solver
+from tcs.kernel.verification.reference import free_joint, link_poses, solutions
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, random_joints
 

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.kernel.pairs import REACHED
-from tcs.scoring import sweep
-from tcs.tables import Reason
+from tcs.kernel.analytic.pairs import REACHED
+from tcs.placement.scoring import sweep
+from tcs.placement.tables import Reason
 from tests.kernel.judge import compare, is_true, stratified
 
 

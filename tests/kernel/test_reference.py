@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel import reference
-from tcs.kernel.reference import compose, inverse, link_poses, shapes_of, solutions, turn
-from tcs.scene.contacts import Group
+from tcs.kernel.verification import reference
+from tcs.kernel.verification.reference import (
+    compose,
+    inverse,
+    link_poses,
+    shapes_of,
+    solutions,
+    turn,
+)
+from tcs.model.scene.contacts import Group
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 
 # A dozen products of rotations over lengths of a few metres.

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.dexterity import MEASURES
-from tcs.kernel.pairs import REACHED
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import jacobian, measured
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.reference import jacobian, measured
 from tests.kernel.judge import chain_of, compare, stratified
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 

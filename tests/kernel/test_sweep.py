@@ -11,11 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tcs.kernel.analytic.pairs import ARM_BLOCKED, BODY_BLOCKED, GRIPPER_BLOCKED, REACHED
 from tcs.kernel.arrays import BOX, SPHERE, GridArrays
-from tcs.kernel.pairs import ARM_BLOCKED, BODY_BLOCKED, GRIPPER_BLOCKED, REACHED
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import compose, isotropy, jacobian, link_poses, shapes_of, turn
-from tcs.tables import Reason
+from tcs.kernel.verification.reference import (
+    compose,
+    isotropy,
+    jacobian,
+    link_poses,
+    shapes_of,
+    turn,
+)
+from tcs.placement.tables import Reason
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
 from tests.kernel.shapes import placed, rotation, straight_arm
 from tests.kernel.toy import (

@@ -6,11 +6,11 @@ import itertools
 
 import numpy as np
 
+from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
-from tcs.kernel.reference import compose, inverse, link_poses, turn
-from tcs.kernel.solver import outside_solver
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.verification.reference import compose, inverse, link_poses, turn
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 
 QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError, UnknownNameError
-from tcs.robots import load_robot
-from tcs.scene import EnvironmentFile, Scene, SceneSpec
+from tcs.model.robots import load_robot
+from tcs.model.scene import EnvironmentFile, Scene, SceneSpec
 from tcs.teleop import load_arm
 from tcs.teleop.arm import UNSAID_VELOCITY, Arm
 

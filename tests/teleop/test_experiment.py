@@ -7,9 +7,9 @@ import pytest
 
 from tcs.capability import read_csv
 from tcs.errors import TcsError
-from tcs.report import as_html, as_markdown
-from tcs.report.blocks import Folded, Picture, Table
-from tcs.report.teleop import experiment_page
+from tcs.output.report import as_html, as_markdown
+from tcs.output.report.blocks import Folded, Picture, Table
+from tcs.output.report.teleop import experiment_page
 from tcs.teleop import load_arm
 from tcs.teleop.experiment import (
     SCRIPTED,

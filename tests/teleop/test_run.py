@@ -10,7 +10,7 @@ import pytest
 
 from tcs.capability import read_csv
 from tcs.errors import DataFileError, OutputError
-from tcs.robots import load_robot
+from tcs.model.robots import load_robot
 from tcs.teleop.run import NO_GROUP, Run, load_run, save_run
 
 ROBOT = load_robot("tiago")

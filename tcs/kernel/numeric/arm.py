@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tcs.kernel.analytic.solver import closest, cos_range
 from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.problem import Problem
-from tcs.kernel.solver import closest, cos_range
 
 SAMPLES = 1 << 18
 """Postures in the table."""

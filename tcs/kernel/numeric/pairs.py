@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tcs.kernel.analytic.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
+from tcs.kernel.analytic.search import best_of
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, whole
 from tcs.kernel.contacts import (
@@ -23,9 +25,7 @@ from tcs.kernel.numeric.search import (
     find_curves,
     turn_into_limits,
 )
-from tcs.kernel.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.problem import Problem
-from tcs.kernel.search import best_of
 
 EXACT = 1e-9
 """Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit, whole
 from tcs.kernel.dexterity import UNLIMITED
-from tcs.kernel.ik import within
 from tcs.kernel.measure import limit_penalty
 from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at
 from tcs.kernel.numeric.curves import (

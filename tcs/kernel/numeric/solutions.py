@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.dexterity import ISOTROPY
-from tcs.kernel.ik import within
 from tcs.kernel.numeric.arm import numeric_arm
 from tcs.kernel.numeric.curves import settle
 from tcs.kernel.numeric.search import (

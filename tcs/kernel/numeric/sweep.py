@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.kernel.analytic.pairs import BODY_BLOCKED, GRIPPER_BLOCKED, REACHED, TOO_FAR
 from tcs.kernel.arrays import IntArray
-from tcs.kernel.borrow import borrowed
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -26,10 +26,10 @@ from tcs.kernel.numeric.search import (
     is_within_span,
     new_hunt,
 )
-from tcs.kernel.pairs import BODY_BLOCKED, GRIPPER_BLOCKED, REACHED, TOO_FAR
 from tcs.kernel.problem import Problem
 from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 from tcs.kernel.sweep import Scores, keep
+from tcs.kernel.views import borrowed
 
 
 def score_numeric_slice(

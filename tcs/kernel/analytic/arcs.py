@@ -1,0 +1,140 @@
+"""Where the free joint may stand at all, in closed form, and where it is worth a closer look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.solver import ArmSolver
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import inner, jit
+
+MAX_ARCS = 6
+"""Two arcs mirror each other about the direction of the goal; limits cut each at most in two, and
+the full turn of a continuous joint once more."""
+
+INSET = 1e-9
+"""How far inside the limits of free joint and elbow arcs end [rad]: a slack of about 1e-9, far
+above its rounding, which must not decide whether the outermost lane is feasible."""
+
+IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
+
+
+@jit
+def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int, int]:
+    """Fill the arcs of the free joint at which the elbow can span the way from shoulder to wrist.
+
+    |SW|^2 is a cosine of q1, the free joint, about the direction of the goal, and a cosine of q4:
+    the limits of joint 4 bound the first cosine from both sides.
+
+    Args:
+        arm: The arm.
+        goal: From `wrist_goal`, shape (4, 3).
+        arcs: Filled with (first, last) [rad], shape (MAX_ARCS, 2); within the joint's limits.
+
+    Returns:
+        The number of arcs, and IN_REACH, OUT_OF_REACH (no angle at all would do) or OUT_OF_LIMITS
+        (the free joint would have to pass its limits).
+    """
+    wx, wy, wz = goal[0, 0], goal[0, 1], goal[0, 2]
+    sx, sy, sz = arm.p[1, 0], arm.p[1, 1], arm.p[1, 2]
+    near = arm.reach[0] + arm.reach[1] * arm.elbow_cos[0]
+    far = arm.reach[0] + arm.reach[1] * arm.elbow_cos[1]
+    steady = wx * wx + wy * wy + wz * wz + sx * sx + sy * sy + sz * sz - 2.0 * wz * sz
+    cosine, sine = wx * sx + wy * sy, wy * sx - wx * sy
+    swing = 2.0 * np.hypot(cosine, sine)
+    centre = np.arctan2(sine, cosine)
+    inner, outer = 0.0, np.pi
+    # |SW|^2 = steady - swing cos(q1 - centre) must lie in [near, far].
+    if steady - swing > far or steady + swing < near:
+        return 0, OUT_OF_REACH
+    if steady - swing < near:
+        inner = INSET + np.arccos(min(max((steady - near) / swing, -1.0), 1.0))
+    if steady + swing > far:
+        outer = np.arccos(min(max((steady - far) / swing, -1.0), 1.0)) - INSET
+    if inner > outer:
+        return 0, OUT_OF_REACH
+    lower, upper = arm.lower[arm.free], arm.upper[arm.free]
+    if not upper - lower < 2.0 * np.pi:
+        # One full turn about the direction of the goal holds all there is.
+        if inner == 0.0:
+            arcs[0, 0], arcs[0, 1] = centre - outer, centre + outer
+            return 1, IN_REACH
+        arcs[0, 0], arcs[0, 1] = centre - outer, centre - inner
+        arcs[1, 0], arcs[1, 1] = centre + inner, centre + outer
+        return 2, IN_REACH
+    count = 0
+    for turn in range(-1, 2):
+        middle = centre + 2.0 * np.pi * turn
+        for side in range(2):
+            first, last = middle - outer, middle - inner
+            if side == 1:
+                first, last = middle + inner, middle + outer
+            first, last = max(first, lower + INSET), min(last, upper - INSET)
+            if first > last:
+                continue
+            # Where arcs join, half a turn away from the goal, rounding leaves a gap.
+            if count and arcs[count - 1, 1] >= first - INSET:
+                arcs[count - 1, 1] = last
+            elif count < MAX_ARCS:
+                arcs[count, 0], arcs[count, 1] = first, last
+                count += 1
+    return count, IN_REACH if count else OUT_OF_LIMITS
+
+
+@inner
+def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
+    """Return whether a window narrower than the spacing may hide about infeasible lane i.
+
+    Args:
+        slack: Of neighbouring lanes, shape (>= count,).
+        i: The lane.
+        count: How many lanes there are.
+        step: Their spacing [rad].
+    """
+    if slack[i] >= 0.0 or slack[i] <= -PEAK_SLOPE * step:
+        return False
+    left = slack[i - 1] if i > 0 else -np.inf
+    right = slack[i + 1] if i + 1 < count else -np.inf
+    return left <= slack[i] and right <= slack[i]
+
+
+@jit
+def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, found: int) -> int:
+    """Append the stretches of a row of lanes in which feasible angles lie or may hide.
+
+    A stretch is a run of feasible lanes with its two neighbours, or the two neighbours of an
+    infeasible lane that comes closer to feasible than both: a window narrower than the spacing
+    shows as such a peak.
+
+    Args:
+        slack: Of neighbouring lanes, shape (>= count,).
+        count: How many lanes there are.
+        step: Their spacing [rad].
+        windows: Filled with (first, last) as lane indices, shape (room, 2).
+        found: How many windows are there already.
+
+    Returns:
+        How many windows are there now.
+    """
+    i = 0
+    while i < count and found < windows.shape[0]:
+        if slack[i] >= 0.0:
+            j = i
+            while j + 1 < count and slack[j + 1] >= 0.0:
+                j += 1
+            windows[found, 0], windows[found, 1] = max(i - 1, 0), min(j + 1, count - 1)
+            found += 1
+            i = j + 1
+            continue
+        if is_peak(slack, i, count, step):
+            windows[found, 0], windows[found, 1] = max(i - 1, 0), min(i + 1, count - 1)
+            found += 1
+        i += 1
+    return found
+
+
+PEAK_SLOPE = 10.0
+"""How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
+difference of cosines of joint angles, which move a few radians per radian of the free joint, and
+up to 13 where one limit is left just as another is met. A peak lies at most half a spacing from
+its best lane, so this allows for slopes of 20."""

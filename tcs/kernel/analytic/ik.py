@@ -1,0 +1,152 @@
+"""Inverse kinematics of one goal: the goal on its way in, a solution's joints on their way out.
+
+Here the real arm and the arm as it is solved part: of a mirrored arm, joints 1 .. 7 are inside
+those of the reversed one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.solver import LAST, ArmSolver
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import inner, jit
+
+
+@jit
+def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatArray) -> None:
+    """Express a tool goal as the lanes need it: all in the frame that joint 1 turns about.
+
+    Args:
+        arm: The arm.
+        R_AG: Goal orientation in the arm base A, shape (3, 3).
+        p_AG: Goal position in A [m], shape (3,).
+        goal: Filled, shape (4, 3): wrist centre, axis 7, x axis of L7, wrist centre to the point
+            whose velocity counts, the real tool.
+    """
+    for i in range(3):
+        for k in range(3):
+            goal[k, i] = 0.0
+    # R_AL7 = R_AG R7^T, column by column; tool offset = R_AL7 p7.
+    for i in range(3):
+        a, b, c, w = R_AG[i, 0], R_AG[i, 1], R_AG[i, 2], p_AG[i]
+        if arm.free == LAST:
+            # Base and tool have changed places: this arm has to bring its tool A to X_GA.
+            a, b, c = R_AG[0, i], R_AG[1, i], R_AG[2, i]
+            w = -(a * p_AG[0] + b * p_AG[1] + c * p_AG[2])
+        x = a * arm.R[7, 0, 0] + b * arm.R[7, 0, 1] + c * arm.R[7, 0, 2]
+        y = a * arm.R[7, 1, 0] + b * arm.R[7, 1, 1] + c * arm.R[7, 1, 2]
+        z = a * arm.R[7, 2, 0] + b * arm.R[7, 2, 1] + c * arm.R[7, 2, 2]
+        offset = x * arm.p[7, 0] + y * arm.p[7, 1] + z * arm.p[7, 2]
+        w = w - offset - arm.p[0, i]
+        for j in range(3):
+            goal[0, j] += arm.R[0, i, j] * w
+            goal[1, j] += arm.R[0, i, j] * z
+            goal[2, j] += arm.R[0, i, j] * x
+        # The real tool stays at the origin of the reversed arm's base.
+        goal[3, i] = -(w + arm.p[0, i]) if arm.free == LAST else offset
+    a, b, c = goal[3, 0], goal[3, 1], goal[3, 2]
+    for j in range(3):
+        goal[3, j] = arm.R[0, 0, j] * a + arm.R[0, 1, j] * b + arm.R[0, 2, j] * c
+
+
+@jit
+def lane_joints(
+    arm: ArmSolver, goal: FloatArray, branch: IntArray, q1: float, q: FloatArray
+) -> None:
+    """Fill the seven joint angles of one lane [rad], each turned into its limits.
+
+    Args:
+        arm: The arm.
+        goal: From `wrist_goal`, shape (4, 3).
+        branch: Three signs, one row of `arm.branches`.
+        q1: The free joint [rad].
+        q: Filled in the real arm's order, shape (7,). Where a joint has no limits, in (-pi, pi].
+    """
+    R = arm.R
+    v, z, x = goal[0].copy(), goal[1].copy(), goal[2].copy()
+    q[0] = q1
+    _unturn(q1, v)
+    _unturn(q1, z)
+    _unturn(q1, x)
+    for i in range(3):
+        v[i] -= arm.p[1, i]
+    square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    _unrotate(R[1], v)
+    k = min(max((square - arm.reach[0]) / arm.reach[1], -1.0), 1.0)
+    q[3] = arm.reach[2] + np.arctan2(branch[0] * np.sqrt(1.0 - k * k), k)
+    c4, s4 = np.cos(q[3]), np.sin(q[3])
+    ux = arm.u0[0] + arm.uc[0] * c4 + arm.us[0] * s4
+    uy = arm.u0[1] + arm.uc[1] * c4 + arm.us[1] * s4
+    uz = arm.u0[2] + arm.uc[2] * c4 + arm.us[2] * s4
+    q[2] = _turn_to_height(R[2], ux, uy, uz, v[2], branch[1])
+    c3, s3 = np.cos(q[2]), np.sin(q[2])
+    rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
+    kx = R[2, 0, 0] * rx + R[2, 0, 1] * ry + R[2, 0, 2] * uz
+    ky = R[2, 1, 0] * rx + R[2, 1, 1] * ry + R[2, 1, 2] * uz
+    q[1] = np.arctan2(kx * v[1] - ky * v[0], kx * v[0] + ky * v[1])
+    for j in range(1, 4):
+        _unrotate(R[j], z)
+        _unturn(q[j], z)
+        _unrotate(R[j], x)
+        _unturn(q[j], x)
+    _unrotate(R[4], z)
+    _unrotate(R[4], x)
+    fx, fy, fz = R[6, 0, 2], R[6, 1, 2], R[6, 2, 2]
+    q[5] = _turn_to_height(R[5], fx, fy, fz, z[2], branch[2])
+    c6, s6 = np.cos(q[5]), np.sin(q[5])
+    rx, ry = c6 * fx - s6 * fy, s6 * fx + c6 * fy
+    kx = R[5, 0, 0] * rx + R[5, 0, 1] * ry + R[5, 0, 2] * fz
+    ky = R[5, 1, 0] * rx + R[5, 1, 1] * ry + R[5, 1, 2] * fz
+    q[4] = np.arctan2(kx * z[1] - ky * z[0], kx * z[0] + ky * z[1])
+    _unturn(q[4], x)
+    _unrotate(R[5], x)
+    _unturn(q[5], x)
+    _unrotate(R[6], x)
+    q[6] = np.arctan2(x[1], x[0])
+    if arm.free == LAST:
+        for j in range(3):
+            q[j], q[6 - j] = q[6 - j], q[j]
+    for j in range(7):
+        q[j] = within(q[j], arm.lower[j], arm.upper[j])
+
+
+@jit
+def within(angle: float, lower: float, upper: float) -> float:
+    """Return `angle` turned by full turns into [lower, upper], and clipped to it.
+
+    The clip takes away rounding only: callers have checked the limits through the slack.
+    Without limits, the angle in (-pi, pi].
+    """
+    turn = 2.0 * np.pi
+    if not np.isfinite(lower):
+        return angle - turn * np.ceil((angle - np.pi) / turn)
+    middle = 0.5 * (lower + upper)
+    angle -= turn * np.ceil((angle - middle - np.pi) / turn)
+    return min(max(angle, lower), upper)
+
+
+@inner
+def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, sign: int) -> float:
+    """Return the turn about z after which R (x, y, z) has the z component `height`."""
+    P = R[2, 0] * x + R[2, 1] * y
+    Q = R[2, 1] * x - R[2, 0] * y
+    m = height - R[2, 2] * z
+    h = sign * np.sqrt(max(P * P + Q * Q - m * m, 0.0))
+    return np.arctan2(Q * m + P * h, P * m - Q * h)
+
+
+@inner
+def _unturn(angle: float, v: FloatArray) -> None:
+    """Turn v by -angle about z, in place."""
+    c, s = np.cos(angle), np.sin(angle)
+    v[0], v[1] = c * v[0] + s * v[1], -s * v[0] + c * v[1]
+
+
+@inner
+def _unrotate(R: FloatArray, v: FloatArray) -> None:
+    """Replace v by R^T v, in place."""
+    x, y, z = v[0], v[1], v[2]
+    v[0] = R[0, 0] * x + R[1, 0] * y + R[2, 0] * z
+    v[1] = R[0, 1] * x + R[1, 1] * y + R[2, 1] * z
+    v[2] = R[0, 2] * x + R[1, 2] * y + R[2, 2] * z

@@ -1,0 +1,316 @@
+"""One initial configuration against one goal: is it reached, how well, and if not, why not?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.ik import lane_joints
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.search import (
+    MAX_CANDIDATES,
+    Search,
+    best_of,
+    fill_lanes,
+    find_candidates,
+    put_in_order,
+)
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import inner, whole
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    at_goal,
+    pair_touches,
+    place_links,
+)
+from tcs.kernel.dexterity import ISOTROPY, UNLIMITED
+from tcs.kernel.measure import measure_at
+from tcs.kernel.problem import Problem
+
+REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED, GRIPPER_BLOCKED, ARM_BLOCKED = 0, 1, 2, 3, 4, 5
+"""Reasons, the numbers of `tcs.placement.tables.Reason`."""
+
+ONE_LANE, NOTHING = whole(1), whole(-1)
+
+REFINEMENTS = 3
+"""Rounds in which the neighbourhood of the best solution is divided by REFINE_LANES / 2."""
+REFINE_LANES = whole(8)
+SQUEEZES = 8
+"""Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
+SQUEEZE_PARTS = 16.0
+"""How finely the neighbourhood of an angle found by halving is refined."""
+END_HALVINGS = 12
+"""Halvings towards the end of a feasible stretch: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
+SAME_STRETCH = 1.01
+"""Candidates within this many of their spacings have nothing infeasible between them that was
+seen; the hundredth is for rounding."""
+
+
+@inner
+def lanes_measure(problem: Problem) -> bool:
+    """Return whether what the lanes are filled with, isotropy, is the measure that counts."""
+    return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
+
+
+@inner
+def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
+    """Return the measure that counts at an angle of the free joint on branch b; fills `q`."""
+    lane_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
+    return measure_at(problem, search.q)
+
+
+@inner
+def best_free(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
+) -> tuple[int, int]:
+    """Return the best collision-free candidate, and the contact of the best one of all.
+
+    Candidates are tried in descending order of their measure. Those tried in vain are marked.
+
+    Returns:
+        Index of the candidate or -1; contact code of the very best candidate or NO_CONTACT.
+    """
+    first_contact = NO_CONTACT
+    top = best_of(search.found_measure, found)
+    for rank in range(found):
+        if rank == 1:
+            for n in range(found):
+                search.key[n] = -search.found_measure[n]
+            put_in_order(search, found)
+        if rank:
+            top = search.order[rank]
+        branch = problem.arm.branches[search.found_branch[top]]
+        lane_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
+        contact = arm_contact(problem, work, body_A, search.q)
+        if contact == NO_CONTACT and at_goal(problem, work):
+            return top, first_contact
+        if rank == 0:
+            first_contact = contact
+    return -1, first_contact
+
+
+@inner
+def squeeze(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
+) -> int:
+    """Look for a free angle where every candidate touches something.
+
+    A free stretch narrower than the spacing lies where one contact has ended and another not
+    begun, or where a contact has ended and a joint limit is about to be passed. So the very ends
+    of the feasible stretches join the candidates, all are walked in the order of their angles, and
+    where the pair in contact changes, halving finds whether there is room between the two.
+
+    Returns:
+        Index of the candidate that now holds a free angle, or -1.
+    """
+    arm = problem.arm
+    found = _add_ends(problem, search, found)
+    _by_angle(search, found)
+    order = search.order
+    work.last[0] = -1
+    partner, i, j = NOTHING, NOTHING, NOTHING
+    for rank in range(found):
+        n = order[rank]
+        b = search.found_branch[n]
+        lane_joints(arm, search.goal, arm.branches[b], search.found_angle[n], search.q)
+        contact = arm_contact(problem, work, body_A, search.q)
+        if contact == NO_CONTACT and at_goal(problem, work):
+            return n
+        changed = work.last[0] != partner or work.last[1] != i or work.last[2] != j
+        if rank and changed and _are_neighbours(search, order[rank - 1], n):
+            first = search.found_angle[order[rank - 1]]
+            width = search.found_angle[n] - first
+            angle = _between(problem, work, body_A, search, b, first, width, partner, i, j)
+            if np.isfinite(angle):
+                search.found_angle[n] = angle
+                search.found_measure[n] = _measure_if_feasible(problem, search, b, angle)
+                search.found_step[n] = width / SQUEEZE_PARTS
+                return n
+        partner, i, j = work.last[0], work.last[1], work.last[2]
+    return -1
+
+
+@inner
+def _by_angle(search: Search, found: int) -> None:
+    """Put the candidates in order: branch by branch, by their angles."""
+    for n in range(found):
+        # No angle of the free joint is anywhere near this far from zero.
+        search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
+    put_in_order(search, found)
+
+
+@inner
+def _are_neighbours(search: Search, m: int, n: int) -> bool:
+    """Return whether nothing infeasible was seen between two candidates that follow each other."""
+    width = search.found_angle[n] - search.found_angle[m]
+    spacing = max(search.found_step[m], search.found_step[n])
+    return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
+
+
+@inner
+def _add_ends(problem: Problem, search: Search, found: int) -> int:
+    """Append the last angle that keeps all limits at each end of the feasible stretches.
+
+    Returns:
+        How many candidates there are now.
+    """
+    _by_angle(search, found)
+    order, before = search.order, found
+    for rank in range(before):
+        n = order[rank]
+        for side in (-1, 1):
+            if 0 <= rank + side < before:
+                m = order[rank + side]
+                left, right = (m, n) if side < 0 else (n, m)
+                if _are_neighbours(search, left, right):
+                    continue
+            found = _add_end(problem, search, n, side, found)
+    return found
+
+
+@inner
+def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) -> int:
+    """Append where the stretch ends that candidate n is the outermost of, to one side."""
+    b, angle = search.found_branch[n], search.found_angle[n]
+    inside, outside, value = 0.0, search.found_step[n], -1.0
+    for _ in range(END_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        measure = _measure_if_feasible(problem, search, b, angle + side * middle)
+        if measure >= 0.0:
+            inside, value = middle, measure
+        else:
+            outside = middle
+    if inside == 0.0 or found == MAX_CANDIDATES:
+        return found
+    search.found_branch[found], search.found_angle[found] = b, angle + side * inside
+    search.found_step[found], search.found_measure[found] = inside, value
+    return found + 1
+
+
+@inner
+def _between(
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    search: Search,
+    b: int,
+    first: float,
+    width: float,
+    partner: int,
+    i: int,
+    j: int,
+) -> float:
+    """Return a free angle in first .. first + width, or nan.
+
+    At `first` the pair (partner, i, j) touches, at the other end the pair in `work.last`.
+    """
+    arm = problem.arm
+    other, k, m = work.last[0], work.last[1], work.last[2]
+    answer = np.nan
+    low, high = 0.0, 1.0
+    for _ in range(SQUEEZES):
+        middle = 0.5 * (low + high)
+        angle = first + middle * width
+        lane_joints(arm, search.goal, arm.branches[b], angle, search.q)
+        place_links(problem.chain_R, problem.chain_p, search.q, work.link_R, work.link_p)
+        if pair_touches(problem, work, body_A, partner, i, j):
+            low = middle
+        elif pair_touches(problem, work, body_A, other, k, m):
+            high = middle
+        else:
+            if _measure_if_feasible(problem, search, b, angle) >= 0.0 and (
+                arm_contact(problem, work, body_A, search.q) == NO_CONTACT
+                and at_goal(problem, work)
+            ):
+                answer = angle
+            break
+    work.last[0], work.last[1], work.last[2] = other, k, m
+    return answer
+
+
+@inner
+def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float) -> float:
+    """Return what a candidate at this angle on branch b is worth, or -1 if it is none."""
+    arm = problem.arm
+    search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, ONE_LANE,
+        search.slack, search.measure,
+    )  # fmt: skip
+    if search.slack[0] < 0.0:
+        return -1.0
+    return search.measure[0] if lanes_measure(problem) else measure_of(problem, search, b, angle)
+
+
+@inner
+def refine(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, winner: int
+) -> None:
+    """Climb from a collision-free candidate to the best angle nearby; fills `search.best`.
+
+    Each round spreads lanes over one spacing to either side, takes the best one that is feasible
+    and free, and narrows the spacing.
+    """
+    arm = problem.arm
+    branch = arm.branches[search.found_branch[winner]]
+    centre, step = search.found_angle[winner], search.found_step[winner]
+    value = search.found_measure[winner]
+    lane_joints(arm, search.goal, branch, centre, search.best)
+    for _ in range(REFINEMENTS):
+        fine = fill_lanes(search, centre - step, centre + step, REFINE_LANES)
+        solve_lanes(
+            arm, search.goal, branch, search.cosine, search.sine, REFINE_LANES,
+            search.slack, search.measure,
+        )  # fmt: skip
+        for i in range(REFINE_LANES):
+            if search.slack[i] < 0.0:
+                search.measure[i] = -1.0
+            elif not lanes_measure(problem):
+                b, angle = search.found_branch[winner], search.angle[i]
+                search.measure[i] = measure_of(problem, search, b, angle)
+        for _ in range(REFINE_LANES):
+            i = best_of(search.measure, REFINE_LANES)
+            if search.measure[i] <= value:
+                break
+            lane_joints(arm, search.goal, branch, search.angle[i], search.q)
+            contact = arm_contact(problem, work, body_A, search.q)
+            if contact == NO_CONTACT and at_goal(problem, work):
+                centre, value = search.angle[i], search.measure[i]
+                for k in range(7):
+                    search.best[k] = search.q[k]
+                break
+            search.measure[i] = -1.0
+        step = fine
+
+
+@inner
+def score_pair(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, arcs: int
+) -> tuple[int, int]:
+    """Score one goal within reach; base and gripper are free already.
+
+    Args:
+        problem: The scene.
+        work: Room, base and gripper are placed.
+        body_A: The robot's other shapes in A at the torso level in hand.
+        search: `goal` and `arcs` are set; `best` gets filled with joint angles [rad] when reached.
+        arcs: How many arcs there are.
+
+    Returns:
+        Reason and contact code.
+    """
+    found = find_candidates(problem.arm, search, arcs)
+    if found == 0:
+        return JOINT_LIMITS, NO_CONTACT
+    if not lanes_measure(problem):
+        for n in range(found):
+            b, angle = search.found_branch[n], search.found_angle[n]
+            search.found_measure[n] = measure_of(problem, search, b, angle)
+    winner, contact = best_free(problem, work, body_A, search, found)
+    if winner < 0:
+        winner = squeeze(problem, work, body_A, search, found)
+    if winner < 0:
+        return ARM_BLOCKED, contact
+    refine(problem, work, body_A, search, winner)
+    return REACHED, NO_CONTACT

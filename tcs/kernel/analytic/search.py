@@ -1,0 +1,332 @@
+"""Which values of the free joint are worth a collision check: arcs, windows, candidates."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.analytic.arcs import MAX_ARCS, PEAK_SLOPE, is_peak, windows_of
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.solver import ArmSolver
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import inner, jit, whole
+
+FIRST_LANES = 48
+"""Lanes over all arcs together in the first look: enough to find the feasible windows."""
+FINE_STEP = 0.0125
+"""Spacing [rad] of the second look inside the windows. Chosen by measurement: recall against a
+dense scan of 11,520 samples (benchmarks/)."""
+LEAST_LANES = whole(8)
+"""Lanes that even the smallest window or arc gets: one vector of the processor."""
+FINEST_LANES = whole(8)
+"""Lanes at each end of a feasible stretch, and about a peak that is closed in on."""
+PEAK_LOOKS = 4
+"""How often lanes close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
+rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
+as the two happen to let them be."""
+STRAIGHT = 0.05
+"""Squared sine of the wrist's bend below which joints 5 and 7 (of a mirrored arm, 1 and 3) swing by
+half a turn within a few hundredths of a radian, past the window in which both keep their limits."""
+NONE = whole(0)
+STRAIGHT_LOOKS = 5
+"""How often lanes close in on a straight wrist, each time to 2/7 of their spacing: from 0.05 rad
+down to 1e-4 rad."""
+MAX_LANES = 512
+MAX_WINDOWS = 32
+MAX_CANDIDATES = 4096
+
+
+class Search(NamedTuple):
+    """Scratch of the search over the free joint, reused from pair to pair."""
+
+    goal: FloatArray
+    arcs: FloatArray
+    windows: FloatArray
+    ends: FloatArray
+    """Outer and inner side of the ends of feasible stretches [rad], shape (MAX_WINDOWS, 2)."""
+    peaks: FloatArray
+    """Infeasible angles that are nearer to feasible than their neighbours [rad], shape
+    (MAX_WINDOWS,)."""
+    straight: FloatArray
+    """Where the wrist is straightest: angle [rad], spacing of the lanes [rad] and branch, shape
+    (MAX_WINDOWS, 3)."""
+    angle: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    slack: FloatArray
+    measure: FloatArray
+    found_angle: FloatArray
+    """Free joint of each candidate [rad], shape (MAX_CANDIDATES,)."""
+    found_step: FloatArray
+    """Spacing [rad] of the lanes it was found with."""
+    found_measure: FloatArray
+    """Its isotropy to the sixth power, or another measure if one was asked for; -1 once it was
+    found to collide."""
+    found_branch: IntArray
+    """Row of its branch in `arm.branches`."""
+    key: FloatArray
+    """What the candidates are put in order by."""
+    order: IntArray
+    """Indices of the candidates in that order."""
+    spare: IntArray
+    """Room to sort in."""
+    q: FloatArray
+    """Joint angles in hand, shape (7,)."""
+    best: FloatArray
+    """Joint angles of the best solution so far, shape (7,)."""
+
+
+def new_search() -> Search:
+    """Return scratch memory for one worker."""
+    return Search(
+        np.empty((4, 3)),
+        np.empty((MAX_ARCS, 2)),
+        np.empty((MAX_WINDOWS, 2)),
+        np.empty((MAX_WINDOWS, 2)),
+        np.empty(MAX_WINDOWS),
+        np.empty((MAX_WINDOWS, 3)),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_LANES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES, np.int64),
+        np.empty(MAX_CANDIDATES),
+        np.empty(MAX_CANDIDATES, np.int64),
+        np.empty(MAX_CANDIDATES, np.int64),
+        np.empty(7),
+        np.empty(7),
+    )
+
+
+@inner
+def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
+    """Spread `count` >= 2 lanes evenly from first to last, ends included; return their spacing.
+
+    Cosines and sines follow by turning the first ones on: 512 turns lose about 1e-13, and the
+    joint angles of a solution are computed anew from its angle.
+    """
+    step = (last - first) / (count - 1)
+    c, s = np.cos(first), np.sin(first)
+    dc, ds = np.cos(step), np.sin(step)
+    for i in range(count):
+        search.angle[i] = first + i * step
+        search.cosine[i], search.sine[i] = c, s
+        c, s = c * dc - s * ds, s * dc + c * ds
+    return step
+
+
+@inner
+def best_of(measure: FloatArray, count: int) -> int:
+    """Return the index of the greatest value, the first one of equals."""
+    best = 0
+    for i in range(1, count):
+        if measure[i] > measure[best]:
+            best = i
+    return best
+
+
+@inner
+def put_in_order(search: Search, count: int) -> None:
+    """Fill `order` with the first candidates by ascending `key`, equal ones as they come.
+
+    A merge sort of our own: numpy's costs the compiler three seconds.
+    """
+    key, order, spare = search.key, search.order, search.spare
+    for i in range(count):
+        order[i] = i
+    width = 1
+    while width < count:
+        for first in range(0, count, 2 * width):
+            middle, last = min(first + width, count), min(first + 2 * width, count)
+            i, j = first, middle
+            for k in range(first, last):
+                if j == last or (i < middle and key[order[i]] <= key[order[j]]):
+                    spare[k] = order[i]
+                    i += 1
+                else:
+                    spare[k] = order[j]
+                    j += 1
+        for k in range(count):
+            order[k] = spare[k]
+        width *= 2
+
+
+@jit
+def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
+    """Collect angles of the free joint, on every branch, at which all joints keep their limits.
+
+    Args:
+        arm: The arm.
+        search: Its `goal` and `arcs` are set; its candidates get filled.
+        arcs: How many arcs there are.
+
+    Returns:
+        How many candidates were found.
+    """
+    length = 0.0
+    for k in range(arcs):
+        length += search.arcs[k, 1] - search.arcs[k, 0]
+    found = straight = NONE
+    for k in range(arcs):
+        first, last = search.arcs[k, 0], search.arcs[k, 1]
+        share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0
+        # Rounded: cut off, rounding errors would decide over a lane where arcs mirror each other.
+        count = max(LEAST_LANES, int(share + 0.5))
+        for b in range(len(arm.branches)):
+            step = fill_lanes(search, first, last, count)
+            solve_lanes(
+                arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
+                search.slack, search.measure,
+            )  # fmt: skip
+            windows = windows_of(search.slack, count, step, search.windows, 0)
+            for w in range(windows):
+                start = first + search.windows[w, 0] * step
+                stop = first + search.windows[w, 1] * step
+                found = _look_closer(arm, search, b, start, stop, found)
+            if found == 0:
+                straight = _note_straight(search, b, count, step, first, straight)
+    if found == 0:
+        for n in range(straight):
+            found = _close_in_straight(arm, search, n, found)
+    return found
+
+
+@inner
+def _note_straight(
+    search: Search, b: int, count: int, step: float, first: float, straight: int
+) -> int:
+    """Append the lanes at which the wrist is straighter than at both their neighbours.
+
+    No lane is feasible, so `measure` tells of the bend.
+    """
+    bend = search.measure
+    for i in range(count):
+        if bend[i] > -STRAIGHT and straight < MAX_WINDOWS:
+            left = bend[i - 1] if i > 0 else -np.inf
+            right = bend[i + 1] if i + 1 < count else -np.inf
+            if left <= bend[i] and right < bend[i]:
+                search.straight[straight, 0] = first + i * step
+                search.straight[straight, 1] = step
+                search.straight[straight, 2] = b
+                straight += 1
+    return straight
+
+
+@inner
+def _close_in_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
+    """Append feasible angles about one at which the wrist is all but straight, if there are any."""
+    middle, step = search.straight[n, 0], search.straight[n, 1]
+    b = int(search.straight[n, 2])
+    for _ in range(STRAIGHT_LOOKS):
+        step = fill_lanes(search, middle - step, middle + step, FINEST_LANES)
+        solve_lanes(
+            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES,
+            search.slack, search.measure,
+        )  # fmt: skip
+        before = found
+        for i in range(FINEST_LANES):
+            if search.slack[i] >= 0.0:
+                found = _add(search, b, i, step, found)
+        if found > before:
+            break
+        middle = search.angle[best_of(search.measure, FINEST_LANES)]
+    return found
+
+
+@inner
+def _look_closer(
+    arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
+) -> int:
+    """Append the feasible angles of one window on branch b; return how many there are now."""
+    count = min(max(LEAST_LANES, int((last - first) / FINE_STEP) + 1), MAX_LANES)
+    step = fill_lanes(search, first, last, count)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
+        search.slack, search.measure,
+    )  # fmt: skip
+    before = search.slack[0] >= 0.0
+    ends = peaks = 0
+    for i in range(count):
+        inside = search.slack[i] >= 0.0
+        if inside:
+            found = _add(search, b, i, step, found)
+        if inside != before and ends < MAX_WINDOWS:
+            # The outer and the inner side of an end of a feasible stretch.
+            search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
+            search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
+            ends += 1
+        before = inside
+        if peaks < MAX_WINDOWS and is_peak(search.slack, i, count, step):
+            search.peaks[peaks] = search.angle[i]
+            peaks += 1
+    for e in range(ends):
+        found = _look_between(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
+    for k in range(peaks):
+        found = _close_in(arm, search, b, search.peaks[k], step, first, last, found)
+    return found
+
+
+@inner
+def _close_in(
+    arm: ArmSolver,
+    search: Search,
+    b: int,
+    middle: float,
+    step: float,
+    first: float,
+    last: float,
+    found: int,
+) -> int:
+    """Append feasible angles about an infeasible peak, within first .. last, if there are any."""
+    for _ in range(PEAK_LOOKS):
+        low, high = max(middle - step, first), min(middle + step, last)
+        step = fill_lanes(search, low, high, FINEST_LANES)
+        solve_lanes(
+            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES,
+            search.slack, search.measure,
+        )  # fmt: skip
+        before = found
+        for i in range(FINEST_LANES):
+            if search.slack[i] >= 0.0:
+                found = _add(search, b, i, step, found)
+        peak = best_of(search.slack, FINEST_LANES)
+        if found > before or search.slack[peak] < -PEAK_SLOPE * step:
+            break
+        middle = search.angle[peak]
+    return found
+
+
+@inner
+def _look_between(
+    arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
+) -> int:
+    """Append feasible angles between two neighbouring lanes, themselves left out.
+
+    Close to a joint limit, where a feasible stretch ends, the best measure often is.
+    """
+    step = fill_lanes(search, outer, inner, FINEST_LANES)
+    solve_lanes(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES - 1,
+        search.slack, search.measure,
+    )  # fmt: skip
+    for i in range(1, FINEST_LANES - 1):
+        if search.slack[i] >= 0.0:
+            found = _add(search, b, i, abs(step), found)
+    return found
+
+
+@inner
+def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
+    """Append lane i as a candidate on branch b; return how many there are now."""
+    if found == MAX_CANDIDATES:
+        return found
+    search.found_angle[found] = search.angle[i]
+    search.found_step[found] = step
+    search.found_measure[found] = search.measure[i]
+    search.found_branch[found] = b
+    return found + 1

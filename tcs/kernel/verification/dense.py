@@ -1,0 +1,106 @@
+"""A dense scan of the free joint: the yardstick for what the search may have missed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.ik import lane_joints, wrist_goal
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.pairs import lanes_measure, measure_of
+from tcs.kernel.analytic.search import MAX_LANES, Search, fill_lanes, new_search
+from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    at_goal,
+    gripper_body_contact,
+    new_workspace,
+)
+from tcs.kernel.measure import measure_at
+from tcs.kernel.problem import Problem
+from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
+from tcs.kernel.views import borrowed
+
+DENSE_SAMPLES = 11_520
+"""Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
+
+
+def dense_scan(
+    problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
+) -> float:
+    """Return the best measure of any collision-free solution, or -1 when there is none.
+
+    Every sample of the free joint is tried on every branch; nothing is skipped and nothing
+    refined. The base is not checked: ask only for configurations whose base is free.
+
+    Args:
+        problem: The scene, its goals and its grid.
+        configuration: Flat index of the initial configuration.
+        goal: Index of the goal, one whose gripper is free.
+        samples: How many angles, spread evenly over the limits of the free joint. An arm outside
+            the closed form has none: there it is `numeric_dense.STARTS` starts in any case.
+        joints: Filled with the solution [rad] when there is one, shape (7,).
+    """
+    if is_outside(problem.arm):
+        # Imported where it is needed: most arms have a closed form.
+        from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scan
+
+        return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
+    # Made here, where they outlive the call: the compiled code only borrows them.
+    work, search = new_workspace(problem), new_search()
+    return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))
+
+
+@jit
+def _dense_scan(
+    owned_problem: Problem,
+    owned_work: Workspace,
+    owned_search: Search,
+    configuration: int,
+    goal: int,
+    samples: int,
+    joints: FloatArray,
+) -> float:
+    problem, work, search = borrowed(owned_problem), borrowed(owned_work), borrowed(owned_search)
+    arm = problem.arm
+    torso = configuration % problem.torso_levels
+    state = stand(problem, work, configuration // problem.torso_levels)
+    goal_in_arm_base(problem, work, state, torso, goal)
+    wrist_goal(arm, work.R_AG, work.p_AG, search.goal)
+    body_A = problem.body_A[torso]
+    if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
+        return -1.0
+    room_in_arm_base(problem, work, torso)
+    first, last = arm.lower[arm.free], arm.upper[arm.free]
+    if not np.isfinite(first):
+        first, last = -np.pi, np.pi
+    step = (last - first) / (samples - 1)
+    angles = np.empty(samples * len(arm.branches))
+    measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
+    found = 0
+    for b in range(len(arm.branches)):
+        for start in range(0, samples, MAX_LANES):
+            count = min(MAX_LANES, samples - start)
+            stop = start + max(count, 2) - 1
+            fill_lanes(search, first + start * step, first + stop * step, stop - start + 1)
+            solve_lanes(
+                arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
+                search.slack, search.measure,
+            )  # fmt: skip
+            for i in range(count):
+                if search.slack[i] >= 0.0:
+                    angles[found], branches[found] = search.angle[i], b
+                    measures[found] = search.measure[i]
+                    if not lanes_measure(problem):
+                        measures[found] = measure_of(problem, search, b, search.angle[i])
+                    found += 1
+    for i in np.argsort(-measures[:found], kind="mergesort"):
+        lane_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
+        contact = arm_contact(problem, work, body_A, search.q)
+        if contact == NO_CONTACT and at_goal(problem, work):
+            joints[:] = search.q
+            return measure_at(problem, joints)
+    return -1.0

@@ -1,0 +1,88 @@
+"""Many starts from everywhere: the yardstick for what numeric IK may have missed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import jit, whole
+from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
+from tcs.kernel.measure import measure_at
+from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of, spread
+from tcs.kernel.numeric.pairs import NOWHERE, choose, squeeze
+from tcs.kernel.numeric.search import Hunt, find_candidates, hunt_from, new_hunt
+from tcs.kernel.problem import Problem
+from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
+from tcs.kernel.views import borrowed
+
+STARTS = 400
+"""Postures spread over the joint limits, each brought to the goal."""
+LOOKS = whole(60)
+"""Looks that a start gets: it may be half a turn and a whole arm off."""
+STRIDE, SPACING = 0.08, 0.0125
+"""As in `numeric_pairs`, but finer [rad]."""
+EVERYWHERE = np.inf
+"""How far beyond their limits joints are followed [rad]: to the end of every curve."""
+POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
+
+
+def numeric_dense_scan(
+    problem: Problem, configuration: int, goal: int, starts: int, joints: FloatArray
+) -> float:
+    """Return the best measure of any collision-free solution found, or -1 when there is none.
+
+    Every start that arrives is followed along its whole curve, limits or not. The table that the
+    sweep starts from is not used, and nothing is refined. The base is not checked: ask only for
+    configurations whose base is free.
+
+    Args:
+        problem: The scene, its goals and its grid.
+        configuration: Flat index of the initial configuration.
+        goal: Index of the goal, one whose gripper is free.
+        starts: How many postures to start from.
+        joints: Filled with the solution [rad] when there is one, shape (7,).
+    """
+    arm = numeric_arm_of(problem)
+    low, high = joint_ranges(problem.arm.lower, problem.arm.upper)
+    postures = low + spread(starts, 7) * (high - low)
+    # Made here, where they outlive the call: the compiled code only borrows them.
+    work, hunt = new_workspace(problem), new_hunt(POINTS, CURVES, CANDIDATES)
+    return float(_scan(problem, arm, work, hunt, configuration, goal, postures, joints))
+
+
+@jit
+def _scan(
+    owned_problem: Problem,
+    owned_arm: NumericArm,
+    owned_work: Workspace,
+    owned_hunt: Hunt,
+    configuration: int,
+    goal: int,
+    postures: FloatArray,
+    joints: FloatArray,
+) -> float:
+    problem, arm = borrowed(owned_problem), borrowed(owned_arm)
+    work, hunt = borrowed(owned_work), borrowed(owned_hunt)
+    torso = configuration % problem.torso_levels
+    state = stand(problem, work, configuration // problem.torso_levels)
+    goal_in_arm_base(problem, work, state, torso, goal)
+    body_A = problem.body_A[torso]
+    if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
+        return -1.0
+    room_in_arm_base(problem, work, torso)
+    count = 0
+    for n in range(len(postures)):
+        hunt.curves.q_now[:] = postures[n]
+        count = hunt_from(
+            arm, work.R_AG, work.p_AG, hunt, count, EVERYWHERE, STRIDE, LOOKS, problem.measure.of
+        )
+    found = find_candidates(problem, arm, hunt, count, SPACING)
+    if found == 0:
+        return -1.0
+    at, _ = choose(problem, arm, work, body_A, hunt, found)
+    if at == NOWHERE:
+        at = squeeze(problem, arm, work, body_A, hunt, found)
+    if at == NOWHERE:
+        return -1.0
+    joints[:] = hunt.curves.q_now
+    return measure_at(problem, joints)

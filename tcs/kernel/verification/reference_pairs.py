@@ -1,0 +1,399 @@
+"""The plain-loop twin of scoring: one configuration against one goal, from `reference`'s pieces.
+
+It looks at the same angles of the free joint as the kernel, so that verdicts can be compared one
+by one; how many of them the kernel needs is another question (see `dense`). One thing it leaves
+out: where every angle touches something, the kernel halves its way between two contacts
+(`pairs.squeeze`) and may find room that the twin calls ARM_BLOCKED. There `confirms` judges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.kernel.analytic.arcs import INSET, PEAK_SLOPE
+from tcs.kernel.analytic.pairs import (
+    ARM_BLOCKED,
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED,
+    JOINT_LIMITS,
+    REACHED,
+    REFINE_LANES,
+    REFINEMENTS,
+    TOO_FAR,
+)
+from tcs.kernel.analytic.search import (
+    FINE_STEP,
+    FINEST_LANES,
+    FIRST_LANES,
+    LEAST_LANES,
+    PEAK_LOOKS,
+    STRAIGHT,
+    STRAIGHT_LOOKS,
+)
+from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
+from tcs.kernel.dexterity import DEFAULT_MEASURE
+from tcs.kernel.verification.reference import (
+    Placed,
+    Pose,
+    compose,
+    distance,
+    elbow,
+    free_joint,
+    inverse,
+    is_mirrored,
+    jacobian,
+    link_poses,
+    measured,
+    shapes_of,
+    solutions,
+    turn,
+)
+
+Branch = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `score` finds."""
+
+    reason: int
+    isotropy: float = 0.0
+    """The measure, isotropy if no other was asked for."""
+    q: FloatArray | None = None
+    clearance: float = math.inf
+    """How far the nearest pair that decided is from deciding otherwise [m]; for tests."""
+
+
+@dataclass
+class Stand:
+    """A scene with the robot at one configuration, everything in the arm base A."""
+
+    scene: SceneArrays
+    room: list[Placed]
+    body: list[Placed]
+    X_AG: Pose
+    clearance: float = math.inf
+
+    def touches(self, a: Placed, b: Placed) -> bool:
+        """Return whether two shapes are closer than they may be, and note how clear that is."""
+        required = max(self.scene.margin, a.pad + b.pad)
+        # Balls that are well apart spare the exact distance; they cannot decide a verdict.
+        if float(np.linalg.norm(a.p - b.p)) - a.ball - b.ball > required + 0.01:
+            return False
+        excess = distance(a, b) - required
+        self.clearance = min(self.clearance, abs(excess))
+        return excess < 0.0
+
+    def arm_at(self, q: FloatArray) -> list[Placed]:
+        """Return the arm's shapes at joint angles q."""
+        poses = link_poses(self.scene.chain, q)
+        shapes = shapes_of(self.scene.arm, 0)
+        return [s.moved(poses[f - 1]) for s, f in zip(shapes, self.scene.arm.frame, strict=True)]
+
+    def gripper_touches(self, with_body: bool) -> bool:
+        """Return whether the gripper at the goal touches the room, or the robot's own body."""
+        X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
+        others = self.body if with_body else self.room
+        checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_room
+        shapes = shapes_of(self.scene.arm, 0)
+        return any(
+            self.touches(shapes[i].moved(X_A7), others[j])
+            for i in range(len(shapes))
+            if self.scene.arm.frame[i] == 7
+            for j in range(len(others))
+            if checked[i, j]
+        )
+
+    def arm_touches(self, q: FloatArray) -> bool:
+        """Return whether the arm at q touches the room, the body or itself.
+
+        The gripper against room and body is left out: it has been looked at.
+        """
+        arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
+        pairs = [
+            (arm[i], other)
+            for i in range(len(arm))
+            if frame[i] < 7
+            for others, checked in ((self.room, scene.arm_vs_room), (self.body, scene.arm_vs_body))
+            for j, other in enumerate(others)
+            if checked[i, j]
+        ]
+        pairs += [
+            (arm[i], arm[j])
+            for i in range(len(arm))
+            for j in range(i)
+            if scene.arm_vs_arm[i, j] and min(frame[i], frame[j]) < 7
+        ]
+        return any(self.touches(a, b) for a, b in pairs)
+
+
+def stand_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> tuple[Stand, bool]:
+    """Return the scene with the robot at configuration h, and whether base or body touch."""
+    shape = (
+        grid.environment_states,
+        len(grid.base_x),
+        len(grid.base_y),
+        len(grid.base_yaw),
+        grid.torso_levels,
+    )
+    state, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, shape))
+    X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    X_BA = scene.arm_base_R[torso], scene.arm_base_p[torso]
+    X_AW = inverse(compose(X_WB, X_BA))
+    X_AB = inverse(X_BA)
+    stand = Stand(
+        scene=scene,
+        room=[s.moved(X_AW) for s in shapes_of(scene.room, state)],
+        body=[s.moved(X_AB) for s in shapes_of(scene.body, torso)],
+        X_AG=compose(X_AW, (scene.goal_R[state, goal], scene.goal_p[state, goal])),
+    )
+    blocked = any(
+        stand.touches(stand.body[i], stand.room[j])
+        for i in range(len(stand.body))
+        for j in range(len(stand.room))
+        if scene.body_vs_room[i, j]
+    )
+    return stand, blocked
+
+
+def score(
+    scene: SceneArrays, grid: GridArrays, h: int, goal: int, measure: str = DEFAULT_MEASURE
+) -> Verdict:
+    """Return what the kernel should say about configuration h and one goal, by a measure."""
+    stand, blocked = stand_at(scene, grid, h, goal)
+
+    def verdict(reason: int, value: float = 0.0, q: FloatArray | None = None) -> Verdict:
+        return Verdict(reason, value, q, stand.clearance)
+
+    if blocked:
+        return verdict(BODY_BLOCKED)
+    if stand.gripper_touches(with_body=False):
+        return verdict(GRIPPER_BLOCKED)
+    chain = scene.chain
+    arcs, possible = elbow_arcs(chain, stand.X_AG)
+    if not arcs:
+        return verdict(JOINT_LIMITS if possible else TOO_FAR)
+    if stand.gripper_touches(with_body=True):
+        return verdict(GRIPPER_BLOCKED)
+    candidates = find_candidates(chain, stand.X_AG, arcs)
+    if not candidates:
+        return verdict(JOINT_LIMITS)
+
+    def value(candidate: Candidate) -> float:
+        q = candidate.q
+        return measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
+
+    for candidate in sorted(candidates, key=value, reverse=True):
+        if not stand.arm_touches(candidate.q):
+            best = climb(stand, candidate, value)
+            return verdict(REACHED, value(best), best.q)
+    return verdict(ARM_BLOCKED)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A solution that keeps all limits."""
+
+    q: FloatArray
+    branch: Branch
+    step: float
+
+
+def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], bool]:
+    """Return the arcs of the free joint at which the elbow spans the way, and whether any would."""
+    near, far = elbow_spans(chain)
+    X_A7 = compose(X_AG, inverse((chain.R[7], chain.p[7])))
+    if is_mirrored(chain):
+        # Seen from L7 the shoulder stands still, and joint 7 turns the wrist backwards.
+        w = inverse((chain.R[6], chain.p[6]))[1]
+        s = inverse(X_A7)[0] @ (chain.p[0] - X_A7[1])
+    else:
+        # Seen from what joint 1 turns against, the wrist stands still and the shoulder turns.
+        w, s = compose(inverse((chain.R[0], chain.p[0])), X_A7)[1], chain.p[1]
+    steady = float(w @ w + s @ s - 2 * w[2] * s[2])
+    swing = 2 * math.hypot(w[0], w[1]) * math.hypot(s[0], s[1])
+    if steady - swing > far or steady + swing < near:
+        return [], False
+    centre = math.atan2(w[1], w[0]) - math.atan2(s[1], s[0])
+    inner = math.acos(min((steady - near) / swing, 1.0)) if steady - swing < near else 0.0
+    outer = math.acos(max((steady - far) / swing, -1.0)) if steady + swing > far else math.pi
+    free = free_joint(chain)
+    lower, upper = chain.lower[free], chain.upper[free]
+    inner, outer = inner + INSET * (inner > 0), outer - INSET * (outer < math.pi)
+    if inner > outer:
+        return [], False
+    arcs: list[tuple[float, float]] = []
+    for middle in (centre + 2 * math.pi * k for k in range(-2, 3)):
+        for first, last in ((middle - outer, middle - inner), (middle + inner, middle + outer)):
+            first, last = max(first, lower + INSET), min(last, upper - INSET)
+            if first <= last and arcs and arcs[-1][1] >= first - INSET:
+                arcs[-1] = (arcs[-1][0], last)
+            elif first <= last:
+                arcs.append((first, last))
+    return arcs, True
+
+
+def elbow_spans(chain: Chain) -> tuple[float, float]:
+    """Return the least and the greatest |SW|^2 within the limits of joint 4 [m^2]."""
+    _, _, phase = elbow(chain, 0.0)
+    turning = [phase + k * math.pi for k in range(-4, 5)]
+    angles = [a for a in turning if chain.lower[3] <= a <= chain.upper[3]]
+    angles += [a for a in (chain.lower[3], chain.upper[3]) if math.isfinite(a)]
+    spans = [float(np.sum((chain.p[3] + chain.R[3] @ turn(a) @ chain.p[4]) ** 2)) for a in angles]
+    return min(spans), max(spans)
+
+
+def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -> list[Candidate]:
+    """Return the feasible angles of the kernel's two looks: over the arcs, inside the windows."""
+    length = sum(last - first for first, last in arcs)
+    found: list[Candidate] = []
+    straight: list[tuple[Branch, float, float]] = []
+    for first, last in arcs:
+        share = FIRST_LANES * (last - first) / length if length else 0
+        count = max(LEAST_LANES, int(share + 0.5))
+        angles = [first + i * (last - first) / (count - 1) for i in range(count)]
+        looks = [solutions(chain, X_AG, angle) for angle in angles]
+        for branch in looks[0]:
+            slack = [look[branch].slack for look in looks]
+            step = (last - first) / (count - 1)
+            for i, j in windows_of(slack, step):
+                found += look_closer(chain, X_AG, branch, angles[i], angles[j])
+            bend = [math.inf, *(look[branch].bend for look in looks), math.inf]
+            for i in range(1, count + 1):
+                if bend[i] < STRAIGHT and bend[i] <= bend[i - 1] and bend[i] < bend[i + 1]:
+                    straight.append((branch, angles[i - 1], step))
+    if not found:
+        for branch, middle, step in straight:
+            found += close_in_straight(chain, X_AG, branch, middle, step)
+    return found
+
+
+def close_in_straight(
+    chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
+) -> list[Candidate]:
+    """Return the feasible angles about one at which the wrist is all but straight."""
+    for _ in range(STRAIGHT_LOOKS):
+        low, step = middle - step, 2 * step / (FINEST_LANES - 1)
+        angles = [low + i * step for i in range(FINEST_LANES)]
+        found = candidates_at(chain, X_AG, branch, angles, step)
+        if found:
+            return found
+        middle = min(angles, key=lambda angle: solutions(chain, X_AG, angle)[branch].bend)
+    return []
+
+
+def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
+    """Return the stretches of lanes in which feasible angles lie or may hide."""
+    last = len(slack) - 1
+    inside = [i for i, left in enumerate(slack) if left >= 0]
+    windows = []
+    for i in inside:
+        if i - 1 not in inside:
+            j = next(k for k in range(i, last + 1) if k == last or slack[k + 1] < 0)
+            windows.append((max(i - 1, 0), min(j + 1, last)))
+    windows += [(max(i - 1, 0), min(i + 1, last)) for i in peaks_of(slack, step)]
+    return windows
+
+
+def peaks_of(slack: list[float], step: float) -> list[int]:
+    """Return the infeasible lanes about which a window narrower than the spacing may hide."""
+    last = len(slack) - 1
+    peaks = []
+    for i, left in enumerate(slack):
+        sides = [slack[k] for k in (i - 1, i + 1) if 0 <= k <= last]
+        if -PEAK_SLOPE * step < left < 0 and all(s <= left for s in sides):
+            peaks.append(i)
+    return peaks
+
+
+def look_closer(
+    chain: Chain, X_AG: Pose, branch: Branch, first: float, last: float
+) -> list[Candidate]:
+    """Return the feasible angles of one window on one branch."""
+    count = max(LEAST_LANES, int((last - first) / FINE_STEP) + 1)
+    step = (last - first) / (count - 1)
+    angles = [first + i * step for i in range(count)]
+    slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
+    inside = [left >= 0 for left in slack]
+    found = candidates_at(chain, X_AG, branch, angles, step)
+    for i in range(1, count):
+        if inside[i] != inside[i - 1]:
+            outer, inner = (i - 1, i) if inside[i] else (i, i - 1)
+            found += look_between(chain, X_AG, branch, angles[outer], angles[inner])
+    for i in peaks_of(slack, step):
+        found += close_in(chain, X_AG, branch, angles[i], step, (first, last))
+    return found
+
+
+def close_in(
+    chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float, ends: tuple[float, float]
+) -> list[Candidate]:
+    """Return the feasible angles about an infeasible peak, found by ever narrower looks."""
+    for _ in range(PEAK_LOOKS):
+        low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
+        step = (high - low) / (FINEST_LANES - 1)
+        angles = [low + i * step for i in range(FINEST_LANES)]
+        found = candidates_at(chain, X_AG, branch, angles, step)
+        slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
+        if found or max(slack) < -PEAK_SLOPE * step:
+            return found
+        middle = angles[slack.index(max(slack))]
+    return []
+
+
+def look_between(
+    chain: Chain, X_AG: Pose, branch: Branch, outer: float, inner: float
+) -> list[Candidate]:
+    """Return the feasible angles between two neighbouring lanes, themselves left out."""
+    fine = (inner - outer) / (FINEST_LANES - 1)
+    near = [outer + k * fine for k in range(1, FINEST_LANES - 1)]
+    return candidates_at(chain, X_AG, branch, near, abs(fine))
+
+
+def candidates_at(
+    chain: Chain, X_AG: Pose, branch: Branch, angles: list[float], step: float
+) -> list[Candidate]:
+    """Return the feasible ones of some angles on one branch."""
+    found = []
+    for angle in angles:
+        solution = solutions(chain, X_AG, angle)[branch]
+        if solution.slack >= 0:
+            found.append(Candidate(solution.q, branch, step))
+    return found
+
+
+def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
+    """Return whether the arm at joint angles q reaches the goal from h and touches nothing."""
+    stand, blocked = stand_at(scene, grid, h, goal)
+    R, p = link_poses(scene.chain, q)[-1]
+    # Joints are float32: seven roundings of 1.2e-7 rad at up to 1 m from the tool.
+    at_goal = np.allclose(R, stand.X_AG[0], atol=2e-6) and np.allclose(p, stand.X_AG[1], atol=2e-6)
+    within = bool(np.all((q >= scene.chain.lower) & (q <= scene.chain.upper)))
+    gripper = stand.gripper_touches(with_body=False) or stand.gripper_touches(with_body=True)
+    return at_goal and within and not (blocked or gripper or stand.arm_touches(q))
+
+
+def climb(stand: Stand, best: Candidate, value: Callable[[Candidate], float]) -> Candidate:
+    """Return the best solution near a collision-free one, as the kernel refines it.
+
+    Args:
+        stand: The scene.
+        best: Where to start.
+        value: The measure of a solution.
+    """
+    chain, step = stand.scene.chain, best.step
+    for _ in range(REFINEMENTS):
+        fine = 2 * step / (REFINE_LANES - 1)
+        near, angle = [], best.q[free_joint(chain)]
+        for i in range(REFINE_LANES):
+            solution = solutions(chain, stand.X_AG, angle - step + i * fine)[best.branch]
+            if solution.slack >= 0:
+                near.append(Candidate(solution.q, best.branch, fine))
+        better = [c for c in sorted(near, key=value, reverse=True) if value(c) > value(best)]
+        best = next((c for c in better if not stand.arm_touches(c.q)), best)
+        step = fine
+    return best

@@ -1,0 +1,16 @@
+"""The grid of initial configurations: its axes, and the configurations they span."""
+
+from __future__ import annotations
+
+from tcs.model.grid.axis import Axis
+from tcs.model.grid.configuration import ENVIRONMENT_UNITS, InitialConfiguration
+from tcs.model.grid.grid import MAX_CONFIGURATIONS, ROBOT_AXES, Grid
+
+__all__ = [
+    "ENVIRONMENT_UNITS",
+    "MAX_CONFIGURATIONS",
+    "ROBOT_AXES",
+    "Axis",
+    "Grid",
+    "InitialConfiguration",
+]

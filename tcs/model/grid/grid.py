@@ -1,0 +1,269 @@
+"""The grid of initial configurations that is scored, eta in the TCS paper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tcs.errors import GridError, UnknownNameError
+from tcs.model.grid import InitialConfiguration
+from tcs.model.grid.axis import Axis
+
+ROBOT_AXES = {"base_x": "m", "base_y": "m", "base_yaw": "deg", "torso": "m"}
+"""The axes every grid ends with, in flat order, and the unit each is written in."""
+
+MAX_CONFIGURATIONS = 20_000_000
+"""Most configurations a grid may hold: scores of more would not fit into memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Every combination of the values of some axes.
+
+    A configuration is known by its flat index: C order over the axes, so that the last one,
+    the torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`.
+
+    >>> grid = Grid.from_spec({
+    ...     "base_x": {"unit": "m", "start": -1.5, "step": 0.05, "count": 61},
+    ...     "base_y": {"unit": "m", "start": -1.5, "step": 0.05, "count": 61},
+    ...     "base_yaw": {"unit": "deg", "start": 0, "step": 45, "count": 8},
+    ...     "torso": {"unit": "m", "start": 0, "step": 0.15, "count": 3},
+    ... })
+    >>> grid.size
+    89304
+    >>> grid.indices(4).tolist()
+    [0, 0, 1, 1]
+    """
+
+    axes: tuple[Axis, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse a set of axes that spans no usable grid.
+
+        Raises:
+            GridError: If a robot axis is missing, out of place or in a wrong unit, an axis comes
+                twice, a heading does, or there would be far too many configurations.
+        """
+        names = [axis.name for axis in self.axes]
+        for name in names:
+            if names.count(name) > 1:
+                raise GridError(f"grid: axis '{name}' is there twice.")
+        missing = [name for name in ROBOT_AXES if name not in names]
+        if missing:
+            raise GridError(
+                f"grid: needs axis {', '.join(missing)}. Every grid has {', '.join(ROBOT_AXES)}; "
+                "give an axis count 1 to hold it still."
+            )
+        if names[-len(ROBOT_AXES) :] != list(ROBOT_AXES):
+            raise GridError(
+                f"grid: axes are {', '.join(names)}, but must end with {', '.join(ROBOT_AXES)}."
+            )
+        for name, unit in ROBOT_AXES.items():
+            if self.axis(name).unit != unit:
+                raise GridError(
+                    f"grid: axis '{name}': unit is '{self.axis(name).unit}', but must be '{unit}'."
+                )
+        yaw = self.axis("base_yaw")
+        # A micro-degree short of a full turn is a rounded full turn.
+        if (yaw.count - 1) * yaw.step > 360.0 - 1e-6:
+            raise GridError(
+                f"grid: axis 'base_yaw': {yaw.count} values {yaw.step:g} deg apart go round more "
+                f"than once and repeat headings. At most {max(1, math.ceil(360.0 / yaw.step))}."
+            )
+        if self.size > MAX_CONFIGURATIONS:
+            counts = " x ".join(str(count) for count in self.shape)
+            raise GridError(
+                f"grid: would be {self.size:,} configurations ({counts}), but at most "
+                f"{MAX_CONFIGURATIONS:,} are allowed. Take larger steps or fewer values."
+            )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many values each axis has."""
+        return tuple(axis.count for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """How many configurations there are."""
+        return math.prod(self.shape)
+
+    @property
+    def environment_axes(self) -> tuple[Axis, ...]:
+        """The axes that move the environment, e.g. the bed; they come first."""
+        return self.axes[: -len(ROBOT_AXES)]
+
+    @property
+    def environment_shape(self) -> tuple[int, ...]:
+        """How many values each environment axis has; () where nothing in the room moves."""
+        return tuple(axis.count for axis in self.environment_axes)
+
+    def axis(self, name: str) -> Axis:
+        """Return the axis of that name.
+
+        Raises:
+            UnknownNameError: If the grid has no such axis.
+        """
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        raise UnknownNameError("axis", name, (axis.name for axis in self.axes), where="grid")
+
+    def indices(self, flat: ArrayLike) -> NDArray[np.int64]:
+        """Return where configurations lie along each axis.
+
+        Args:
+            flat: Flat indices, shape (...).
+
+        Returns:
+            Index along each axis in the order of `axes`, shape (..., n_axes).
+
+        Raises:
+            GridError: If an index is not one of this grid.
+        """
+        checked = self._checked(flat)
+        return np.stack(np.unravel_index(checked, self.shape), axis=-1).astype(np.int64)
+
+    def flat(self, indices: ArrayLike) -> NDArray[np.int64]:
+        """Return flat indices, the inverse of `indices`.
+
+        Args:
+            indices: Index along each axis in the order of `axes`, shape (..., n_axes).
+
+        Returns:
+            Flat indices, shape (...).
+
+        Raises:
+            GridError: If the indices do not fit the axes of this grid.
+        """
+        along = np.asarray(indices)
+        if along.ndim == 0 or along.shape[-1] != len(self.axes) or along.dtype.kind not in "iu":
+            raise GridError(
+                f"grid: needs {len(self.axes)} whole-number indices for each configuration, "
+                f"but got shape {along.shape} of {along.dtype}."
+            )
+        if np.any(along < 0) or np.any(along >= self.shape):
+            raise GridError(f"grid: an index lies outside the shape {self.shape}.")
+        return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(along, -1, 0)), self.shape))
+
+    def values(self, flat: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """Return the coordinates of configurations.
+
+        Args:
+            flat: Flat indices, shape (...).
+
+        Returns:
+            For each axis its values there [m or rad], shape (...).
+
+        Raises:
+            GridError: If an index is not one of this grid.
+        """
+        along = self.indices(flat)
+        return {axis.name: axis.values[along[..., i]] for i, axis in enumerate(self.axes)}
+
+    def configuration(self, flat_index: int) -> InitialConfiguration:
+        """Return one configuration by its flat index.
+
+        Raises:
+            GridError: If the index is not one of this grid.
+        """
+        at = {name: float(value) for name, value in self.values(flat_index).items()}
+        return InitialConfiguration(
+            base_x=at["base_x"],
+            base_y=at["base_y"],
+            base_yaw=at["base_yaw"],
+            torso=at["torso"],
+            environment=tuple((axis.name, at[axis.name]) for axis in self.environment_axes),
+            environment_units=tuple(axis.held_unit for axis in self.environment_axes),
+        )
+
+    def overridden(self, changes: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
+        """Return this grid with some axes changed, as a task asks for in an environment.
+
+        Args:
+            changes: For each axis to change, new values of some of its start, step and count.
+            where: Where the changes stand, for the message.
+
+        Raises:
+            UnknownNameError: If the grid has no such axis, or an axis no such key.
+            GridError: If the result is no grid.
+        """
+        names = [axis.name for axis in self.axes]
+        for name in changes:
+            if name not in names:
+                raise UnknownNameError("axis", name, names, where=where)
+        return self._located(
+            tuple(
+                axis.overridden(changes[axis.name], where=where) if axis.name in changes else axis
+                for axis in self.axes
+            ),
+            where,
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the grid as plain containers, for a file."""
+        return {"axes": [axis.to_dict() for axis in self.axes]}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, object], *, where: str = "") -> Self:
+        """Return the grid that `to_dict` wrote.
+
+        Raises:
+            GridError: If it is not of that form, or spans no usable grid.
+            UnknownNameError: If an axis has a key that is none.
+        """
+        axes = plain.get("axes")
+        if not isinstance(axes, list | tuple) or not all(isinstance(a, Mapping) for a in axes):
+            raise GridError(f"{where or 'grid'}: needs 'axes', a list of axes.")
+        return cls._located(tuple(Axis.from_dict(axis, where=where) for axis in axes), where)
+
+    @classmethod
+    def from_spec(cls, spec: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
+        """Return the grid that an environment file spells out under `grid:`.
+
+        Args:
+            spec: For each axis its unit, start, step and count. The robot's axes may stand in
+                any order; axes of the environment keep the order they are written in.
+            where: Where it stands, for the message.
+
+        Raises:
+            GridError: If it spans no usable grid.
+            UnknownNameError: If an axis has a key that is none.
+        """
+        order = [name for name in spec if name not in ROBOT_AXES]
+        order += [name for name in ROBOT_AXES if name in spec]
+        for name in order:
+            if not isinstance(spec[name], Mapping):
+                raise GridError(
+                    f"{where or 'grid'}: axis '{name}' is {spec[name]!r}, "
+                    "but needs unit, start, step and count."
+                )
+        return cls._located(
+            tuple(Axis.from_dict({**spec[name], "name": name}, where=where) for name in order),
+            where,
+        )
+
+    @classmethod
+    def _located(cls, axes: tuple[Axis, ...], where: str) -> Self:
+        """Return the grid of these axes; what is wrong with it is told with its place."""
+        try:
+            return cls(axes)
+        except GridError as error:
+            raise GridError(f"{where}: {error}" if where else str(error)) from None
+
+    def _checked(self, flat: ArrayLike) -> NDArray[np.int64]:
+        """Return flat indices as an array, refusing those that are not of this grid."""
+        checked = np.asarray(flat)
+        if checked.dtype.kind not in "iu" and checked.size:
+            raise GridError(f"grid: a configuration is known by a whole number, not {flat!r}.")
+        outside = (checked < 0) | (checked >= self.size)
+        if np.any(outside):
+            first = np.atleast_1d(checked)[np.atleast_1d(outside)][0]
+            raise GridError(
+                f"grid: there is no configuration {first}. They are numbered 0 to {self.size - 1}."
+            )
+        return checked.astype(np.int64)

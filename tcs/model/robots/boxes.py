@@ -1,0 +1,248 @@
+"""The tightest box or capsule around a set of triangles."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
+
+from tcs.model.robots.primitives import Primitive, rotation_of
+
+FloatArray = NDArray[np.float64]
+
+_DECIMALS = 6
+_STEP = 10.0**-_DECIMALS
+_QUATERNION_DECIMALS = 9
+# Thinner than any part that matters; a flat part still needs a box with some thickness.
+_THINNEST = 1e-4
+_FACETS = 32
+"""So many facets of a hull at most are looked at closely: those of a rounded part go into the
+thousands, and all but a few can be told to be worse by a glance."""
+_GLANCES = np.linspace(0.0, np.pi / 2, 6, endpoint=False)
+"""Angles about a facet's normal at which a box is tried at a glance [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A shape that encloses some points, before it is rounded and named.
+
+    Attributes:
+        kind: "box" or "capsule".
+        R: R_BP, shape (3, 3); a capsule lies along its z.
+        volume: [m^3].
+    """
+
+    kind: str
+    R: FloatArray
+    volume: float
+
+
+def corner_points(triangles: FloatArray) -> FloatArray:
+    """Return the corners that decide about enclosing: those of the convex hull, shape (m, 3).
+
+    Args:
+        triangles: Corners [m], shape (n, 3, 3).
+    """
+    return hull_corners(np.unique(triangles.reshape(-1, 3), axis=0))
+
+
+def hull_corners(points: FloatArray) -> FloatArray:
+    """Return which of some points are the corners of their convex hull, shape (m, 3)."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        # Flat or too few: all of them then.
+        return points
+
+
+def hull_volume(triangles: FloatArray) -> float:
+    """Return the volume of the convex hull of triangles [m^3], shape (n, 3, 3).
+
+    A flat part has none; it counts as the box around it, a tenth of a millimetre thick.
+    """
+    points = triangles.reshape(-1, 3)
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:
+        return float(np.maximum(np.ptp(points, axis=0), _THINNEST).prod())
+
+
+def tightest_orientation(points: FloatArray) -> FloatArray:
+    """Return the orientation R_BP of the smallest box around points that rests on a hull facet.
+
+    For each facet of the hull the box that has it as a face is the smallest rectangle around the
+    points as seen along its normal. The smallest box of all need not rest on a facet, but is
+    hardly smaller.
+
+    Args:
+        points: [m], shape (m, 3).
+    """
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return np.eye(3)
+    best, best_volume = np.eye(3), math.inf
+    normals = np.unique(np.round(hull.equations[:, :3], 6), axis=0)
+    frames = np.stack([_frame_with_z(normal / np.linalg.norm(normal)) for normal in normals])
+    for frame in _promising(points[hull.vertices], frames):
+        seen = points @ frame
+        angle, area = _tightest_rectangle(seen[:, :2])
+        volume = area * float(np.ptp(seen[:, 2]))
+        # A box must beat another clearly: then the result does not hang on rounding.
+        if volume < best_volume * (1 - 1e-9):
+            best_volume = volume
+            c, s = math.cos(angle), math.sin(angle)
+            best = frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return best
+
+
+def best_candidate(points: FloatArray, orientations: FloatArray) -> Candidate:
+    """Return the smallest box or capsule around points.
+
+    Args:
+        points: [m], shape (m, 3).
+        orientations: Further orientations worth a try, shape (k, 3, 3).
+    """
+    tried = [tightest_orientation(points), *orientations]
+    boxes = [Candidate("box", R, _box_volume(points, R)) for R in tried]
+    smallest = min(boxes, key=lambda candidate: candidate.volume)
+    # A capsule lies along any axis of a frame worth a try.
+    for R, axis in itertools.product(tried[:2], range(3)):
+        frame = np.roll(R, 2 - axis, axis=1)
+        # The circle takes long to find; it is at least as wide as the points.
+        width, height = np.ptp(points @ frame[:, :2], axis=0).max(), np.ptp(points @ frame[:, 2])
+        if _capsule_volume(width / 2, max(height - width, 0.0)) < smallest.volume:
+            radius, length, _ = _capsule_around(points, frame)
+            volume = _capsule_volume(radius, length)
+            if volume < smallest.volume:
+                smallest = Candidate("capsule", frame, volume)
+    return smallest
+
+
+def enclose(body: str, points: FloatArray, kind: str, R: FloatArray) -> Primitive:
+    """Return the primitive of that kind and orientation around points, rounded outward.
+
+    Orientation and centre are rounded first, then the sizes are measured from there and rounded
+    up, so what the file holds encloses every point exactly.
+
+    Args:
+        body: Name of the body.
+        points: In its frame [m], shape (m, 3).
+        kind: "box" or "capsule".
+        R: R_BP, shape (3, 3).
+    """
+    w, x, y, z = _rounded_quaternion(R)
+    R = rotation_of((w, x, y, z))
+    if kind == "capsule":
+        _, length, centre = _capsule_around(points, R)
+        length = max(_rounded_up(length), _THINNEST)
+    else:
+        seen = points @ R
+        centre = R @ ((seen.min(axis=0) + seen.max(axis=0)) / 2)
+    centre = np.round(centre, _DECIMALS) + 0.0
+    seen = np.abs((points - centre) @ R)
+    if kind == "capsule":
+        beyond = np.maximum(seen[:, 2] - length / 2, 0.0)
+        radius = float(np.sqrt(seen[:, 0] ** 2 + seen[:, 1] ** 2 + beyond**2).max())
+        size: tuple[float, ...] = (_rounded_up(radius), length)
+    else:
+        size = tuple(max(_rounded_up(2 * half), _THINNEST) for half in seen.max(axis=0))
+    return Primitive(
+        body=body,
+        kind="capsule" if kind == "capsule" else "box",
+        size=size,
+        xyz=(float(centre[0]), float(centre[1]), float(centre[2])),
+        quaternion=(w, x, y, z),
+    )
+
+
+def _rounded_up(length: float) -> float:
+    """Return a length rounded up, with a step to spare for the arithmetic of whoever checks."""
+    return round((math.ceil(length / _STEP) + 1) * _STEP, _DECIMALS)
+
+
+def _rounded_quaternion(R: FloatArray) -> tuple[float, float, float, float]:
+    w, x, y, z = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
+    first, *rest = (round(float(q), _QUATERNION_DECIMALS) + 0.0 for q in (w, x, y, z))
+    return first, rest[0], rest[1], rest[2]
+
+
+def _box_volume(points: FloatArray, R: FloatArray) -> float:
+    return float(np.ptp(points @ R, axis=0).prod())
+
+
+def _capsule_volume(radius: float, length: float) -> float:
+    return math.pi * radius**2 * (length + 4 / 3 * radius)
+
+
+def _frame_with_z(z: FloatArray) -> FloatArray:
+    """Return a right-handed frame whose z axis is given, shape (3, 3)."""
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:
+    """Return the frames whose z a small box around points may well have, shape (k, 3, 3)."""
+    if len(frames) <= _FACETS:
+        return frames
+    x, y, z = np.moveaxis(frames, 2, 0)
+
+    def widths(directions: FloatArray) -> FloatArray:
+        return np.asarray(np.ptp(directions @ points.T, axis=1))
+
+    areas = [
+        widths(math.cos(angle) * x + math.sin(angle) * y)
+        * widths(math.cos(angle) * y - math.sin(angle) * x)
+        for angle in _GLANCES
+    ]
+    volumes = np.min(areas, axis=0) * widths(z)
+    # In the order of the facets, so that a tie goes to the same one as ever.
+    chosen = np.sort(np.argsort(volumes, kind="stable")[:_FACETS])
+    return np.asarray(frames[chosen])
+
+
+def _tightest_rectangle(points: FloatArray) -> tuple[float, float]:
+    """Return angle [rad] and area [m^2] of the smallest rectangle around points, shape (m, 2)."""
+    try:
+        corners = points[ConvexHull(points).vertices]
+    except QhullError:
+        return 0.0, float(np.ptp(points, axis=0).prod())
+    edges = np.roll(corners, -1, axis=0) - corners
+    angles = np.arctan2(edges[:, 1], edges[:, 0])
+    along = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    areas = np.ptp(along @ corners.T, axis=1) * np.ptp(across @ corners.T, axis=1)
+    i = int(np.argmin(areas))
+    return float(angles[i]), float(areas[i])
+
+
+def _capsule_around(points: FloatArray, R: FloatArray) -> tuple[float, float, FloatArray]:
+    """Return radius, length between cap centres and centre of a capsule along the z axis of R."""
+    seen = points @ R
+    middle, radius = _circle_around(seen[:, :2])
+    off_axis = np.square(seen[:, :2] - middle).sum(axis=1)
+    # How far before a point a cap centre may lie and still reach it.
+    reach = np.sqrt(np.maximum(radius**2 - off_axis, 0.0))
+    top, bottom = float((seen[:, 2] - reach).max()), float((seen[:, 2] + reach).min())
+    centre = R @ np.array([*middle, (top + bottom) / 2])
+    return radius, max(top - bottom, 0.0), centre
+
+
+def _circle_around(points: FloatArray, steps: int = 2000) -> tuple[FloatArray, float]:
+    """Return centre and radius of a circle around points, shape (m, 2), nearly the smallest.
+
+    Source:
+        Badoiu and Clarkson, "Smaller core-sets for balls", 2003: step toward the farthest point,
+        each time by a smaller share; the radius is off by less than 1/steps.
+    """
+    centre = points.mean(axis=0)
+    for i in range(1, steps):
+        farthest = points[int(np.argmax(np.square(points - centre).sum(axis=1)))]
+        centre = centre + (farthest - centre) / (i + 1)
+    return centre, float(np.sqrt(np.square(points - centre).sum(axis=1).max()))

@@ -1,0 +1,288 @@
+"""Draft a robot file from a URDF: arm, torso, posture, shapes and pairs, found, not typed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from tcs.errors import OutputError, RobotError, UnknownNameError
+from tcs.files.writing import whole_file
+from tcs.model.robots.checks import check_robot
+from tcs.model.robots.disabled_pairs import propose_disabled_pairs
+from tcs.model.robots.fit_robot import fit_robot
+from tcs.model.robots.geometry import body_triangles
+from tcs.model.robots.packages import resolve_uri
+from tcs.model.robots.pose import pose_in_root
+from tcs.model.robots.primitives import Primitive, write_primitives
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.self_collision import DRAWS, free_posture
+from tcs.model.robots.urdf import Joint, Urdf, read_urdf
+
+ARM_JOINTS = 7
+_VERTICAL = 0.99
+"""Cosine beyond which a sliding joint counts as a torso lift."""
+_ON_FLOOR = 0.02
+"""Bodies that come as low as this [m] stand on the floor."""
+
+_HEADER = """\
+# Drafted by `tcs robot new`; look it over:
+{remarks}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A robot file that nobody has looked over yet.
+
+    Attributes:
+        robot: What it says; its URDF is an absolute path or a `package://` address.
+        primitives: The collision shapes.
+        remarks: What was chosen and why, a line each.
+    """
+
+    robot: RobotFile
+    primitives: tuple[Primitive, ...]
+    remarks: tuple[str, ...]
+
+
+def draft_robot(
+    urdf: str | Path,
+    tool: str,
+    *,
+    base: str | None = None,
+    name: str | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Draft:
+    """Return a robot file for a URDF.
+
+    The arm is the seven turning joints nearest the tool. The torso is a vertical sliding joint
+    between root and arm. Every other joint stands at 0 where its range reaches to both sides of
+    it, else in the middle of its range. Shapes enclose the meshes, as `fit_robot` has them, and
+    pairs need no check for the reasons of `propose_disabled_pairs`.
+
+    Args:
+        urdf: Path of the URDF, or its `package://` address.
+        tool: T, the link that has to come to a goal.
+        base: Link that the arm has to start at or beyond; None is the root.
+        name: What to call the robot; None takes the URDF's file name.
+        on_progress: Called with the bodies fitted and all bodies.
+
+    Raises:
+        UnknownNameError: If the URDF has no link named like tool or base.
+        RobotError: If the URDF or a mesh cannot be used, the tool does not hang on the base, or
+            fewer than seven turning joints lead to it.
+    """
+    path = resolve_uri(str(urdf), Path()).resolve()
+    model = read_urdf(path)
+    arm, arm_base, torso = _arm(model, tool, base)
+    if not body_triangles(model):
+        raise RobotError(
+            f"URDF '{path}': no link has a visual or collision geometry, so nothing could ever "
+            "collide. Add shapes to its links."
+        )
+    address = str(urdf) if str(urdf).startswith("package://") else str(path)
+    posture, gripper = _positions(model, arm, torso)
+    remarks = [
+        f"arm: the seven turning joints nearest '{tool}', from '{arm_base}' on: "
+        f"{', '.join(joint.name for joint in arm)}",
+        f"torso: {f'{torso.name!r}' if torso else 'no vertical sliding joint below the arm'}",
+    ]
+    # The search for pairs reads the shapes from their file.
+    with tempfile.TemporaryDirectory() as folder:
+        shapes = Path(folder) / "primitives.csv"
+        write_primitives(shapes, ())
+        robot = RobotFile(
+            name=name or path.stem,
+            title=f"{path.stem}, tool {tool}",
+            urdf=address,
+            root_body=model.root,
+            arm_base=arm_base,
+            arm_joints=tuple(joint.name for joint in arm),
+            tool_frame=tool,
+            torso_joint=torso.name if torso else None,
+            limits="soft" if any(joint.soft != joint.hard for joint in arm) else "hard",
+            posture="drafted" if posture else None,
+            postures={"drafted": posture} if posture else {},
+            gripper="drafted" if gripper else None,
+            grippers={"drafted": gripper} if gripper else {},
+            standing_bodies=_standing(model, posture, arm, torso),
+            primitives=str(shapes),
+            source=_source(path, address),
+        )
+        check_robot(robot, where=f"robot drafted from '{path}'")
+        fits = fit_robot(robot, on_progress)
+        primitives = tuple(shape for found in fits for shape in found.fit.primitives)
+        write_primitives(shapes, primitives)
+        robot = robot.model_copy(update={"disabled_groups": propose_disabled_pairs(robot)})
+        rest = free_posture(robot)
+        if rest is None:
+            remarks.append(f"rest: none of {DRAWS} postures of the arm is free of self-collision")
+        robot = robot.model_copy(update={"rest": rest or {}})
+    worst = max(fits, key=lambda found: found.fit.excess)
+    remarks += [
+        f"shapes: {len(primitives)}, of which '{worst.body}' exceeds its hull most, "
+        f"{worst.fit.excess:.2f} times",
+        "posture: 0 where a joint's range reaches to both sides of it, else the middle of its "
+        "range; see that the gripper is open and a second arm out of the way",
+        f"root: '{model.root}' has to lie on the floor, z up, x forward",
+    ]
+    return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
+
+
+def write_draft(draft: Draft, path: Path) -> Path:
+    """Write a draft as a YAML file with its shapes in a CSV file beside it; both or neither.
+
+    Args:
+        draft: The draft.
+        path: The YAML file; it must not be there yet.
+
+    Returns:
+        The CSV file.
+
+    Raises:
+        OutputError: If one of the two is there already or cannot be written.
+    """
+    shapes = check_free(path)
+    content = draft.robot.model_dump(mode="json", exclude_defaults=True)
+    content["primitives"] = shapes.name
+    if not draft.robot.urdf.startswith("package://"):
+        # Folders of one's own move together.
+        content["urdf"] = Path(os.path.relpath(draft.robot.urdf, path.resolve().parent)).as_posix()
+    text = _HEADER.format(remarks="\n".join(f"# - {remark}" for remark in draft.remarks))
+    text += yaml.safe_dump(
+        content, sort_keys=False, width=95, default_flow_style=None, allow_unicode=True
+    )
+    write_primitives(shapes, draft.primitives)
+    try:
+        with whole_file(path, "Robot file") as stream:
+            stream.write(text.encode())
+    except BaseException:
+        shapes.unlink()
+        raise
+    return shapes
+
+
+def check_free(path: Path) -> Path:
+    """Return the CSV file that belongs to a YAML file, if neither of them is there yet.
+
+    Raises:
+        OutputError: If one is, or the name does not end in `.yaml`.
+    """
+    if path.suffix != ".yaml":
+        raise OutputError(
+            f"robot file '{path}': its name must end in .yaml, by which `tcs` knows a path from "
+            "the name of a robot."
+        )
+    shapes = path.with_name(f"{path.stem}_primitives.csv")
+    for file in (path, shapes):
+        if file.exists():
+            raise OutputError(f"'{file}' is already there. Remove it, or name another file.")
+    return shapes
+
+
+def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Joint | None]:
+    """Return the arm's joints, the link that carries the first one, and the torso joint."""
+    where = f"URDF '{model.path}'"
+    for what, link in (("tool frame", tool), ("base", base)):
+        if link is not None and link not in model.links:
+            raise UnknownNameError("link", link, model.links, where=f"{where}, {what}")
+    chain = model.chain(base or model.root, tool)
+    if chain is None:
+        raise RobotError(f"{where}: tool frame '{tool}' does not hang on base '{base}'.")
+    movable = [joint for joint in chain if joint.is_movable]
+    arm: list[Joint] = []
+    end = ""
+    for joint in reversed(movable):
+        if joint.type == "prismatic" or joint.mimic is not None:
+            end = f"; '{joint.name}' before them {'mimics another' if joint.mimic else 'slides'}"
+        if end or len(arm) == ARM_JOINTS:
+            break
+        arm.insert(0, joint)
+    if len(arm) < ARM_JOINTS:
+        found = ", ".join(joint.name for joint in arm) or "none"
+        raise RobotError(
+            f"{where}: an arm of seven turning joints is needed, but from "
+            f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
+            f"({found}{end}). Name another tool frame or base."
+        )
+    exact = base is not None and movable == arm
+    arm_base = str(base) if exact else arm[0].parent
+    return arm, arm_base, _torso(model, arm[0].parent)
+
+
+def _torso(model: Urdf, arm_base: str) -> Joint | None:
+    """Return the vertical sliding joint of the greatest travel between root and arm, if any."""
+    lifts = []
+    for joint in model.chain(model.root, arm_base) or ():
+        if joint.type != "prismatic" or joint.mimic is not None:
+            continue
+        R, _ = pose_in_root(model, joint.child, {})
+        axis = R @ np.array(joint.axis) / np.linalg.norm(joint.axis)
+        if axis[2] > _VERTICAL:
+            lifts.append(joint)
+    return max(lifts, key=lambda joint: joint.soft[1] - joint.soft[0], default=None)
+
+
+def _positions(
+    model: Urdf, arm: list[Joint], torso: Joint | None
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return where the other joints stand [rad or m]: those the hand carries apart."""
+    held = set(_moved_by(model, arm[-1]))
+    posture: dict[str, float] = {}
+    gripper: dict[str, float] = {}
+    for joint in model.joints.values():
+        scored = joint in arm or joint == torso
+        if not joint.is_movable or joint.mimic is not None or scored:
+            continue
+        lower, upper = joint.soft
+        value = 0.0 if lower < 0.0 < upper else round((lower + upper) / 2, 6)
+        (gripper if joint.child in held else posture)[joint.name] = value
+    return posture, gripper
+
+
+def _moved_by(model: Urdf, joint: Joint) -> tuple[str, ...]:
+    """Return every link that a joint moves."""
+    return tuple(link for link in model.links if model.chain(joint.child, link) is not None)
+
+
+def _standing(
+    model: Urdf, posture: dict[str, float], arm: list[Joint], torso: Joint | None
+) -> tuple[str, ...]:
+    """Return the bodies that reach down to the floor, but for those that arm or torso move."""
+    moved = {link for joint in (arm[0], torso) if joint for link in _moved_by(model, joint)}
+    found = []
+    for body, triangles in body_triangles(model).items():
+        R, p = pose_in_root(model, body, posture)
+        if body not in moved and (triangles @ R.T + p)[..., 2].min() <= _ON_FLOOR:
+            found.append(body)
+    return tuple(found)
+
+
+def _source(path: Path, address: str) -> str:
+    """Return where the figures come from, and what is known about their licence."""
+    licence = "no package.xml lies above it: look up its licence before you pass anything on"
+    for folder in path.parents:
+        package = folder / "package.xml"
+        if package.is_file():
+            licence = (
+                f"the package it lies in is licensed {_licence(package)}; its meshes may not be"
+            )
+            break
+    shown = path.name if address == str(path) else address
+    figures = f"Kinematics, limits and meshes: {shown}; {licence}. No mesh is copied."
+    return f"{figures} Primitives: fitted to the meshes by `tcs robot new`."
+
+
+def _licence(package: Path) -> str:
+    try:
+        found = ElementTree.parse(package).findtext("license")
+    except (OSError, ElementTree.ParseError):
+        found = None
+    return f"'{' '.join(found.split())}'" if found else "in terms its package.xml does not name"

@@ -1,0 +1,63 @@
+"""A robot's URDF together with the frames and bodies that its file adds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tcs.model.robots.robot_file import BodyPrimitive, RobotFile
+from tcs.model.robots.urdf import Geometry, Joint, Urdf
+
+
+def model_with_extras(robot: RobotFile) -> Urdf:
+    """Return the URDF's model with extra frames and bodies as further links on fixed joints.
+
+    The primitives of an extra body stand for its surface, for nothing else is known of it; a
+    capsule becomes a cylinder with a sphere at either end.
+
+    Raises:
+        RobotError: If the URDF cannot be used.
+    """
+    model = robot.model()
+    links, joints = dict(model.links), dict(model.joints)
+    for extra in (*robot.frames, *robot.bodies):
+        links[extra.name] = ()
+        joint = Joint(
+            name=f"{extra.name}_joint",
+            type="fixed",
+            parent=extra.parent,
+            child=extra.name,
+            xyz=extra.xyz,
+            rpy=extra.rpy,
+            axis=(1.0, 0.0, 0.0),
+            hard=(0.0, 0.0),
+            soft=(0.0, 0.0),
+            mimic=None,
+        )
+        joints[joint.name] = joint
+    for body in robot.bodies:
+        links[body.name] = tuple(g for shape in body.primitives for g in _geometries(shape))
+    return Urdf(path=model.path, links=links, joints=joints)
+
+
+def _geometries(shape: BodyPrimitive) -> tuple[Geometry, ...]:
+    geometry = Geometry(
+        role="collision",
+        shape="box",
+        size=shape.size,
+        mesh=None,
+        xyz=shape.xyz,
+        rpy=shape.rpy,
+        rgba=None,
+    )
+    if shape.kind == "box":
+        return (geometry,)
+    ball = replace(geometry, shape="sphere", size=shape.size[:1])
+    if shape.kind == "sphere":
+        return (ball,)
+    along = Rotation.from_euler("xyz", shape.rpy).as_matrix()[:, 2] * (shape.size[1] / 2)
+    ends = np.array(shape.xyz) + np.stack([along, -along])
+    balls = tuple(replace(ball, xyz=(float(x), float(y), float(z))) for x, y, z in ends)
+    return (replace(geometry, shape="cylinder"), *balls)

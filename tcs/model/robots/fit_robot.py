@@ -1,0 +1,187 @@
+"""Fit primitives to every body of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tcs.model.robots.boxes import corner_points, enclose, hull_volume
+from tcs.model.robots.fitting import Fit, Target, fit_triangles
+from tcs.model.robots.geometry import (
+    body_triangles,
+    geometry_triangles,
+    place,
+    surface_geometries,
+    welded_top,
+)
+from tcs.model.robots.primitives import Primitive, union_volume
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.urdf import Urdf
+
+FloatArray = NDArray[np.float64]
+
+# What the kernel checks grows with the number of shapes, so each must earn its place.
+HAND = Target(excess=1.25, max_shapes=2)
+"""Goals lie 1-4 cm off the skin: a bulky hand would block what the real one reaches."""
+ARM = Target(excess=1.40, max_shapes=2)
+"""Links that the arm joints move."""
+REST = Target(excess=0.0, max_shapes=6)
+"""Base, torso, head: as closely as a few shapes can, for they are large and not convex."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyFit:
+    """What encloses one body, or several welded together.
+
+    Attributes:
+        body: The body that carries the primitives.
+        enclosed: Every body whose triangles they enclose.
+        fit: The primitives and their excess.
+    """
+
+    body: str
+    enclosed: tuple[str, ...]
+    fit: Fit
+
+
+def fit_robot(
+    robot: RobotFile, on_progress: Callable[[int, int], None] | None = None
+) -> tuple[BodyFit, ...]:
+    """Return primitives that enclose every triangle of a robot, body by body.
+
+    What is welded to the root (a base with its wheels) is enclosed as one body; other bodies each
+    on their own. Bodies of the same shape, such as those of a left and a right arm, get the same
+    primitives. What the URDF draws as a few boxes keeps these.
+
+    Args:
+        robot: The robot.
+        on_progress: Called with the bodies done and all bodies.
+
+    Raises:
+        RobotError: If a mesh cannot be read.
+    """
+    model = robot.model()
+    triangles = body_triangles(model)
+    groups = _groups(robot, model, triangles)
+    moved = _moved_by(model, robot.arm_joints[0])
+    held = _moved_by(model, robot.arm_joints[-1])
+    targets: dict[object, Target] = {}
+    for body in groups:
+        target = HAND if body in held else ARM if body in moved else REST
+        key = _shape_key(model, body) if body in triangles else body
+        # The scored arm decides for the other one, too: same shape, same primitives.
+        known = targets.get(key, REST)
+        targets[key] = min(known, target, key=lambda t: t.max_shapes)
+    fits: dict[object, tuple[Fit, FloatArray, FloatArray]] = {}
+    results = []
+    for done, (body, members) in enumerate(groups.items()):
+        if on_progress is not None:
+            on_progress(done, len(groups))
+        own = _in_frame_of(model, body, members, triangles)
+        key = _shape_key(model, body) if len(members) == 1 else body
+        R, p = _key_frame(model, body)
+        if key not in fits:
+            target = targets.get(key, REST)
+            fit = _as_drawn(model, body, members, target) or fit_triangles(body, own, target)
+            fits[key] = fit, R, p
+        else:
+            fit = _transferred(fits[key], body, own, R, p)
+        results.append(BodyFit(body=body, enclosed=tuple(members), fit=fit))
+    if on_progress is not None:
+        on_progress(len(groups), len(groups))
+    return tuple(results)
+
+
+def _groups(
+    robot: RobotFile, model: Urdf, triangles: dict[str, FloatArray]
+) -> dict[str, list[str]]:
+    """Return which bodies are enclosed together, by the body that carries the primitives."""
+    groups: dict[str, list[str]] = {}
+    standing = [body for body in triangles if welded_top(model, body)[0] == robot.root_body]
+    if standing:
+        volume = {body: float(np.ptp(triangles[body], axis=(0, 1)).prod()) for body in standing}
+        groups[max(standing, key=lambda body: volume[body])] = standing
+    return groups | {body: [body] for body in triangles if body not in standing}
+
+
+def _in_frame_of(
+    model: Urdf, body: str, members: list[str], triangles: dict[str, FloatArray]
+) -> FloatArray:
+    """Return the triangles of welded bodies in the frame of one of them [m], shape (n, 3, 3)."""
+    _, R_AB, p_AB = welded_top(model, body)
+    pieces = []
+    for member in members:
+        _, R_AM, p_AM = welded_top(model, member)
+        in_top = triangles[member] @ R_AM.T + p_AM
+        pieces.append(triangles[member] if member == body else (in_top - p_AB) @ R_AB)
+    return np.concatenate(pieces)
+
+
+def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit | None:
+    """Return the boxes that the URDF draws, if there is nothing else and they are few."""
+    # Once each: what is seen and what is touched are often the same box.
+    drawn = {
+        (member, g.shape, g.size, g.xyz, g.rpy): (member, g)
+        for member in members
+        for g in surface_geometries(model, member)
+    }.values()
+    if len(drawn) > target.max_shapes or any(g.shape != "box" for _, g in drawn):
+        return None
+    shapes, pieces = [], []
+    _, R_AB, _ = welded_top(model, body)
+    for member, geometry in drawn:
+        own = place(geometry_triangles(geometry), geometry.xyz, geometry.rpy)
+        triangles = _in_frame_of(model, body, [member], {member: own})
+        _, R_AM, _ = welded_top(model, member)
+        R_BG = R_AB.T @ R_AM @ Rotation.from_euler("xyz", geometry.rpy).as_matrix()
+        shapes.append(enclose(body, corner_points(triangles), "box", R_BG))
+        pieces.append(triangles)
+    hull = hull_volume(np.concatenate(pieces))
+    return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
+
+
+def _moved_by(model: Urdf, joint: str) -> set[str]:
+    """Return every body that a joint moves."""
+    first = model.joints[joint].child
+    return {body for body in model.links if model.chain(first, body) is not None}
+
+
+def _key_frame(model: Urdf, body: str) -> tuple[FloatArray, FloatArray]:
+    """Return the pose in the body of its first geometry: R of shape (3, 3), p of shape (3,)."""
+    first = surface_geometries(model, body)[0]
+    return Rotation.from_euler("xyz", first.rpy).as_matrix(), np.array(first.xyz)
+
+
+def _shape_key(model: Urdf, body: str) -> object:
+    """Return what two bodies share when they are equal but for where their geometry sits."""
+    R, p = _key_frame(model, body)
+    keys = set()
+    for geometry in surface_geometries(model, body):
+        corners = place(geometry_triangles(geometry)[:1], geometry.xyz, geometry.rpy)
+        seen = np.round((corners - p) @ R, 6) + 0.0
+        keys.add((geometry.shape, geometry.mesh, geometry.size, seen.tobytes()))
+    return frozenset(keys)
+
+
+def _transferred(
+    known: tuple[Fit, FloatArray, FloatArray],
+    body: str,
+    triangles: FloatArray,
+    R: FloatArray,
+    p: FloatArray,
+) -> Fit:
+    """Return the fit of a body of the same shape, turned to this body and measured anew."""
+    fit, R_known, p_known = known
+    R_step = R @ R_known.T
+    in_known = (triangles - p) @ R_step + p_known
+    shapes: list[Primitive] = []
+    for shape in fit.primitives:
+        # What the other body's file holds was rounded outward by a few micrometres.
+        inside = shape.contains_triangles(in_known, tolerance=1e-9)
+        points = corner_points(triangles[inside])
+        shapes.append(enclose(body, points, shape.kind, R_step @ shape.rotation))
+    return replace(fit, primitives=tuple(shapes))

@@ -1,0 +1,113 @@
+"""A URDF reduced to what a plant needs: links, joints, limits and, on request, visual meshes."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
+from pathlib import Path
+
+from tcs.model.robots.meshes import as_obj
+from tcs.model.robots.packages import resolve_uri
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.urdf import Geometry, Joint, read_urdf
+
+
+def kinematic_urdf(urdf: str | Path, meshes: bool = False) -> str:
+    """Return the text of a URDF that Drake reads without a warning.
+
+    Transmissions, sensors, simulator extensions, inertias, mimic and collision geometry are left
+    out: scoring needs none of them, and the PR2's own file makes Drake warn 117 times.
+
+    Args:
+        urdf: The original: a path, or a `package://` address.
+        meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
+
+    Raises:
+        RobotError: If the URDF or one of its meshes cannot be used.
+    """
+    return _text(_tree(resolve_uri(str(urdf), Path()), meshes))
+
+
+def robot_urdf(robot: RobotFile, meshes: bool = False) -> str:
+    """Return `kinematic_urdf` of a robot with its extra frames and bodies as further links.
+
+    Args:
+        robot: The robot.
+        meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
+
+    Raises:
+        RobotError: If the URDF or one of its meshes cannot be used.
+    """
+    root = _tree(robot.urdf_path(), meshes)
+    for extra in (*robot.frames, *robot.bodies):
+        ElementTree.SubElement(root, "link", name=extra.name)
+        joint = ElementTree.SubElement(root, "joint", name=f"{extra.name}_joint", type="fixed")
+        _add_origin(joint, extra.xyz, extra.rpy)
+        ElementTree.SubElement(joint, "parent", link=extra.parent)
+        ElementTree.SubElement(joint, "child", link=extra.name)
+    return _text(root)
+
+
+def _tree(path: Path, meshes: bool) -> ElementTree.Element:
+    model = read_urdf(path)
+    root = ElementTree.Element("robot", name=path.stem)
+    for name, geometries in model.links.items():
+        link = ElementTree.SubElement(root, "link", name=name)
+        if meshes:
+            for geometry in geometries:
+                if geometry.role == "visual":
+                    _add_visual(link, geometry)
+    for joint in model.joints.values():
+        _add_joint(root, joint)
+    return root
+
+
+def _add_joint(root: ElementTree.Element, joint: Joint) -> None:
+    element = ElementTree.SubElement(root, "joint", name=joint.name, type=joint.type)
+    _add_origin(element, joint.xyz, joint.rpy)
+    ElementTree.SubElement(element, "parent", link=joint.parent)
+    ElementTree.SubElement(element, "child", link=joint.child)
+    if not joint.is_movable:
+        return
+    ElementTree.SubElement(element, "axis", xyz=_words(joint.axis))
+    if joint.type != "continuous":
+        lower, upper = joint.hard
+        limit = {"lower": repr(lower), "upper": repr(upper), "effort": "0", "velocity": "0"}
+        ElementTree.SubElement(element, "limit", limit)
+
+
+def _add_visual(link: ElementTree.Element, geometry: Geometry) -> None:
+    visual = ElementTree.SubElement(link, "visual")
+    _add_origin(visual, geometry.xyz, geometry.rpy)
+    holder = ElementTree.SubElement(visual, "geometry")
+    if geometry.mesh is not None:
+        # Drake takes an address here, for a text has no folder that a path could start from.
+        address = f"file://{as_obj(geometry.mesh)}"
+        attributes = {"filename": address, "scale": _words(geometry.size)}
+        ElementTree.SubElement(holder, "mesh", attributes)
+    elif geometry.shape == "box":
+        ElementTree.SubElement(holder, "box", size=_words(geometry.size))
+    elif geometry.shape == "sphere":
+        ElementTree.SubElement(holder, "sphere", radius=repr(geometry.size[0]))
+    else:
+        radius, length = geometry.size
+        ElementTree.SubElement(holder, "cylinder", radius=repr(radius), length=repr(length))
+    if geometry.rgba is not None:
+        # Named, for Drake asks every material for a name; the colour makes it a local one.
+        name = "rgba_" + "_".join(f"{channel:g}" for channel in geometry.rgba)
+        material = ElementTree.SubElement(visual, "material", name=name)
+        ElementTree.SubElement(material, "color", rgba=_words(geometry.rgba))
+
+
+def _add_origin(element: ElementTree.Element, xyz: Iterable[float], rpy: Iterable[float]) -> None:
+    ElementTree.SubElement(element, "origin", xyz=_words(xyz), rpy=_words(rpy))
+
+
+def _words(numbers: Iterable[float]) -> str:
+    # repr gives a float back exactly, so Drake's kinematics are those of the original file.
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _text(root: ElementTree.Element) -> str:
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

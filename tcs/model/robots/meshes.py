@@ -1,0 +1,90 @@
+"""Meshes of a URDF: read as triangles, or converted once to OBJ, the format that Drake reads."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import RobotError
+from tcs.files.paths import CACHE_ADVICE, cache_folder
+from tcs.files.writing import whole_file
+
+if TYPE_CHECKING:
+    import trimesh
+
+FloatArray = NDArray[np.float64]
+
+_VERSION = b"1"
+"""Part of the cache key: raise it when the conversion changes."""
+
+
+def as_obj(mesh: Path) -> Path:
+    """Return an OBJ file of a mesh: itself, or its conversion in the user's cache.
+
+    The file is named by the content it was made from, so an edited mesh never meets a stale
+    conversion, and equal meshes share one.
+
+    Args:
+        mesh: A file in any format that trimesh reads: STL, Collada, OBJ, ...
+
+    Raises:
+        RobotError: If the mesh cannot be read.
+        OutputError: If the cache cannot be written.
+    """
+    if mesh.suffix.lower() == ".obj":
+        return mesh
+    key = hashlib.sha256(_VERSION + mesh.suffix.lower().encode() + _content(mesh)).hexdigest()
+    target = cache_folder("meshes") / f"{mesh.stem}_{key[:16]}.obj"
+    if not target.is_file():
+        text = _obj_text(mesh)
+        # Two processes may convert the same mesh.
+        with whole_file(target, "Converted mesh", advice=CACHE_ADVICE) as stream:
+            stream.write(text.encode())
+    return target
+
+
+@cache
+def mesh_triangles(mesh: Path) -> FloatArray:
+    """Return the corners of every triangle of a mesh [its own unit], shape (n, 3, 3).
+
+    Triangles without area are kept: they are part of what must be enclosed.
+
+    Raises:
+        RobotError: If the mesh cannot be read.
+    """
+    loaded = _load(mesh)
+    triangles = np.asarray(loaded.vertices, dtype=np.float64)[loaded.faces]
+    triangles.setflags(write=False)
+    return triangles
+
+
+def _content(mesh: Path) -> bytes:
+    try:
+        return mesh.read_bytes()
+    except OSError as error:
+        raise RobotError(f"mesh '{mesh}' cannot be read: {error.strerror}.") from error
+
+
+def _obj_text(mesh: Path) -> str:
+    from trimesh.exchange.obj import export_obj
+
+    return str(export_obj(_load(mesh), include_texture=False, include_color=False))  # type: ignore[no-untyped-call]
+
+
+def _load(mesh: Path) -> trimesh.Trimesh:
+    # Imported where it is needed: it costs half a second that scoring does not have to spend.
+    import trimesh
+
+    _content(mesh)
+    try:
+        loaded = trimesh.load(mesh, force="mesh", process=False)
+    except Exception as error:  # whatever its many readers raise on a broken file
+        raise RobotError(f"mesh '{mesh}' cannot be used: {error}.") from error
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        raise RobotError(f"mesh '{mesh}' holds no triangle.")
+    return loaded

@@ -1,0 +1,274 @@
+"""Boxes, capsules and spheres that enclose a robot's meshes, and the CSV files that keep them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import RobotError
+from tcs.files.writing import whole_file
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+Kind = Literal["sphere", "capsule", "box"]
+SIZES: dict[str, int] = {"sphere": 1, "capsule": 2, "box": 3}
+"""How many numbers `size` holds."""
+
+_COLUMNS = (
+    "body", "kind", "size_a", "size_b", "size_c", "x", "y", "z", "qw", "qx", "qy", "qz",
+)  # fmt: skip
+# Written with 6 decimals (rotations with 9), so a quaternion's length is 1 to a few 1e-9.
+_UNIT_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Primitive:
+    """One convex shape P on a body B of the robot.
+
+    Raises:
+        RobotError: If the kind is unknown, a size is not positive, or the quaternion is not unit.
+    """
+
+    body: str
+    kind: Kind
+    size: tuple[float, ...]
+    """Sphere: radius. Capsule: radius, length between cap centres along its z. Box: full sizes
+    along its x, y, z [m]."""
+    xyz: tuple[float, float, float]
+    """Centre in the body, p_BoPo_B [m]."""
+    quaternion: tuple[float, float, float, float]
+    """Orientation R_BP, wxyz."""
+
+    def __post_init__(self) -> None:
+        where = f"primitive of body '{self.body}'"
+        if self.kind not in SIZES:
+            raise RobotError(f"{where}: kind '{self.kind}' is none of {', '.join(SIZES)}.")
+        if len(self.size) != SIZES[self.kind] or not all(0 < s < math.inf for s in self.size):
+            raise RobotError(
+                f"{where}: a {self.kind} needs {SIZES[self.kind]} positive size(s) [m], "
+                f"not {self.size}."
+            )
+        if not all(math.isfinite(x) for x in self.xyz):
+            raise RobotError(f"{where}: its centre {self.xyz} must be finite [m].")
+        if not abs(math.hypot(*self.quaternion) - 1) <= _UNIT_TOLERANCE:
+            raise RobotError(f"{where}: quaternion {self.quaternion} (wxyz) must have length 1.")
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        if self.kind == "box":
+            return math.prod(self.size)
+        radius = self.size[0]
+        length = self.size[1] if self.kind == "capsule" else 0.0
+        return math.pi * radius**2 * (length + 4 / 3 * radius)
+
+    @property
+    def rotation(self) -> FloatArray:
+        """R_BP, shape (3, 3)."""
+        return rotation_of(self.quaternion)
+
+    def contains(self, p_BoQ_B: FloatArray, *, tolerance: float = 0.0) -> BoolArray:
+        """Return which points of the body lie in the primitive.
+
+        Args:
+            p_BoQ_B: Points in the body frame [m], shape (..., 3).
+            tolerance: How far outside a point may lie [m].
+
+        Returns:
+            Booleans, shape (...).
+        """
+        p_PoQ_P = np.abs((p_BoQ_B - np.array(self.xyz)) @ self.rotation)
+        if self.kind == "box":
+            half = np.array(self.size) / 2 + tolerance
+            return np.asarray((p_PoQ_P <= half).all(axis=-1))
+        if self.kind == "capsule":
+            beyond_cap_centre = np.maximum(p_PoQ_P[..., 2] - self.size[1] / 2, 0.0)
+            p_PoQ_P = np.concatenate([p_PoQ_P[..., :2], beyond_cap_centre[..., None]], axis=-1)
+        radius = self.size[0] + tolerance
+        return np.asarray(np.square(p_PoQ_P).sum(axis=-1) <= radius**2)
+
+    def distance(self, p_BoQ_B: FloatArray) -> FloatArray:
+        """Return how far points of the body lie outside the primitive [m], 0 inside.
+
+        Args:
+            p_BoQ_B: Points in the body frame [m], shape (..., 3).
+
+        Returns:
+            Shape (...).
+        """
+        p_PoQ_P = np.abs((p_BoQ_B - np.array(self.xyz)) @ self.rotation)
+        half, radius = np.array(self.size) / 2, 0.0
+        if self.kind != "box":
+            radius = self.size[0]
+            half = np.array([0.0, 0.0, self.size[1] / 2 if self.kind == "capsule" else 0.0])
+        beyond = np.linalg.norm(np.maximum(p_PoQ_P - half, 0.0), axis=-1)
+        return np.asarray(np.maximum(beyond - radius, 0.0))
+
+    def contains_triangles(self, triangles: FloatArray, *, tolerance: float = 0.0) -> BoolArray:
+        """Return which triangles lie wholly in the primitive: it is convex, so corners decide.
+
+        Args:
+            triangles: Corners in the body frame [m], shape (n, 3, 3).
+            tolerance: How far outside a corner may lie [m].
+
+        Returns:
+            Booleans, shape (n,).
+        """
+        return np.asarray(self.contains(triangles, tolerance=tolerance).all(axis=-1))
+
+    def shrunk(self, by: float) -> Primitive:
+        """Return the primitive with every face moved inward by `by` [m]; negative: outward.
+
+        Raises:
+            RobotError: If nothing would be left.
+        """
+        if self.kind == "box":
+            size = tuple(s - 2 * by for s in self.size)
+        else:
+            size = (self.size[0] - by, *self.size[1:])
+        return Primitive(
+            body=self.body, kind=self.kind, size=size, xyz=self.xyz, quaternion=self.quaternion
+        )
+
+
+def rotation_of(quaternion: Iterable[float]) -> FloatArray:
+    """Return the rotation matrix of a quaternion (wxyz), shape (3, 3)."""
+    w, x, y, z = np.array(tuple(quaternion)) / math.hypot(*quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_of_rpy(rpy: Iterable[float]) -> tuple[float, float, float, float]:
+    """Return the quaternion (wxyz) of roll, pitch, yaw about fixed axes [rad], as in a URDF."""
+    roll, pitch, yaw = rpy
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def enclosed(primitives: Iterable[Primitive], triangles: FloatArray) -> BoolArray:
+    """Return which triangles lie wholly in at least one of the primitives.
+
+    Corners in two different primitives would not do: the middle could stand out between them.
+
+    Args:
+        primitives: Primitives of one body.
+        triangles: Corners in the body frame [m], shape (n, 3, 3).
+
+    Returns:
+        Booleans, shape (n,).
+    """
+    inside = np.zeros(len(triangles), dtype=np.bool_)
+    for primitive in primitives:
+        inside |= primitive.contains_triangles(triangles)
+    return inside
+
+
+def union_volume(primitives: Iterable[Primitive], samples: int = 20_000, seed: int = 0) -> float:
+    """Return the volume that the primitives of one body fill together [m^3].
+
+    Each primitive is sampled uniformly; a point that lies in m of them counts 1/m. One primitive
+    alone is therefore exact, and the standard error of several is at most half their summed volume
+    over the square root of the samples each gets.
+
+    Args:
+        primitives: Primitives of one body.
+        samples: Points in each primitive.
+        seed: Seed of the points; the same seed gives the same volume.
+    """
+    shapes = tuple(primitives)
+    if len(shapes) == 1:
+        return shapes[0].volume
+    rng = np.random.default_rng(seed)
+    total = 0.0
+    for shape in shapes:
+        points = _points_in(shape, samples, rng)
+        count = sum(other.contains(points).astype(np.int64) for other in shapes if other != shape)
+        total += shape.volume * float(np.mean(1.0 / (1.0 + count)))
+    return total
+
+
+def _points_in(shape: Primitive, samples: int, rng: np.random.Generator) -> FloatArray:
+    """Return points spread uniformly in a primitive, in its body's frame [m], shape (n, 3)."""
+    if shape.kind == "box":
+        half = np.array(shape.size) / 2
+    else:
+        radius = shape.size[0]
+        length = shape.size[1] if shape.kind == "capsule" else 0.0
+        half = np.array([radius, radius, radius + length / 2])
+    points = rng.uniform(-1.0, 1.0, size=(samples, 3)) * half
+    p_BoQ_B = np.asarray(points @ shape.rotation.T + np.array(shape.xyz))
+    return p_BoQ_B if shape.kind == "box" else p_BoQ_B[shape.contains(p_BoQ_B)]
+
+
+def write_primitives(path: Path, primitives: Iterable[Primitive]) -> None:
+    """Write primitives to a CSV file: metres with 6 decimals, quaternions (wxyz) with 9.
+
+    Raises:
+        OutputError: If it cannot be written there.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for p in primitives:
+        sizes = [f"{s:.6f}" for s in p.size] + [""] * (3 - len(p.size))
+        place = [f"{x + 0.0:.6f}" for x in p.xyz]
+        writer.writerow([p.body, p.kind, *sizes, *place, *(f"{q + 0.0:.9f}" for q in p.quaternion)])
+    with whole_file(path, "Primitives file") as stream:
+        stream.write(text.getvalue().encode())
+
+
+def read_primitives(path: Path) -> tuple[Primitive, ...]:
+    """Return the primitives that a CSV file holds, in its order.
+
+    Raises:
+        RobotError: If the file cannot be read, or a row makes no primitive.
+    """
+    try:
+        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
+    except OSError as error:
+        raise RobotError(f"primitives '{path}' cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise RobotError(f"primitives '{path}' is no text file in UTF-8.") from error
+    found = []
+    for number, row in enumerate(rows, start=2):
+        where = f"primitives '{path}', line {number}"
+        if set(row) != set(_COLUMNS):
+            raise RobotError(f"{where}: its columns must be {', '.join(_COLUMNS)}.")
+        try:
+            sizes = tuple(float(row[key]) for key in _COLUMNS[2:5] if row[key])
+            x, y, z, qw, qx, qy, qz = (float(row[key]) for key in _COLUMNS[5:])
+            found.append(
+                Primitive(
+                    body=row["body"],
+                    kind=row["kind"],  # type: ignore[arg-type]  # checked by Primitive
+                    size=sizes,
+                    xyz=(x, y, z),
+                    quaternion=(qw, qx, qy, qz),
+                )
+            )
+        except (TypeError, ValueError) as error:
+            raise RobotError(f"{where}: {error}.") from error
+        except RobotError as error:
+            raise RobotError(f"{where}: {error}") from error
+    return tuple(found)

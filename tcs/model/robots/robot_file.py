@@ -1,0 +1,279 @@
+"""Robot files: what `tcs` has to know about a robot beyond its URDF, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.files.documents import Document, Number, Placed, PositiveNumber, checked, read_mapping
+from tcs.files.paths import named_file, shipped_files
+from tcs.model.robots.packages import resolve_uri
+from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
+from tcs.model.robots.urdf import Urdf, read_urdf
+
+Name = Annotated[str, Field(min_length=1)]
+Positions = Mapping[Name, Number]
+
+_FILES = ("urdf", "primitives")
+"""Fields that name a file, relative to the robot file."""
+BASED_ON = "based_on"
+"""Key of a file that takes over whatever it does not say itself from another robot."""
+
+
+class _OnLink(Placed):
+    """Something named that is fixed to a link of the robot."""
+
+    name: Name
+    parent: Name
+
+
+class ExtraFrame(_OnLink):
+    """A frame that the URDF lacks, e.g. the tip of a tool."""
+
+
+class BodyPrimitive(Placed):
+    """One collision shape of an extra body."""
+
+    kind: Literal["sphere", "capsule", "box"]
+    size: tuple[PositiveNumber, ...]
+    """Sphere: radius. Capsule: radius, length between cap centres. Box: full sizes [m]."""
+
+
+class ExtraBody(_OnLink):
+    """A body that the URDF lacks, e.g. a tool in the hand."""
+
+    primitives: tuple[BodyPrimitive, ...]
+
+
+class DisabledGroup(Document):
+    """Pairs of bodies whose contact is never checked, and why."""
+
+    reason: Annotated[str, Field(min_length=10)]
+    limits: Literal["soft", "hard"] = "hard"
+    """The widest limits under which the reason holds; "hard" holds under soft ones as well."""
+    pairs: tuple[tuple[Name, Name], ...]
+
+
+class RobotFile(Document):
+    """A robot as its file says it; `load_robot` has checked it against the URDF."""
+
+    name: Name
+    title: str
+    urdf: str
+    """`package://...`, or a path."""
+    root_body: Name
+    """B: the URDF's root link, which the planar base joint carries."""
+    arm_base: Name
+    """A: the link that carries joint 1 of the scored arm."""
+    arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
+    """The scored arm's seven joints, from A outward."""
+    rest: Mapping[Name, Number] = {}
+    """Where the scored arm's joints are while it rests [rad]; a joint not named is at 0, or at the
+    nearest position its limits allow."""
+    tool_frame: Name
+    """T: what has to come to a goal; a link of the URDF, or an extra frame or body."""
+    torso_joint: Name | None = None
+    limits: Literal["soft", "hard"] = "soft"
+    """Which limits of the URDF hold: `safety_controller` or `limit`."""
+    postures: Mapping[Name, Positions] = {}
+    """Joints other than arm and torso by posture name [rad or m]; a joint not named is at 0, or at
+    the nearest position its limits allow."""
+    posture: Name | None = None
+    """The posture in force; None leaves every joint at 0."""
+    grippers: Mapping[Name, Positions] = {}
+    """Gripper joints by opening [rad or m]."""
+    gripper: Name | None = None
+    """The opening in force."""
+    frames: tuple[ExtraFrame, ...] = ()
+    bodies: tuple[ExtraBody, ...] = ()
+    standing_bodies: tuple[Name, ...] = ()
+    """Bodies that may touch the floor."""
+    primitives: str
+    """CSV file of the collision shapes."""
+    disabled_groups: tuple[DisabledGroup, ...] = ()
+    source: str
+
+    @model_validator(mode="after")
+    def _choices_exist(self) -> Self:
+        for field, choice, choices in (
+            ("posture", self.posture, self.postures),
+            ("gripper", self.gripper, self.grippers),
+        ):
+            if choice is not None and choice not in choices:
+                raise UnknownNameError(field, choice, choices, where=f"robot '{self.name}'")
+        return self
+
+    def __hash__(self) -> int:
+        """Hash the content; pydantic's own hash stumbles over the mappings."""
+        return hash(self.model_dump_json())
+
+    @property
+    def disabled_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Every pair of bodies whose contact is not checked under the limits in force."""
+        holding = (g for g in self.disabled_groups if g.limits in ("hard", self.limits))
+        return tuple(pair for group in holding for pair in group.pairs)
+
+    def urdf_path(self) -> Path:
+        """Return where the URDF lies on this machine.
+
+        Raises:
+            RobotError: If it is not there.
+        """
+        return resolve_uri(self.urdf, Path())
+
+    def model(self) -> Urdf:
+        """Return what the URDF says.
+
+        Raises:
+            RobotError: If it cannot be used.
+        """
+        return read_urdf(self.urdf_path())
+
+    def joint_limits(self) -> dict[str, tuple[float, float]]:
+        """Return the limits in force of every movable joint [rad or m], infinite where it turns on.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints.values()
+        return {j.name: j.soft if self.limits == "soft" else j.hard for j in joints if j.is_movable}
+
+    def joint_positions(self) -> dict[str, float]:
+        """Return where every movable joint but the scored arm and the torso stands [rad or m].
+
+        Joints named by the posture and the gripper opening in force are where these say; joints
+        that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        given: dict[str, float] = {}
+        if self.posture is not None:
+            given |= self.postures[self.posture]
+        if self.gripper is not None:
+            given |= self.grippers[self.gripper]
+        scored = {*self.arm_joints, self.torso_joint}
+        return {n: q for n, q in self.with_mimics(given).items() if n not in scored}
+
+    def with_mimics(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return the position of every movable joint, from those of some [rad or m].
+
+        Joints that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+
+        Args:
+            given: Joints whose position is known.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints
+        limits = self.joint_limits()
+
+        def position(name: str) -> float:
+            mimic = joints[name].mimic
+            if name in given:
+                return given[name]
+            if mimic is not None:
+                return mimic.multiplier * position(mimic.leader) + mimic.offset
+            lower, upper = limits[name]
+            return min(max(0.0, lower), upper)
+
+        return {name: position(name) for name in limits}
+
+    def load_primitives(self) -> tuple[Primitive, ...]:
+        """Return every collision shape: those of the CSV file, then those of the extra bodies.
+
+        Raises:
+            RobotError: If the file cannot be used.
+        """
+        extra = tuple(
+            Primitive(
+                body=body.name,
+                kind=shape.kind,
+                size=shape.size,
+                xyz=shape.xyz,
+                quaternion=quaternion_of_rpy(shape.rpy),
+            )
+            for body in self.bodies
+            for shape in body.primitives
+        )
+        return read_primitives(Path(self.primitives)) + extra
+
+    def with_choices(
+        self,
+        *,
+        posture: str | None = None,
+        gripper: str | None = None,
+        limits: Literal["soft", "hard"] | None = None,
+    ) -> RobotFile:
+        """Return the same robot with another posture, gripper opening or kind of limits in force.
+
+        Args:
+            posture: Name of a posture of the file; None keeps the one in force.
+            gripper: Name of a gripper opening of the file; None keeps the one in force.
+            limits: "soft" or "hard"; None keeps those in force.
+
+        Raises:
+            UnknownNameError: If the file has no posture or opening of that name.
+        """
+        chosen = {"posture": posture, "gripper": gripper, "limits": limits}
+        given = {key: value for key, value in chosen.items() if value is not None}
+        return RobotFile.model_validate(self.model_dump() | given)
+
+
+def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:
+    """Return the limits in force of every movable joint; see `RobotFile.joint_limits`."""
+    return robot.joint_limits()
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the robots that ship with `tcs`, sorted."""
+    return tuple(_shipped())
+
+
+def load_robot(name_or_path: str | Path) -> RobotFile:
+    """Return a robot, checked against its URDF, the files it names as absolute paths.
+
+    Args:
+        name_or_path: One of `robot_names()`, or the path of a file: anything that ends in `.yaml`
+            or holds a path separator.
+
+    Raises:
+        UnknownNameError: If there is no robot of that name, or the file names something unknown.
+        RobotError: If the file, or a model it names, cannot be used.
+    """
+    from tcs.model.robots.checks import check_robot
+
+    path = named_file("robot", name_or_path, _shipped()).resolve()
+    where = f"robot file '{path}'"
+    content = _content(path)
+    robot = checked(content, RobotFile, where, RobotError, also_known=(BASED_ON,))
+    check_robot(robot, where=where)
+    return robot
+
+
+def _content(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Return what a file says, with what it takes over; `above` are the files based on it."""
+    where = f"robot file '{path}'"
+    content = read_mapping(path, where, RobotError, known=(*RobotFile.model_fields, BASED_ON))
+    for key in _FILES:
+        value = content.get(key)
+        if isinstance(value, str) and not value.startswith("package://"):
+            content[key] = str((path.parent / Path(value).expanduser()).resolve())
+    base = content.pop(BASED_ON, None)
+    if base is None:
+        return content
+    chain = (*above, path)
+    field = f"{where}, field '{BASED_ON}'"
+    file = named_file("robot", str(base), _shipped(), beside=path.parent, where=field).resolve()
+    if file in chain:
+        raise RobotError(f"{field}: '{base}' is based on this file in turn. Name another one.")
+    return {**_content(file, chain), **content}
+
+
+def _shipped() -> dict[str, Path]:
+    return shipped_files("models/robots/*.yaml")

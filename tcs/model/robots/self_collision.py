@@ -1,0 +1,227 @@
+"""Which bodies of a robot touch each other: by its primitives, and by its meshes' hulls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    CollisionFilterDeclaration,
+    CollisionFilterManager,
+    Convex,
+    Cylinder,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.geometry import surface_geometries, welded_top
+from tcs.model.robots.kinematic import robot_urdf
+from tcs.model.robots.meshes import as_obj
+from tcs.model.robots.primitives import Primitive
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.urdf import Geometry, Urdf
+
+FloatArray = NDArray[np.float64]
+BodyPair = tuple[str, str]
+
+DRAWS = 500
+"""Random postures among which one that is free is looked for."""
+
+MARGIN = 0.001
+"""Primitives closer than this [m] touch: what scoring counts as contact unless a room says more."""
+
+
+class SelfCollision:
+    """A robot alone, as a Drake plant that tells which of its bodies touch.
+
+    Every pair of bodies is compared, disabled or not, but for those that are welded together.
+    """
+
+    def __init__(self, robot: RobotFile, *, hulls: bool = False) -> None:
+        """Build the plant, every joint at the middle of its limits.
+
+        Args:
+            robot: The robot.
+            hulls: Compare the convex hulls of the original geometry instead of the primitives.
+
+        Raises:
+            RobotError: If the robot's model cannot be used.
+        """
+        model = robot.model()
+        builder = DiagramBuilder()
+        # A continuous plant: nothing is simulated.
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+        Parser(plant).AddModelsFromString(robot_urdf(robot), "urdf")
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(robot.root_body))
+        add = _Adder(plant)
+        if hulls:
+            _add_hulls(add, model)
+        for primitive in robot.load_primitives():
+            # Extra bodies have no mesh: their primitives are all there is.
+            if not hulls or primitive.body not in model.links:
+                add.primitive(primitive if hulls else primitive.shrunk(-MARGIN / 2))
+        plant.Finalize()
+        self._bodies = add.bodies
+        _compare_all_but_welded(scene_graph.collision_filter_manager(), self._bodies, robot)
+        joints = (plant.get_joint(index) for index in plant.GetJointIndices())
+        self._starts = {j.name(): j.position_start() for j in joints if j.num_positions() == 1}
+        self._plant = plant
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+        self._state = plant.GetMyMutableContextFromRoot(self._context)
+        self._query_port = scene_graph.get_query_output_port()
+        self._query_context = scene_graph.GetMyContextFromRoot(self._context)
+
+    def touching(self, positions: Mapping[str, float]) -> frozenset[BodyPair]:
+        """Return the pairs of bodies that touch, each sorted by name.
+
+        Primitives touch when they come closer than `MARGIN`, hulls when they overlap.
+
+        Args:
+            positions: Joints [rad or m]; those not named stay where they were.
+        """
+        q = self._plant.GetPositions(self._state).copy()
+        for name, value in positions.items():
+            q[self._starts[name]] = value
+        self._plant.SetPositions(self._state, q)
+        contacts = self._query_port.Eval(self._query_context).ComputePointPairPenetration()
+        return frozenset(_pair(self._bodies[c.id_A], self._bodies[c.id_B]) for c in contacts)
+
+
+def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
+    """Return a posture of the scored arm in which no pair that scoring checks touches [rad].
+
+    Everything at 0, or at the nearest limit, is tried first, then the middle of every range, then
+    random postures; the torso is down.
+
+    Args:
+        robot: The robot.
+        seed: Seed of the draws.
+
+    Returns:
+        Positions by joint: none where 0 will do; None when nothing tried is free.
+    """
+    model, limits = model_with_extras(robot), robot.joint_limits()
+    moved, hand = (
+        {body for body in model.links if model.chain(model.joints[name].child, body) is not None}
+        for name in (robot.arm_joints[0], robot.arm_joints[-1])
+    )
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    judge, standing = SelfCollision(robot), robot.joint_positions()
+    bounded = {name: tuple(np.clip(limits[name], -np.pi, np.pi)) for name in robot.arm_joints}
+    middle = {name: float(np.mean(pair)) for name, pair in bounded.items()}
+    draws = (
+        {name: sample[name] for name in robot.arm_joints}
+        for sample in sample_positions(robot, DRAWS, seed)
+    )
+    for drawn in ({}, middle, *draws):
+        # As it will be written: with few digits, and still within limits.
+        arm = {name: float(np.clip(round(q, 4), *limits[name])) for name, q in drawn.items()}
+        touching = judge.touching(robot.with_mimics({**standing, **arm}))
+        checked = (pair for pair in touching if moved & set(pair) and not set(pair) <= hand)
+        if not any(frozenset(pair) not in off for pair in checked):
+            return arm
+    return None
+
+
+def sample_positions(robot: RobotFile, count: int, seed: int) -> list[dict[str, float]]:
+    """Return postures spread uniformly over every joint's limits in force [rad or m].
+
+    Arm, torso, head, other arm and grippers all move; joints that mimic another follow it, and
+    those that turn on and on take one full turn.
+
+    Args:
+        robot: The robot.
+        count: How many postures.
+        seed: Seed of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    joints = robot.model().joints
+    limits = robot.joint_limits()
+    free = [name for name in limits if joints[name].mimic is None]
+    lower = np.array([max(limits[name][0], -np.pi) for name in free])
+    upper = np.array([min(limits[name][1], np.pi) for name in free])
+    return [
+        robot.with_mimics(dict(zip(free, map(float, draw), strict=True)))
+        for draw in rng.uniform(lower, upper, size=(count, len(free)))
+    ]
+
+
+class _Adder:
+    """Registers collision shapes and remembers whose they are."""
+
+    def __init__(self, plant: MultibodyPlant) -> None:
+        self.plant = plant
+        self.bodies: dict[GeometryId, str] = {}
+
+    def primitive(self, primitive: Primitive) -> None:
+        rotation = RotationMatrix(primitive.rotation)
+        kinds: dict[str, type[Sphere] | type[Capsule] | type[Box]] = {
+            "sphere": Sphere,
+            "capsule": Capsule,
+            "box": Box,
+        }
+        shape = kinds[primitive.kind](*primitive.size)
+        self.shape(primitive.body, RigidTransform(rotation, primitive.xyz), shape)
+
+    def shape(self, body: str, X_BS: RigidTransform, shape: Shape) -> None:
+        geometry = self.plant.RegisterCollisionGeometry(
+            self.plant.GetBodyByName(body),
+            X_BS,
+            shape,
+            f"{body} {len(self.bodies)}",
+            ProximityProperties(),
+        )
+        self.bodies[geometry] = body
+
+
+def _add_hulls(add: _Adder, model: Urdf) -> None:
+    for body in model.links:
+        for geometry in surface_geometries(model, body):
+            pose = RigidTransform(RollPitchYaw(geometry.rpy), geometry.xyz)
+            add.shape(body, pose, _hull_of(geometry))
+
+
+def _hull_of(geometry: Geometry) -> Shape:
+    if geometry.mesh is not None:
+        obj: Path = as_obj(geometry.mesh)
+        return Convex(str(obj), np.array(geometry.size))
+    if geometry.shape == "box":
+        return Box(*geometry.size)
+    if geometry.shape == "sphere":
+        return Sphere(*geometry.size)
+    return Cylinder(*geometry.size)
+
+
+def _compare_all_but_welded(
+    manager: CollisionFilterManager, bodies: Mapping[GeometryId, str], robot: RobotFile
+) -> None:
+    """Undo Drake's own filter, which drops neighbours across a joint, but for welded bodies."""
+    model = robot.model()
+    carriers = {extra.name: extra.parent for extra in (*robot.frames, *robot.bodies)}
+    groups: dict[str, list[GeometryId]] = {}
+    for geometry, body in bodies.items():
+        while body in carriers:
+            body = carriers[body]
+        groups.setdefault(welded_top(model, body)[0], []).append(geometry)
+    sets = [GeometrySet(group) for group in groups.values()]
+    for i, first in enumerate(sets):
+        for second in sets[i + 1 :]:
+            manager.Apply(CollisionFilterDeclaration().AllowBetween(first, second))
+        manager.Apply(CollisionFilterDeclaration().ExcludeWithin(first))
+
+
+def _pair(first: str, second: str) -> BodyPair:
+    return (first, second) if first <= second else (second, first)

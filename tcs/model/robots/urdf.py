@@ -1,0 +1,350 @@
+"""What `tcs` reads from a URDF: joints with their soft limits, links and their geometry."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Literal
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.model.robots.packages import resolve_uri
+
+Vector = tuple[float, float, float]
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+"""Joint types with one degree of freedom; every other joint but `fixed` is refused."""
+_XACRO = "{http://www.ros.org/wiki/xacro}"
+"""The namespace of macros that a URDF is generated from."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mimic:
+    """A joint that follows another: q = multiplier * q_leader + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """One joint of a URDF [m or rad]."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    xyz: Vector
+    """Origin of the joint in the parent link [m]."""
+    rpy: Vector
+    """Roll, pitch, yaw about the parent's fixed axes [rad]."""
+    axis: Vector
+    hard: tuple[float, float]
+    """The `limit` element; infinite where continuous."""
+    soft: tuple[float, float]
+    """The `safety_controller` element within the hard limits; the hard ones without it."""
+    mimic: Mimic | None
+    velocity: float = math.inf
+    """How fast it may move by the `limit` element [m/s or rad/s]; infinite where that says none."""
+
+    @property
+    def is_movable(self) -> bool:
+        """Whether the joint has a degree of freedom."""
+        return self.type in MOVABLE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Geometry:
+    """One visual or collision geometry of a link."""
+
+    role: Literal["visual", "collision"]
+    shape: Literal["mesh", "box", "cylinder", "sphere"]
+    size: tuple[float, ...]
+    """Mesh: scale (3). Box: full sizes (3) [m]. Cylinder: radius, length [m]. Sphere: radius."""
+    mesh: Path | None
+    xyz: Vector
+    """Origin in the link [m]."""
+    rpy: Vector
+    """Roll, pitch, yaw about the link's fixed axes [rad]."""
+    rgba: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """The tree of a robot: links, joints, geometry."""
+
+    path: Path
+    links: Mapping[str, tuple[Geometry, ...]]
+    joints: Mapping[str, Joint]
+
+    @cached_property
+    def parent_joints(self) -> Mapping[str, Joint]:
+        """The joint above each link, by link name; the root has none."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @property
+    def root(self) -> str:
+        """Name of the link that nothing carries."""
+        return next(link for link in self.links if link not in self.parent_joints)
+
+    def joint(self, name: str, where: str) -> Joint:
+        """Return a joint by name.
+
+        Raises:
+            UnknownNameError: If there is none; `where` begins its message.
+        """
+        try:
+            return self.joints[name]
+        except KeyError:
+            raise UnknownNameError("joint", name, self.joints, where=where) from None
+
+    def chain(self, base: str, tip: str) -> tuple[Joint, ...] | None:
+        """Return the joints from link `base` out to link `tip`, None if `tip` hangs elsewhere."""
+        joints: list[Joint] = []
+        link = tip
+        while link != base:
+            joint = self.parent_joints.get(link)
+            if joint is None:
+                return None
+            joints.append(joint)
+            link = joint.parent
+        return tuple(reversed(joints))
+
+
+@cache
+def read_urdf(path: Path) -> Urdf:
+    """Return links and joints of a URDF file.
+
+    Args:
+        path: The file; read once in a process.
+
+    Raises:
+        RobotError: If it cannot be read, is no URDF, names a mesh that is not there, or its joints
+            form no tree.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except OSError as error:
+        raise RobotError(f"URDF '{path}' cannot be read: {error.strerror}.") from error
+    except ElementTree.ParseError as error:
+        raise RobotError(f"URDF '{path}' is no sound XML: {error}.") from error
+    if root.tag != "robot":
+        raise RobotError(f"URDF '{path}': the root element is '{root.tag}', but must be 'robot'.")
+    if any(element.tag.startswith(_XACRO) for element in root.iter()):
+        raise RobotError(
+            f"URDF '{path}' holds xacro macros. Expand them first: xacro {path.name} > robot.urdf"
+        )
+    colours = {
+        element.get("name", ""): colour
+        for element in root.findall("material")
+        if (colour := _colour(element, path)) is not None
+    }
+
+    def geometry(element: ElementTree.Element) -> Geometry | None:
+        return _geometry(element, colours, path)
+
+    links: dict[str, tuple[Geometry, ...]] = {}
+    for link in root.findall("link"):
+        elements = (*link.findall("visual"), *link.findall("collision"))
+        links[_attribute(link, "name", path)] = tuple(
+            found for element in elements if (found := geometry(element)) is not None
+        )
+    joints = {j.name: j for j in (_joint(element, path) for element in root.findall("joint"))}
+    model = Urdf(path=path, links=links, joints=joints)
+    _check_tree(model)
+    return model
+
+
+def _check_tree(model: Urdf) -> None:
+    """Refuse a model whose joints name unknown links or form no single tree."""
+    for joint in model.joints.values():
+        for link in (joint.parent, joint.child):
+            if link not in model.links:
+                where = f"URDF '{model.path}', joint '{joint.name}'"
+                raise UnknownNameError("link", link, model.links, where=where)
+        _check_mimic(model, joint)
+    roots = [link for link in model.links if link not in model.parent_joints]
+    # One joint above every link but the root: then whatever hangs nowhere runs in a circle.
+    adrift = len(roots) != 1 or len(model.parent_joints) != len(model.joints)
+    if adrift or not all(_reaches_root(model, link) for link in model.links):
+        raise RobotError(
+            f"URDF '{model.path}': its joints form no single tree "
+            f"(links that nothing carries: {', '.join(roots) or 'none'})."
+        )
+
+
+def _reaches_root(model: Urdf, link: str) -> bool:
+    for _ in model.links:
+        if link not in model.parent_joints:
+            return True
+        link = model.parent_joints[link].parent
+    return False
+
+
+def _check_mimic(model: Urdf, joint: Joint) -> None:
+    """Refuse a joint that follows an unknown or fixed one, or at last itself."""
+    where = f"URDF '{model.path}', joint '{joint.name}', mimic"
+    seen = {joint.name}
+    while joint.mimic is not None:
+        joint = model.joint(joint.mimic.leader, where)
+        if joint.name in seen or not joint.is_movable:
+            raise RobotError(f"{where}: '{joint.name}' must be another joint, and movable.")
+        seen.add(joint.name)
+
+
+def _joint(element: ElementTree.Element, path: Path) -> Joint:
+    name = _attribute(element, "name", path)
+    where = f"URDF '{path}', joint '{name}'"
+    kind = element.get("type", "")
+    if kind not in (*MOVABLE, "fixed"):
+        raise RobotError(
+            f"{where}: type '{kind}' is not supported, only {', '.join(MOVABLE)} and fixed."
+        )
+    ends = {}
+    for end in ("parent", "child"):
+        found = element.find(end)
+        if found is None:
+            raise RobotError(f"{where}: there is no '{end}' element.")
+        ends[end] = _attribute(found, "link", path)
+    hard = _hard_limits(element, kind, where)
+    xyz, rpy = _origin(element, where)
+    axis = element.find("axis")
+    return Joint(
+        name=name,
+        type=kind,
+        parent=ends["parent"],
+        child=ends["child"],
+        xyz=xyz,
+        rpy=rpy,
+        axis=_vector(axis, "xyz", (1.0, 0.0, 0.0), where),
+        hard=hard,
+        soft=_soft_limits(element, hard, where),
+        mimic=_mimic(element, where),
+        velocity=_velocity(element, where),
+    )
+
+
+def _hard_limits(element: ElementTree.Element, kind: str, where: str) -> tuple[float, float]:
+    if kind == "fixed":
+        return 0.0, 0.0
+    if kind == "continuous":
+        return -math.inf, math.inf
+    limit = element.find("limit")
+    if limit is None:
+        raise RobotError(f"{where}: a {kind} joint needs a 'limit' element.")
+    # The URDF specification takes a missing bound as 0.
+    lower, upper = (_numbers(limit.get(key, "0"), 1, where)[0] for key in ("lower", "upper"))
+    if lower > upper:
+        raise RobotError(f"{where}: its lower limit {lower} is above its upper limit {upper}.")
+    return lower, upper
+
+
+def _velocity(element: ElementTree.Element, where: str) -> float:
+    limit = element.find("limit")
+    text = "0" if limit is None else limit.get("velocity", "0")
+    # Exporters write 0 where they know no velocity; a joint that may not move would be fixed.
+    speed = _numbers(text, 1, where)[0]
+    return speed if speed > 0.0 else math.inf
+
+
+def _soft_limits(
+    element: ElementTree.Element, hard: tuple[float, float], where: str
+) -> tuple[float, float]:
+    safety = element.find("safety_controller")
+    # A safety controller without positions limits the velocity only.
+    if safety is None or not {"soft_lower_limit", "soft_upper_limit"} <= safety.attrib.keys():
+        return hard
+    lower, upper = (
+        _numbers(safety.get(key, ""), 1, where)[0]
+        for key in ("soft_lower_limit", "soft_upper_limit")
+    )
+    lower, upper = max(lower, hard[0]), min(upper, hard[1])
+    if lower > upper:
+        raise RobotError(f"{where}: its soft limits leave no position within the hard ones.")
+    return lower, upper
+
+
+def _mimic(element: ElementTree.Element, where: str) -> Mimic | None:
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    return Mimic(
+        leader=mimic.get("joint", ""),
+        multiplier=_numbers(mimic.get("multiplier", "1"), 1, where)[0],
+        offset=_numbers(mimic.get("offset", "0"), 1, where)[0],
+    )
+
+
+def _geometry(
+    element: ElementTree.Element, colours: Mapping[str, tuple[float, ...]], path: Path
+) -> Geometry | None:
+    where = f"URDF '{path}'"
+    holder = element.find("geometry")
+    if holder is None or len(holder) == 0:
+        return None
+    shape = holder[0]
+    mesh: Path | None = None
+    if shape.tag == "mesh":
+        size: tuple[float, ...] = _vector(shape, "scale", (1.0, 1.0, 1.0), where)
+        mesh = resolve_uri(_attribute(shape, "filename", path), path.parent)
+    elif shape.tag == "box":
+        size = _vector(shape, "size", (0.0, 0.0, 0.0), where)
+    elif shape.tag == "cylinder":
+        size = tuple(_numbers(shape.get(key, ""), 1, where)[0] for key in ("radius", "length"))
+    elif shape.tag == "sphere":
+        size = _numbers(shape.get("radius", ""), 1, where)
+    else:
+        raise RobotError(f"{where}: geometry '{shape.tag}' is none of mesh, box, cylinder, sphere.")
+    xyz, rpy = _origin(element, where)
+    material = element.find("material")
+    rgba = None
+    if material is not None:
+        rgba = _colour(material, path) or colours.get(material.get("name", ""))
+    return Geometry(
+        role="visual" if element.tag == "visual" else "collision",
+        shape=shape.tag,  # type: ignore[arg-type]  # one of the four tested above
+        size=size,
+        mesh=mesh,
+        xyz=xyz,
+        rpy=rpy,
+        rgba=rgba,  # type: ignore[arg-type]  # four numbers, see _colour
+    )
+
+
+def _colour(material: ElementTree.Element, path: Path) -> tuple[float, ...] | None:
+    colour = material.find("color")
+    return None if colour is None else _numbers(colour.get("rgba", ""), 4, f"URDF '{path}'")
+
+
+def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
+    origin = element.find("origin")
+    zero = (0.0, 0.0, 0.0)
+    return _vector(origin, "xyz", zero, where), _vector(origin, "rpy", zero, where)
+
+
+def _vector(element: ElementTree.Element | None, key: str, default: Vector, where: str) -> Vector:
+    if element is None or key not in element.attrib:
+        return default
+    x, y, z = _numbers(element.get(key, ""), 3, where)
+    return x, y, z
+
+
+def _numbers(text: str, count: int, where: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(word) for word in text.split())
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
+        raise RobotError(f"{where}: '{text}' must be {count} finite number(s).")
+    return numbers
+
+
+def _attribute(element: ElementTree.Element, key: str, path: Path) -> str:
+    value = element.get(key)
+    if not value:
+        raise RobotError(f"URDF '{path}': a '{element.tag}' element has no '{key}'.")
+    return value

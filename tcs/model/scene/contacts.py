@@ -1,0 +1,145 @@
+"""Which contacts are checked: one rule, used by Drake's filter and by the lowered arrays alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    SceneGraph,
+    SceneGraphInspector,
+    Sphere,
+)
+from pydrake.multibody.tree import BodyIndex
+
+from tcs.errors import EnvironmentFileError, UnknownNameError
+from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
+from tcs.model.scene.environment import FLOOR
+
+
+class Group(Enum):
+    """What a collision shape belongs to."""
+
+    ARM = "arm"
+    """The scored arm and what it carries."""
+    BODY = "body"
+    """The rest of the robot."""
+    ROOM = "room"
+    """Furniture, person, obstacles, floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One collision shape of the scene and what it belongs to."""
+
+    geometry: GeometryId
+    body: BodyIndex
+    group: Group
+    carrier: int
+    """Arm: 1..7, the link that carries it. Body: 1 if it rides on the torso, else 0. Room: 0."""
+    name: str
+    """What a blocked configuration is blamed on, e.g. "person::head_center"."""
+    pad: float
+    """How far the true surface may stand out of the shape [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactRule:
+    """Which pairs of shapes count as collision.
+
+    Checked: the arm against itself, the rest of the robot and the room; the rest of the robot
+    against the room, except the floor it stands on. The rest of the robot keeps its posture, and
+    the room stands still, so neither is checked against itself.
+
+    Attributes:
+        disabled_pairs: Pairs of robot bodies never checked (the robot file's).
+        allowed_contacts: Pairs of a robot body and a room body that may touch (the task's).
+    """
+
+    disabled_pairs: frozenset[frozenset[str]]
+    allowed_contacts: frozenset[frozenset[str]]
+
+    @classmethod
+    def of(
+        cls,
+        parts: Iterable[Part],
+        disabled_pairs: Iterable[tuple[str, str]],
+        allowed_contacts: Iterable[tuple[str, str]],
+        *,
+        where: str,
+    ) -> ContactRule:
+        """Return the rule for a robot's disabled pairs and a task's allowed contacts.
+
+        Args:
+            parts: Every part of the scene, to know which names there are.
+            disabled_pairs: Pairs of robot bodies that are never checked.
+            allowed_contacts: Pairs (robot body, room body) that may touch.
+            where: Where the allowed contacts stand, for the message.
+
+        Raises:
+            UnknownNameError: If an allowed contact names a body that has no shape in the scene.
+        """
+        robot_names, room_names = set[str](), set[str]()
+        for part in parts:
+            (room_names if part.group is Group.ROOM else robot_names).add(part.name)
+        allowed = []
+        for robot_body, room_body in allowed_contacts:
+            if robot_body not in robot_names:
+                raise UnknownNameError("robot body", robot_body, robot_names, where=where)
+            if room_body not in room_names:
+                raise UnknownNameError("room body", room_body, room_names, where=where)
+            allowed.append(frozenset((robot_body, room_body)))
+        return cls(
+            disabled_pairs=frozenset(frozenset(pair) for pair in disabled_pairs),
+            allowed_contacts=frozenset(allowed),
+        )
+
+    def is_checked(self, first: Part, second: Part) -> bool:
+        """Return whether contact between two parts counts, in either order."""
+        groups = {first.group, second.group}
+        names = frozenset((first.name, second.name))
+        if groups in ({Group.ROOM}, {Group.BODY}):
+            return False
+        if Group.ROOM not in groups:
+            moves = groups == {Group.ARM, Group.BODY} or first.carrier != second.carrier
+            return moves and names not in self.disabled_pairs
+        if groups == {Group.BODY, Group.ROOM} and FLOOR in names:
+            return False
+        return names not in self.allowed_contacts
+
+
+def apply_rule(scene_graph: SceneGraph, parts: tuple[Part, ...], rule: ContactRule) -> None:
+    """Make Drake check exactly the pairs that the rule says."""
+    everything = GeometrySet([part.geometry for part in parts])
+    declaration = CollisionFilterDeclaration().ExcludeWithin(everything)
+    for i, part in enumerate(parts):
+        partners = [p.geometry for p in parts[i + 1 :] if rule.is_checked(part, p)]
+        if partners:
+            declaration.AllowBetween(GeometrySet([part.geometry]), GeometrySet(partners))
+    scene_graph.collision_filter_manager().Apply(declaration)
+
+
+def shape_of(inspector: SceneGraphInspector, part: Part) -> tuple[int, tuple[float, float, float]]:
+    """Return kind and size of a part's shape, in the kernel's terms [m].
+
+    Raises:
+        EnvironmentFileError: If it is of a kind that the kernel does not know.
+    """
+    shape = inspector.GetShape(part.geometry)
+    if isinstance(shape, Sphere):
+        return SPHERE, (shape.radius(), 0.0, 0.0)
+    if isinstance(shape, Capsule):
+        return CAPSULE, (shape.radius(), shape.length() / 2, 0.0)
+    if isinstance(shape, Box):
+        return BOX, (shape.width() / 2, shape.depth() / 2, shape.height() / 2)
+    raise EnvironmentFileError(
+        f"'{part.name}': collision shape '{inspector.GetName(part.geometry)}' is a "
+        f"{type(shape).__name__}, but must be a Box, Capsule or Sphere. "
+        "Put boxes or capsules that enclose it in its place."
+    )

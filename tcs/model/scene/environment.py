@@ -1,0 +1,247 @@
+"""Environment files: furniture, person, the user's own obstacles, grid and error model, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from tcs.errors import EnvironmentFileError, GridError
+from tcs.files.documents import (
+    Document,
+    Length,
+    Number,
+    Placed,
+    PositiveNumber,
+    checked,
+    read_mapping,
+)
+from tcs.files.paths import data_folder, named_file, shipped_files
+from tcs.model.grid import Axis, Grid
+from tcs.model.scene.joint_error import JointError
+from tcs.model.scene.posture import Posture
+
+FLOOR = "floor"
+"""Name under which the floor is reported."""
+BASED_ON = "based_on"
+"""Key of a file that takes over whatever it does not say itself from another environment."""
+WORLD = "world"
+"""Name of the environment frame W as a parent."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
+
+
+class _NamedPlace(Placed):
+    """Something named that stands in its parent's frame."""
+
+    name: Name
+
+
+class ModelEntry(_NamedPlace):
+    """An SDFormat model that is part of the environment."""
+
+    file: str
+    parent: str = WORLD
+    """Where its root link is fixed: "world" or "model::link"."""
+    named_by: Literal["link", "collision"] = "collision"
+    """What a blocked configuration is blamed on: the link, or the single collision shape."""
+
+
+class Obstacle(_NamedPlace):
+    """An obstacle of the user's own: a box, or any SDFormat model, fixed to the world."""
+
+    box: tuple[PositiveNumber, PositiveNumber, PositiveNumber] | None = None
+    """Full sizes along its own x, y, z [m]."""
+    file: str | None = None
+
+    @model_validator(mode="after")
+    def _is_box_or_file(self) -> Self:
+        if (self.box is None) == (self.file is None):
+            raise ValueError("give either 'box: [x, y, z]' or 'file: some.sdf'")
+        return self
+
+
+E = TypeVar("E", ModelEntry, Obstacle)
+
+
+class EnvironmentFile(Document):
+    """Everything that surrounds the robot, as its file says it."""
+
+    name: Name
+    title: str
+    origin: str
+    """Where the origin of W is and where its axes point, in words."""
+    source: str
+    models: tuple[ModelEntry, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    floor: bool = True
+    """A floor at z = 0 that the arm must not touch; what stands on it is exempt."""
+    joints: Mapping[str, Number] = {}
+    """Joint positions that differ from 0 [m or rad]."""
+    posture: Mapping[str, Posture] = {}
+    """For each joint that others follow, e.g. a head rest, where those others stand."""
+    body_frames: Mapping[str, str] = {}
+    """Names that goals use for parts of the person, each a "model::link"."""
+    padding: Mapping[str, Length] = {}
+    """How far the true surface may stand out of a link's shapes, by "model::link" [m]."""
+    contact_margin: Length = 0.001
+    """Contacts closer than this count as collision [m]."""
+    grid: Mapping[str, Mapping[str, Any]]
+    """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis that is
+    none of the robot's moves the joint of its name."""
+    observed: Mapping[str, Mapping[str, Any]] = {}
+    """Axes that the robot finds as they are and cannot choose, in the same form: the joint of that
+    name is scored at each of the values."""
+    errors: Mapping[str, JointError] = {}
+    """How far off each joint may be (Table II of the TCS paper)."""
+
+    @model_validator(mode="after")
+    def _names_are_distinct(self) -> Self:
+        names = [WORLD, FLOOR]
+        for entry in self.placed:
+            if entry.name in names:
+                raise ValueError(f"name '{entry.name}' is used twice or reserved; rename one")
+            names.append(entry.name)
+        return self
+
+    @model_validator(mode="after")
+    def _a_joint_follows_one_other(self) -> Self:
+        leader_of: dict[str, str] = {}
+        for leader, posture in self.posture.items():
+            for name in posture.joints:
+                if name in self.posture:
+                    raise ValueError(f"posture: '{name}' follows '{leader}' and leads others")
+                if name in leader_of:
+                    both = f"'{leader_of[name]}' and '{leader}'"
+                    raise ValueError(f"posture: '{name}' follows {both}; it can follow one")
+                leader_of[name] = leader
+        for field in ("joints", "errors", "grid", "observed"):
+            for name in getattr(self, field):
+                if name in leader_of:
+                    raise ValueError(
+                        f"{field}: '{name}' follows '{leader_of[name]}', so it cannot be set by "
+                        "hand; take it out here or under 'posture'"
+                    )
+        return self
+
+    @property
+    def observed_axes(self) -> tuple[Axis, ...]:
+        """The axes under `observed`, in the order they are written in."""
+        return tuple(
+            Axis.from_dict({**plain, "name": name}) for name, plain in self.observed.items()
+        )
+
+    @property
+    def placed(self) -> tuple[ModelEntry | Obstacle, ...]:
+        """Models, then obstacles."""
+        return (*self.models, *self.obstacles)
+
+    def __hash__(self) -> int:
+        """Hash the content; pydantic's own hash stumbles over the mappings."""
+        return hash(self.model_dump_json())
+
+
+NOWHERE = EnvironmentFile(
+    name="nowhere",
+    title="Nothing at all",
+    origin="the robot's base",
+    source="none: there is nothing in it",
+    floor=False,
+    grid={},
+)
+"""For a robot by itself: not even a floor."""
+
+
+def environment_names() -> tuple[str, ...]:
+    """Return the names of the environments that ship with `tcs`, sorted."""
+    return tuple(_shipped())
+
+
+def load_environment(name_or_path: str | Path) -> EnvironmentFile:
+    """Return an environment, its model files resolved to absolute paths.
+
+    Args:
+        name_or_path: One of `environment_names()`, or the path of a file: anything that ends in
+            `.yaml` or holds a path separator. Files it names are looked for beside it, then in
+            the data folder.
+
+    Raises:
+        UnknownNameError: If no environment has that name, or a key in the file is not known.
+        EnvironmentFileError: If the file cannot be read or says something impossible.
+        GridError: If its grid is none, or an observed axis is none.
+
+    >>> load_environment("wheelchair").body_frames["head"]
+    'person::head_center'
+    """
+    return _read(named_file("environment", name_or_path, _shipped()).absolute())
+
+
+def _shipped() -> dict[str, Path]:
+    return shipped_files("models/beds_wheelchairs/*.yaml")
+
+
+def _folder() -> Path:
+    return data_folder() / "models" / "beds_wheelchairs"
+
+
+def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
+    """Return the environment of a file; `above` are the files that are based on it."""
+    where = f"environment file '{path}'"
+    known = (*EnvironmentFile.model_fields, BASED_ON)
+    content = read_mapping(path, where, EnvironmentFileError, known=known)
+    base = content.pop(BASED_ON, None)
+    if base is not None:
+        content = {**_base(str(base), path, above).model_dump(), **content}
+    environment = checked(
+        content, EnvironmentFile, where, EnvironmentFileError, also_known=(BASED_ON,)
+    )
+    # Only to refuse a bad grid here, where the file's name can be given.
+    Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
+    _check_observed(environment, where=f"{where}, field 'observed'")
+    return _with_files_resolved(environment, path)
+
+
+def _check_observed(environment: EnvironmentFile, where: str) -> None:
+    """Refuse observed axes that are none, or that the grid has as well."""
+    for name, plain in environment.observed.items():
+        Axis.from_dict({**plain, "name": name}, where=where)
+        if name in environment.grid:
+            raise GridError(
+                f"{where}: axis '{name}' is one of the grid's too. The robot either chooses it "
+                "('grid') or finds it ('observed'): take it out of one of them."
+            )
+
+
+def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> EnvironmentFile:
+    """Return the environment that the file at `path` is based on."""
+    chain = (*above, path)
+    where = f"environment file '{path}', field '{BASED_ON}'"
+    base = named_file("environment", name_or_path, _shipped(), beside=path.parent, where=where)
+    base = base.absolute()
+    if base.resolve() in [file.resolve() for file in chain]:
+        raise EnvironmentFileError(
+            f"{where}: '{name_or_path}' is based on this file in turn. Name another one."
+        )
+    return _read(base, chain)
+
+
+def _with_files_resolved(environment: EnvironmentFile, path: Path) -> EnvironmentFile:
+    def resolved(entry: E, field: str) -> E:
+        if entry.file is None:
+            return entry
+        places = (path.parent, _folder(), data_folder())
+        for place in places:
+            candidate = (place / Path(entry.file).expanduser()).resolve()
+            if candidate.is_file():
+                return entry.model_copy(update={"file": str(candidate)})
+        looked = ", ".join(f"'{place}'" for place in places)
+        raise EnvironmentFileError(
+            f"environment file '{path}', field '{field}.file': '{entry.file}' is in none of "
+            f"{looked}. Give a path from the file's own folder, or an absolute one."
+        )
+
+    models = tuple(resolved(m, f"models[{i}]") for i, m in enumerate(environment.models))
+    obstacles = tuple(resolved(o, f"obstacles[{i}]") for i, o in enumerate(environment.obstacles))
+    return environment.model_copy(update={"models": models, "obstacles": obstacles})

@@ -1,0 +1,358 @@
+"""From a Drake plant to the arrays that the kernel scores: nothing here is typed in by hand."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.tree import Frame
+
+from tcs.errors import UnknownNameError
+from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArrays, Shapes
+from tcs.model.grid import Grid
+from tcs.model.scene.chain import Axis, link_frames
+from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
+from tcs.model.scene.scene import Scene
+from tcs.model.tasks import Task
+
+T = TypeVar("T", SceneArrays, GridArrays)
+
+_DIGEST_DECIMALS = 9
+"""Arrays are hashed as multiples of a nanometre (or nanoradian): far below any change of a model,
+far above what another processor's rounding alters."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoweredScene:
+    """A scene, its goals and its grid as plain arrays, and the names behind their indices.
+
+    Attributes:
+        arrays: Everything the kernel needs to score one configuration.
+        grid: The configurations to score.
+        robot_bodies: Names that `body` of the arm's and the robot's shapes refers to.
+        room_bodies: Names that `body` of the room's shapes refers to.
+        goals: Names of the goals, in order.
+    """
+
+    arrays: SceneArrays
+    grid: GridArrays
+    robot_bodies: tuple[str, ...]
+    room_bodies: tuple[str, ...]
+    goals: tuple[str, ...]
+
+    def digest(self) -> str:
+        """Return the SHA-256 of all arrays and names, as hexadecimal digits.
+
+        Two scenes of the same digest give the same scores.
+        """
+        sha = hashlib.sha256()
+        for item in _flat((self.arrays, self.grid)):
+            array = np.asarray(item)
+            if array.dtype.kind == "f":
+                # Adding 0.0 turns -0.0 into 0.0, which is equal and must hash so.
+                array = np.round(array.astype("<f8"), _DIGEST_DECIMALS) + 0.0
+            else:
+                array = array.astype("<i8")
+            sha.update(repr(array.shape).encode())
+            sha.update(array.tobytes())
+        sha.update(repr((self.robot_bodies, self.room_bodies, self.goals)).encode())
+        return sha.hexdigest()
+
+
+def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
+    """Return the arrays of a scene for a task, read off its Drake plant and scene graph.
+
+    Args:
+        scene: The scene; its state is left as it was.
+        task: The goals, and the contacts the task allows; None for arrays that have no goals yet.
+        grid: The configurations; axes besides the robot's move the environment's joints of the
+            same name.
+
+    Raises:
+        UnknownNameError: If a goal rides on a body frame that the environment does not have, the
+            task allows contact between bodies that are not there, or a grid axis is no joint.
+        GridError: If a grid axis goes beyond its joint's limits, or is of another unit.
+        EnvironmentFileError: If a shape is of a kind the kernel does not know.
+    """
+    before = scene.positions()
+    try:
+        return _lowered(scene, task, grid)
+    finally:
+        scene.restore(before)
+
+
+def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
+    built = scene.built
+    environment = scene.spec.environment.name
+    where = f"environment '{environment}'"
+    if task is not None:
+        where = f"task '{task.name}', {where}"
+    rule = ContactRule.of(
+        built.parts,
+        scene.spec.robot.disabled_pairs,
+        () if task is None else task.allowed_contacts,
+        where=f"{where}, allowed contacts",
+    )
+    arm = [part for part in built.parts if part.group is Group.ARM]
+    body = [part for part in built.parts if part.group is Group.BODY]
+    room = [part for part in built.parts if part.group is Group.ROOM]
+    robot_bodies = _names([*arm, *body])
+    room_bodies = _names(room)
+
+    scene.place_base(0.0, 0.0, 0.0)
+    scene.set_arm(np.zeros(len(built.arm_joints)))
+    torso_levels = grid.axis("torso").values
+    chain, X_AL = arm_chain(scene)
+    arm_base, body_poses = _torso_states(scene, body, torso_levels)
+    for axis in grid.environment_axes:
+        built.room_joints.check_axis(axis, where=where)
+    room_poses, poses_of_goals = _environment_states(scene, room, task, _states_of(grid))
+
+    arrays = SceneArrays(
+        chain=chain,
+        arm_base_R=_rotations(_matrices([arm_base]))[0],
+        arm_base_p=_origins(_matrices([arm_base]))[0],
+        arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
+        body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
+        room=_shapes(scene, room, room_bodies, room_poses),
+        arm_vs_arm=_checked(rule, arm, arm),
+        arm_vs_body=_checked(rule, arm, body),
+        arm_vs_room=_checked(rule, arm, room),
+        body_vs_room=_checked(rule, body, room),
+        margin=scene.spec.environment.contact_margin,
+        goal_R=_rotations(poses_of_goals),
+        goal_p=_origins(poses_of_goals),
+    )
+    return LoweredScene(
+        arrays=_read_only(arrays),
+        grid=_read_only(
+            GridArrays(
+                environment_states=len(poses_of_goals),
+                base_x=grid.axis("base_x").values,
+                base_y=grid.axis("base_y").values,
+                base_yaw=grid.axis("base_yaw").values,
+                torso_levels=len(torso_levels),
+            )
+        ),
+        robot_bodies=robot_bodies,
+        room_bodies=room_bodies,
+        goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
+    )
+
+
+def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
+    """Return the arm's chain, and the poses of its link frames in A with all joints at zero.
+
+    Args:
+        scene: The scene, its arm at zero.
+    """
+    built, state = scene.built, scene.plant_context
+    axes = []
+    for joint in built.arm_joints:
+        X_AJ = joint.frame_on_child().CalcPose(state, built.arm_base_frame)
+        axes.append(Axis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
+    R_AL, p_AL = link_frames(tuple(axes))
+    X_AL = [_transform(R, p) for R, p in zip(R_AL, p_AL, strict=True)]
+    X_AT = built.tool_frame.CalcPose(state, built.arm_base_frame)
+    # At zero every Rz is the identity, so F[i] is what lies between neighbouring frames.
+    frames = [RigidTransform(), *X_AL, X_AT]
+    steps = [before.inverse() @ after for before, after in itertools.pairwise(frames)]
+    chain = Chain(
+        R=_rotations(_matrices([steps]))[0],
+        p=_origins(_matrices([steps]))[0],
+        lower=built.arm_lower,
+        upper=built.arm_upper,
+    )
+    return chain, X_AL
+
+
+def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> list[RigidTransform]:
+    """Return the poses of the arm's shapes in the link frames that carry them."""
+    query = scene.query_object()
+    X_WA = scene.built.arm_base_frame.CalcPoseInWorld(scene.plant_context)
+    poses = []
+    for part in parts:
+        X_WL = X_WA @ X_AL[part.carrier - 1]
+        poses.append(X_WL.inverse() @ query.GetPoseInWorld(part.geometry))
+    return poses
+
+
+def _torso_states(
+    scene: Scene, parts: list[Part], levels: FloatArray
+) -> tuple[list[RigidTransform], list[list[RigidTransform]]]:
+    """Return X_BA, and the poses of the rest of the robot in B, for each torso level."""
+    arm_base, poses = [], []
+    for level in levels:
+        scene.set_torso(float(level))
+        X_BW = scene.base_pose().inverse()
+        query = scene.query_object()
+        X_WA = scene.built.arm_base_frame.CalcPoseInWorld(scene.plant_context)
+        arm_base.append(X_BW @ X_WA)
+        poses.append([X_BW @ query.GetPoseInWorld(part.geometry) for part in parts])
+    return arm_base, poses
+
+
+def environment_at(
+    lowered: LoweredScene, scene: Scene, task: Task, states: Iterable[Mapping[str, float]]
+) -> SceneArrays:
+    """Return the arrays of a lowered scene with its environment in other states than the grid's.
+
+    Args:
+        lowered: The scene as arrays.
+        scene: The scene itself; its state is left as it was.
+        task: The goals.
+        states: Positions of the environment's joints by name [m or rad]; what one state does not
+            name stays as the state before has left it.
+
+    Returns:
+        Arrays of as many environment states; a state of the grid gives the very numbers that
+        lowering the grid gives.
+
+    Raises:
+        UnknownNameError: If there is no such joint.
+        TcsError: If a joint follows another one, or does not go that far.
+    """
+    before = scene.positions()
+    room = [part for part in scene.built.parts if part.group is Group.ROOM]
+    try:
+        room_poses, poses_of_goals = _environment_states(scene, room, task, states)
+    finally:
+        scene.restore(before)
+    moved = lowered.arrays.room._replace(R=_rotations(room_poses), p=_origins(room_poses))
+    return lowered.arrays._replace(
+        room=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
+    )
+
+
+def _states_of(grid: Grid) -> Iterator[dict[str, float]]:
+    """Yield the states of the environment in a grid, in its order."""
+    names = [axis.name for axis in grid.environment_axes]
+    for state in itertools.product(*(axis.values for axis in grid.environment_axes)):
+        yield {name: float(value) for name, value in zip(names, state, strict=True)}
+
+
+def _environment_states(
+    scene: Scene, parts: list[Part], task: Task | None, states: Iterable[Mapping[str, float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the poses in W of the room's shapes and of the goals, for each environment state.
+
+    Returns:
+        Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
+    """
+    riding = [] if task is None else _riding_goals(scene, task)
+    rooms, goals = [], []
+    for state in states:
+        for name, value in state.items():
+            scene.set_joint(name, value)
+        query = scene.query_object()
+        rooms.append([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
+        goals.append(
+            [
+                (frame.CalcPoseInWorld(scene.plant_context) @ X_HG).GetAsMatrix34()
+                for frame, X_HG in riding
+            ]
+        )
+    return _stacked(rooms, len(parts)), _stacked(goals, len(riding))
+
+
+def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
+    """Return X_WG of every goal of a task, at the scene's present state.
+
+    Raises:
+        UnknownNameError: If a goal rides on a body frame that the environment does not have.
+    """
+    return [
+        frame.CalcPoseInWorld(scene.plant_context) @ X_HG
+        for frame, X_HG in _riding_goals(scene, task)
+    ]
+
+
+def _riding_goals(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]]:
+    """Return the body frame H that each goal rides on, and its pose X_HG there.
+
+    Raises:
+        UnknownNameError: If the environment has no such body frame.
+    """
+    frames = scene.built.body_frames
+    found = []
+    for i, goal in enumerate(task.goals):
+        if goal.body_frame not in frames:
+            where = f"task '{task.name}', goal {i}, environment '{scene.spec.environment.name}'"
+            raise UnknownNameError("frame", goal.body_frame, frames, where=where)
+        X_HG = RigidTransform(Quaternion(goal.quaternion), goal.position)
+        found.append((frames[goal.body_frame], X_HG))
+    return found
+
+
+def _names(parts: list[Part]) -> tuple[str, ...]:
+    """Return the names of the parts, each once, in the order they first come."""
+    return tuple(dict.fromkeys(part.name for part in parts))
+
+
+def _shapes(scene: Scene, parts: list[Part], names: tuple[str, ...], states: FloatArray) -> Shapes:
+    """Return shapes at poses of shape (states, parts, 3, 4)."""
+    inspector = scene.built.scene_graph.model_inspector()
+    kinds_and_sizes = [shape_of(inspector, part) for part in parts]
+    index = {name: i for i, name in enumerate(names)}
+    return Shapes(
+        kind=np.array([kind for kind, _ in kinds_and_sizes], dtype=np.int8),
+        size=np.array([size for _, size in kinds_and_sizes], dtype=np.float64).reshape(-1, 3),
+        pad=np.array([part.pad for part in parts], dtype=np.float64),
+        body=np.array([index[part.name] for part in parts], dtype=np.int16),
+        frame=np.array([part.carrier for part in parts], dtype=np.int8),
+        R=_rotations(states),
+        p=_origins(states),
+    )
+
+
+def _checked(rule: ContactRule, first: list[Part], second: list[Part]) -> BoolArray:
+    """Return which pairs are checked, shape (first, second)."""
+    checked = [[a is not b and rule.is_checked(a, b) for b in second] for a in first]
+    return np.array(checked, dtype=np.bool_).reshape(len(first), len(second))
+
+
+def _matrices(states: list[list[RigidTransform]]) -> FloatArray:
+    """Return poses as matrices, shape (states, poses, 3, 4)."""
+    count = len(states[0]) if states else 0
+    return _stacked([[X.GetAsMatrix34() for X in poses] for poses in states], count)
+
+
+def _stacked(states: list[list[FloatArray]], count: int) -> FloatArray:
+    return np.array(states, dtype=np.float64).reshape(len(states), count, 3, 4)
+
+
+def _rotations(poses: FloatArray) -> FloatArray:
+    """Return the rotations of poses, shape (states, poses, 3, 3)."""
+    return np.ascontiguousarray(poses[..., :3])
+
+
+def _origins(poses: FloatArray) -> FloatArray:
+    """Return the origins of poses, shape (states, poses, 3)."""
+    return np.ascontiguousarray(poses[..., 3])
+
+
+def _transform(R: FloatArray, p: FloatArray) -> RigidTransform:
+    return RigidTransform(RotationMatrix(R), p)
+
+
+def _flat(item: object) -> Iterator[object]:
+    """Yield the leaves of nested named tuples, in order."""
+    if isinstance(item, tuple):
+        for member in item:
+            yield from _flat(member)
+    else:
+        yield item
+
+
+def _read_only(arrays: T) -> T:
+    """Return the same arrays, guarded against being written to."""
+    for leaf in _flat(arrays):
+        if isinstance(leaf, np.ndarray):
+            leaf.flags.writeable = False
+    return arrays

@@ -1,0 +1,231 @@
+"""The Drake plant of a scene: robot on planar base joints, environment, collision shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    GeometryId,
+    ProximityProperties,
+    SceneGraph,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    Joint,
+    ModelInstanceIndex,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+)
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from tcs.errors import RobotError
+from tcs.kernel.arrays import FloatArray
+from tcs.model.robots import Primitive, RobotFile, robot_urdf
+from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
+from tcs.model.scene.joints import RoomJoints
+from tcs.model.scene.room import add_room, room_parts
+from tcs.model.scene.spec import SceneSpec
+
+BASE_JOINTS = ("base_x", "base_y", "base_yaw")
+"""The planar joints that carry the robot's base, in their order from the world outward."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePlant:
+    """A finalized plant and what in it plays which role.
+
+    Attributes:
+        diagram: Plant and scene graph together.
+        plant: The plant.
+        scene_graph: The scene graph.
+        base_joints: base_x, base_y, base_yaw.
+        arm_joints: The scored arm's seven joints, in the robot file's order.
+        arm_lower: Their lower limits in force [rad], -inf where continuous.
+        arm_upper: Their upper limits in force [rad], +inf where continuous.
+        torso_joint: The torso lift, None for a robot without one.
+        torso_limits: Limits of the torso in force [m].
+        base_frame: B, the robot's base.
+        arm_base_frame: A, the link that carries joint 1.
+        tool_frame: T.
+        room_joints: Joints of the environment.
+        body_frames: Frames that goals may name.
+        parts: Every collision shape: arm, body, room.
+        rule: Which pairs of them are checked.
+    """
+
+    diagram: Diagram
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    base_joints: tuple[Joint, ...]
+    arm_joints: tuple[RevoluteJoint, ...]
+    arm_lower: FloatArray
+    arm_upper: FloatArray
+    torso_joint: Joint | None
+    torso_limits: tuple[float, float]
+    base_frame: Frame
+    arm_base_frame: Frame
+    tool_frame: Frame
+    room_joints: RoomJoints
+    body_frames: dict[str, Frame]
+    parts: tuple[Part, ...]
+    rule: ContactRule
+
+
+def build_plant(
+    spec: SceneSpec,
+    allowed_contacts: Iterable[tuple[str, str]] = (),
+    *,
+    meshes: bool = False,
+) -> ScenePlant:
+    """Return the finalized plant of a scene.
+
+    Args:
+        spec: Robot and environment.
+        allowed_contacts: Pairs (robot body, room body) that may touch.
+        meshes: Whether to load the robot's visual meshes.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+        EnvironmentFileError: If a model of the environment cannot be used, or a joint not go where
+            the file puts it.
+        GridError: If an observed axis is none of its joint's.
+        UnknownNameError: If a file names something that is not there.
+    """
+    robot, environment = spec.robot, spec.environment
+    builder = DiagramBuilder()
+    # A continuous plant: nothing is simulated, and a time step would only add discrete state.
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    instance = _add_robot(plant, robot, meshes)
+    base_joints = _add_base(plant, plant.GetBodyByName(robot.root_body, instance))
+    primitives = _add_primitives(plant, robot, instance)
+    room = add_room(plant, environment)
+    for name, value in robot.joint_positions().items():
+        plant.GetJointByName(name, instance).set_default_positions([value])
+    plant.Finalize()
+
+    torso = plant.GetJointByName(robot.torso_joint, instance) if robot.torso_joint else None
+    arm_joints = tuple(plant.GetJointByName(name, instance) for name in robot.arm_joints)
+    inspector = scene_graph.model_inspector()
+    parts = (
+        *_robot_parts(plant, inspector, primitives, arm_joints, torso),
+        *room_parts(plant, inspector, room, environment),
+    )
+    for part in parts:
+        shape_of(inspector, part)
+    where = f"environment '{environment.name}', allowed contacts"
+    rule = ContactRule.of(parts, robot.disabled_pairs, allowed_contacts, where=where)
+    apply_rule(scene_graph, parts, rule)
+    limits = robot.joint_limits()
+    return ScenePlant(
+        diagram=builder.Build(),
+        plant=plant,
+        scene_graph=scene_graph,
+        base_joints=base_joints,
+        arm_joints=arm_joints,
+        arm_lower=np.array([limits[name][0] for name in robot.arm_joints]),
+        arm_upper=np.array([limits[name][1] for name in robot.arm_joints]),
+        torso_joint=torso,
+        torso_limits=limits[robot.torso_joint] if robot.torso_joint else (0.0, 0.0),
+        base_frame=plant.GetFrameByName(robot.root_body, instance),
+        arm_base_frame=plant.GetFrameByName(robot.arm_base, instance),
+        tool_frame=plant.GetFrameByName(robot.tool_frame, instance),
+        room_joints=room.joints,
+        body_frames={
+            name: room.links[link].body_frame() for name, link in environment.body_frames.items()
+        },
+        parts=parts,
+        rule=rule,
+    )
+
+
+def _add_base(plant: MultibodyPlant, root: RigidBody) -> tuple[Joint, ...]:
+    """Hang the robot's root from the world on x, y and yaw."""
+    instance = plant.AddModelInstance("base")
+    axes = (np.eye(3)[0], np.eye(3)[1], np.eye(3)[2])
+    parent = plant.world_body()
+    joints = []
+    for name, axis in zip(BASE_JOINTS, axes, strict=True):
+        kind = RevoluteJoint if name == "base_yaw" else PrismaticJoint
+        child = root if name == "base_yaw" else plant.AddRigidBody(f"{name}_link", instance)
+        joints.append(plant.AddJoint(kind(name, parent.body_frame(), child.body_frame(), axis)))
+        parent = child
+    return tuple(joints)
+
+
+def _shape(primitive: Primitive) -> Shape:
+    if primitive.kind == "sphere":
+        return Sphere(*primitive.size)
+    if primitive.kind == "capsule":
+        return Capsule(*primitive.size)
+    return Box(*primitive.size)
+
+
+def _add_robot(plant: MultibodyPlant, robot: RobotFile, meshes: bool) -> ModelInstanceIndex:
+    text = robot_urdf(robot, meshes)
+    try:
+        instances = Parser(plant).AddModelsFromString(text, "urdf")
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(f"robot '{robot.name}': its URDF cannot be used: {reason}") from error
+    instance: ModelInstanceIndex = instances[0]
+    return instance
+
+
+def _add_primitives(
+    plant: MultibodyPlant, robot: RobotFile, instance: ModelInstanceIndex
+) -> tuple[GeometryId, ...]:
+    """Give the robot's links their collision shapes."""
+    added = []
+    for i, primitive in enumerate(robot.load_primitives()):
+        X_BG = RigidTransform(Quaternion(primitive.quaternion), primitive.xyz)
+        body = plant.GetBodyByName(primitive.body, instance)
+        name = f"{primitive.body} {i}"
+        added.append(
+            plant.RegisterCollisionGeometry(
+                body, X_BG, _shape(primitive), name, ProximityProperties()
+            )
+        )
+    return tuple(added)
+
+
+def _robot_parts(
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    geometries: Iterable[GeometryId],
+    arm_joints: tuple[Joint, ...],
+    torso: Joint | None,
+) -> tuple[Part, ...]:
+    """Sort the robot's shapes into what each arm link carries and what stays with the body."""
+    above = {joint.child_body().index(): joint for joint in _joints(plant)}
+    arm_link = {joint.index(): i + 1 for i, joint in enumerate(arm_joints)}
+    parts = []
+    for geometry in geometries:
+        body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
+        group, carrier = Group.BODY, 0
+        link = body
+        while link.index() in above:
+            joint = above[link.index()]
+            if joint.index() in arm_link:
+                group, carrier = Group.ARM, arm_link[joint.index()]
+                break
+            if torso is not None and joint.index() == torso.index():
+                carrier = 1
+            link = joint.parent_body()
+        parts.append(Part(geometry, body.index(), group, carrier, body.name(), 0.0))
+    return tuple(parts)
+
+
+def _joints(plant: MultibodyPlant) -> Iterable[Joint]:
+    return (plant.get_joint(index) for index in plant.GetJointIndices())

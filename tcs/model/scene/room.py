@@ -1,0 +1,219 @@
+"""Everything around the robot, put into a Drake plant: models, obstacles, floor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Box, ProximityProperties, SceneGraphInspector
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    Joint,
+    ModelInstanceIndex,
+    RigidBody,
+    WeldJoint,
+)
+
+from tcs.errors import EnvironmentFileError, UnknownNameError
+from tcs.model.scene.contacts import Group, Part
+from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
+from tcs.model.scene.joints import RoomJoints
+
+_FLOOR_SIZE = (100.0, 100.0, 1.0)
+"""Wider than any room, so that the arm finds a floor wherever the robot stands; thick enough that
+nothing lies below it [m]."""
+_CALM = np.array([0.70, 0.66, 0.58, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """The environment inside a plant.
+
+    Attributes:
+        links: Every link, by "model::link"; a box obstacle by its name alone.
+        joints: Every joint that moves.
+        named_by_link: Names of the models whose shapes are reported by link.
+        floor: Whether there is a floor.
+    """
+
+    links: dict[str, RigidBody]
+    joints: RoomJoints
+    named_by_link: frozenset[str]
+    floor: bool
+
+
+def add_room(plant: MultibodyPlant, environment: EnvironmentFile) -> Room:
+    """Add everything the environment file names to a plant that is not finalized.
+
+    Raises:
+        EnvironmentFileError: If a model cannot be used, or a joint not go where the file puts it.
+        GridError: If an observed axis is none of its joint's.
+        UnknownNameError: If the file names a parent, link or joint that is not there.
+    """
+    links: dict[str, RigidBody] = {}
+    by_name: dict[str, Joint] = {}
+    where = f"environment '{environment.name}'"
+    for entry in environment.placed:
+        parent = _parent_frame(plant, entry, links, where)
+        X_PM = RigidTransform(RollPitchYaw(entry.rpy), entry.xyz)
+        here = f"{where}, '{entry.name}'"
+        if isinstance(entry, Obstacle) and entry.box is not None:
+            links[entry.name] = _add_box(plant, entry.name, entry.box, X_PM)
+            continue
+        instance = _add_model(plant, entry, parent, X_PM, here)
+        for index in plant.GetBodyIndices(instance):
+            body = plant.get_body(index)
+            links[f"{entry.name}::{body.name()}"] = body
+        for joint_index in plant.GetJointIndices(instance):
+            joint = plant.get_joint(joint_index)
+            if joint.num_positions() == 0:
+                continue
+            if joint.name() in by_name:
+                raise EnvironmentFileError(
+                    f"{here}: joint '{joint.name()}' is there twice. Rename it in one of the files."
+                )
+            by_name[joint.name()] = joint
+    if environment.floor:
+        top = RigidTransform([0.0, 0.0, -_FLOOR_SIZE[2] / 2])
+        plant.RegisterCollisionGeometry(
+            plant.world_body(), top, Box(*_FLOOR_SIZE), FLOOR, ProximityProperties()
+        )
+    joints = RoomJoints(by_name, environment.posture)
+    _check_names(environment, links, joints, where)
+    joints.set_defaults(environment.joints, where=f"{where}, field 'joints'")
+    by_link = {m.name for m in environment.models if m.named_by == "link"}
+    by_link |= {o.name for o in environment.obstacles if o.box is not None}
+    return Room(links, joints, frozenset(by_link), environment.floor)
+
+
+def room_parts(
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    room: Room,
+    environment: EnvironmentFile,
+) -> tuple[Part, ...]:
+    """Return every collision shape of the room, in the order of the environment file."""
+    parts = []
+    for link, body in room.links.items():
+        model = link.split("::", maxsplit=1)[0]
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            name = link if model in room.named_by_link else inspector.GetName(geometry)
+            pad = float(environment.padding.get(link, 0.0))
+            parts.append(Part(geometry, body.index(), Group.ROOM, 0, name, pad))
+    if room.floor:
+        world = plant.world_body()
+        (floor,) = plant.GetCollisionGeometriesForBody(world)
+        parts.append(Part(floor, world.index(), Group.ROOM, 0, FLOOR, 0.0))
+    return tuple(parts)
+
+
+def _parent_frame(
+    plant: MultibodyPlant, entry: ModelEntry | Obstacle, links: dict[str, RigidBody], where: str
+) -> Frame:
+    if isinstance(entry, Obstacle) or entry.parent == WORLD:
+        return plant.world_frame()
+    if entry.parent not in links:
+        known = (WORLD, *links)
+        raise UnknownNameError("parent", entry.parent, known, where=f"{where}, '{entry.name}'")
+    return links[entry.parent].body_frame()
+
+
+def _add_box(
+    plant: MultibodyPlant, name: str, size: tuple[float, float, float], X_WO: RigidTransform
+) -> RigidBody:
+    # Its own body, not a shape of the world: so it is found and named like every other obstacle.
+    body = plant.AddRigidBody(name, plant.AddModelInstance(name))
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WO)
+    at_body = RigidTransform()
+    plant.RegisterCollisionGeometry(body, at_body, Box(*size), "box", ProximityProperties())
+    plant.RegisterVisualGeometry(body, at_body, Box(*size), "box", _CALM)
+    return body
+
+
+def _add_model(
+    plant: MultibodyPlant,
+    entry: ModelEntry | Obstacle,
+    parent: Frame,
+    X_PM: RigidTransform,
+    where: str,
+) -> ModelInstanceIndex:
+    """Parse the entry's file and fix its model frame M to the parent."""
+    parser = Parser(plant)
+    # The file's own model name does not matter: two shelves may come from one file.
+    parser.SetAutoRenaming(True)
+    try:
+        instances = parser.AddModels(str(entry.file))
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise EnvironmentFileError(f"{where}: '{entry.file}' cannot be used: {reason}") from error
+    if len(instances) != 1:
+        raise EnvironmentFileError(
+            f"{where}: '{entry.file}' holds {len(instances)} models, but must hold one. "
+            "Give each a file of its own."
+        )
+    (instance,) = instances
+    plant.RenameModelInstance(instance, entry.name)
+    _fix(plant, instance, parent, X_PM, where)
+    return instance
+
+
+def _fix(
+    plant: MultibodyPlant,
+    instance: ModelInstanceIndex,
+    parent: Frame,
+    X_PM: RigidTransform,
+    where: str,
+) -> None:
+    """Weld a model's root to its parent, wherever the file itself had placed it."""
+    model_frame = plant.GetFrameByName("__model__", instance)
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
+    to_world = [j for j in joints if j.parent_body() == plant.world_body()]
+    if not all(isinstance(joint, WeldJoint) for joint in to_world):
+        raise EnvironmentFileError(
+            f"{where}: a joint hangs the model from the world, but the environment file places it. "
+            "Hang it from a link of the model."
+        )
+    # A <static> model, or one fixed to the world, is taken off and placed as the file says.
+    pose_of = {joint.child_body().index(): joint.X_FM() for joint in to_world}
+    moved = {j.child_body().index() for j in joints} - set(pose_of)
+    for joint in to_world:
+        plant.RemoveJoint(joint)
+    roots = [i for i in plant.GetBodyIndices(instance) if i not in moved]
+    if len(roots) == 1:
+        plant.WeldFrames(parent, model_frame, X_PM)
+        return
+    if not all(root in pose_of for root in roots):
+        names = ", ".join(plant.get_body(root).name() for root in roots)
+        raise EnvironmentFileError(
+            f"{where}: the model has {len(roots)} links that hang from nothing: {names}. "
+            "Fix them to one another with joints."
+        )
+    base = model_frame.body().index()
+    X_WM = pose_of[base] @ model_frame.GetFixedPoseInBodyFrame()
+    for root in roots:
+        X_PL = X_PM @ X_WM.inverse() @ pose_of[root]
+        plant.WeldFrames(parent, plant.get_body(root).body_frame(), X_PL)
+
+
+def _check_names(
+    environment: EnvironmentFile, links: Iterable[str], joints: RoomJoints, where: str
+) -> None:
+    """Refuse names in the environment file that its models do not have."""
+    for link in environment.padding:
+        if link not in links:
+            raise UnknownNameError("link", link, links, where=f"{where}, field 'padding'")
+    for frame, link in environment.body_frames.items():
+        if link not in links:
+            raise UnknownNameError("link", link, links, where=f"{where}, body frame '{frame}'")
+    for joint in environment.joints:
+        if joint not in joints.by_name:
+            raise UnknownNameError("joint", joint, joints.by_name, where=f"{where}, field 'joints'")
+    for name, error in environment.errors.items():
+        joints.check_error(name, error, where=f"{where}, field 'errors'")
+    joints.check_posture(where=where)
+    for axis in environment.observed_axes:
+        joints.check_axis(axis, where=f"{where}, field 'observed'")

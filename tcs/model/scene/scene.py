@@ -1,0 +1,225 @@
+"""A live scene: place the robot, ask where its tool is and what it touches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.framework import Context
+
+from tcs.errors import TcsError, UnknownNameError
+from tcs.kernel.arrays import FloatArray
+from tcs.model.scene.contacts import Group
+from tcs.model.scene.plant import ScenePlant, build_plant
+from tcs.model.scene.spec import SceneSpec
+
+Contact = tuple[str, str, float]
+"""Two bodies and the signed distance between them [m]."""
+
+
+class Scene:
+    """One robot in one environment, as a Drake plant with one state.
+
+    It starts with the base at the origin, the torso at its lowest, the arm at zero and the room
+    as its file says. Drake plants do not pickle: pass the spec on and build another scene.
+    """
+
+    def __init__(
+        self,
+        spec: SceneSpec,
+        *,
+        allowed_contacts: Iterable[tuple[str, str]] = (),
+        meshes: bool = False,
+    ) -> None:
+        """Build the plant.
+
+        Args:
+            spec: Robot and environment.
+            allowed_contacts: Pairs (robot body, room body) that may touch.
+            meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
+
+        Raises:
+            RobotError: If the robot's model cannot be used.
+            EnvironmentFileError: If a model of the environment cannot be used, or a joint not go
+                where the file puts it.
+            GridError: If an observed axis is none of its joint's.
+            UnknownNameError: If a file names something that is not there.
+        """
+        self.spec = spec
+        self.built: ScenePlant = build_plant(spec, tuple(allowed_contacts), meshes=meshes)
+        self.context: Context = self.built.diagram.CreateDefaultContext()
+        self._state = self.built.plant.GetMyMutableContextFromRoot(self.context)
+        joints = self.built.arm_joints
+        self._arm_positions = np.array([joint.position_start() for joint in joints])
+        self._arm_velocities = np.array([joint.velocity_start() for joint in joints])
+        self._pads: dict[str, float] = {}
+        for part in self.built.parts:
+            # A link may come with several shapes; they share its padding.
+            self._pads[part.name] = max(part.pad, self._pads.get(part.name, 0.0))
+        self.set_torso(0.0)
+
+    @property
+    def plant_context(self) -> Context:
+        """The plant's own part of the context."""
+        return self._state
+
+    @property
+    def arm_limits(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper limits of the arm in force [rad], infinite where continuous."""
+        return self.built.arm_lower, self.built.arm_upper
+
+    def place_base(self, x: float, y: float, yaw: float) -> None:
+        """Put the robot's base B at (x, y) in W [m], heading `yaw` [rad]."""
+        for joint, value in zip(self.built.base_joints, (x, y, yaw), strict=True):
+            self._set(joint.position_start(), value)
+
+    def set_torso(self, height: float) -> float:
+        """Lift the torso and return the height used [m]: the one asked for, within its limits.
+
+        A robot without a torso joint stays as it is, and 0 is returned.
+        """
+        joint = self.built.torso_joint
+        if joint is None:
+            return 0.0
+        used = float(np.clip(height, *self.built.torso_limits))
+        self._set(joint.position_start(), used)
+        return used
+
+    def set_arm(self, positions: ArrayLike) -> None:
+        """Set the seven joints of the scored arm [rad], in the robot file's order.
+
+        Limits are not enforced: what breaks them is for the caller to judge.
+
+        Raises:
+            TcsError: If there are not exactly seven finite numbers.
+        """
+        values = np.asarray(positions, dtype=float)
+        if values.shape != self._arm_positions.shape or not np.all(np.isfinite(values)):
+            raise TcsError(
+                f"arm positions must be {len(self._arm_positions)} finite numbers [rad], "
+                f"but are {positions!r}."
+            )
+        q = self.built.plant.GetPositions(self._state).copy()
+        q[self._arm_positions] = values
+        self.built.plant.SetPositions(self._state, q)
+
+    def set_joint(self, name: str, value: float) -> None:
+        """Set a joint of the environment [m or rad], and with it all that follow it.
+
+        Raises:
+            UnknownNameError: If the environment has no such joint.
+            TcsError: If the joint follows another one, or does not go that far.
+        """
+        where = f"environment '{self.spec.environment.name}'"
+        for joint, position in self.built.room_joints.positions(name, value, where=where):
+            self._set(joint.position_start(), position)
+
+    def positions(self) -> FloatArray:
+        """Return the positions of all joints, for `restore`, shape (n,)."""
+        return np.array(self.built.plant.GetPositions(self._state))
+
+    def restore(self, positions: FloatArray) -> None:
+        """Set all joints to what `positions` returned."""
+        self.built.plant.SetPositions(self._state, positions)
+
+    def tool_pose(self) -> RigidTransform:
+        """Return X_WT, the pose of the tool in the environment frame."""
+        return self.built.tool_frame.CalcPoseInWorld(self._state)
+
+    def base_pose(self) -> RigidTransform:
+        """Return X_WB, the pose of the robot's base in the environment frame."""
+        return self.built.base_frame.CalcPoseInWorld(self._state)
+
+    def body_frame_pose(self, name: str, *, where: str = "") -> RigidTransform:
+        """Return X_WH, the pose of a part of the person, e.g. "head".
+
+        Args:
+            name: One of the environment file's body frames.
+            where: Where the name stands, for the message.
+
+        Raises:
+            UnknownNameError: If the environment has no such body frame.
+        """
+        frames = self.built.body_frames
+        if name not in frames:
+            place = where or f"environment '{self.spec.environment.name}'"
+            raise UnknownNameError("frame", name, frames, where=place)
+        return frames[name].CalcPoseInWorld(self._state)
+
+    def tool_jacobian(self) -> FloatArray:
+        """Return the Jacobian of the tool's velocity V_WT with respect to the arm's joints.
+
+        Returns:
+            Shape (6, 7), rows angular then linear [rad/rad; m/rad], expressed in W.
+        """
+        plant = self.built.plant
+        world = plant.world_frame()
+        jacobian = plant.CalcJacobianSpatialVelocity(
+            self._state,
+            JacobianWrtVariable.kV,
+            self.built.tool_frame,
+            np.zeros(3),
+            world,
+            world,
+        )
+        return np.array(jacobian[:, self._arm_velocities])
+
+    def query_object(self) -> QueryObject:
+        """Return Drake's geometry queries at the present state."""
+        port = self.built.plant.get_geometry_query_input_port()
+        query: QueryObject = port.Eval(self._state)
+        return query
+
+    def clearances(self, max_distance: float) -> tuple[Contact, ...]:
+        """Return how close the checked pairs of bodies are, closest first.
+
+        Args:
+            max_distance: Pairs farther apart are left out [m].
+
+        Returns:
+            For each pair of bodies the least signed distance over their shapes, negative where
+            they overlap. Arm before body before room.
+        """
+        part_of = {part.geometry: part for part in self.built.parts}
+        order = (Group.ARM, Group.BODY, Group.ROOM)
+        least: dict[tuple[str, str], float] = {}
+        for pair in self.query_object().ComputeSignedDistancePairwiseClosestPoints(max_distance):
+            both = sorted(
+                (part_of[pair.id_A], part_of[pair.id_B]),
+                key=lambda part: (order.index(part.group), part.carrier, part.name),
+            )
+            names = (both[0].name, both[1].name)
+            least[names] = min(pair.distance, least.get(names, np.inf))
+        found = [(a, b, float(distance)) for (a, b), distance in least.items()]
+        return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
+
+    def required_clearance(self, first: str, second: str) -> float:
+        """Return how far two bodies must stay apart: margin, or their paddings if larger [m].
+
+        Raises:
+            UnknownNameError: If a name has no collision shape.
+        """
+        for name in (first, second):
+            if name not in self._pads:
+                raise UnknownNameError("body", name, self._pads)
+        paddings = self._pads[first] + self._pads[second]
+        return max(self.spec.environment.contact_margin, paddings)
+
+    def violations(self) -> tuple[Contact, ...]:
+        """Return the checked pairs of bodies that are closer than required, closest first."""
+        largest = sorted(self._pads.values())[-2:]
+        farthest = max(self.spec.environment.contact_margin, sum(largest))
+        return tuple(
+            contact
+            for contact in self.clearances(farthest)
+            if contact[2] < self.required_clearance(contact[0], contact[1])
+        )
+
+    def _set(self, index: int, value: float) -> None:
+        q = self.built.plant.GetPositions(self._state).copy()
+        q[index] = value
+        self.built.plant.SetPositions(self._state, q)

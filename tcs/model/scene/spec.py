@@ -1,0 +1,20 @@
+"""What a scene is made of, as a value: the robot file and the environment file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tcs.model.robots import RobotFile
+from tcs.model.scene.environment import EnvironmentFile
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSpec:
+    """One robot in one environment.
+
+    Hashable and picklable, which a live Drake plant is not: hand this to a worker and let it build
+    its own `Scene`.
+    """
+
+    robot: RobotFile
+    environment: EnvironmentFile

@@ -1,0 +1,123 @@
+"""Task files: how a task is written down, and which ones ship with `tcs`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from tcs.errors import TaskError, UnknownNameError
+from tcs.files.documents import Document, checked, read_mapping
+from tcs.files.paths import named_file, shipped_files
+from tcs.model.tasks.task import Goal, Task
+
+
+class _Entry(Document):
+    """What a task file says, without a guess at what it may have meant."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class GoalEntry(_Entry):
+    """One goal as it is written."""
+
+    body_frame: str
+    position: list[float]
+    quaternion_wxyz: list[float]
+    weight: float = 1.0
+
+
+class AxisEntry(_Entry):
+    """What a task changes on one axis of an environment's grid."""
+
+    start: float | None = None
+    step: float | None = None
+    count: int | None = None
+
+
+class TaskFile(_Entry):
+    """A task as it is written."""
+
+    name: str
+    title: str
+    source: str
+    environments: list[str]
+    goals: list[GoalEntry]
+    tool: str = ""
+    allowed_contacts: list[list[str]] = Field(default_factory=list)
+    grids: dict[str, dict[str, AxisEntry]] = Field(default_factory=dict)
+
+
+def task_names() -> tuple[str, ...]:
+    """Return the names of the tasks that ship with `tcs`, sorted."""
+    return tuple(_shipped())
+
+
+def load_task(name_or_path: str | Path) -> Task:
+    """Return a task.
+
+    Args:
+        name_or_path: One of `task_names()`, or the path of a file: anything that ends in `.yaml`
+            or holds a path separator.
+
+    Raises:
+        UnknownNameError: If no task has that name, or a key in the file is not known.
+        TaskError: If the file cannot be read or says something impossible.
+
+    >>> len(load_task("shaving").goals)
+    8
+    """
+    return _read(named_file("task", name_or_path, _shipped()))
+
+
+def _shipped() -> dict[str, Path]:
+    return shipped_files("tasks/*/*.yaml")
+
+
+def _read(path: Path) -> Task:
+    where = f"task file '{path}'"
+    content = read_mapping(path, where, TaskError, known=TaskFile.model_fields)
+    written = checked(content, TaskFile, where, TaskError)
+    goals = []
+    for i, entry in enumerate(written.goals):
+        try:
+            goals.append(_goal(entry))
+        except TaskError as error:
+            raise TaskError(f"{where}, goals[{i}]: {error}") from None
+    for i, pair in enumerate(written.allowed_contacts):
+        if len(pair) != 2:
+            raise TaskError(
+                f"{where}, field 'allowed_contacts[{i}]' is {pair}, but must name two bodies."
+            )
+    try:
+        return Task(
+            name=written.name,
+            title=written.title,
+            goals=tuple(goals),
+            environments=tuple(written.environments),
+            source=written.source,
+            tool=written.tool,
+            allowed_contacts=tuple((pair[0], pair[1]) for pair in written.allowed_contacts),
+            grids={
+                environment: {
+                    axis: entry.model_dump(exclude_none=True) for axis, entry in axes.items()
+                }
+                for environment, axes in written.grids.items()
+            },
+        )
+    except TaskError as error:
+        raise TaskError(f"{where}, {error}") from None
+    except UnknownNameError as error:
+        raise UnknownNameError(
+            error.kind, error.name, error.known, where=f"{where}, {error.where}"
+        ) from None
+
+
+def _goal(entry: GoalEntry) -> Goal:
+    return Goal(
+        body_frame=entry.body_frame,
+        position=np.array(entry.position, dtype=np.float64),
+        quaternion=np.array(entry.quaternion_wxyz, dtype=np.float64),
+        weight=entry.weight,
+    )

@@ -1,0 +1,37 @@
+"""Write pictures, wholly or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from tcs.errors import OutputError
+from tcs.files.writing import whole_file
+
+FORMATS = ("png", "pdf", "svg")
+"""What a picture may be written as; the end of its name says which."""
+
+
+def check_format(path: Path) -> str:
+    """Return the format that a file name asks for.
+
+    Raises:
+        OutputError: If the name ends in none of `FORMATS`.
+    """
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in FORMATS:
+        allowed = ", ".join(f".{name}" for name in FORMATS)
+        raise OutputError(f"Picture '{path}': its name must end in one of {allowed}.")
+    return ending
+
+
+def save_figure(path: Path, figure: Figure, *, dpi: float = 130.0) -> None:
+    """Write a figure; an older file of that name stays until the new one is complete.
+
+    Raises:
+        OutputError: If its name ends in none of `FORMATS`, or it cannot be written there.
+    """
+    ending = check_format(path)
+    with whole_file(path, "Picture") as stream:
+        figure.savefig(stream, format=ending, dpi=dpi)

@@ -1,0 +1,141 @@
+"""Small multiples: the same map for every state of the environment, all in one scale."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tcs.kernel.dexterity import DEFAULT_MEASURE
+from tcs.output.draw import floor_plan
+from tcs.output.draw.floor_plan import Stand
+from tcs.output.draw.solids import Kind, Solid
+from tcs.placement.tables.place_map import FloatArray, PlaceMap
+
+Score = Literal["reachability", "manipulability"]
+_PANEL = 2.5
+"""Width of a panel in inches."""
+_LINES = 0.7
+"""Size of lines and letters, beside those of a map that has the page to itself."""
+_ROOM_AROUND = 0.15
+"""What is shown around places, person and robots [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StatePanel:
+    """The map of one state of the environment."""
+
+    places: PlaceMap
+    """What each place is worth in this state."""
+    room: Sequence[Solid]
+    """Furniture, person and obstacles as they are then."""
+    members: Sequence[tuple[int, Stand]]
+    """Members of the chosen set that want this state, each with its number in the tour."""
+
+
+def draw_states(
+    panels: Sequence[Sequence[StatePanel]],
+    rows: Sequence[str],
+    columns: Sequence[str],
+    *,
+    members: Sequence[Stand],
+    title: str,
+    subtitle: str = "",
+    score: Score = "reachability",
+    measure: str = DEFAULT_MEASURE,
+) -> Figure:
+    """Return a picture with a panel for each state of the environment.
+
+    Each panel says what its best place is worth. All show the same part of the floor: every place
+    that is worth anything in any state, the person, and the chosen members.
+
+    Args:
+        panels: Row by row, from the top.
+        rows: What the states of each row have in common; "" where that goes without saying.
+        columns: What those of each column have in common.
+        members: The chosen configurations in the order of the tour.
+        title: First line, for a person.
+        subtitle: Second line.
+        score: Which score the colours stand for.
+        measure: Name of the dexterity measure behind P_M.
+    """
+    points = _part_of_the_floor(panels)
+    low, high = points.min(axis=0), points.max(axis=0)
+    tall = float(np.clip((high - low)[1] / (high - low)[0], 0.5, 1.6))
+    size = (_PANEL * len(columns) + 1.6, _PANEL * tall * len(rows) + 1.9 + 0.24 * len(members))
+    figure = Figure(figsize=(max(size[0], 7.0), size[1]), layout="constrained")
+    grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    floor_plan.frame(grid[0, 0], [points], _ROOM_AROUND)
+    factor = 100.0 if score == "reachability" else 1.0
+    values = [[factor * getattr(panel.places, score) for panel in row] for row in panels]
+    best = max(float(one.max(initial=0.0)) for row in values for one in row)
+    most = 100.0 if score == "reachability" else best or 1.0
+    mesh = None
+    for i, row in enumerate(panels):
+        for j, panel in enumerate(row):
+            axes = grid[i, j]
+            mesh = floor_plan.draw_cells(axes, panel.places, values[i][j], most)
+            _draw_panel(axes, panel, _said(float(values[i][j].max(initial=0.0)), score))
+            if i == 0:
+                axes.annotate(
+                    columns[j], (0.5, 1.0), (0, 22), xycoords="axes fraction",
+                    textcoords="offset points", ha="center", fontsize=11, weight="bold",
+                )  # fmt: skip
+        grid[i, 0].set_ylabel(f"{rows[i]}\nbase y [m]" if rows[i] else "base y [m]", fontsize=9)
+    for axes in grid[-1]:
+        axes.set_xlabel("base x [m]", fontsize=9)
+    floor_plan.draw_scale_bar(grid[-1, 0], size=_LINES + 0.15)
+    if mesh is not None:
+        label = (
+            "goals reached, P_R [%]"
+            if score == "reachability"
+            else f"manipulability, P_M ({measure}) [0 to 1]"
+        )
+        figure.colorbar(mesh, ax=list(grid.ravel()), label=label, shrink=0.6, aspect=30)
+    width = int(9.5 * figure.get_figwidth())
+    lines = [*textwrap.wrap(title, width), *textwrap.wrap(subtitle, width)]
+    lines.append(f"Each place: best of all {panels[0][0].places.over_words}.")
+    figure.suptitle("\n".join(lines), fontsize=11)
+    room = [solid for row in panels for panel in row for solid in panel.room]
+    handles = floor_plan.what_is_what(room, robot=bool(members))
+    handles += floor_plan.stops(members, None)
+    figure.legend(handles=handles, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: StatePanel, said: str) -> None:
+    floor_plan.draw_room(axes, panel.room)
+    for number, stand in panel.members:
+        floor_plan.draw_stand(axes, stand, label=str(number), size=_LINES)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=8)
+    axes.set_title(said, fontsize=9, pad=4)
+
+
+def _said(best: float, score: Score) -> str:
+    """Return what the best place of a panel is worth."""
+    if best <= 0.0:
+        return "nothing in reach"
+    return f"best place {best:.0f} %" if score == "reachability" else f"best place {best:.3f}"
+
+
+def _part_of_the_floor(panels: Sequence[Sequence[StatePanel]]) -> FloatArray:
+    """Return corners of everything that all panels have to show [m], shape (n, 2)."""
+    found = []
+    for panel in (panel for row in panels for panel in row):
+        places = panel.places
+        grid = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
+        found.append(grid[places.reachability > 0.0])
+        found += [stand.polygon for _, stand in panel.members]
+        found += [solid.footprint for solid in panel.room if solid.kind is Kind.PERSON]
+    points = np.concatenate(found) if found else np.empty((0, 2))
+    if len(points):
+        return points
+    places = panels[0][0].places
+    corners = np.array([[places.x[0], places.y[0]], [places.x[-1], places.y[-1]]])
+    return np.asarray(corners + np.array([[-0.5], [0.5]]))

@@ -1,0 +1,33 @@
+"""Reports: pages of text, tables and pictures about what was scored and how well it holds up."""
+
+from __future__ import annotations
+
+from tcs.output.report.answer import Answer, Check, answer_of
+from tcs.output.report.answer_page import answer_page
+from tcs.output.report.blocks import Page, Section
+from tcs.output.report.html import as_html
+from tcs.output.report.markdown import as_markdown
+from tcs.output.report.paper import Paper, load_paper
+from tcs.output.report.robustness import robustness_page
+from tcs.output.report.study import Plan, RowStudy, check_row, study_row, study_rows
+from tcs.output.report.write import write_report
+
+__all__ = [
+    "Answer",
+    "Check",
+    "Page",
+    "Paper",
+    "Plan",
+    "RowStudy",
+    "Section",
+    "answer_of",
+    "answer_page",
+    "as_html",
+    "as_markdown",
+    "check_row",
+    "load_paper",
+    "robustness_page",
+    "study_row",
+    "study_rows",
+    "write_report",
+]

@@ -1,0 +1,334 @@
+"""The report of one score file: where to stand, how good that is, why, and how it was checked."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from typing import Any
+
+from tcs.output.report.answer import Answer
+from tcs.output.report.answer_tables import (
+    goals_table,
+    joints_table,
+    pairs_table,
+    reasons_table,
+    stops_table,
+    success_table,
+    verification_table,
+)
+from tcs.output.report.blocks import (
+    Block,
+    Bullets,
+    Code,
+    Facts,
+    Folded,
+    Page,
+    Picture,
+    Section,
+    Text,
+)
+from tcs.output.report.machine import machine, today, versions
+from tcs.output.report.reproduce import commands, estimated, place_words
+from tcs.output.report.words import REASONS, percent
+from tcs.placement.store import shown_state
+from tcs.placement.tables import SetTable
+
+LIMITS = (
+    "Goals are checked one by one, with everything standing still: no approach, no way of the arm "
+    "from one goal to the next, and no way of the base between stops has been checked."
+)
+
+
+def answer_page(answer: Answer, *, command: str) -> Page:
+    """Return the report as a page.
+
+    Args:
+        answer: What a score file answers.
+        command: What made this report.
+    """
+    spec = answer.job.spec
+    sections = [Section("In short", _summary(answer)), Section("From above", _map(answer))]
+    if answer.states is not None:
+        sections.append(Section("For each state of the room", _states(answer)))
+    if answer.views:
+        sections.append(Section("Each stop", _views(answer)))
+    sections += [
+        Section("Goal by goal", _goals(answer)),
+        Section("Why not elsewhere", _reasons(answer)),
+        Section("Checked again", _verification(answer)),
+        Section("When the room is a little off", _success(answer)),
+        Section("How to make it again", _made(answer, command)),
+    ]
+    return Page(
+        title=answer.job.task.title,
+        lead=f"Where should the robot stand? {spec.environment.title}. {spec.robot.title}.",
+        sections=sections,
+        foot=f"tcs {versions()[0][1]}, {today()}.",
+    )
+
+
+def _summary(answer: Answer) -> list[Block]:
+    """Return the answer in a few sentences, and the stops."""
+    reachability, manipulability = answer.scores
+    members, goals = len(answer.shown.members), answer.goals
+    if not members:
+        said = [f"None of the {goals} goals is reached from anywhere on the grid."]
+        return [Bullets([*said, *_hopeless(answer), _soundness(answer), LIMITS])]
+    reached = goals - len(answer.unreached)
+    places = ("one place", "two places together", "three places together")[members - 1]
+    said = [
+        f"From {places} the robot reaches {reached} of {goals} goals (P_R "
+        f"{percent(reachability)} %); P_M is {manipulability:.3f} ({answer.measure})."
+    ]
+    if answer.unreached:
+        listed = ", ".join(str(goal) for goal in answer.unreached)
+        said.append(f"Not reached: {listed}. Why, and what would help: see Goal by goal.")
+    if answer.shown.here is not None:
+        here = place_words(answer.shown.here)
+        said.append(f"At the default weights it is the set to choose for a robot at {here}.")
+    else:
+        of_all = "" if answer.max_members is None else f" of at most {answer.max_members}"
+        said.append(
+            f"Of the sets{of_all} that the file keeps, it is the one with the greatest P_R + P_M, "
+            "wherever the robot is now."
+        )
+    state = answer.file.observed_states[answer.shown.table]
+    if state:
+        shown = shown_state(answer.file.observed_axes, state)
+        listed = ", ".join(_found(name, value) for name, value in shown.items())
+        tables = len(answer.file.tables)
+        said.append(
+            f"It holds where this is found: {listed}"
+            + (f"; the file answers for {tables} such states." if tables > 1 else ".")
+        )
+    said += _success_in_short(answer)
+    return [Bullets([*said, _soundness(answer), LIMITS]), stops_table(answer)]
+
+
+def _hopeless(answer: Answer) -> list[str]:
+    """Return what stopped the configurations that came nearest to reaching a goal."""
+    found: dict[str, list[int]] = {}
+    for goal, spread in enumerate(answer.distributions):
+        if spread.reached == 0 and spread.farthest is not None:
+            found.setdefault(REASONS[spread.farthest.reason], []).append(goal)
+    return [
+        f"{_numbered(goals)}: reached from nowhere on the grid; what came nearest was stopped by "
+        f"this: {why}."
+        for why, goals in found.items()
+    ]
+
+
+def _numbered(goals: Sequence[int]) -> str:
+    """Return goals by their numbers.
+
+    >>> _numbered([2]), _numbered([0, 3])
+    ('Goal 2', 'Goals 0, 3')
+    """
+    return f"Goal{'s' if len(goals) > 1 else ''} {', '.join(map(str, goals))}"
+
+
+def _soundness(answer: Answer) -> str:
+    found = answer.verification
+    if not answer.is_sound:
+        return (
+            "SOME ANSWERS OF THE FILE ARE FALSE: do not use it. What is wrong is told under Goal "
+            "by goal and Checked again."
+        )
+    said = []
+    if found.checked:
+        shown = f"each of the {len(answer.findings)} postures shown here and "
+        said.append(
+            f"Drake confirms {shown if answer.findings else ''}all of {found.checked:,} stored "
+            "answers drawn at random"
+        )
+    elif answer.findings:
+        said.append(f"Drake confirms each of the {len(answer.findings)} postures shown here")
+    if found.dense_checked:
+        said.append(
+            f"of {found.dense_checked:,} unreached pairs drawn at random {found.missed:,} turned "
+            "out to be reachable"
+        )
+    return f"{'; '.join(said) or 'Nothing was re-checked with Drake'}."
+
+
+def _success_in_short(answer: Answer) -> list[str]:
+    if answer.success is None:
+        return []
+    row = answer.success.row_of(tuple(sorted(answer.shown.indices)))
+    if row is None:
+        return []
+    low, high = float(answer.success.low[row]), float(answer.success.high[row])
+    return [
+        "With the room off at random it is estimated to reach "
+        f"{percent(float(answer.success.success[row]))} % (95 % between {percent(low)} and "
+        f"{percent(high)} %)."
+    ]
+
+
+def _found(name: str, value: float) -> str:
+    """Return a value of an observed axis in words.
+
+    >>> _found("head_tilt_deg", 5.0)
+    'head tilt 5 deg'
+    """
+    unit = "deg" if name.endswith("_deg") else "m"
+    return f"{name.removesuffix('_deg').replace('_', ' ')} {value:g} {unit}"
+
+
+def _map(answer: Answer) -> list[Block]:
+    return [
+        Picture(
+            answer.map,
+            "png",
+            "The room from above, twice: every place coloured by the share of the goals reached "
+            "from it, and by manipulability, with the bases of the robot at the chosen places.",
+            "Each place shows the best that a robot standing there can do by itself; two places "
+            "together can do more than either. Grey: it cannot stand there.",
+        )
+    ]
+
+
+def _states(answer: Answer) -> list[Block]:
+    assert answer.states is not None
+    return [
+        Picture(
+            answer.states,
+            "png",
+            "The same map once for each state of the room that can be set, in rows and columns.",
+            "One colour scale for all. Each stop is marked in the panel of the state it wants.",
+        )
+    ]
+
+
+def _views(answer: Answer) -> list[Block]:
+    blocks: list[Block] = []
+    for number, view in enumerate(answer.views, start=1):
+        goals = [str(goal) for goal, at in enumerate(answer.server) if at == number - 1]
+        listed = ", ".join(goals) or "none"
+        blocks.append(
+            Picture(
+                view,
+                "png",
+                f"The robot at stop {number} with its arm at a goal, and the tool there, nearer.",
+                f"Stop {number}, best for goals {listed}. The robot is drawn as the shapes that "
+                "contacts are checked with; they enclose it. Arrows end where the tool has to be.",
+            )
+        )
+    return blocks
+
+
+def _goals(answer: Answer) -> list[Block]:
+    blocks: list[Block] = [goals_table(answer)]
+    blocks += [Text(said) for said in _hopeless(answer)]
+    for goal in answer.unreached if answer.shown.members else ():
+        fix = answer.explanation(goal).fix
+        if fix is not None:
+            blocks.append(Text(f"Goal {goal} would be reached from stop 1 so: {fix.sentence}"))
+    if answer.shown.members:
+        blocks.append(Folded("Arm joints", [joints_table(answer)]))
+    return blocks
+
+
+def _reasons(answer: Answer) -> list[Block]:
+    blocks: list[Block] = [
+        Text(
+            "Checked in this order: does the body of the robot touch anything; does the gripper at "
+            "the goal; is the goal within reach; is there a posture within the joint limits; is "
+            "there one in which the arm touches nothing."
+        ),
+        reasons_table(answer),
+    ]
+    pairs = pairs_table(answer)
+    if pairs.rows:
+        blocks.append(pairs)
+    return blocks
+
+
+def _verification(answer: Answer) -> list[Block]:
+    if not answer.check.pairs and not answer.check.dense:
+        return [Text("Nothing was re-checked when this report was made: no pairs were asked for.")]
+    return [
+        Text(
+            "Each stored answer that is drawn is set in Drake's own model of the scene: is the "
+            "tool at the goal, are the joints within their limits, is everything as far apart as "
+            "it has to be, and is the measure that of Drake's Jacobian?"
+        ),
+        verification_table(answer),
+    ]
+
+
+def _success(answer: Answer) -> list[Block]:
+    table = success_table(answer)
+    made = estimated(answer)
+    if table is None or made is None:
+        return [
+            Text("Nothing is estimated in this file. This estimates it, for the best sets:"),
+            Code(shlex.join(["tcs", "robustify", str(answer.path)])),
+        ]
+    widths = "; ".join(_error(joint, error) for joint, error in made["errors"].items())
+    base = "the base must stay free" if made["check_base"] else "the base is not checked again"
+    blocks: list[Block] = [
+        Text(
+            f"Estimated by tcs {made['program_version']} from up to {made['samples']:,} samples, "
+            f"seed {made['seed']}, with errors on {widths}; {base}. The configuration is not "
+            "planned anew, the arm is."
+        ),
+        table,
+    ]
+    if len(answer.shown.indices) and answer.success is not None:
+        if answer.success.row_of(tuple(sorted(answer.shown.indices))) is None:
+            blocks.append(
+                Text(
+                    "The set shown here was none of those that raced; tcs evaluate tries the best "
+                    "set of a file."
+                )
+            )
+    return blocks
+
+
+def _error(joint: str, error: dict[str, Any]) -> str:
+    (key, width) = next((k, v) for k, v in error.items() if k != "distribution")
+    unit = "deg" if key.endswith("_deg") else "m"
+    sign = "standard deviation" if error["distribution"] == "normal" else "uniform ±"
+    return f"{joint.replace('_', ' ')} ({sign} {width:g} {unit})"
+
+
+def _kept(sets: SetTable) -> str:
+    """Return which sets a table holds, and how many."""
+    apart = f", members {sets.min_distance:g} m apart or more" if sets.max_members > 1 else ""
+    return f"rule {sets.rule}{apart}, {sets.sets:,} in this table"
+
+
+def _configurations(answer: Answer) -> str:
+    size, tables = answer.job.grid.size, len(answer.file.tables)
+    return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} tables"
+
+
+def _made(answer: Answer, command: str) -> list[Block]:
+    file = answer.file
+    timings, metadata = file.metadata["timings"], file.metadata
+    seconds = timings["total_seconds"] - timings["compile_seconds"]
+    scored: Sequence[tuple[str, str]] = (
+        ("Score file", f"{answer.path.name}, SHA-256 {answer.sha256}"),
+        ("Scored by", f"tcs {metadata['program_version']}, {metadata['created']}"),
+        ("Task", metadata["task"]),
+        ("Environment", metadata["environment"]),
+        ("Robot", metadata["robot"]),
+        ("Scene", f"SHA-256 {metadata['scene_digest']}; the models of today are the same"),
+        ("Inverse kinematics", answer.verification.ik),
+        ("Configurations", _configurations(answer)),
+        ("Sets kept", _kept(answer.scored.sets)),
+        ("Time to score", f"{seconds:.1f} s when the file was made, compiling aside"),
+    )
+    return [
+        Code(commands(answer, command)),
+        Facts(scored),
+        Facts(
+            [
+                *versions(),
+                *machine(),
+                ("Re-checked", f"{answer.check.pairs:,} pairs, {answer.check.dense:,} scanned"),
+                ("Time of this report", f"{answer.seconds:.1f} s"),
+            ]
+        ),
+    ]

@@ -1,0 +1,86 @@
+"""How a score file, and the report of it, can be made again: exact commands."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any
+
+from tcs.model.grid import InitialConfiguration
+from tcs.output.report.answer import Answer
+from tcs.placement.store import shown_state
+
+PAPER_DISTANCE = 0.40
+"""Least distance of two members where nobody asks for another [m], as in the TCS paper."""
+
+
+def commands(answer: Answer, report: str) -> str:
+    """Return the commands that make the file and the report, one a line.
+
+    Args:
+        answer: What the report is about.
+        report: The command that made the report.
+    """
+    return "\n".join(
+        part for part in (score_command(answer), robustify_command(answer), report) if part
+    )
+
+
+def score_command(answer: Answer) -> str:
+    """Return the command that scores the same again; today's models are those of the file."""
+    file, sets = answer.file, answer.scored.sets
+    words = ["tcs", "score", file.metadata["task"]]
+    words += ["--environment", file.metadata["environment"], "--robot", file.metadata["robot"]]
+    words += ["--measure", answer.measure, "--rules", sets.rule]
+    words += ["--max-members", str(sets.max_members)]
+    if sets.same_environment:
+        words.append("--same-environment")
+    if "observation" in file.metadata:
+        words += _observed(answer)
+    line = shlex.join([*words, "--out", str(answer.path)])
+    if abs(sets.min_distance - PAPER_DISTANCE) > 1e-9:
+        line += f"  # in Python, with min_distance={sets.min_distance:g}"
+    return line
+
+
+def robustify_command(answer: Answer) -> str:
+    """Return the command that estimates success again; "" where nothing is estimated."""
+    made = estimated(answer)
+    if made is None:
+        return ""
+    words = ["tcs", "robustify", str(answer.path)]
+    words += ["--sets", str(made["sets"]), "--samples", str(made["samples"])]
+    words += ["--seed", str(made["seed"])]
+    if made["check_base"]:
+        words.append("--check-base")
+    if not made["errors_of_environment"]:
+        words += ["--errors", "ERRORS.yaml"]
+    records = answer.file.metadata["robustness"]
+    if any(record != made for record in records):
+        words += _observed(answer)
+    return shlex.join(words)
+
+
+def estimated(answer: Answer) -> dict[str, Any] | None:
+    """Return how the success of this table's sets was estimated; None where it was not."""
+    records = answer.file.metadata.get("robustness")
+    if not isinstance(records, list) or answer.success is None:
+        return None
+    record = records[answer.shown.table]
+    return record if isinstance(record, dict) else None
+
+
+def place_words(here: InitialConfiguration) -> str:
+    """Return where the robot is now, in words.
+
+    >>> place_words(InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=0.0, torso=0.0))
+    'x 1.4 m, y -1.2 m, heading 0 deg'
+    """
+    at = here.to_json()
+    return f"x {at['base_x']:g} m, y {at['base_y']:g} m, heading {at['base_yaw_deg']:g} deg"
+
+
+def _observed(answer: Answer) -> list[str]:
+    """Return the options that name the observed state of the table."""
+    state = answer.file.observed_states[answer.shown.table]
+    shown = shown_state(answer.file.observed_axes, state)
+    return [word for name, value in shown.items() for word in ("--observed", f"{name}={value:.9g}")]

@@ -1,0 +1,395 @@
+"""The robustness report: Tables I and III of the TCS paper on our scenes, beside the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tcs.output.draw import Box, Cloud, Group, as_svg, draw_boxes, draw_clouds
+from tcs.output.report.blocks import (
+    Block,
+    Bullets,
+    Code,
+    Facts,
+    Folded,
+    Page,
+    Picture,
+    Section,
+    Text,
+)
+from tcs.output.report.machine import machine, today, versions
+from tcs.output.report.paper import Paper
+from tcs.output.report.study import Plan, RowStudy
+from tcs.output.report.tables import (
+    NEAR,
+    contrasts_table,
+    find_contrast,
+    gain_table,
+    is_short,
+    losses_table,
+    prediction_table,
+    table_1,
+    table_3,
+)
+from tcs.output.report.words import lost_goal, mean_and_std, p_value, percent, signed
+
+SERIES = ("best set, by P_R + P_M", "best single configuration", "surest set, by success")
+METHODS = ("with TC-manipulability", "", "without")
+
+
+def robustness_page(
+    rows: Sequence[RowStudy], paper: Paper, plan: Plan, *, seconds: float, command: str
+) -> Page:
+    """Return the report as a page.
+
+    Args:
+        rows: What was found, in the order to show it.
+        paper: The paper's figures.
+        plan: How much was tried.
+        seconds: How long it took, wall clock.
+        command: How to make it again.
+    """
+    compared = [row for row in rows if row.methods is not None]
+    sections = [
+        Section("What was found", findings(rows, paper)),
+        Section("Table I: success under error", _table_1(rows, paper)),
+    ]
+    if compared:
+        sections.append(
+            Section("Table III: TC-manipulability, one and two places", _table_3(compared, paper))
+        )
+    if any(row.gains for row in rows):
+        sections.append(Section("What choosing by success gains", _gains(rows)))
+    sections += [
+        Section("How well P_M predicts success", _prediction(rows)),
+        Section("What is lost, and why", _losses(rows, paper)),
+        Section("Chosen configurations", _chosen(rows)),
+        Section("How it was made", _made(rows, paper, plan, seconds, command)),
+    ]
+    robots = ", ".join(sorted({row.titles[2] for row in rows}))
+    return Page(
+        title="How sure is it when the room is a few centimetres off?",
+        lead=(
+            f"{len(rows)} tasks from the TCS paper with {robots}. In each of {plan.samples:,} "
+            "samples the person, and the wheelchair, are somewhere else than the robot believes "
+            "(Table II of the paper); the robot stands where it was told to, and what its arm "
+            "still reaches is counted."
+        ),
+        sections=sections,
+        foot=f"tcs {versions()[0][1]}, {today()}, seed {plan.seed}, {plan.samples:,} samples.",
+    )
+
+
+def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
+    """Return the main findings in a few sentences."""
+    known = [row for row in rows if paper.published(row.task, row.environment)]
+    short = [row for row in known if is_short(row, paper)]
+    items = []
+    if known:
+        items.append(
+            f"In {len(known) - len(short)} of {len(known)} rows the mean is at or above the "
+            "paper's."
+            + (
+                " Below it: " + "; ".join(_short_of(row, paper) for row in short) + "."
+                if short
+                else ""
+            )
+        )
+    told = [(row, m, find_contrast(row, m)) for row in rows for m in (1, 2)]
+    tests = [(row, m, contrast) for row, m, contrast in told if contrast is not None]
+    if tests:
+        above = [one for one in tests if one[2].paired.mean > 0.0]
+        sure = [one for one in above if one[2].independent.p < 0.01]
+        items.append(
+            f"With TC-manipulability the mean is above that without in {len(above)} of "
+            f"{len(tests)} comparisons, in {len(sure)} of them with p < 0.01 (rank sum, as in the "
+            "paper)."
+        )
+        items += [_exception(one[0], one[1]) for one in tests if one not in sure]
+    items += _gain_findings(rows, paper)
+    found = [
+        one.rho
+        for row in rows
+        for one in row.predictions
+        if one.equal_reach and one.rho is not None
+    ]
+    if found:
+        items.append(
+            "Among sets that reach as much without error, P_M goes with success in "
+            f"{sum(rho > 0.0 for rho in found)} of {len(found)} cases; the rank correlation is "
+            f"{min(found):+.2f} to {max(found):+.2f}, {np.median(found):+.2f} in the middle."
+        )
+    return [Bullets(items)]
+
+
+def _gain_findings(rows: Sequence[RowStudy], paper: Paper) -> list[str]:
+    """Return what choosing by success gains, in a sentence or two; nothing where nobody did."""
+    told = [(row, row.gain) for row in rows if row.gain is not None]
+    if not told:
+        return []
+    gained = [row for row, gain in told if gain.paired.mean > 0.0 and gain.paired.p < 0.01]
+    most, greatest = max(told, key=lambda one: one[1].paired.mean)
+    said = (
+        f"Choosing by estimated success gains in {len(gained)} of {len(told)} rows (p < 0.01, "
+        f"signed rank), most in {most.name}: {signed(100.0 * greatest.paired.mean)} points."
+    )
+    known = [(row, gain) for row, gain in told if paper.published(row.task, row.environment)]
+    below = [
+        f"{row.name} ({percent(gain.robust.summary.mean)})"
+        for row, gain in known
+        if 100.0 * gain.robust.summary.mean < _published_mean(row, paper) - NEAR
+    ]
+    if known:
+        said += f" With it {len(known) - len(below)} of {len(known)} are at or above the paper's."
+    if below:
+        said += f" Below: {', '.join(below)}."
+    return [said]
+
+
+def _short_of(row: RowStudy, paper: Paper) -> str:
+    theirs = _published_mean(row, paper)
+    return f"{row.name} ({percent(row.best.summary.mean)} against {theirs:.1f} %)"
+
+
+def _published_mean(row: RowStudy, paper: Paper) -> float:
+    published = paper.published(row.task, row.environment)
+    return published.mean if published else 0.0
+
+
+def _exception(row: RowStudy, members: int) -> str:
+    found = find_contrast(row, members)
+    if found is None or row.methods is None:
+        return ""
+    drawn = row.methods.cells[members, False]
+    places = "one place" if members == 1 else "two places"
+    said = (
+        f"{row.name}, {places}: with TC-manipulability the mean is "
+        f"{signed(100.0 * found.paired.mean)} points from that without (rank sum p "
+        f"{p_value(found.independent.p)}, signed rank p {p_value(found.paired.p)})."
+    )
+    if drawn.choices <= 20:
+        said += (
+            f" Only {drawn.choices} sets reach as much as the best, so there is little to choose "
+            "between."
+        )
+    else:
+        said += (
+            f" The set with the greatest P_R + P_M is one of {drawn.choices:,} that reach as much; "
+            "isotropy knows neither joint limits nor what is near the arm."
+        )
+    lost = row.single_losses if members == 1 else row.losses
+    # What is never reached is not lost by the errors.
+    at_times = [loss for loss in lost.goals if loss.success > 0.0] if lost is not None else []
+    if at_times:
+        said += f" {lost_goal(at_times[0])}"
+    return said
+
+
+def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
+    groups = []
+    for row in rows:
+        published = paper.published(row.task, row.environment)
+        theirs = (published.mean, published.std) if published else None
+        boxes = [
+            Box(1, 100.0 * row.single.shares),
+            Box(0, 100.0 * row.best.shares, theirs),
+        ]
+        if row.gain is not None:
+            boxes.append(Box(2, 100.0 * row.gain.robust.shares))
+        groups.append(Group(row.name, boxes))
+    figure = draw_boxes(groups, SERIES, label="goals reached [%]", reference="paper, Table I")
+    return [
+        table_1(rows, paper),
+        Picture(
+            as_svg(figure, "table-1"),
+            "svg",
+            "Box plots of the percentage of goals reached, for each row of Table I the best "
+            "single configuration, the best set, and the surest set.",
+            "Box: the middle half of the samples; line: median; whiskers: 5th and 95th percentile; "
+            "dot: mean; rings: samples beyond the whiskers. Diamond with a line: the paper's "
+            "mean and one standard deviation to each side, cut at 100 %.",
+        ),
+    ]
+
+
+def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
+    groups = []
+    for row in rows:
+        for members in (1, 2):
+            published = paper.compared(row.task, row.environment, members)
+            cells = row.methods.cells if row.methods else {}
+            boxes = [
+                Box(series, 100.0 * cells[members, is_with].shares, theirs)
+                for series, is_with, theirs in (
+                    (2, False, published.without if published else None),
+                    (0, True, published.with_ if published else None),
+                )
+                if (members, is_with) in cells
+            ]
+            if boxes:
+                place = "one place" if members == 1 else "two places"
+                groups.append(Group(f"{row.name}\n{place}", boxes))
+    figure = draw_boxes(groups, METHODS, label="goals reached [%]", reference="paper, Table III")
+    return [
+        table_3(rows, paper),
+        Picture(
+            as_svg(figure, "table-3"),
+            "svg",
+            "Box plots of the percentage of goals reached with one and with two configurations, "
+            "with and without TC-manipulability.",
+            "As above; on the same samples for both methods.",
+        ),
+        Folded("All comparisons", [contrasts_table(rows)]),
+    ]
+
+
+def _gains(rows: Sequence[RowStudy]) -> list[Block]:
+    return [
+        Text(
+            "P_R and P_M are computed for the room as it is believed to be. Success under error "
+            "can be estimated for each set instead (tcs robustify). The surest set is the one "
+            "whose estimate has the greatest lower end of its 95 % interval."
+        ),
+        gain_table(rows),
+    ]
+
+
+def _prediction(rows: Sequence[RowStudy]) -> list[Block]:
+    clouds = [
+        Cloud(
+            f"{row.task.replace('_', ' ')}\n{row.environment}",
+            [
+                (one.manipulability, 100.0 * one.success)
+                for one in row.predictions
+                if one.equal_reach
+            ],
+            (row.best.manipulability, 100.0 * row.best.summary.mean),
+        )
+        for row in rows
+    ]
+    figure = draw_clouds(
+        clouds,
+        ("sets of one", "sets of two"),
+        x_label="P_M without error",
+        y_label="mean of goals reached [%]",
+    )
+    return [
+        prediction_table(rows),
+        Picture(
+            as_svg(figure, "prediction"),
+            "svg",
+            "For each row a cloud of sets: success with error over P_M without error.",
+            "Dots: random sets whose P_R is at least 0.98 of the greatest. Diamond: the best set, "
+            "over all samples. Each panel has axes of its own.",
+        ),
+    ]
+
+
+def _losses(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
+    blocks: list[Block] = [
+        Text(
+            "The goals that the best set does not reach in every sample: in how many it does [%], "
+            "from which stop most often, and what stops the arm there in the others. A gripper "
+            "that would touch something at the goal does so wherever the robot stands: the ceiling "
+            "is the most that any set could reach on average with the room set as here. Off in the "
+            "losses: the joint whose error tells them from the other samples best, and its mean "
+            "there in standard deviations."
+        )
+    ]
+    lossless = [row.name for row in rows if not row.losses.goals]
+    for row in sorted(rows, key=lambda row: row.best.summary.mean):
+        if not row.losses.goals:
+            continue
+        if is_short(row, paper):
+            blocks += [Text(f"Below the paper: {_reading(row)}"), losses_table(row)]
+        else:
+            blocks.append(Folded(row.name, [losses_table(row)]))
+    if lossless:
+        blocks.append(Text(f"Nothing is lost in any sample: {'; '.join(lossless)}."))
+    return blocks
+
+
+def _reading(row: RowStudy) -> str:
+    """Return what a row that falls short comes down to."""
+    weights = row.best.weights
+    lost = sum((1.0 - loss.success) * weights[loss.goal] for loss in row.losses.goals)
+    worst = row.losses.goals[0]
+    share = (1.0 - worst.success) * weights[worst.goal] / lost
+    said = f"{row.name}. Of all that is lost, {percent(share, 0)} % is goal {worst.goal}. "
+    said += lost_goal(worst)
+    if row.gain is not None and row.gain.paired.mean > 0.0:
+        surest = row.gain.robust
+        said += (
+            " It need not be so: the surest set reaches "
+            f"{mean_and_std(surest)} %, though its P_M is "
+            f"{row.best.manipulability - surest.manipulability:.3f} less."
+        )
+    return said
+
+
+def _chosen(rows: Sequence[RowStudy]) -> list[Block]:
+    blocks: list[Block] = []
+    for row in rows:
+        words = "; ".join(
+            f"stop {i + 1}: " + ", ".join(f"{name} {value:g}" for name, value in member.items())
+            for i, member in enumerate(row.best.members)
+        )
+        blocks += [
+            Picture(
+                row.scene,
+                "png",
+                f"The robot at each place of the best set for {row.name}.",
+                f"{row.titles[0]} – {row.titles[1]}. P_R {row.best.reachability:.2f}, P_M "
+                f"{row.best.manipulability:.3f}; under error {mean_and_std(row.best)} %. {words}.",
+            ),
+            Folded(
+                f"{row.name} from above",
+                [Picture(row.map, "png", f"Map of {row.name} with the best set.", row.name)],
+            ),
+        ]
+    return blocks
+
+
+def _made(
+    rows: Sequence[RowStudy], paper: Paper, plan: Plan, seconds: float, command: str
+) -> list[Block]:
+    cpu = sum(row.cpu_seconds for row in rows)
+    slowest = max(rows, key=lambda row: row.best.seconds)
+    scores = [
+        (
+            row.name,
+            f"scored by tcs {row.made_by['version']} at {row.made_by['created']}, measure "
+            f"{row.made_by['measure']}, scene {row.made_by['scene'][:12]}, SHA-256 of the file "
+            f"{row.made_by['sha256'][:16]}; errors on {', '.join(row.best.errors.errors)}",
+        )
+        for row in rows
+    ]
+    return [
+        Code(command),
+        Facts(
+            [
+                *versions(),
+                *machine(),
+                ("Seed", str(plan.seed)),
+                ("Samples", f"{plan.samples:,} of each method, the same errors for all"),
+                (
+                    "Sets for the prediction",
+                    f"{plan.sets} of each kind, {plan.set_samples} samples",
+                ),
+                ("Time", f"{seconds:.0f} s, {cpu:.0f} s of processor time"),
+                (
+                    "Slowest row",
+                    f"{slowest.name}, {slowest.best.samples:,} samples of the best set in "
+                    f"{slowest.best.seconds:.1f} s",
+                ),
+                ("Paper", paper.source),
+            ]
+        ),
+        Text(
+            "As in the paper: the configuration is not planned anew; a goal counts when any member "
+            "of the set has a solution free of contact; whether the base touches something is not "
+            "asked again; on the bed the person is scored where they belong (shift 0)."
+        ),
+        Folded("Score files", [Facts(scores)]),
+    ]

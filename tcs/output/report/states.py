@@ -1,0 +1,97 @@
+"""Small multiples of a score file: a map for each state of its environment."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from matplotlib.figure import Figure
+
+from tcs.errors import SelectionError
+from tcs.model.grid import Axis, Grid
+from tcs.output.draw import PlaceMap, Stand, StatePanel, draw_states
+from tcs.output.draw.states import Score
+from tcs.output.report.pictures import Shown, Stage, base_outline, room_solids, stage, title_of
+from tcs.placement.store import ScoreFile
+
+MOST_PANELS = 60
+"""More would be too small to read on a page."""
+
+
+def has_states(file: ScoreFile) -> bool:
+    """Return whether the environment has more than one state, but not too many to draw."""
+    return 1 < math.prod(Grid.from_dict(file.grid).environment_shape) <= MOST_PANELS
+
+
+def states_figure(
+    file: ScoreFile, shown: Shown, score: Score = "reachability", staged: Stage | None = None
+) -> Figure:
+    """Return the map of each state of the environment, rows by columns, in one scale.
+
+    Columns are the values of the environment's last axis, rows those of the others, the greatest
+    on top. With one axis alone there is one row.
+
+    Args:
+        file: A score file.
+        shown: The set to mark, each member in the panel of the state it wants.
+        score: What to colour the places by.
+        staged: `stage` of both, where there is one already; its scene is moved about.
+
+    Raises:
+        SelectionError: If the environment has one state only, or too many to draw.
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    grid = Grid.from_dict(file.grid)
+    axes = [axis for axis in grid.environment_axes if axis.count > 1]
+    states = math.prod(grid.environment_shape)
+    if states == 1:
+        raise SelectionError(
+            f"environment '{file.environment.get('name', '')}' has nothing to set, so there is one "
+            "map only. Draw it without --states."
+        )
+    if states > MOST_PANELS:
+        raise SelectionError(
+            f"the environment has {states} states, of which {MOST_PANELS} at most can be drawn on "
+            "one page. Draw the map without --states."
+        )
+    job, scene = staged or stage(file, shown)
+    base = base_outline(scene)
+    scores = file.tables[shown.table].scores
+    stands = [Stand(member, base) for member in shown.members]
+    size = grid.size // states
+
+    def panel(state: int) -> StatePanel:
+        at = grid.configuration(state * size)
+        for name, value in at.environment:
+            scene.set_joint(name, value)
+        chosen = [
+            (number, stand)
+            for number, (h, stand) in enumerate(zip(shown.indices, stands, strict=True), start=1)
+            if h // size == state
+        ]
+        return StatePanel(PlaceMap.of_state(scores, grid, state), room_solids(scene), chosen)
+
+    columns = axes[-1]
+    numbers = range(states)
+    rows = [
+        [panel(state) for state in numbers[first : first + columns.count]]
+        for first in reversed(numbers[:: columns.count])
+    ]
+    above = itertools.product(*([_said(axis, i) for i in range(axis.count)] for axis in axes[:-1]))
+    return draw_states(
+        rows,
+        [", ".join(said) for said in above][::-1],
+        [_said(columns, i) for i in range(columns.count)],
+        members=stands,
+        title=title_of(job),
+        subtitle=shown.subtitle,
+        score=score,
+        measure=file.metadata["measure"],
+    )
+
+
+def _said(axis: Axis, index: int) -> str:
+    """Return a value of an axis in words."""
+    value = axis.start + index * axis.step
+    number = f"{value:.0f}°" if axis.unit == "deg" else f"{value:.2f} m"
+    return f"{axis.name.replace('_', ' ')} {number}"

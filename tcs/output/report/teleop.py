@@ -1,0 +1,225 @@
+"""The page of the experiment with the teleoperated arm: the paper's Tables II and III."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from tcs.output.draw import Box, Group, as_svg, draw_boxes
+from tcs.output.draw.tool_paths import PathGroup, draw_tool_paths
+from tcs.output.report.blocks import (
+    Block,
+    Bullets,
+    Code,
+    Column,
+    Facts,
+    Folded,
+    Page,
+    Picture,
+    Section,
+    Table,
+    Text,
+)
+from tcs.output.report.machine import machine, today, versions
+from tcs.output.report.teleop_tables import (
+    NAMES,
+    PAPER,
+    SCALE,
+    group_table,
+    learning_table,
+    maps_blocks,
+    median_of,
+    motion_blocks,
+    number,
+    signed_rank_table,
+    title_of,
+    trials_table,
+)
+from tcs.output.report.words import p_value
+from tcs.teleop.experiment import HYPOTHESES, SCRIPTED, Experiment, ratio_of_medians
+from tcs.teleop.lines import BLOCKED_AFTER
+from tcs.teleop.maps import DrivenMaps
+from tcs.teleop.operators import Traits
+from tcs.teleop.trial import END_EFFECTOR, NOVEL
+
+
+def experiment_page(
+    experiment: Experiment, maps: DrivenMaps | None = None, *, seconds: float, command: str
+) -> Page:
+    """Return the experiment as a page.
+
+    Args:
+        experiment: What was done.
+        maps: The capability maps of it, if they were made.
+        seconds: How long it took, wall clock.
+        command: How to make it again.
+    """
+    plan, arm = experiment.plan, experiment.arm
+    return Page(
+        title="Following a line that needs the arm reshaped",
+        lead=(
+            f"{plan.operators} {SCRIPTED}, drive {arm.robot.title} along a straight line on which "
+            f"joint {experiment.course.blocking + 1} meets its limit after three quarters of the "
+            f"way, {plan.trials} trials with each controller after {plan.training} of training."
+        ),
+        sections=[
+            Section("What was found", [Bullets(findings(experiment))]),
+            Section("Accuracy, time, effort", _compared(experiment)),
+            Section("Paths of the tool", _paths(experiment)),
+            Section("Motion of the hand", motion_blocks(experiment)),
+            Section("Trials", [trials_table(experiment), learning_table(experiment)]),
+            *([] if maps is None else [Section("Capability maps", maps_blocks(experiment, maps))]),
+            Section("The operators", _operators(experiment)),
+            Section("How it was made", _made(experiment, seconds, command)),
+        ],
+        foot=f"tcs {versions()[0][1]}, {today()}, seed {plan.seed}; {SCRIPTED}.",
+    )
+
+
+def findings(experiment: Experiment) -> list[str]:
+    """Return the main findings in a sentence each."""
+    tests = experiment.tested()
+    said = [
+        f"These are {SCRIPTED}: what follows tells what the controllers do to one way of driving, "
+        "and nothing about what people feel."
+    ]
+    for name in HYPOTHESES:
+        test, ratio = tests[name], ratio_of_medians(experiment, name)
+        theirs = PAPER[name][1] / PAPER[name][0]
+        there, here = (median_of(experiment, one, name) for one in (END_EFFECTOR.name, NOVEL.name))
+        said.append(
+            f"{NAMES[name]}: median {there} with end-effector control, {here} with the novel "
+            f"controller, {ratio:.2f} of it (paper: {theirs:.2f}); signed rank p "
+            f"{p_value(test.p)}, r {test.effect:+.2f}."
+        )
+    for name in experiment.drives:
+        finished = float(experiment.sample(name, "finished").mean())
+        if finished < 1.0:
+            said.append(
+                f"With {title_of(experiment, name)} {100 * finished:.0f} % of the trials came to "
+                f"the end within {experiment.plan.time_limit:g} s; the others count with that "
+                "time, and with the planes that they met."
+            )
+    return said
+
+
+def _compared(experiment: Experiment) -> list[Block]:
+    figures: list[Block] = []
+    titles = [condition.title for condition in experiment.plan.conditions]
+    for name in HYPOTHESES:
+        boxes = [
+            Box(i, SCALE.get(name, 1.0) * experiment.sample(condition, name))
+            for i, condition in enumerate(experiment.drives)
+        ]
+        figure = draw_boxes([Group("", boxes)], titles, label=NAMES[name])
+        figures.append(
+            Picture(
+                as_svg(figure, f"teleop-{name}"),
+                "svg",
+                f"Box plots of {NAMES[name]} with each controller.",
+                f"{NAMES[name]}: means over the trials of each operator ({SCRIPTED}). Box: the "
+                "middle half; line: median; whiskers: 5th and 95th percentile; dot: mean.",
+            )
+        )
+    return [group_table(experiment), signed_rank_table(experiment), *figures]
+
+
+def _paths(experiment: Experiment) -> list[Block]:
+    groups = [
+        PathGroup(title_of(experiment, name), [path for drive in drives for path in drive.paths])
+        for name, drives in experiment.drives.items()
+    ]
+    line = experiment.course.line
+    figure = draw_tool_paths(
+        groups, np.asarray(line.start), np.asarray(line.end), blocked=BLOCKED_AFTER
+    )
+    return [
+        Picture(
+            as_svg(figure, "teleop-paths"),
+            "svg",
+            "Paths of the tool with each controller, from above and from the side.",
+            "Every trial that counts, from above (top) and from the side (bottom). Dashed: the "
+            "line, from the disc to the square; cross: where, without noise, the joint meets its "
+            f"limit. {SCRIPTED[0].upper()}{SCRIPTED[1:]}.",
+        )
+    ]
+
+
+def _operators(experiment: Experiment) -> list[Block]:
+    rows = []
+    for field in fields(Traits):
+        values = [getattr(one, field.name) for one in experiment.traits]
+        rows.append(
+            [
+                field.name.replace("_", " "),
+                number(getattr(Traits(), field.name)),
+                number(values[0])
+                if len({*values}) == 1
+                else f"{number(min(values))} to {number(max(values))}",
+            ]
+        )
+    return [
+        Text(
+            "Each operator has one way of driving for all controllers: pursue the line, notice "
+            "late, tremble, think when the arm stops, try something, and if it does not help, "
+            "something else, further. The controller decides what there is to try: motions of the "
+            "hand in a random direction with a random turn, or joint group 1 one way or the other. "
+            "What helped is remembered and tried first the next time."
+        ),
+        Table(
+            f"What operators are like, in m, s and rad; {SCRIPTED}. The values are ours, not "
+            "fitted to any outcome.",
+            [Column("trait", False), Column("usual"), Column("here")],
+            rows,
+        ),
+    ]
+
+
+def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
+    course, plan = experiment.course, experiment.plan
+    turns = np.degrees(course.turns)
+    settings = [
+        f"{condition.title}: mode {condition.mode.value}, at limits {condition.settings.limits}"
+        for condition in plan.conditions
+    ]
+    return [
+        Code(command),
+        Facts(
+            [
+                *versions(),
+                *machine(),
+                ("Seed", str(plan.seed)),
+                ("Time", f"{seconds:.0f} s"),
+                ("Line", f"{_place(course.line.start)} to {_place(course.line.end)}, in the base"),
+                ("Length", f"{course.line.length:.3f} m"),
+                ("Start posture", ", ".join(f"{q:.4f}" for q in course.joints) + " rad"),
+                (
+                    "Turns of joint 1 that open the way",
+                    f"{turns[0]:.0f} to {turns[-1]:.0f} deg, found without noise in steps of 10",
+                ),
+                ("Controllers", "; ".join(settings)),
+                ("Paper", "N. S. Hoeba, VR mediated teleoperation, Delft: Tables II and III"),
+            ]
+        ),
+        Folded(
+            "What differs from the paper",
+            [
+                Bullets(
+                    [
+                        "No people, so no questionnaires and no preference.",
+                        "The line is found by search; the paper does not give the coordinates of "
+                        "its own.",
+                        "A third controller that reshapes the arm by itself.",
+                        "Contacts are not looked at during trials, as in the paper; the way that "
+                        "the search found is free of the robot's own body.",
+                    ]
+                )
+            ],
+        ),
+    ]
+
+
+def _place(point: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:.3f}" for value in point) + ") m"

@@ -1,0 +1,239 @@
+"""Tables of the experiment with the teleoperated arm; each says that no people took part."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcs.output.report.blocks import Block, Column, Table, Text
+from tcs.output.report.words import p_value
+from tcs.teleop.experiment import HYPOTHESES, SCRIPTED, Experiment
+from tcs.teleop.maps import DrivenMaps
+from tcs.teleop.trial import END_EFFECTOR, NOVEL
+
+PAPER = {"accuracy": (0.0572, 0.0351), "time": (37.09, 36.65), "effort": (0.25e-6, 0.11e-6)}
+"""Medians of end-effector control and of the novel controller: null-space paper, Table II, of 26
+people."""
+NAMES = {
+    "accuracy": "accuracy: greatest error of the barycentre [mm]",
+    "time": "completion time [s]",
+    "effort": "effort: mean absolute work on the device [µJ]",
+    "work": "absolute work on the device in all [mJ]",
+    "steering_angle": "cumulative steering angle [rad]",
+    "steering_translation": "cumulative steering translation [m]",
+    "arc_length": "spectral arc length [-]",
+    "stops": "times the arm stopped",
+    "turned": "joint 1 turned through its group [rad]",
+    "finished": "share of trials that came to the end",
+    "planes_met": "normal planes met, of 30",
+}
+SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
+"""From SI units to those of `NAMES`."""
+
+
+def group_table(experiment: Experiment) -> Table:
+    """Return the paper's Table II, with the tests of normality."""
+    rows = []
+    for name in HYPOTHESES:
+        for condition in experiment.drives:
+            found, scale = experiment.described(condition, name), SCALE.get(name, 1.0)
+            both = {END_EFFECTOR.name: 0, NOVEL.name: 1}
+            paper = PAPER[name][both[condition]] * scale if condition in both else math.nan
+            rows.append(
+                [
+                    NAMES[name],
+                    title_of(experiment, condition),
+                    str(found.count),
+                    *(number(scale * x) for x in (found.median, found.mean, found.std)),
+                    number(found.shapiro_w),
+                    p_value(found.shapiro_p),
+                    number(paper) if math.isfinite(paper) else "–",
+                ]
+            )
+    titles = ("measure", "controller", "N", "median", "mean", "std", "Shapiro-Wilk W", "p")
+    return Table(
+        f"Group statistics, as the paper's Table II; {SCRIPTED}. Last column: the paper's people.",
+        [
+            *(Column(title, i > 1) for i, title in enumerate(titles)),
+            Column("median, paper"),
+        ],
+        rows,
+    )
+
+
+def signed_rank_table(experiment: Experiment) -> Table:
+    """Return the paper's Table III."""
+    rows = []
+    asked = {"greater": "EE > NV", "less": "EE < NV", "two-sided": "EE ≠ NV"}
+    for name, test in experiment.tested().items():
+        rows.append(
+            [
+                NAMES[name],
+                asked[test.tail],
+                number(test.levene_f),
+                p_value(test.levene_p),
+                number(test.statistic),
+                number(test.z),
+                p_value(test.p),
+                f"{test.effect:.3f}",
+            ]
+        )
+    titles = ("measure", "asked", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
+    return Table(
+        "End-effector control (EE) against the novel controller (NV), as the paper's Table III: "
+        f"Levene's test, Wilcoxon's signed ranks; {SCRIPTED}.",
+        [Column(title, i > 1) for i, title in enumerate(titles)],
+        rows,
+    )
+
+
+def motion_blocks(experiment: Experiment) -> list[Block]:
+    """Return steering, smoothness and time as the ITCM thesis compares them."""
+    rows, pairs = [], []
+    for name, found in experiment.varied().items():
+        cells = []
+        for condition in experiment.drives:
+            sample = experiment.sample(condition, name)
+            cells.append(f"{number(sample.mean())} ({number(sample.std(ddof=1))})")
+        rows.append(
+            [
+                NAMES[name],
+                *cells,
+                f"F({found.df_between:g}, {found.df_error:g}) = {number(found.f)}",
+                p_value(found.p),
+            ]
+        )
+        for pair in found.post_hoc:
+            pairs.append(
+                [
+                    NAMES[name],
+                    f"{title_of(experiment, pair.first)} – {title_of(experiment, pair.second)}",
+                    number(pair.difference),
+                    number(pair.t),
+                    p_value(pair.p),
+                    f"{pair.effect:.2f}",
+                ]
+            )
+    titles = [title_of(experiment, name) for name in experiment.drives]
+    return [
+        Table(
+            "Mean (std) over operators, and one-way analysis of variance with repeated measures, "
+            f"as the ITCM thesis; {SCRIPTED}.",
+            [Column("measure", False), *(Column(t) for t in titles), Column("F"), Column("p")],
+            rows,
+        ),
+        Table(
+            f"Pairs: paired t tests, two-tailed, p times the number of pairs (Bonferroni); "
+            f"{SCRIPTED}.",
+            [
+                Column("measure", False),
+                Column("pair", False),
+                *(Column(title) for title in ("difference", "t", "p", "r")),
+            ],
+            pairs,
+        ),
+        Text(
+            "Steering is that of the hand that drives the tool; while the other hand turns the "
+            "joint group, it rests, and rests lengthen the spectral arc. Operators turn the hand "
+            "only when they try something: with the novel controller they never have to."
+        ),
+    ]
+
+
+def trials_table(experiment: Experiment) -> Table:
+    """Return how the trials went."""
+    rows = []
+    for name in ("finished", "stops", "turned", "work", "planes_met"):
+        scale = SCALE.get(name, 1.0)
+        means = [scale * experiment.sample(c, name).mean() for c in experiment.drives]
+        rows.append([NAMES[name], *(number(mean) for mean in means)])
+    titles = [title_of(experiment, name) for name in experiment.drives]
+    return Table(
+        f"Means over the trials that count; {SCRIPTED}.",
+        [Column("what", False), *(Column(title) for title in titles)],
+        rows,
+    )
+
+
+def learning_table(experiment: Experiment) -> Table:
+    """Return accuracy and time from trial to trial."""
+    plan, rows = experiment.plan, []
+    for condition, drives in experiment.drives.items():
+        for name in ("accuracy", "time"):
+            every = np.array([[getattr(t, name) for t in (*d.training, *d.trials)] for d in drives])
+            medians = np.median(every, axis=0) * SCALE.get(name, 1.0)
+            rows.append(
+                [title_of(experiment, condition), NAMES[name], *(number(x) for x in medians)]
+            )
+    numbered = [f"training {i + 1}" for i in range(plan.training)]
+    numbered += [f"trial {i + 1}" for i in range(plan.trials)]
+    return Table(
+        f"Median of each trial over operators: what they learn; {SCRIPTED}.",
+        [Column("controller", False), Column("measure", False), *(Column(n) for n in numbered)],
+        rows,
+    )
+
+
+def maps_blocks(experiment: Experiment, maps: DrivenMaps) -> list[Block]:
+    """Return how the capability map changes with the controller."""
+    rows = []
+    for one in maps.maps:
+        best = one.best
+        stand = ["–", "–"]
+        if best is not None:
+            stand = [
+                f"{best.x:.2f}, {best.y:.2f} m, {math.degrees(best.yaw):.1f} deg",
+                number(best.score),
+            ]
+        rows.append(
+            [
+                title_of(experiment, one.condition),
+                f"{one.samples:,}",
+                f"{len(one.capability.cells):,}",
+                f"{100 * one.shared:.0f}",
+                number(one.mean_score),
+                str(one.grasp_cells),
+                *stand,
+            ]
+        )
+    titles = ("samples", "cells", "also in the first [%]", "mean score", "cells of the grasp")
+    return [
+        Text(
+            "All that was driven with a controller is one recording, and its map (ITCM) says from "
+            "where an operator with that controller reaches a tool pose. The grasp that all are "
+            f"asked for: tool {maps.height:.2f} m above the floor, pitch "
+            f"{math.degrees(maps.pitch):.1f} deg, roll {math.degrees(maps.roll):.1f} deg; base "
+            "poses are seen from the tool."
+        ),
+        Table(
+            f"Maps of what was driven, by controller; {SCRIPTED}.",
+            [
+                Column("controller", False),
+                *(Column(title) for title in titles),
+                Column("best base pose"),
+                Column("its score"),
+            ],
+            rows,
+        ),
+    ]
+
+
+def title_of(experiment: Experiment, name: str) -> str:
+    """Return what a condition is called in tables."""
+    return next(one.title for one in experiment.plan.conditions if one.name == name)
+
+
+def median_of(experiment: Experiment, condition: str, name: str) -> str:
+    """Return the median of a measure in the unit of `NAMES`."""
+    return number(SCALE.get(name, 1.0) * np.median(experiment.sample(condition, name)))
+
+
+def number(value: float) -> str:
+    """Return three digits, without an exponent where there need be none.
+
+    >>> number(0.01234), number(123.4), number(0.0)
+    ('0.0123', '123', '0')
+    """
+    text = f"{float(value):.3g}"
+    return f"{float(text):g}"

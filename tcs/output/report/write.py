@@ -1,0 +1,42 @@
+"""Write a study down: the page, its tables as Markdown and every sample as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tcs.files.writing import make_folder, whole_file
+from tcs.output.report.html import as_html
+from tcs.output.report.markdown import as_markdown
+from tcs.output.report.paper import load_paper
+from tcs.output.report.robustness import robustness_page
+from tcs.output.report.samples import samples_csv
+from tcs.output.report.study import Plan, RowStudy
+
+NAMES = ("robustness.html", "robustness.md", "samples.csv")
+"""What is written into the folder."""
+
+
+def write_report(
+    folder: Path, rows: Sequence[RowStudy], plan: Plan, *, seconds: float, command: str
+) -> tuple[Path, ...]:
+    """Write a robustness report and return its files, each whole or not at all.
+
+    Args:
+        folder: Where to; made if it is not there.
+        rows: What was found.
+        plan: How much was tried.
+        seconds: How long it took, wall clock.
+        command: How to make it again.
+
+    Raises:
+        OutputError: If something cannot be written there.
+    """
+    make_folder(folder)
+    page = robustness_page(rows, load_paper(), plan, seconds=seconds, command=command)
+    contents = (as_html(page).encode(), as_markdown(page).encode(), samples_csv(rows))
+    paths = tuple(folder / name for name in NAMES)
+    for path, content in zip(paths, contents, strict=True):
+        with whole_file(path, "Report") as stream:
+            stream.write(content)
+    return paths

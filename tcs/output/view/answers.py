@@ -1,0 +1,173 @@
+"""What a score file answers about one configuration: which goals are reached, why not the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.store import ScoreFile
+from tcs.placement.tables import Reason, ScoreTable, SuccessTable
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+
+COLOURS = {
+    Reason.REACHED: "#009e73",
+    Reason.TOO_FAR: "#56b4e9",
+    Reason.JOINT_LIMITS: "#f0e442",
+    Reason.BODY_BLOCKED: "#4d4d4d",
+    Reason.GRIPPER_BLOCKED: "#e69f00",
+    Reason.ARM_BLOCKED: "#d55e00",
+}
+"""Colours of Okabe and Ito, told apart by who is colour-blind, and a dark grey."""
+
+COLOUR_NAMES = {
+    Reason.REACHED: "green",
+    Reason.TOO_FAR: "light blue",
+    Reason.JOINT_LIMITS: "yellow",
+    Reason.BODY_BLOCKED: "grey",
+    Reason.GRIPPER_BLOCKED: "light orange",
+    Reason.ARM_BLOCKED: "dark orange",
+}
+"""How to call them on a terminal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What came of one configuration at every goal."""
+
+    index: int
+    """Its flat index."""
+    configuration: InitialConfiguration
+    """It itself."""
+    reasons: tuple[Reason, ...]
+    """Whether each goal is reached, or why not."""
+    pairs: tuple[tuple[str, str] | None, ...]
+    """The two bodies that block at each goal, if any do."""
+    reachability: float
+    """P_R of the configuration by itself, TCS eq. (1)."""
+    manipulability: float
+    """P_M of the configuration by itself, TCS eq. (4)."""
+
+    @property
+    def reached(self) -> tuple[int, ...]:
+        """Numbers of the goals that are reached."""
+        return tuple(g for g, one in enumerate(self.reasons) if one == Reason.REACHED)
+
+    def line(self, goal: int) -> str:
+        """Return the verdict as a line of text.
+
+        Args:
+            goal: The goal that is shown: it is told first.
+        """
+        return f"goal {goal} {self._said(goal)}; {self.summary}"
+
+    @property
+    def summary(self) -> str:
+        """What is reached, the scores, and why the rest is not reached."""
+        scores = (
+            f"{len(self.reached)} of {len(self.reasons)} goals, "
+            f"P_R {self.reachability:.0%}, P_M {self.manipulability:.3f}"
+        )
+        rest = self._missed()
+        return f"{scores}{'; ' if rest else ''}{rest}"
+
+    def _said(self, goal: int) -> str:
+        reason, pair = self.reasons[goal], self.pairs[goal]
+        if reason == Reason.REACHED:
+            return "reached"
+        touching = f" ({pair[0]} at {pair[1]})" if pair is not None else ""
+        return f"not reached: {_words(reason)}{touching}"
+
+    def _missed(self) -> str:
+        """Return the other reasons, each with its goals."""
+        found: dict[Reason, list[int]] = {}
+        for g, reason in enumerate(self.reasons):
+            if reason != Reason.REACHED:
+                found.setdefault(reason, []).append(g)
+        return "; ".join(f"{_words(reason)}: {listed(found[reason])}" for reason in sorted(found))
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """One table of a score file, and the set of it that is looked at."""
+
+    grid: Grid
+    """What can be chosen."""
+    scores: ScoreTable
+    """Its scores."""
+    members: tuple[int, ...]
+    """Flat indices of the set in the order of the tour; none where no goal is reached."""
+    success: SuccessTable | None
+    """Estimated success under error, where the file holds any."""
+
+    @classmethod
+    def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> Answers:
+        """Return the answers of one table of a file."""
+        found = file.tables[table]
+        return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
+
+    @property
+    def goals(self) -> int:
+        """How many goals there are."""
+        return self.scores.goals
+
+    def verdict(self, index: int) -> Verdict:
+        """Return what came of a configuration.
+
+        Args:
+            index: Its flat index.
+
+        Raises:
+            GridError: If there is none of that index.
+        """
+        scores, configuration = self.scores, self.grid.configuration(index)
+        names = scores.pair_names
+        return Verdict(
+            index=index,
+            configuration=configuration,
+            reasons=tuple(Reason(code) for code in scores.reason[index]),
+            pairs=tuple(names[i] if i >= 0 else None for i in scores.pair[index].tolist()),
+            reachability=float(tc_reachability(scores.reached[index], scores.weights)),
+            manipulability=float(tc_manipulability(scores.isotropy[index], scores.weights)),
+        )
+
+    def joints(self, index: int, goal: int) -> NDArray[np.float32] | None:
+        """Return the stored arm joints [rad] at a goal, shape (7,); None where not reached."""
+        return self.scores.joints_of(index, goal)
+
+    def environment_state(self, index: int) -> int:
+        """Return the number of a configuration's environment state, in C order over its axes."""
+        return index // (self.grid.size // math.prod(self.grid.environment_shape))
+
+    def served(self, number: int) -> tuple[int, ...]:
+        """Return the goals that a member of the set serves better than the others do.
+
+        Args:
+            number: Number of the member in the set.
+
+        Returns:
+            The goals it reaches with the greatest measure of all members, ascending; a goal that
+            several serve alike counts for the first of them.
+        """
+        rows = list(self.members)
+        measure = np.where(self.scores.reached[rows], self.scores.isotropy[rows], -1.0)
+        mine = (measure.argmax(axis=0) == number) & self.scores.reached[rows[number]]
+        return tuple(np.flatnonzero(mine).tolist())
+
+
+def legend() -> str:
+    """Return what the colours of the arrows mean, as a line of text."""
+    return ", ".join(f"{COLOUR_NAMES[reason]}: {_words(reason)}" for reason in Reason)
+
+
+def _words(reason: Reason) -> str:
+    return reason.name.lower().replace("_", " ")
+
+
+def listed(goals: Iterable[int]) -> str:
+    """Return numbers of goals, one after the other."""
+    return " ".join(str(goal) for goal in goals)

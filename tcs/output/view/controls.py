@@ -1,0 +1,188 @@
+"""What is looked at, and what sliders and buttons change about it; nothing here needs a browser."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+from tcs.model.grid import Axis
+from tcs.output.view.answers import Answers
+from tcs.output.view.floor import kinds
+
+MEMBER, GOAL, COLOUR = "set member", "goal", "floor colour"
+NEXT_MEMBER, NEXT_GOAL = "next set member", "next goal"
+NEXT_COLOUR, BACK = "next floor colour", "back to the set"
+KEYS: Mapping[str, str] = {
+    NEXT_MEMBER: "KeyM",
+    NEXT_GOAL: "KeyG",
+    NEXT_COLOUR: "KeyC",
+    BACK: "KeyB",
+}
+"""Buttons, and the key of each in the browser."""
+_PARTS = 1_000_000
+"""Of a metre or degree: finer than anybody writes a grid."""
+_STAND = {
+    "base_x": "stand at x",
+    "base_y": "stand at y",
+    "base_yaw": "heading",
+    "torso": "torso",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class State:
+    """What is looked at."""
+
+    along: tuple[int, ...]
+    """Where the configuration lies along each axis of the grid."""
+    goal: int
+    """Number of the goal."""
+    kind: str
+    """What the floor is coloured by."""
+    member: int
+    """Number of the member of the set that was looked at last."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Slider:
+    """A slider; it takes low, low + step, ... high."""
+
+    name: str
+    low: float
+    high: float
+    step: float
+
+    @property
+    def tick(self) -> float:
+        """The step that Meshcat is given: it rounds to multiples of it, whatever the lowest value.
+
+        >>> Slider("stand at x [m]", 0.1, 0.5, 0.2).tick
+        0.1
+        """
+        low, step = (round(abs(value) * _PARTS) for value in (self.low, self.step))
+        return math.gcd(low, step) / _PARTS
+
+
+class Controls:
+    """The controls of one file: names and ranges, and what they do to the state."""
+
+    def __init__(self, answers: Answers) -> None:
+        """Lay the controls out.
+
+        Args:
+            answers: What there is to look at.
+        """
+        self._answers = answers
+        self._kinds = kinds(answers)
+        # An axis of one value leaves nothing to move.
+        self._axes = {
+            label_of(axis): (number, axis)
+            for number, axis in enumerate(answers.grid.axes)
+            if axis.count > 1
+        }
+
+    @property
+    def sliders(self) -> tuple[Slider, ...]:
+        """Every slider that has something to move, in the order in which they are shown."""
+        counted = (
+            Slider(MEMBER, 1.0, float(len(self._answers.members)), 1.0),
+            Slider(GOAL, 0.0, float(self._answers.goals - 1), 1.0),
+            Slider(COLOUR, 0.0, float(len(self._kinds) - 1), 1.0),
+        )
+        moving = (
+            Slider(label, axis.start, axis.start + (axis.count - 1) * axis.step, axis.step)
+            for label, (_, axis) in self._axes.items()
+        )
+        return tuple(slider for slider in (*counted, *moving) if slider.high > slider.low)
+
+    def first(self) -> State:
+        """Return what is looked at first: the first member of the set at a goal it serves."""
+        state = State((0,) * len(self._answers.grid.axes), 0, self._kinds[0], 0)
+        return self._at_member(state, 0) if self._answers.members else state
+
+    def values(self, state: State) -> dict[str, float]:
+        """Return where every slider stands in a state, by name [m or deg]."""
+        counted = {
+            MEMBER: state.member + 1.0,
+            GOAL: float(state.goal),
+            COLOUR: float(self._kinds.index(state.kind)),
+        }
+        moving = {
+            label: axis.start + state.along[number] * axis.step
+            for label, (number, axis) in self._axes.items()
+        }
+        return {slider.name: {**counted, **moving}[slider.name] for slider in self.sliders}
+
+    def moved(self, state: State, name: str, value: float) -> State:
+        """Return the state after a slider was moved.
+
+        Args:
+            state: The state before.
+            name: Name of the slider.
+            value: Where it stands now; the nearest step counts, within its range.
+        """
+        slider = next(one for one in self.sliders if one.name == name)
+        last = round((slider.high - slider.low) / slider.step)
+        step = min(max(round((value - slider.low) / slider.step), 0), last)
+        if name == MEMBER:
+            return self._at_member(state, step)
+        if name == GOAL:
+            return dataclasses.replace(state, goal=step)
+        if name == COLOUR:
+            return dataclasses.replace(state, kind=self._kinds[step])
+        along = list(state.along)
+        along[self._axes[name][0]] = step
+        return dataclasses.replace(state, along=tuple(along))
+
+    def clicked(self, state: State, name: str) -> State:
+        """Return the state after a button was clicked.
+
+        Args:
+            state: The state before.
+            name: One of `KEYS`.
+        """
+        if name == NEXT_GOAL:
+            return dataclasses.replace(state, goal=(state.goal + 1) % self._answers.goals)
+        if name == NEXT_COLOUR:
+            after = (self._kinds.index(state.kind) + 1) % len(self._kinds)
+            return dataclasses.replace(state, kind=self._kinds[after])
+        if not self._answers.members:
+            return state
+        ahead = 1 if name == NEXT_MEMBER else 0
+        return self._at_member(state, (state.member + ahead) % len(self._answers.members))
+
+    def index(self, state: State) -> int:
+        """Return the flat index of the configuration."""
+        return int(self._answers.grid.flat(state.along))
+
+    def environment_state(self, state: State) -> int:
+        """Return the number of the environment's state, in C order over its axes."""
+        return self._answers.environment_state(self.index(state))
+
+    def heading(self, state: State) -> str:
+        """Return where the configuration comes from, as words."""
+        members = self._answers.members
+        if members and members[state.member] == self.index(state):
+            return f"member {state.member + 1} of {len(members)}"
+        return "stand here"
+
+    def _at_member(self, state: State, number: int) -> State:
+        """Return the state at a member; a goal it cannot reach gives way to one it serves best."""
+        index = self._answers.members[number]
+        along = tuple(self._answers.grid.indices(index).tolist())
+        goal = state.goal
+        if not self._answers.scores.reached[index, goal]:
+            reached = self._answers.verdict(index).reached
+            goal = (*self._answers.served(number), *reached, goal)[0]
+        return dataclasses.replace(state, along=along, member=number, goal=goal)
+
+
+def label_of(axis: Axis) -> str:
+    """Return the name of the slider of an axis, with its unit.
+
+    >>> label_of(Axis("head_rest", "deg", 0.0, 40.0, 3))
+    'head rest [deg]'
+    """
+    name = _STAND.get(axis.name, axis.name.replace("_", " "))
+    return f"{name} [{axis.unit}]"

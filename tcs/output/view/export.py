@@ -1,0 +1,147 @@
+"""The scene as one page that needs no server: it plays through the members of a set and goals."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pydrake.geometry import Meshcat, MeshcatAnimation
+from pydrake.math import RigidTransform
+
+from tcs.output.view.answers import COLOURS, Answers, listed
+from tcs.output.view.floor import REACHABILITY, floor_of
+from tcs.output.view.props import FLOOR, SHOWN, Props, Snapshot, arrow_path, draw_floor
+from tcs.placement.tables import Reason
+
+_RATE = 10
+"""Frames in a second: a change takes one of them."""
+_HOLD = 15
+"""Frames for which each goal is shown."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is shown for a while."""
+
+    member: int
+    """Number of the member of the set."""
+    index: int
+    """Flat index of its configuration."""
+    goal: int
+    """The goal that is shown."""
+
+
+def script(answers: Answers) -> tuple[Step, ...]:
+    """Return what the animation goes through: each member, at each goal it serves best.
+
+    A set without members, where no goal is reached from anywhere, shows the first configuration.
+    """
+    steps = [
+        Step(number, index, goal)
+        for number, index in enumerate(answers.members)
+        for goal in answers.served(number)
+    ]
+    return tuple(steps) or (Step(0, 0, 0),)
+
+
+def page(
+    meshcat: Meshcat, props: Props, answers: Answers, *, title: str, notes: Sequence[str] = ()
+) -> str:
+    """Return the page.
+
+    The map on the floor is that of the reachability, with the bed as the member shown wants it.
+
+    Args:
+        meshcat: An empty one.
+        props: The things to show.
+        answers: What came of each configuration.
+        title: First line, for a person.
+        notes: Further lines, such as where the meshes come from and under which licence.
+    """
+    steps = script(answers)
+    shots = [props.snapshot(step.index, step.goal) for step in steps]
+    arrows = sorted(set().union(*(shot.arrows for shot in shots)))
+    props.set_up(meshcat, arrows, compact=True)
+    for path, pose in shots[0].poses.items():
+        meshcat.SetTransform(path, RigidTransform(pose))
+    environments = [answers.environment_state(step.index) for step in steps]
+    for number in sorted(set(environments)):
+        floor = floor_of(answers, number, steps[0].goal, REACHABILITY)
+        draw_floor(meshcat, floor, f"{FLOOR}/{number}")
+    seen = [
+        {f"{FLOOR}/{number}", *(arrow_path(arrow) for arrow in shot.arrows)}
+        for number, shot in zip(environments, shots, strict=True)
+    ]
+    for path in set().union(*seen):
+        meshcat.SetProperty(path, "visible", path in seen[0])
+    if len(shots) > 1:
+        meshcat.SetAnimation(_animation(shots, seen))
+    panel = _panel(title, [*_captions(answers, steps), *notes])
+    return str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1)
+
+
+def _animation(shots: list[Snapshot], seen: list[set[str]]) -> MeshcatAnimation:
+    """Return the snapshots one after the other, each held for a while, and the paths seen at each.
+
+    The browser moves things in straight lines from key to key, so whatever changes gets a key
+    right before it does: nothing is seen to glide through a bed on a way that nobody has checked.
+    """
+    animation = MeshcatAnimation(_RATE)
+    for path in shots[0].poses:
+        poses = [shot.poses[path] for shot in shots]
+        for number, pose in enumerate(poses):
+            if number == 0 or (pose != poses[number - 1]).any():
+                if number:
+                    last = RigidTransform(poses[number - 1])
+                    animation.SetTransform(number * _HOLD - 1, path, last)
+                animation.SetTransform(number * _HOLD, path, RigidTransform(pose))
+    # The animation ends with its last key: the last goal is to be held as long as the others.
+    end = RigidTransform(shots[-1].poses[SHOWN])
+    animation.SetTransform(len(shots) * _HOLD, SHOWN, end)
+    for path in sorted(set().union(*seen)):
+        shown = [path in one for one in seen]
+        for number, visible in enumerate(shown):
+            if number == 0 or visible != shown[number - 1]:
+                animation.SetProperty(number * _HOLD, path, "visible", visible)
+    return animation
+
+
+def _captions(answers: Answers, steps: tuple[Step, ...]) -> list[str]:
+    """Return a line for each member: when it is shown, and what it reaches."""
+    lines = []
+    for number, index in enumerate(answers.members):
+        times = [at * _HOLD / _RATE for at, one in enumerate(steps) if one.member == number]
+        goals = [one.goal for one in steps if one.member == number]
+        if times:
+            until = times[-1] + _HOLD / _RATE
+            line = answers.verdict(index).summary
+            shown = f"member {number + 1} at goals {listed(goals)}"
+            lines.append(f"{times[0]:g} to {until:g} s: {shown}. It reaches {line}.")
+    return lines or ["No goal is reached from anywhere."]
+
+
+def _panel(title: str, lines: list[str]) -> str:
+    """Return title, lines and the legend of the arrows, to lie over the picture."""
+    colours = "".join(
+        f'<span style="white-space:nowrap;margin-right:1em"><span style="color:{COLOURS[one]}">'
+        f"&#9632;</span> {one.name.lower().replace('_', ' ')}</span>"
+        for one in Reason
+    )
+    return overlay(title, lines, f"<p>{colours}</p>")
+
+
+def overlay(title: str, lines: Sequence[str], more: str = "") -> str:
+    """Return title and lines of text as HTML that lies over the picture.
+
+    Args:
+        title: First line, in bold.
+        lines: Further lines.
+        more: HTML below them, taken as it is.
+    """
+    said = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
+    return (
+        "<style>#tcs{position:fixed;left:0;top:0;max-width:44em;margin:8px;padding:6px 10px;"
+        "background:#ffffffdd;font:13px sans-serif;color:#222}#tcs p{margin:3px 0}</style>"
+        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{said}{more}</div>'
+    )

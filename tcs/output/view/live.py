@@ -1,0 +1,133 @@
+"""The live viewer: Meshcat shows the state, its sliders and buttons change it."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.math import RigidTransform
+
+from tcs.errors import OutputError
+from tcs.output.view.answers import Answers
+from tcs.output.view.controls import KEYS, Controls, State
+from tcs.output.view.floor import floor_of
+from tcs.output.view.props import Props, Snapshot, arrow_path, draw_floor
+from tcs.placement.tables import Reason
+
+_PAUSE = 0.01
+"""Between two looks at the controls [s]: short against the 0.1 s that a change may take."""
+
+
+def open_meshcat(port: int | None = None) -> Meshcat:
+    """Return an empty Meshcat that this machine alone can look at.
+
+    Args:
+        port: Where it listens; by default the first free one from 7000 on.
+
+    Raises:
+        OutputError: If it cannot listen there.
+    """
+    # Who is to look there is told by whoever opens it.
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(logging.WARNING)
+    try:
+        return Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
+    except RuntimeError as error:
+        where = "a port from 7000 to 7099" if port is None else f"port {port}"
+        raise OutputError(f"the viewer cannot listen at {where}. Name a free one.") from error
+    finally:
+        log.setLevel(level)
+
+
+class Viewer:
+    """Answers on show in a Meshcat."""
+
+    def __init__(
+        self, meshcat: Meshcat, props: Props, answers: Answers, tell: Callable[[str], None]
+    ) -> None:
+        """Show the set's first member, and lay out the controls.
+
+        Args:
+            meshcat: An empty one.
+            props: The things to show.
+            answers: What came of each configuration.
+            tell: Called with a line of text for each state that is shown.
+        """
+        self._meshcat, self._props, self._answers, self._tell = meshcat, props, answers, tell
+        self._controls = Controls(answers)
+        arrows = ((g, reason) for g in range(answers.goals) for reason in Reason)
+        props.set_up(meshcat, arrows)
+        self._floor: tuple[int, int, str] | None = None
+        self._shown: Snapshot | None = None
+        self._state = self._controls.first()
+        values = self._controls.values(self._state)
+        for slider in self._controls.sliders:
+            place = values[slider.name]
+            meshcat.AddSlider(slider.name, slider.low, slider.high, slider.tick, place)
+        for name, key in KEYS.items():
+            meshcat.AddButton(name, key)
+        self._clicks = dict.fromkeys(KEYS, 0)
+        self._show()
+
+    @property
+    def state(self) -> State:
+        """What is looked at now."""
+        return self._state
+
+    def look(self) -> bool:
+        """Do what was asked for since the last look; return whether anything was."""
+        state = self._state
+        before = self._controls.values(state)
+        for name, value in before.items():
+            now = self._meshcat.GetSliderValue(name)
+            if self._controls.values(self._controls.moved(state, name, now))[name] != value:
+                state = self._controls.moved(state, name, now)
+        for name in KEYS:
+            clicks = self._meshcat.GetButtonClicks(name)
+            for _ in range(clicks - self._clicks[name]):
+                state = self._controls.clicked(state, name)
+            self._clicks[name] = clicks
+        if state == self._state:
+            return False
+        self._state = state
+        for name, value in self._controls.values(state).items():
+            # A slider that is being dragged is where it should be: to set it would hold it back.
+            if abs(self._meshcat.GetSliderValue(name) - value) > 1e-6:
+                self._meshcat.SetSliderValue(name, value)
+        self._show()
+        return True
+
+    def run(self, duration: float | None = None) -> None:
+        """Answer the controls, for so long [s] or until interrupted."""
+        end = None if duration is None else time.monotonic() + duration
+        while end is None or time.monotonic() < end:
+            if not self.look():
+                time.sleep(_PAUSE)
+
+    def _show(self) -> None:
+        state, controls = self._state, self._controls
+        index, environment = controls.index(state), controls.environment_state(state)
+        after = self._props.snapshot(index, state.goal)
+        show_change(self._meshcat, self._shown, after)
+        self._shown = after
+        floor = (environment, state.goal if state.kind == "reason" else 0, state.kind)
+        if floor != self._floor:
+            draw_floor(self._meshcat, floor_of(self._answers, *floor))
+            self._floor = floor
+        line = self._answers.verdict(index).line(state.goal)
+        self._tell(f"{controls.heading(state)}: {line}")
+
+
+def show_change(meshcat: Meshcat, before: Snapshot | None, after: Snapshot) -> None:
+    """Move what has moved, and show the arrows whose colour has changed."""
+    for path, pose in after.poses.items():
+        if before is None or (before.poses[path] != pose).any():
+            meshcat.SetTransform(path, RigidTransform(pose))
+    seen = before.arrows if before is not None else frozenset()
+    for arrow in sorted(after.arrows - seen):
+        meshcat.SetProperty(arrow_path(arrow), "visible", True)
+    for arrow in sorted(seen - after.arrows):
+        meshcat.SetProperty(arrow_path(arrow), "visible", False)

@@ -1,0 +1,234 @@
+"""What a person asks of the arm: keys, sliders and gamepad become a command; no browser is needed.
+
+Meshcat tells how often a key was pressed, and not when it was let go of. So a press moves the arm
+for a moment only, and a key that is held goes on by the repeats that the browser makes of it: an
+arm whose operator is gone stops by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.output.view.teleop.gamepad import DOWN as PAD_DOWN
+from tcs.output.view.teleop.gamepad import UP, A, Asked, Gamepad, Pad
+from tcs.teleop import Command, Mode
+from tcs.teleop.settings import RESHAPING
+
+FloatArray = NDArray[np.float64]
+TAP = 0.15
+"""How long a press moves the arm [s]: keyboards repeat a held key every 0.03 to 0.1 s."""
+MOST_LINEAR, MOST_ANGULAR = 0.25, 1.0
+"""Fastest that may be asked for [m/s, rad/s]."""
+DEAD_LINEAR, DEAD_ANGULAR = 0.02, 0.05
+"""Sliders closer to zero than this count as at zero [m/s, rad/s]."""
+SPEED, TURN_SPEED = "key speed [m/s]", "key turn [rad/s]"
+NEXT_MODE, CLUTCH, STOP, BACK = "next mode", "clutch", "all to zero", "back to the start"
+TURN_DOWN, TURN_UP = "turn group -", "turn group +"
+AXES = ("x", "y", "z")
+MOVES: Mapping[str, tuple[int, float, str]] = {
+    "ahead": (0, 1.0, "KeyW"),
+    "back": (0, -1.0, "KeyS"),
+    "left": (1, 1.0, "KeyA"),
+    "right": (1, -1.0, "KeyD"),
+    "up": (2, 1.0, "KeyR"),
+    "down": (2, -1.0, "KeyF"),
+    "roll right": (3, 1.0, "KeyO"),
+    "roll left": (3, -1.0, "KeyU"),
+    "tip down": (4, 1.0, "KeyI"),
+    "tip up": (4, -1.0, "KeyK"),
+    "turn left": (5, 1.0, "KeyJ"),
+    "turn right": (5, -1.0, "KeyL"),
+}
+"""Buttons that move the tool: which of x, y, z and turns about them, which way, and the key."""
+OTHERS: Mapping[str, str] = {
+    TURN_DOWN: "KeyQ",
+    TURN_UP: "KeyE",
+    NEXT_MODE: "KeyM",
+    CLUTCH: "KeyC",
+    STOP: "Space",
+    BACK: "KeyX",
+}
+
+
+def group_button(number: int) -> str:
+    """Return the name of the button of a joint group, counted from 0."""
+    return f"joint group {number + 1}"
+
+
+def sliders() -> dict[str, tuple[float, float, float, float]]:
+    """Return each slider's lowest and highest value, step, and where it begins."""
+    found = {}
+    for unit, most, name in (("m/s", MOST_LINEAR, "move"), ("rad/s", MOST_ANGULAR, "turn")):
+        for axis in AXES:
+            found[f"{name} {axis} [{unit}]"] = (-most, most, 0.01, 0.0)
+    found[SPEED] = (0.01, MOST_LINEAR, 0.01, 0.1)
+    found[TURN_SPEED] = (0.05, MOST_ANGULAR, 0.05, 0.5)
+    return found
+
+
+RATE_SLIDERS = tuple(name for name in sliders() if name not in (SPEED, TURN_SPEED))
+
+
+def buttons(groups: int) -> dict[str, str]:
+    """Return every button with its key.
+
+    Args:
+        groups: How many joint groups there are.
+    """
+    of_groups = {group_button(i): f"Digit{i + 1}" for i in range(groups)}
+    return {name: key for name, (_, _, key) in MOVES.items()} | of_groups | dict(OTHERS)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How the controls stand."""
+
+    sliders: Mapping[str, float]
+    clicks: Mapping[str, int]
+    """How often each button has been pressed since it is there."""
+    pad: Pad | None
+    watched: bool
+    """Whether a browser looks at the page."""
+
+
+class Source(Protocol):
+    """Where readings come from."""
+
+    def read(self) -> Reading:
+        """Return how the controls stand now."""
+        ...
+
+    def zero(self) -> None:
+        """Put every slider of a rate back to zero."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What a person wants in one step."""
+
+    command: Command
+    lost: str = ""
+    """Why the input counts as lost, in which case the command holds the arm; else empty."""
+    hint: str = ""
+    """What to do instead of what was just tried; may be empty."""
+    back: bool = False
+    """Whether the arm is to be put back to where it began."""
+    watched: bool = True
+    """Whether a browser looks at the page."""
+
+
+@dataclass
+class Hand:
+    """A person at the controls, over time."""
+
+    source: Source
+    modes: tuple[Mode, ...]
+    groups: int
+    group: int = 0
+    """The joint group that is chosen, counted from 0."""
+    clutch: bool = False
+    """Whether the clutch is in by key or button."""
+    _mode: int = 0
+    _gamepad: Gamepad = field(default_factory=Gamepad)
+    _counts: dict[str, int] = field(default_factory=dict)
+    _until: dict[str, float] = field(default_factory=dict)
+    _hint: tuple[str, float] = ("", -1.0)
+
+    @property
+    def mode(self) -> Mode:
+        """What commands move."""
+        return self.modes[self._mode]
+
+    def listen(self, now: float) -> Heard:
+        """Return what is asked for.
+
+        Args:
+            now: Time [s].
+        """
+        reading = self.source.read()
+        pressed = self._pressed(reading, now)
+        asked = self._gamepad.look(reading.pad, now)
+        self._obey(pressed, asked, now)
+        back = BACK in pressed
+        lost = asked.lost
+        if not reading.watched:
+            # Meshcat goes on telling what the last browser has said.
+            self._gamepad.forget()
+            lost = "no browser looks at this page: the arm holds still until one does."
+        if STOP in pressed:
+            self._gamepad.give_up()
+        if back or lost or STOP in pressed:
+            self._until.clear()
+            if any(reading.sliders[name] for name in RATE_SLIDERS):
+                self.source.zero()
+        if lost or back or STOP in pressed:
+            command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
+            return Heard(command, lost, back=back, watched=reading.watched)
+        return Heard(self._command(reading, asked, now), hint=self._hint_at(now))
+
+    def _pressed(self, reading: Reading, now: float) -> dict[str, int]:
+        """Return the buttons pressed since the last look, and how often."""
+        found = {}
+        for name, count in reading.clicks.items():
+            fresh = count - self._counts.get(name, 0)
+            self._counts[name] = count
+            if fresh > 0:
+                found[name] = fresh
+                self._until[name] = now + TAP
+        return found
+
+    def _obey(self, pressed: Mapping[str, int], asked: Asked, now: float) -> None:
+        """Change mode, group and clutch."""
+        reshaping = self.mode in RESHAPING
+        for number in range(self.groups):
+            if group_button(number) in pressed:
+                self.group = number
+        step = (UP in asked.clicks) - (PAD_DOWN in asked.clicks)
+        self.group = (self.group + step) % self.groups
+        changes = pressed.get(NEXT_MODE, 0) + (A in asked.clicks)
+        if changes:
+            if len(self.modes) == 1:
+                self._hint = (f"this condition has {self.mode} control only.", now + 2.0)
+            self._mode = (self._mode + changes) % len(self.modes)
+            # What was asked of the mode before is not meant for this one.
+            self._until.clear()
+            return
+        if pressed.get(CLUTCH, 0) % 2:
+            self.clutch = not self.clutch
+        moves = any(name in pressed for name in MOVES)
+        turns = TURN_DOWN in pressed or TURN_UP in pressed
+        if len(self.modes) > 1:
+            if reshaping and moves:
+                self._hint = ("the tool is held in this mode: M goes on to the next.", now + 2.0)
+            if not reshaping and turns:
+                self._hint = ("groups turn in null-space mode: M goes on to it.", now + 2.0)
+
+    def _command(self, reading: Reading, asked: Asked, now: float) -> Command:
+        clutch = self.clutch or asked.clutch
+        if self.mode in RESHAPING:
+            down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
+            sign = int(np.sign(int(up) - int(down) + asked.turn))
+            group = self.group if self.mode is Mode.NULL_SPACE and sign else None
+            return Command(group=group, sign=sign, mode=self.mode, clutch=clutch)
+        wanted = np.array([reading.sliders[name] for name in RATE_SLIDERS])
+        dead = np.repeat((DEAD_LINEAR, DEAD_ANGULAR), 3)
+        wanted[np.abs(wanted) < dead] = 0.0
+        speeds = np.repeat((reading.sliders[SPEED], reading.sliders[TURN_SPEED]), 3)
+        keys = np.zeros(6)
+        for name, (axis, way, _) in MOVES.items():
+            if now < self._until.get(name, -1.0):
+                keys[axis] += way
+        wanted += speeds * (keys + np.array([*asked.linear, *asked.angular]))
+        most = np.repeat((MOST_LINEAR, MOST_ANGULAR), 3)
+        wanted = np.clip(wanted, -most, most)
+        return Command(linear=wanted[:3], angular=wanted[3:], mode=self.mode, clutch=clutch)
+
+    def _hint_at(self, now: float) -> str:
+        text, until = self._hint
+        return text if now < until else ""

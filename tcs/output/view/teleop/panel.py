@@ -1,0 +1,283 @@
+"""The panel over the picture: seven joint bars and what the person is told, from any camera.
+
+Its things hang on Meshcat's camera, so they stay where they are in the picture, offline and in a
+page without a server as well. Lengths on the panel are shares of half the picture's height.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat, Rgba
+from pydrake.math import RigidTransform
+
+from tcs.output.view.teleop.text import ADVANCE, text_mesh
+from tcs.teleop import Arm
+from tcs.teleop.flags import ShortArray, share_of_range
+
+FloatArray = NDArray[np.float64]
+PANEL = "/Cameras/default/rotated/<object>/panel"
+"""Below the camera itself: what hangs there moves with it."""
+FREE, LIMIT, SINGULAR = "free", "limit", "singular"
+COLOURS: Mapping[str, str] = {FREE: "#2ca02c", LIMIT: "#ff2020", SINGULAR: "#ff00ff"}
+"""Of a bar, as the paper has them: green, red at a limit, magenta at a singularity."""
+_TRACKS: Mapping[str, str] = {FREE: "#c8ccd4", LIMIT: "#ff9a9a", SINGULAR: "#ffa6ff"}
+"""Of what a joint has left to go: a joint at its lower limit has a bar of no length."""
+LINES = ("mode", "said")
+_INK = {"mode": "#ffffff", "said": "#ffd24d"}
+_DISTANCE = 0.05
+"""From the camera [m]: behind its nearest plane (0.01 m), before anything that one looks at."""
+_HALF_HEIGHT = math.tan(math.radians(37.5))
+"""Half the height of what Meshcat's camera sees at a distance of 1; it sees 75 degrees."""
+_WIDTH, _BOTTOM, _TOP = 1.56, -0.92, -0.48
+"""Of the panel; it fits into every window that is not much higher than wide."""
+_BAR = (0.185, 0.04)
+"""Width and height of a bar."""
+_PITCH = _WIDTH / 7.0
+_BARS_AT, _NAMES_AT, _ENDS_AT = -0.815, -0.765, -0.895
+_MARK = 0.012
+"""Width of the mark where the joint stands: seen where the bar has no length."""
+_LINE_AT = {"mode": -0.55, "said": -0.625}
+_FONT, _SMALL = 0.044, 0.034
+_MOST_LETTERS = int((_WIDTH - 0.06) / (_FONT * ADVANCE))
+_KEPT = 40
+"""Lines of text that stay in Meshcat, hidden: what is said comes in turns."""
+
+
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """What the panel shows."""
+
+    shares: tuple[float, ...]
+    """Where each joint stands between its limits, 0 to 1."""
+    states: tuple[str, ...]
+    """`FREE`, `LIMIT` or `SINGULAR` of each joint."""
+    mode: str
+    """What commands move, in one line."""
+    said: str
+    """Why the arm stops, or what else there is to know; may be empty."""
+
+
+def readout(
+    arm: Arm, joints: FloatArray, limits: ShortArray, singular: bool, mode: str, said: str
+) -> Readout:
+    """Return what the panel shows of a posture.
+
+    A singularity belongs to the posture, not to a joint: every bar that is not red turns magenta.
+
+    Args:
+        arm: The arm.
+        joints: Joint positions [rad], shape (7,).
+        limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
+        singular: Whether the posture is singular.
+        mode: What commands move.
+        said: What the person is told.
+    """
+    # A joint without limits stands where it has turned to, from half a turn back to half a turn on.
+    turned = (np.asarray(joints) + math.pi) % (2.0 * math.pi) / (2.0 * math.pi)
+    shares = np.where(arm.bounded, share_of_range(arm, np.asarray(joints)), turned)
+    other = SINGULAR if singular else FREE
+    states = tuple(LIMIT if flag else other for flag in limits)
+    return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, said)
+
+
+def state_facts(limits: ShortArray, singular: bool) -> str:
+    """Return which joints are at a limit and whether the posture is singular, as words.
+
+    >>> state_facts(np.array([0, 1, 0, -1, 0, 0, 0]), True)
+    'at its limit: joint 2 (upper), joint 4 (lower); singular posture'
+    """
+    at = [
+        f"joint {i + 1} ({'upper' if flag > 0 else 'lower'})"
+        for i, flag in enumerate(limits)
+        if flag
+    ]
+    facts = [f"at its limit: {', '.join(at)}"] if at else []
+    return "; ".join([*facts, "singular posture"] if singular else facts)
+
+
+def mode_line(mode: str, group: tuple[int, ...] | None, number: int, clutch: bool) -> str:
+    """Return what commands move, in one line.
+
+    Args:
+        mode: Name of the mode.
+        group: Joints of the group that is chosen, counted from 0; None where there is none.
+        number: Number of that group, counted from 0.
+        clutch: Whether the clutch parts arm and person.
+
+    >>> mode_line("null-space", (0, 1, 2), 0, False)
+    'null-space mode, group 1 (joints 1 2 3)'
+    """
+    line = f"{mode} mode"
+    if group is not None:
+        joints = " ".join(str(joint + 1) for joint in group)
+        line += f", group {number + 1} (joints {joints})"
+    return f"{line}; clutch in" if clutch else line
+
+
+class Panel:
+    """The panel of one arm in one Meshcat."""
+
+    def __init__(self, meshcat: Meshcat, arm: Arm) -> None:
+        """Draw what does not change.
+
+        Args:
+            meshcat: Where to.
+            arm: The arm whose joints it shows.
+        """
+        self._meshcat = meshcat
+        self._bounded = arm.bounded
+        self._shown: Readout | None = None
+        self._texts: dict[str, dict[str, str]] = {line: {} for line in LINES}
+        self._written = 0
+        meshcat.SetTransform(PANEL, RigidTransform([0.0, 0.0, -_DISTANCE]))
+        scale = _DISTANCE * _HALF_HEIGHT
+        meshcat.SetProperty(PANEL, "scale", [scale, scale, scale])
+        self._quad("back", "#20242c", _WIDTH, _TOP - _BOTTOM, (0.0, 0.5 * (_TOP + _BOTTOM), 0.0))
+        for i in range(len(arm.joints)):
+            self._draw_bar(arm, i)
+
+    def show(self, now: Readout) -> None:
+        """Show a readout; only what has changed is sent."""
+        before = self._shown
+        for i, (share, state) in enumerate(zip(now.shares, now.states, strict=True)):
+            if before is None or before.states[i] != state:
+                for one in COLOURS:
+                    self._meshcat.SetProperty(f"{bar(i)}/{one}", "visible", one == state)
+            if before is None or before.shares[i] != share:
+                for path, name, value in bar_properties(i, share, bool(self._bounded[i])):
+                    self._meshcat.SetProperty(path, name, value)
+        for line, text in (("mode", now.mode), ("said", now.said)):
+            if before is None or getattr(before, line) != text:
+                self._say(line, text)
+        self._shown = now
+
+    def text(self, line: str, text: str) -> str:
+        """Write a text, hidden, and return its path; empty for an empty text.
+
+        Args:
+            line: One of `LINES`.
+            text: What to write.
+        """
+        known = self._texts[line]
+        if not text:
+            return ""
+        if text not in known:
+            self._written += 1
+            path = f"{PANEL}/{line}/{self._written}"
+            rows = textwrap.wrap(text, _MOST_LETTERS)
+            # Whatever is longer than two rows is written smaller.
+            font = _FONT
+            if len(rows) > 2:
+                rows = textwrap.wrap(text, math.ceil(len(text) / 2) + 8)[:2]
+                font = (_WIDTH - 0.06) / (ADVANCE * max(len(row) for row in rows))
+            for number, row in enumerate(rows):
+                at = (0.03 - 0.5 * _WIDTH, _LINE_AT[line] - 1.35 * font * number, 0.004)
+                self._write(f"{path}/{number}", row, _INK[line], font, at)
+            self._meshcat.SetProperty(path, "visible", False)
+            known[text] = path
+        return known[text]
+
+    def _say(self, line: str, text: str) -> None:
+        path = self.text(line, text)
+        known = self._texts[line]
+        for other, its in list(known.items()):
+            if its == path:
+                # The latest stands last, so that the oldest goes first.
+                known[other] = known.pop(other)
+            elif self._shown is not None and getattr(self._shown, line) == other:
+                self._meshcat.SetProperty(its, "visible", False)
+        if path:
+            self._meshcat.SetProperty(path, "visible", True)
+        while len(known) > _KEPT:
+            self._meshcat.Delete(known.pop(next(iter(known))))
+
+    def _draw_bar(self, arm: Arm, i: int) -> None:
+        """Draw the bar of a joint in all its colours, its name and its limits."""
+        width, height = _BAR
+        x = bar_middle(i)
+        self._meshcat.SetTransform(bar(i), RigidTransform([x - 0.5 * width, _BARS_AT, 0.0]))
+        middle = 0.5 * width
+        for state, colour in COLOURS.items():
+            frame = (middle, 0.0, 0.001)
+            self._quad(f"bar/{i}/{state}/frame", colour, width + 0.02, height + 0.02, frame)
+            track = (middle, 0.0, 0.002)
+            self._quad(f"bar/{i}/{state}/track", _TRACKS[state], width, height, track)
+            if self._bounded[i]:
+                self._quad(f"bar/{i}/{state}/fill", colour, width, height, (middle, 0.0, 0.003))
+        self._quad(f"bar/{i}/mark", "#101010", _MARK, height + 0.05, (0.0, 0.0, 0.005))
+        name = f"joint {i + 1}"
+        left = x - 0.5 * width
+        self._write(f"{PANEL}/name/{i}", name, "#ffffff", _SMALL, (left, _NAMES_AT, 0.004))
+        ends = _degrees(arm, i)
+        for number, text in enumerate(ends):
+            at = left if number == 0 else left + width - ADVANCE * _SMALL * len(text)
+            self._write(f"{PANEL}/end/{i}/{number}", text, "#b8c0cc", _SMALL, (at, _ENDS_AT, 0.004))
+
+    def _quad(
+        self, name: str, colour: str, width: float, height: float, at: tuple[float, float, float]
+    ) -> None:
+        x, y = 0.5 * width, 0.5 * height
+        # Drawn from its left end on, so that its scale along x is its length.
+        corners = np.array([[-x, x, x, -x], [-y, -y, y, y], [0.0, 0.0, 0.0, 0.0]])
+        faces = np.array([[0, 0], [1, 2], [2, 3]], dtype=np.int32)
+        corners[0] += at[0]
+        corners[1] += at[1]
+        corners[2] += at[2]
+        self._draw(f"{PANEL}/{name}", corners, faces, colour)
+
+    def _write(
+        self, path: str, text: str, colour: str, font: float, at: tuple[float, float, float]
+    ) -> None:
+        corners, faces = text_mesh(text)
+        self._draw(path, font * corners + np.array(at)[:, None], faces, colour)
+
+    def _draw(self, path: str, corners: FloatArray, faces: NDArray[np.int32], colour: str) -> None:
+        """Draw triangles that shine by themselves: no lamp of the scene changes their colour."""
+        self._meshcat.SetTriangleMesh(
+            path, np.asfortranarray(corners), np.asfortranarray(faces), Rgba(0.0, 0.0, 0.0)
+        )
+        for channel, value in zip("rgb", to_rgb(colour), strict=True):
+            # Meshcat adds up light, and shows the sum on sRGB's curve.
+            light = value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+            self._meshcat.SetProperty(f"{path}/<object>", f"material.emissive.{channel}", light)
+            self._meshcat.SetProperty(f"{path}/<object>", f"material.specular.{channel}", 0.0)
+        self._meshcat.SetProperty(f"{path}/<object>", "material.toneMapped", False)
+
+
+def bar(i: int) -> str:
+    """Return the path of a joint's bar."""
+    return f"{PANEL}/bar/{i}"
+
+
+def bar_middle(i: int) -> float:
+    """Return where a joint's bar is on the panel."""
+    return (i - 3.0) * _PITCH
+
+
+def bar_properties(i: int, share: float, bounded: bool) -> list[tuple[str, str, list[float]]]:
+    """Return what puts a bar where its joint stands: path, property, value.
+
+    Args:
+        i: Number of the joint, from 0.
+        share: Where it stands between its limits, 0 to 1.
+        bounded: Whether it has limits; without, there is a mark and no fill.
+    """
+    found = [(f"{bar(i)}/mark", "position", [share * _BAR[0], 0.0, 0.0])]
+    for state in COLOURS if bounded else ():
+        # A scale of exactly 0 has no inverse, which the browser would complain about.
+        found.append((f"{bar(i)}/{state}/fill", "scale", [max(share, 1e-3), 1.0, 1.0]))
+    return found
+
+
+def _degrees(arm: Arm, i: int) -> tuple[str, str]:
+    """Return the limits of a joint as words."""
+    if not arm.bounded[i]:
+        return "turns on", ""
+    return f"{math.degrees(arm.lower[i]):+.0f}", f"{math.degrees(arm.upper[i]):+.0f}"

@@ -1,0 +1,67 @@
+"""Where the arm stands when a person begins to drive it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.output.view.teleop.stage import Stage
+from tcs.teleop import Arm, Settings
+from tcs.teleop.control import smallest_singular_value
+from tcs.teleop.flags import share_of_range
+
+FloatArray = NDArray[np.float64]
+_CANDIDATES, _TRIED, _CLIMB = 3000, 20, 500
+"""Postures drawn, how many of the best are looked at, steps by which each is bettered."""
+_AHEAD = 0.8
+"""Cosine between the tool's x axis and straight ahead: within 37 degrees."""
+_AREA = ((0.4, 0.75), (-0.3, 0.3), (-0.4, 0.4))
+"""Where the tool may be from the shoulder: ahead, left, up, in shares of the arm's length."""
+
+
+def start_posture(arm: Arm, stage: Stage) -> FloatArray:
+    """Return a posture from which there is room to move, the same each time [rad], shape (7,).
+
+    Of postures within the limits whose tool points ahead, one with much room: the smallest
+    singular value of the tool's Jacobian times how far the joint closest to a limit
+    is from it. Postures in which the robot touches itself are passed over.
+
+    Args:
+        arm: The arm.
+        stage: Its robot.
+    """
+    rng = np.random.default_rng(0)
+    area = _area(arm)
+    drawn = [(_room(arm, joints, *area), joints) for joints in arm.random_joints(rng, _CANDIDATES)]
+    drawn.sort(key=lambda one: -one[0])
+    for found, at in drawn[:_TRIED]:
+        best, joints = found, at
+        for spread in np.geomspace(0.3, 0.01, _CLIMB):
+            near = joints + rng.normal(0.0, spread, len(joints))
+            room = _room(arm, near, *area)
+            if room > best:
+                best, joints = room, near
+        stage.poses(joints)
+        if best > 0.0 and stage.contacts() is None:
+            return np.array(joints)
+    # An arm that never points ahead begins in the middle of its range.
+    low, high = (np.where(arm.bounded, ends, 0.0) for ends in (arm.lower, arm.upper))
+    return np.asarray(0.5 * (low + high))
+
+
+def _area(arm: Arm) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and the highest place of the tool in the base [m], shapes (3,)."""
+    shoulder = arm.frames[0, :3, 3]
+    length = float(np.linalg.norm(arm.frames[1:, :3, 3], axis=1).sum())
+    low, high = np.array(_AREA).T * length
+    return shoulder + low, shoulder + high
+
+
+def _room(arm: Arm, joints: FloatArray, low: FloatArray, high: FloatArray) -> float:
+    """Return how much room a posture has to move; 0 where the tool is not as it should be."""
+    at = arm.kinematics(joints)
+    if at.R[0, 0] < _AHEAD or (at.p < low).any() or (at.p > high).any():
+        return 0.0
+    shares = share_of_range(arm, joints)
+    room = float(np.minimum(shares, 1.0 - shares)[arm.bounded].min(initial=0.5))
+    return max(room, 0.0) * smallest_singular_value(at.jacobian, Settings().length)

@@ -1,0 +1,143 @@
+"""What to change to get from one configuration to another, axis by axis and in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from tcs.model.grid import InitialConfiguration
+
+LEAST_CHANGE = 1e-9
+"""A change below a nanometre or a billionth of a degree is none: configurations are written with
+nine decimals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """How far to move along one axis."""
+
+    axis: str
+    """The axis, called as in `InitialConfiguration.to_json`: angles end in `_deg`."""
+    start: float
+    """Value now [unit]."""
+    end: float
+    """Value afterwards [unit]."""
+    change: float
+    """How far to move [unit]; headings the shorter way round."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values: "m" or "deg"."""
+        return "deg" if self.axis.endswith("_deg") else "m"
+
+    @property
+    def words(self) -> str:
+        """What to do, for a person; base places along the axes of the environment frame."""
+        name, up = self.axis.removesuffix("_deg"), self.change > 0.0
+        amount = _angle(self.change) if self.unit == "deg" else _length(self.change)
+        if name in ("base_x", "base_y"):
+            return f"drive {amount} along {'+' if up else '-'}{name[-1]}"
+        if name == "base_yaw":
+            # Half a turn is the same both ways.
+            side = "" if abs(self.change) > 179.95 else f" to the {'left' if up else 'right'}"
+            return f"turn {amount}{side}"
+        part = name.replace("_", " ")
+        for ending in (" height", " rest"):
+            if part.endswith(ending) or part == "torso":
+                what = part.removesuffix(" height")
+                return f"{'raise' if up else 'lower'} the {what} {amount}"
+        return f"change the {part} by {'+' if up else '-'}{amount}"
+
+    @property
+    def is_noticeable(self) -> bool:
+        """Whether it is more than what words round away: half a millimetre, 0.05 degrees."""
+        return abs(self.change) >= (0.05 if self.unit == "deg" else 0.0005)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain containers."""
+        return {
+            "axis": self.axis,
+            "from": self.start,
+            "to": self.end,
+            "change": self.change,
+            "unit": self.unit,
+            "words": self.words,
+        }
+
+
+def changes_between(
+    before: InitialConfiguration, after: InitialConfiguration
+) -> tuple[Change, ...]:
+    """Return what differs between two configurations of the same axes, in their order."""
+    start, end = before.to_json(), after.to_json()
+    changes = []
+    for axis, value in end.items():
+        change = value - start[axis]
+        if axis == "base_yaw_deg":
+            change = math.remainder(change, 360.0)
+        if abs(change) >= LEAST_CHANGE:
+            changes.append(Change(axis, start[axis], value, round(change, 9)))
+    return tuple(changes)
+
+
+def ahead_and_left(
+    before: InitialConfiguration, after: InitialConfiguration
+) -> tuple[float, float]:
+    """Return how far the second place is ahead and to the left of the first base [m].
+
+    >>> here = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=math.pi / 2, torso=0.0)
+    >>> there = InitialConfiguration(base_x=-0.5, base_y=2.0, base_yaw=0.0, torso=0.0)
+    >>> tuple(round(metres, 9) for metres in ahead_and_left(here, there))
+    (2.0, 0.5)
+    """
+    dx, dy = after.base_x - before.base_x, after.base_y - before.base_y
+    cos, sin = math.cos(before.base_yaw), math.sin(before.base_yaw)
+    return cos * dx + sin * dy, cos * dy - sin * dx
+
+
+def sentence(
+    before: InitialConfiguration, after: InitialConfiguration, *, around: float | None = None
+) -> str:
+    """Return what to do as one sentence; forward and left are those of the base as it heads now.
+
+    Args:
+        before: The configuration now.
+        after: The configuration afterwards.
+        around: Length of the way around the furniture [m], where that is what was asked for.
+
+    >>> here = InitialConfiguration(base_x=1.0, base_y=0.0, base_yaw=0.0, torso=0.15)
+    >>> there = InitialConfiguration(base_x=0.93, base_y=0.1, base_yaw=-0.7853981634, torso=0.3)
+    >>> sentence(here, there)
+    'Drive 7 cm back and 10 cm to the left, turn 45 deg to the right, raise the torso 15 cm.'
+    """
+    ahead, left = ahead_and_left(before, after)
+    legs = []
+    if abs(ahead) >= 0.0005:
+        legs.append(f"{_length(ahead)} {'forward' if ahead > 0.0 else 'back'}")
+    if abs(left) >= 0.0005:
+        legs.append(f"{_length(left)} to the {'left' if left > 0.0 else 'right'}")
+    steps = []
+    if legs:
+        way = f" ({_length(around)} around the furniture)" if around is not None else ""
+        steps.append(f"drive {' and '.join(legs)}{way}")
+    steps += [
+        change.words
+        for change in changes_between(before, after)
+        if change.axis not in ("base_x", "base_y") and change.is_noticeable
+    ]
+    if not steps:
+        return "Nothing needs to change."
+    text = ", ".join(steps)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _length(metres: float) -> str:
+    """Return a length without its sign, to the millimetre below a metre."""
+    size = abs(metres)
+    return f"{round(100.0 * size, 1):g} cm" if size < 0.9995 else f"{size:.2f} m"
+
+
+def _angle(degrees: float) -> str:
+    """Return an angle without its sign."""
+    return f"{round(abs(degrees), 1):g} deg"

@@ -1,0 +1,243 @@
+"""Success under error: what sets of configurations reach when the room is a little off."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError, TcsError, UnknownNameError
+from tcs.placement.robustness.error_model import ErrorModel, Offsets, check_draws
+from tcs.placement.robustness.kept import uniform_sets
+from tcs.placement.robustness.statistics import Mean, mean_of
+from tcs.placement.robustness.trials import Errors, Progress, Trials
+from tcs.placement.store import Scored, ScoreFile, shown_state
+from tcs.placement.tables import tc_reachability
+
+SELECTIONS = ("best", "single", "robust", "uniform")
+"""Which sets to evaluate: the set with the best scores; the best single configuration; the set
+with the surest success under error, where `robustify` has estimated it; or, as the paper's
+"without TC-manipulability", another set in every sample, drawn uniformly from those whose P_R is
+at least 0.98 of the greatest."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluation:
+    """What was reached in each sample, and how that came about; arrays are read-only."""
+
+    select: str
+    """One of `SELECTIONS`, or "given"."""
+    sets: NDArray[np.int64]
+    """Flat configuration indices of the members, shape (1, m), or (samples, m) if "uniform"."""
+    offsets: Offsets
+    """By how much joints were off in each sample [m or rad], shapes (samples,)."""
+    reached: NDArray[np.bool_]
+    """Whether any member reaches a goal, shape (samples, goals)."""
+    weights: NDArray[np.float64]
+    """Weights of the goals, sum 1, shape (goals,)."""
+    reachability: float
+    """P_R without error; the mean over the drawn sets if "uniform"."""
+    manipulability: float
+    """P_M without error; likewise."""
+    choices: int
+    """How many sets there were to draw from; 1 unless "uniform"."""
+    clipped: int
+    """In how many samples a joint was stopped at its limit."""
+    errors: ErrorModel
+    """How far off joints may be."""
+    check_base: bool
+    """Whether the base had to be free as well."""
+    seed: int
+    seconds: float
+    """How long it took, compiling left out [s]."""
+    observed: Mapping[str, float]
+    """How the person is found, by joint, angles in degrees under `..._deg` names."""
+    about: Mapping[str, str]
+    """Names of task, environment and robot."""
+    members: tuple[dict[str, float], ...]
+    """The configurations of the set as plain numbers; () if "uniform"."""
+
+    @cached_property
+    def shares(self) -> NDArray[np.float64]:
+        """Share of the goals reached in each sample, by weight, shape (samples,)."""
+        return tc_reachability(self.reached, self.weights)
+
+    @cached_property
+    def summary(self) -> Mean:
+        """Mean of the shares, its standard deviation and interval."""
+        return mean_of(self.shares)
+
+    @property
+    def samples(self) -> int:
+        """How many samples."""
+        return len(self.reached)
+
+    @property
+    def per_goal(self) -> NDArray[np.float64]:
+        """Share of the samples in which each goal is reached, shape (goals,)."""
+        return np.asarray(self.reached.mean(axis=0))
+
+    @property
+    def complete(self) -> float:
+        """Share of the samples in which all goals are reached."""
+        return float(self.reached.all(axis=1).mean())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the figures as plain containers: what `tcs evaluate --json` prints."""
+        return {
+            **self.about,
+            "select": self.select,
+            "members": list(self.members),
+            "choices": self.choices,
+            "observed": dict(self.observed),
+            "reachability": round(self.reachability, 12),
+            "manipulability": round(self.manipulability, 12),
+            "mean": round(self.summary.mean, 12),
+            "std": self.summary.std,
+            "ci95": list(self.summary.ci95),
+            "per_goal": self.per_goal.tolist(),
+            "complete": self.complete,
+            "samples": self.samples,
+            "seed": self.seed,
+            "errors": self.errors.to_json(),
+            "clipped": self.clipped,
+            "check_base": self.check_base,
+            "seconds": self.seconds,
+        }
+
+
+def evaluate(
+    file: ScoreFile | Trials,
+    *,
+    samples: int = 1000,
+    seed: int = 0,
+    errors: Errors = None,
+    select: str | Sequence[int] = "best",
+    members: int = 2,
+    table: int | None = None,
+    check_base: bool = False,
+    stream: str = "",
+    jobs: int = 2,
+    on_progress: Progress = None,
+    on_compile: Callable[[], None] | None = None,
+) -> Evaluation:
+    """Return how much of a task is still done when the room is not where it is believed to be.
+
+    In each sample the joints of the error model are moved by random amounts. A goal counts when
+    any member of the set has a collision-free solution for it there. The configurations are not
+    planned anew, the arm is. The same seed gives the same samples for whatever is compared.
+
+    Args:
+        file: A score file; or its trials, which is faster when evaluating repeatedly.
+        samples: How many samples.
+        seed: Seed of the samples; results are the same for any number of jobs.
+        errors: Path of an error file, or errors by joint, in place of the environment's own. Not
+            for trials, which have theirs.
+        select: One of `SELECTIONS`, or flat configuration indices of the members of a set.
+        members: How many configurations the sets of "uniform" have, 1 or 2.
+        table: Number of the file's table; by default the nominal one. Not for trials.
+        check_base: Whether the base must be free in every sample; the paper leaves that out.
+            Not for trials.
+        stream: Another text gives samples independent of these.
+        jobs: Number of threads.
+        on_progress: Called with configurations in samples done and in all.
+        on_compile: Called first, when the kernel has to be compiled.
+
+    Returns:
+        What was reached, with mean, standard deviation and interval.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+        UnknownNameError: If a joint or a selection has no such name.
+        DataFileError: If the error file cannot be used.
+        SelectionError: If there is no set to evaluate.
+        TcsError: If a number is out of range.
+
+    Source:
+        TCS section IV; the drawing of "uniform" as in hrl_base_selection in
+        gt-ros-pkg/hrl-assistive (BSD), 30 April 2015.
+    """
+    check_draws(samples, seed)
+    begun = time.perf_counter()
+    compiling = 0.0
+    if isinstance(file, Trials):
+        trials = file
+        if errors is not None or table is not None or check_base:
+            raise TcsError("Trials have errors, table and base check already: give them there.")
+    else:
+        trials = Trials.of(
+            file, errors=errors, table=table, check_base=check_base, on_compile=on_compile
+        )
+        compiling = trials.compile_seconds
+    offsets = trials.errors.draw(samples, seed, stream=stream)
+    sets, choices = _chosen(trials.scored, select, members, samples, seed)
+    is_drawn = select == "uniform"
+    if is_drawn:
+        # Every member of every set meets the one sample that is the set's.
+        tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
+        found = trials.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
+        found = found.reshape(sets.shape[1], samples, -1)
+    else:
+        found = trials.reached(sets[0], offsets, jobs=jobs, on_progress=on_progress)
+    reached: NDArray[np.bool_] = np.logical_or.reduce(found, axis=0)
+    scores = np.array([trials.scored.sets.scores_of(tuple(map(int, row))) for row in sets])
+    for array in (sets, reached, *offsets.values()):
+        array.flags.writeable = False
+    return Evaluation(
+        select=select if isinstance(select, str) else "given",
+        sets=sets,
+        offsets=offsets,
+        reached=reached,
+        weights=trials.weights,
+        reachability=float(scores[:, 0].mean()),
+        manipulability=float(scores[:, 1].mean()),
+        choices=choices,
+        clipped=trials.clipped(sets, offsets),
+        errors=trials.errors,
+        check_base=trials.checks_base,
+        seed=seed,
+        seconds=time.perf_counter() - begun - compiling,
+        observed=shown_state(trials.file.observed_axes, trials.observed),
+        about={
+            "task": trials.job.task.name,
+            "environment": trials.job.spec.environment.name,
+            "robot": trials.job.spec.robot.name,
+        },
+        members=()
+        if is_drawn
+        else tuple(trials.job.grid.configuration(int(h)).to_json() for h in sets[0]),
+    )
+
+
+def _chosen(
+    scored: Scored, select: str | Sequence[int], members: int, samples: int, seed: int
+) -> tuple[NDArray[np.int64], int]:
+    """Return the sets to evaluate, shape (1, m) or (samples, m), and how many there were."""
+    sets = scored.sets
+    if not len(sets.candidates):
+        raise SelectionError(
+            "Nothing to evaluate: no goal is reached from any initial configuration. Look at the "
+            "reasons in the score table."
+        )
+    if not isinstance(select, str):
+        given = np.array([int(h) for h in select], dtype=np.int64)
+        # Refuses what is no set of candidates.
+        sets.scores_of(tuple(given.tolist()))
+        return given[None], 1
+    if select == "uniform":
+        return uniform_sets(sets, members, samples, seed)
+    if select not in SELECTIONS:
+        raise UnknownNameError("selection", select, SELECTIONS, where="evaluate")
+    if select == "robust" and scored.success is None:
+        raise SelectionError(
+            "No success under error was estimated for this table. Estimate it first: "
+            "tcs robustify FILE."
+        )
+    robust = scored.success.surest(sets) if scored.success is not None else ()
+    chosen = {"best": sets.best, "single": sets.best_single, "robust": robust}[select]
+    return np.array(chosen, dtype=np.int64)[None], 1

@@ -1,0 +1,162 @@
+"""Go through the kept sets one by one: those with the best scores, random ones, all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError, TcsError
+from tcs.placement.robustness.error_model import named_generator
+from tcs.placement.tables import SetTable
+from tcs.placement.tables.rules import SHARE_TOLERANCE
+
+IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+
+CHUNK = 200_000
+"""Pairs formed at once: their scores need some 10 MB."""
+
+AS_GOOD = 0.98
+"""Sets count as equally reachable from this share of the greatest P_R on: hrl_base_selection in
+gt-ros-pkg/hrl-assistive (BSD), state of 30 April 2015."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Kept sets of two."""
+
+    first: IntArray
+    """Candidate number of the first member, shape (n,)."""
+    second: IntArray
+    """Of the second, greater, shape (n,)."""
+    reachability: FloatArray
+    """P_R, shape (n,)."""
+    manipulability: FloatArray
+    """P_M, shape (n,)."""
+
+    def only(self, which: NDArray[np.bool_] | IntArray) -> Pairs:
+        """Return some of them."""
+        return Pairs(
+            self.first[which],
+            self.second[which],
+            self.reachability[which],
+            self.manipulability[which],
+        )
+
+    @classmethod
+    def joined(cls, parts: Iterable[Pairs]) -> Pairs:
+        """Return all pairs of several parts."""
+        parts = list(parts)
+        none: IntArray = np.empty(0, np.int64)
+        return cls(
+            np.concatenate([none, *(part.first for part in parts)]),
+            np.concatenate([none, *(part.second for part in parts)]),
+            np.concatenate([np.empty(0), *(part.reachability for part in parts)]),
+            np.concatenate([np.empty(0), *(part.manipulability for part in parts)]),
+        )
+
+
+def kept_pairs(
+    sets: SetTable, *, least_reachability: float = 0.0, least_sum: float = 0.0
+) -> Iterator[Pairs]:
+    """Yield the kept sets of two with at least these scores, some at a time.
+
+    Args:
+        sets: The table.
+        least_reachability: Least P_R.
+        least_sum: Least P_R + P_M.
+    """
+    if sets.max_members < 2:
+        return
+    room = SHARE_TOLERANCE
+    groups = (sets.pair_reachability >= least_reachability - room) & (
+        sets.pair_sum >= least_sum - room
+    )
+    able = (sets.member_reachability >= least_reachability - room) & (
+        sets.member_sum >= least_sum - room
+    )
+    of_cell = [
+        cell[able[cell]] for cell in np.split(sets.by_cell, sets.cell_start[1:-1].astype(np.intp))
+    ]
+    batch: list[tuple[IntArray, IntArray]] = []
+    size = 0
+    for one, other in sets.pair_cells[groups]:
+        first = np.repeat(of_cell[one], of_cell[other].size)
+        second = np.tile(of_cell[other], of_cell[one].size)
+        batch.append((first, second))
+        size += first.size
+        if size >= CHUNK:
+            yield _kept(sets, batch, least_reachability, least_sum)
+            batch, size = [], 0
+    if batch:
+        yield _kept(sets, batch, least_reachability, least_sum)
+
+
+def _kept(
+    sets: SetTable,
+    batch: list[tuple[IntArray, IntArray]],
+    least_reachability: float,
+    least_sum: float,
+) -> Pairs:
+    """Return those of some pairs of candidates that are kept sets with these scores."""
+    a, b = (np.concatenate(column) for column in zip(*batch, strict=True))
+    first, second = np.minimum(a, b), np.maximum(a, b)
+    # Within one cell each pair comes twice, and a candidate meets itself.
+    once = (first < second) & ((sets.cell[first] != sets.cell[second]) | (a < b))
+    if sets.same_environment:
+        once &= sets.state[first] == sets.state[second]
+    first, second = first[once], second[once]
+    reachability, manipulability = np.zeros(first.size), np.zeros(first.size)
+    for g, weight in enumerate(sets.weights):
+        column = sets.isotropy[:, g].astype(np.float64)
+        manipulability += float(weight) * np.maximum(column[first], column[second])
+        reachability += float(weight) * (sets.reached[first, g] | sets.reached[second, g])
+    limits = sets.limits
+    larger = np.maximum(sets.single_manipulability[first], sets.single_manipulability[second])
+    kept = (
+        (manipulability >= limits.manipulability)
+        & (manipulability >= limits.gain * larger)
+        & (reachability >= max(limits.reachability, least_reachability))
+        & (reachability + manipulability >= least_sum)
+    )
+    return Pairs(first[kept], second[kept], reachability[kept], manipulability[kept])
+
+
+def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[IntArray, int]:
+    """Return sets drawn uniformly from those that reach as much as the best, and how many exist.
+
+    Args:
+        sets: The table.
+        members: 1 or 2: singles with P_R of at least 0.98 of the greatest of a single, or kept
+            pairs with P_R of at least 0.98 of the greatest of any set.
+        count: How many to draw, with replacement.
+        seed: Seed of the drawing.
+
+    Returns:
+        Flat configuration indices, shape (count, members); the number of sets to draw from.
+
+    Raises:
+        SelectionError: If there are none.
+        TcsError: If `members` is neither 1 nor 2.
+    """
+    if members not in (1, 2):
+        raise TcsError(f"members is {members}; sets of 1 or 2 can be drawn.")
+    singles = sets.single_reachability
+    greatest = float(singles.max(initial=0.0))
+    rng = named_generator(seed, f"sets of {members}")
+    if members == 1:
+        pool = np.flatnonzero(singles >= AS_GOOD * greatest - SHARE_TOLERANCE)[:, None]
+    else:
+        greatest = max(greatest, float(sets.pair_reachability.max(initial=0.0)))
+        least = AS_GOOD * greatest - SHARE_TOLERANCE
+        pairs = Pairs.joined(kept_pairs(sets, least_reachability=least))
+        pool = np.stack([pairs.first, pairs.second], axis=1)
+    if not len(pool):
+        raise SelectionError(
+            f"There is no set of {members} that reaches as much as the best set, so none can be "
+            "drawn. Draw sets of 1, or evaluate the best set."
+        )
+    return sets.candidates[pool[rng.integers(len(pool), size=count)]].astype(np.int64), len(pool)

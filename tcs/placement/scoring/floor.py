@@ -1,0 +1,63 @@
+"""Where the base can drive, read off the scores: between places where the body is not blocked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcs.model.grid import ROBOT_AXES, Grid
+from tcs.placement.tables import Floor, Reason, ScoreTable
+from tcs.placement.tables.floor import MOVES
+
+BORDER = 0.6
+"""What blocks the base at the border of the grid is taken to go on for so long [m]. The grid says
+nothing about the floor beyond it, and the paper's ends where the foot end of the bed does: half a
+PR2 and a bed's end are 0.6 m."""
+
+STEP = 0.1
+"""Distance of neighbours along an axis that the grid holds still [m]."""
+
+
+def floor_of(scores: ScoreTable, grid: Grid) -> Floor:
+    """Return where the base can drive between the places of a grid, and around it.
+
+    The base can move from a place to a neighbour when in some state of the environment, with some
+    heading and torso level, it is blocked at neither; diagonally when also at neither of the two
+    places beside the way. The robot may turn, lift its torso and have the environment set where
+    it stands. Places are checked, not the way between them.
+
+    Args:
+        scores: Scores of every configuration of the grid.
+        grid: The grid.
+    """
+    blocked = (scores.reason == Reason.BODY_BLOCKED).any(axis=1)
+    names = list(ROBOT_AXES)
+    x, y = names.index("base_x") - len(names), names.index("base_y") - len(names)
+    free = np.moveaxis(~blocked.reshape(grid.shape), (x, y), (-2, -1))
+    free = free.reshape(-1, *free.shape[-2:])
+    axes = [grid.axis(name) for name in ("base_x", "base_y")]
+    known = [axis.step for axis in axes if axis.count > 1] or [STEP]
+    step = [axis.step if axis.count > 1 else known[0] for axis in axes]
+    border = [math.ceil(BORDER / s - 1e-9) for s in step]  # 0.6 / 0.1 is a little less than 6
+    free = np.pad(free, ((0, 0), (border[0],) * 2, (border[1],) * 2), mode="edge")
+    # Everything is free beyond: one ring of places stands for it.
+    free = np.pad(free, ((0, 0), (1, 1), (1, 1)), constant_values=True)
+    shape = free.shape[-2:]
+    moves = np.zeros((len(MOVES), *shape), dtype=np.bool_)
+    for along, (dx, dy) in zip(moves, MOVES, strict=True):
+        low, high = max(0, -dy), shape[1] - max(0, dy)
+        rows, columns = {0, dx}, {0, dy}
+        possible = np.ones((len(free), shape[0] - dx, high - low), dtype=np.bool_)
+        for i in rows:
+            for j in columns:
+                possible &= free[:, i : shape[0] - dx + i, low + j : high + j]
+        along[: shape[0] - dx, low:high] = possible.any(axis=0)
+    return Floor(
+        start=(
+            axes[0].start - (border[0] + 1) * step[0],
+            axes[1].start - (border[1] + 1) * step[1],
+        ),
+        step=(step[0], step[1]),
+        moves=moves,
+    )

@@ -1,0 +1,30 @@
+"""Build again what a score file was scored from."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from tcs.model.scene import LoweredScene, Scene
+from tcs.placement.scoring.job import Job, load_job
+from tcs.placement.store import ScoreFile, check_scene
+
+
+def reopen(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene, LoweredScene]:
+    """Return the job a file was scored from, its live scene, and that scene as arrays.
+
+    Args:
+        file: A score file.
+        meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
+
+    Raises:
+        UnknownNameError: If its task, environment or robot is not known here.
+        DataFileError: If a file that it names cannot be used.
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
+    # The file knows for which states it was scored: a scene scored as it was observed has its own.
+    job = dataclasses.replace(job, observed=file.observed_axes)
+    scene = job.scene(meshes=meshes)
+    lowered = job.lowered(scene)
+    check_scene(file, lowered.digest())
+    return job, scene, lowered

@@ -1,0 +1,314 @@
+"""Build the sets of configurations worth choosing from, tau in the TCS paper."""
+
+from __future__ import annotations
+
+import math
+from typing import TypedDict, Unpack
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import IntArray
+from tcs.kernel.sets import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
+from tcs.model.grid import ROBOT_AXES, Grid
+from tcs.placement.scoring.floor import floor_of
+from tcs.placement.scoring.triples import kept_triples
+from tcs.placement.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
+from tcs.placement.tables.groups import Groups
+from tcs.placement.tables.rounding import float32_above
+from tcs.placement.tables.rules import (
+    candidates_of,
+    check_rule,
+    order_keys,
+    pair_limits,
+    spaced_places,
+)
+from tcs.placement.tables.sets import DISTANCE_TOLERANCE, MOST_MEMBERS
+
+CELLS_PER_SLICE = 16
+"""Small enough to share the work evenly (early cells have more partners than late ones) and to
+keep the buffers of a slice small; large enough that a slice takes much longer than its hand-out."""
+
+
+class SetOptions(TypedDict, total=False):
+    """Which sets are kept; whatever takes `**sets` takes these."""
+
+    rule: str
+    """One of `tcs.placement.tables.rules.RULES`. "paper", the default: singles that reach a goal,
+    pairs whose P_M is greater than the best P_M of a single, and triples whose P_M is greater than
+    the best P_M of a pair and of a single. "code2015": as hrl_base_selection did, without triples.
+    """
+    same_environment: bool
+    """Whether the members of a set must share the state of the environment; by default not."""
+    max_members: int
+    """1 to keep singles only, 2, the default, to keep pairs too, 3 for triples. Triples take some
+    ten seconds for 5,000 candidates, 100 MB, and more for more."""
+    min_distance: float
+    """Least base x-y distance between two members of a set [m], 0.40 by default. The paper gives
+    no figure; this is that of hrl_base_selection in gt-ros-pkg/hrl-assistive."""
+
+
+def build_sets(
+    scores: ScoreTable, grid: Grid, *, jobs: int = 2, **options: Unpack[SetOptions]
+) -> SetTable:
+    """Return every set of one, two or three configurations that a rule keeps.
+
+    The search is exact over all sets; the result does not depend on `jobs`.
+
+    Args:
+        scores: Scores of every configuration of the grid.
+        grid: The grid.
+        jobs: Number of threads.
+        **options: Which sets are kept, see `SetOptions`.
+
+    Returns:
+        The sets; without any candidate when no goal is reached anywhere.
+
+    Raises:
+        UnknownNameError: If there is no such rule.
+        TcsError: If the scores are not those of the grid, an argument is out of range, or there
+            are too many candidates for triples.
+
+    Source:
+        TCS section IV-A, eq. (1) and (4).
+    """
+    checked = checked_options(**options)
+    rule, max_members = checked["rule"], checked["max_members"]
+    same_environment, min_distance = checked["same_environment"], checked["min_distance"]
+    if scores.configurations != grid.size:
+        raise TcsError(
+            f"Sets: the score table has {scores.configurations} configurations, the grid "
+            f"{grid.size}. Score this grid first."
+        )
+    if jobs < 1:
+        raise TcsError(f"Sets: {jobs} jobs; must be at least 1.")
+    candidates = candidates_of(scores.reached, scores.weights, rule)
+    state_size = grid.size // math.prod(grid.environment_shape)
+    state = candidates.astype(np.int64) // state_size
+    cell, cell_xy = base_cells(grid, candidates)
+    arrays = _grouped(
+        scores,
+        candidates,
+        cell,
+        state if same_environment else np.zeros_like(state),
+        cell_xy,
+        rule=rule,
+        min_distance=min_distance,
+    )
+    pair_cells, between, members, best_pairs = _kept_pairs(arrays, jobs if max_members > 1 else 0)
+    best_single, best = _best_sets(scores, candidates, best_pairs, rule)
+    triples = None
+    if max_members > 2:
+        smaller = max(arrays.single.max(initial=0.0), between.manipulability.max(initial=0.0))
+        triples, best = _with_triples(scores, arrays, cell, float(smaller), candidates, best, jobs)
+    return SetTable(
+        rule=rule,
+        max_members=max_members,
+        min_distance=float(min_distance),
+        same_environment=same_environment,
+        state_size=state_size,
+        weights=scores.weights,
+        candidates=candidates,
+        reached=scores.reached[candidates],
+        isotropy=scores.isotropy[candidates],
+        cell=cell,
+        cell_xy=cell_xy,
+        pair_cells=pair_cells.astype(np.int32),
+        pair_count=between.kept,
+        pair_reachability=between.reachability,
+        pair_manipulability=float32_above(between.manipulability),
+        pair_sum=float32_above(between.total),
+        member_reachability=members.reachability,
+        member_manipulability=float32_above(members.manipulability),
+        member_sum=float32_above(members.total),
+        triples=triples,
+        best=best,
+        best_single=best_single,
+        floor=floor_of(scores, grid),
+    )
+
+
+def checked_options(
+    *,
+    rule: str = "paper",
+    same_environment: bool = False,
+    max_members: int = 2,
+    min_distance: float = 0.40,
+) -> SetOptions:
+    """Return all options, the default for those not given, before anything is scored.
+
+    Raises:
+        UnknownNameError: If there is no such rule.
+        TcsError: If a number is out of range, or the rule has no sets of so many.
+    """
+    check_rule(rule)
+    if not 1 <= max_members <= MOST_MEMBERS:
+        raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
+    if rule == "code2015" and max_members > 2:
+        raise TcsError("Sets: rule 'code2015' has sets of one and two; for three take 'paper'.")
+    if not 0.0 <= min_distance < math.inf:
+        raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
+    return {
+        "rule": rule,
+        "same_environment": same_environment,
+        "max_members": max_members,
+        "min_distance": min_distance,
+    }
+
+
+def base_cells(
+    grid: Grid, candidates: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Return the base cell of each candidate, shape (C,), and the cells' x, y, shape (N, 2).
+
+    Only cells with a candidate are counted, in the order of base x, then base y.
+    """
+    names = list(ROBOT_AXES)
+    along = grid.indices(candidates)[:, -len(names) :]
+    x, y = along[:, names.index("base_x")], along[:, names.index("base_y")]
+    columns = grid.axis("base_y").count
+    place, cell = np.unique(x * columns + y, return_inverse=True)
+    xy = np.stack(
+        [grid.axis("base_x").values[place // columns], grid.axis("base_y").values[place % columns]],
+        axis=1,
+    )
+    return cell.astype(np.int32), xy
+
+
+def _grouped(
+    scores: ScoreTable,
+    candidates: NDArray[np.int32],
+    cell: NDArray[np.int32],
+    state: NDArray[np.int64],
+    cell_xy: NDArray[np.float64],
+    *,
+    rule: str,
+    min_distance: float,
+) -> SetArrays:
+    """Return what the kernel needs, candidates sorted by cell."""
+    number = np.argsort(cell, kind="stable").astype(np.int64)
+    start = np.searchsorted(cell[number], np.arange(len(cell_xy) + 1)).astype(np.int64)
+    isotropy = scores.isotropy[candidates[number]].astype(np.float64)
+    reached = scores.reached[candidates[number]]
+    single = tc_manipulability(isotropy, scores.weights)
+    limits = pair_limits(rule, tc_reachability(reached, scores.weights), single)
+    return SetArrays(
+        number=number,
+        start=start,
+        state=state[number],
+        xy=spaced_places(rule, cell_xy),
+        isotropy=isotropy,
+        reached=reached,
+        single=single,
+        peak=np.maximum.reduceat(isotropy, start[:-1], axis=0) if len(number) else isotropy,
+        weights=scores.weights,
+        least_distance=min_distance - DISTANCE_TOLERANCE,
+        least_reachability=limits.reachability,
+        least_manipulability=limits.manipulability,
+        least_gain=limits.gain,
+        by_sum=rule != "code2015",
+    )
+
+
+def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
+    """Return what is kept between all cells by so many threads; nothing with none.
+
+    Returns:
+        The pairs of cells with a kept pair, lexicographic, shape (K, 2); what is kept between
+        them, arrays of shape (K,); the kept pairs of each candidate, by its number; and the
+        best pair of each cell.
+    """
+    cells = arrays.start.size - 1 if jobs else 0
+    slices = [
+        (begin, min(begin + CELLS_PER_SLICE, cells))
+        for begin in range(0, max(cells, 1), CELLS_PER_SLICE)
+    ]
+    found = Parallel(n_jobs=max(jobs, 1), prefer="threads")(
+        delayed(_bound_slice)(arrays, begin, end) for begin, end in slices
+    )
+    # Slices one after the other are in lexicographic order.
+    pair_cells, between, members, best = zip(*found, strict=True)
+    # Sorted by number: the inverse of how the candidates were sorted by cell.
+    rows = np.argsort(arrays.number)
+    return (
+        np.concatenate(pair_cells),
+        CellPairs(*(np.concatenate(parts) for parts in zip(*between, strict=True))),
+        MemberPairs(*(np.max(parts, axis=0)[rows] for parts in zip(*members, strict=True))),
+        BestPairs(*(np.concatenate(parts) for parts in zip(*best, strict=True))),
+    )
+
+
+def _bound_slice(
+    arrays: SetArrays, begin: int, end: int
+) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
+    """Return what is kept between cells begin..end-1 and every cell not before them.
+
+    Returns:
+        The pairs of cells with a kept pair, lexicographic, shape (k, 2); what is kept between
+        them, arrays of shape (k,); the kept pairs of each candidate; and the best pair of each
+        cell of the slice.
+    """
+    shape = (end - begin, arrays.start.size - 1)
+    out = CellPairs(
+        np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    )
+    members = MemberPairs(*(np.zeros(arrays.number.size) for _ in range(3)))
+    size = (end - begin, 2)
+    best = BestPairs(np.full(size, -1.0), np.full(size, -1, dtype=np.int64))
+    bound_cells(arrays, begin, end, out, members, best)
+    row, second = np.nonzero(out.kept)
+    found = CellPairs(
+        kept=out.kept[row, second],
+        reachability=out.reachability[row, second],
+        manipulability=out.manipulability[row, second],
+        total=out.total[row, second],
+    )
+    return np.stack([row + begin, second], axis=1), found, members, best
+
+
+def _best_sets(
+    scores: ScoreTable, candidates: NDArray[np.int32], pairs: BestPairs, rule: str
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the best single and the best set in the order of the rule; ties go to the first."""
+    if not len(candidates):
+        return (), ()
+    keys = order_keys(
+        rule,
+        tc_reachability(scores.reached[candidates], scores.weights),
+        tc_manipulability(scores.isotropy[candidates], scores.weights),
+    )
+    single = np.lexsort((-keys[1], -keys[0]))[0]
+    best_single: tuple[int, ...] = (int(candidates[single]),)
+    if not len(pairs.keys):
+        return best_single, best_single
+    a, b = pairs.members.T
+    pair = np.lexsort((b, a, -pairs.keys[:, 1], -pairs.keys[:, 0]))[0]
+    # Singles come before pairs, so a pair has to be better, not as good.
+    if tuple(pairs.keys[pair]) > (keys[0][single], keys[1][single]):
+        return best_single, tuple(int(h) for h in candidates[pairs.members[pair]])
+    return best_single, best_single
+
+
+def _with_triples(
+    scores: ScoreTable,
+    arrays: SetArrays,
+    cell: NDArray[np.int32],
+    smaller: float,
+    candidates: NDArray[np.int32],
+    best: tuple[int, ...],
+    jobs: int,
+) -> tuple[Groups, tuple[int, ...]]:
+    """Return the triples with a greater P_M than `smaller`, and the best set with them."""
+    rows = cell[arrays.number].astype(np.int64)
+    triples, (total, members) = kept_triples(arrays, rows, float(np.nextafter(smaller, 1.0)), jobs)
+    if not members:
+        return triples, best
+    reached = np.logical_or.reduce(scores.reached[list(best)], axis=0)
+    isotropy = np.maximum.reduce(scores.isotropy[list(best)], axis=0)
+    so_far = tc_reachability(reached, scores.weights) + tc_manipulability(isotropy, scores.weights)
+    # Smaller sets come first, so a triple has to be better, not as good.
+    if total > so_far:
+        best = tuple(int(h) for h in candidates[list(members)])
+    return triples, best

@@ -1,0 +1,163 @@
+"""Score a lowered scene: the kernel over slices of the grid, on several threads."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.errors import TcsError
+from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.cache import is_compiled
+from tcs.kernel.dexterity import DEFAULT_MEASURE
+from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.model.scene import LoweredScene
+from tcs.placement.tables import ScoreTable
+
+SLICE = 1024
+"""Configurations in a slice: some milliseconds of work, so that threads end together and a bar
+moves, and scratch memory that stays in the processor's cache."""
+
+ANALYTIC, NUMERIC = "analytic", "numeric"
+"""How inverse kinematics was solved: in closed form, or by Newton's method from many starts."""
+_ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "sweep._score_numeric_slice"}
+"""Modules and functions of the kernel that all the rest is compiled into."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The scores of a grid, and what they cost."""
+
+    tables: tuple[ScoreTable, ...]
+    """The grid's configurations, cut into as many tables as were asked for."""
+    compile_seconds: float
+    """Compiling the kernel, or loading its machine code."""
+    scoring_seconds: float
+    """Scoring alone, machine code at hand."""
+    ik: str
+    """How the arm is solved: ANALYTIC or NUMERIC."""
+
+
+def sweep(
+    lowered: LoweredScene,
+    weights: NDArray[np.float64],
+    *,
+    tables: int = 1,
+    measure: str = DEFAULT_MEASURE,
+    jobs: int = 2,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> Sweep:
+    """Score every configuration of the grid against every goal.
+
+    Args:
+        lowered: The scene.
+        weights: Weights of the goals, sum 1, shape (goals,).
+        tables: How many equal parts to cut the scores into, e.g. one for each observed state
+            when the observed axes are the outermost of the grid.
+        measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
+        jobs: Number of threads; the scores do not depend on it.
+        on_progress: Called with configurations done and in all.
+        on_compile: Called first, when no earlier run has left machine code on this machine.
+
+    Returns:
+        Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
+
+    Raises:
+        UnknownNameError: If there is no measure of that name.
+        TcsError: If there is to be no thread.
+    """
+    if jobs < 1:
+        raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    compile_seconds = warm_up(problem, on_compile)
+    size, goals = _size(problem), problem.goal_p.shape[1]
+    begun = time.perf_counter()
+    grippers = gripper_contacts(problem)
+    starts = range(0, size, SLICE)
+    reason = np.empty((size, goals), np.uint8)
+    contact = np.empty((size, goals), np.int32)
+    isotropy = np.empty((size, goals), np.float32)
+    joints = []
+    done = 0
+    for part in Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
+        delayed(_slice)(problem, grippers, start, min(start + SLICE, size)) for start in starts
+    ):
+        rows = slice(done, done + len(part.reason))
+        reason[rows], contact[rows], isotropy[rows] = part.reason, part.contact, part.isotropy
+        # Only the joints of reached pairs are worth keeping: one pair in ten.
+        joints.append(part.joints[part.reason == 0])
+        done += len(part.reason)
+        if on_progress is not None:
+            on_progress(done, size)
+    scoring_seconds = time.perf_counter() - begun
+    names = _name_contacts(contact, lowered, problem)
+    winning = np.concatenate(joints) if joints else np.empty((0, 7), np.float32)
+    winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
+    parts = tuple(
+        ScoreTable(
+            isotropy=isotropy[rows],
+            reason=reason[rows],
+            pair=contact[rows],
+            pair_names=names,
+            arm_joints=winning[winners[i] : winners[i + 1]],
+            weights=np.asarray(weights, dtype=np.float64),
+        )
+        for i in range(tables)
+        for rows in [slice(i * size // tables, (i + 1) * size // tables)]
+    )
+    return Sweep(parts, compile_seconds, scoring_seconds, ik_of(problem))
+
+
+def ik_of(problem: Problem) -> str:
+    """Return how the problem's arm is solved: ANALYTIC or NUMERIC."""
+    return NUMERIC if is_outside(problem.arm) else ANALYTIC
+
+
+def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> float:
+    """Have the kernel's machine code at hand; return the seconds it took."""
+    if on_compile is not None and not is_compiled(_ENTRIES[ik_of(problem)]):
+        on_compile()
+    begun = time.perf_counter()
+    _slice(problem, gripper_contacts(problem), 0, 0)
+    return time.perf_counter() - begun
+
+
+def _size(problem: Problem) -> int:
+    """Return how many configurations the grid has."""
+    places = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
+    return int(problem.environment_states * places * problem.torso_levels)
+
+
+def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int) -> Scores:
+    """Return the scores of configurations start <= h < stop."""
+    shape = (stop - start, problem.goal_p.shape[1])
+    scores = Scores(
+        reason=np.empty(shape, np.uint8),
+        contact=np.empty(shape, np.int32),
+        isotropy=np.zeros(shape, np.float32),
+        joints=np.zeros((*shape, 7), np.float32),
+    )
+    score_slice(problem, grippers, start, stop, scores)
+    return scores
+
+
+def _name_contacts(
+    contact: NDArray[np.int32], lowered: LoweredScene, problem: Problem
+) -> tuple[tuple[str, str], ...]:
+    """Turn contact codes, in place, into indices of the returned pairs of names."""
+    others = problem.room_bodies + problem.robot_bodies
+    both = (*lowered.room_bodies, *lowered.robot_bodies)
+    # A place for every code, NO_CONTACT (-1) last, where a negative index finds it.
+    there = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
+    there[contact] = True
+    codes = np.flatnonzero(there[:-1])
+    index = np.full(there.size, -1, dtype=np.int32)
+    index[codes] = np.arange(codes.size, dtype=np.int32)
+    np.take(index, contact, out=contact, mode="wrap")
+    return tuple((lowered.robot_bodies[code // others], both[code % others]) for code in codes)

@@ -1,0 +1,352 @@
+"""Re-check stored answers with Drake, and look for answers that the search has missed."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import TcsError
+from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.reference import measured
+from tcs.model.scene import Scene, goal_poses
+from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.reopen import reopen
+from tcs.placement.scoring.sweep import ik_of
+from tcs.placement.store import Scored, ScoreFile
+from tcs.placement.tables import Reason
+
+POSITION_BAR = 1e-6
+"""Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
+the tool by up to 1.2e-7 rad x 1 m for each of the seven joints, 4e-7 m in practice."""
+ROTATION_BAR = 2e-6
+"""Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
+8.4e-7, and reading an angle off a rotation matrix near the identity loses as much again."""
+ISOTROPY_BAR = 1e-6
+"""Greatest difference of a stored measure from that of Drake's Jacobian. Float32 keeps 6e-8; a
+least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
+CLEARANCE_ROUNDING = 2e-6
+"""How much closer than required a pair may be [m] when Drake measures it: rounding of the joints
+moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is good to 1e-6 m."""
+UNREACHED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
+"""Strata of the dense scan: base and gripper are free and the goal is within reach."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What re-checking a score file found."""
+
+    measure: str
+    """Name of the dexterity measure the file was made with."""
+    ik: str
+    """How the arm is solved, "analytic" or "numeric", and with it what a dense scan is: 11,520
+    values of the free joint, or 400 starts from everywhere."""
+    checked: int
+    """Reached pairs re-checked with Drake."""
+    false_reached: int
+    """Of these, how many miss the goal, pass a limit or touch something."""
+    max_position_error: float
+    """Greatest distance of the tool from its goal [m]."""
+    max_rotation_error: float
+    """Greatest rotation of the tool from its goal [rad]."""
+    max_isotropy_error: float
+    """Greatest difference of the file's measure, isotropy or another, from that of Drake's
+    Jacobian."""
+    limit_violations: int
+    """Joints beyond their limits."""
+    dense_checked: int
+    """Unreached pairs scanned densely."""
+    missed: int
+    """Of these, how many have a solution that Drake confirms."""
+    unconfirmed_hits: int
+    """Solutions of the dense scan that Drake refuses."""
+    recall: float
+    """Estimated share of reachable pairs that are stored as reached."""
+    recall_ci95: tuple[float, float]
+    """Its interval: exact binomial limits in each stratum, added up."""
+    shortfall_checked: int
+    """Reached pairs scanned densely."""
+    mean_shortfall: float
+    """How much more of the file's measure the dense scan finds there, on average."""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether no answer was found false."""
+        return (
+            self.false_reached == 0
+            and self.limit_violations == 0
+            and self.unconfirmed_hits == 0
+            and self.max_position_error <= POSITION_BAR
+            and self.max_rotation_error <= ROTATION_BAR
+            and self.max_isotropy_error <= ISOTROPY_BAR
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the findings as plain containers."""
+        return {**asdict(self), "recall_ci95": list(self.recall_ci95)}
+
+
+def verify(
+    file: ScoreFile,
+    *,
+    pairs: int = 500,
+    dense: int = 200,
+    seed: int = 0,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Verification:
+    """Check answers of a score file against Drake and against a dense scan.
+
+    Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
+    every checked contact, the dexterity measure the file was made with. Random unreached pairs,
+    stratified over those whose base and gripper are free and whose goal is within reach, are
+    scanned densely, and so are random reached pairs, for the dexterity the search left behind: with
+    11,520 values of the free joint, or, for an arm that no closed form solves, from 400 starts all
+    over its limits. Drake has to confirm every solution the scan finds where none is stored.
+
+    Args:
+        file: A score file.
+        pairs: How many reached pairs to re-check.
+        dense: How many unreached and how many reached pairs to scan densely.
+        seed: Seed of the random choice.
+        on_progress: Called with pairs done and in all.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+        TcsError: If a number is negative.
+    """
+    if pairs < 0 or dense < 0:
+        raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
+    job, scene, lowered = reopen(file)
+    rng = np.random.default_rng(seed)
+    reason = np.concatenate([table.scores.reason for table in file.tables])
+    reached = _sample(rng, reason == Reason.REACHED, pairs)
+    unreached = [_sample(rng, reason == r, n) for r, n in _shares(reason, dense).items()]
+    again = _sample(rng, reason == Reason.REACHED, dense)
+    total = len(reached) + sum(map(len, unreached)) + len(again)
+    count = itertools.count(1)
+
+    def step() -> None:
+        if on_progress is not None:
+            on_progress(next(count), total)
+
+    measure = file.metadata["measure"]
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
+    findings = check.stored(reached, step)
+    hits = [check.hits(part, step) for part in unreached]
+    shortfall = check.shortfall(again, step)
+    scanned, missed = [len(part) for part in unreached], [sum(part) for part in hits]
+    sizes = [int(np.count_nonzero(reason == r)) for r in UNREACHED]
+    recall, interval = estimated_recall(
+        int(np.count_nonzero(reason == Reason.REACHED)), sizes, scanned, missed
+    )
+    return Verification(
+        measure=measure,
+        ik=ik_of(problem),
+        checked=len(findings),
+        false_reached=sum(not finding.is_true for finding in findings),
+        max_position_error=max((finding.position_error for finding in findings), default=0.0),
+        max_rotation_error=max((finding.rotation_error for finding in findings), default=0.0),
+        max_isotropy_error=max((finding.isotropy_error for finding in findings), default=0.0),
+        limit_violations=sum(finding.limit_violations for finding in findings),
+        dense_checked=sum(scanned),
+        missed=sum(missed),
+        unconfirmed_hits=sum(not confirmed for part in hits for confirmed in part),
+        recall=recall,
+        recall_ci95=interval,
+        shortfall_checked=len(shortfall),
+        mean_shortfall=float(np.mean(shortfall)) if shortfall else 0.0,
+    )
+
+
+def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -> list[Finding]:
+    """Return what Drake says of the stored solutions of certain reached pairs.
+
+    Args:
+        file: A score file.
+        table: Number of the table.
+        pairs: Configurations of that table, each with a goal that it reaches.
+
+    Raises:
+        StoreMismatchError: If the models are not those the file was made from.
+    """
+    job, scene, lowered = reopen(file)
+    measure = file.metadata["measure"]
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
+    return check.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
+
+
+Pairs = list[tuple[int, int]]
+"""Configurations of all tables, counted on from one to the next, and goals: (h, g)."""
+
+
+@dataclass(frozen=True)
+class _Check:
+    """The three kinds of checks on the scores of a file."""
+
+    tables: tuple[Scored, ...]
+    size: int
+    """Configurations in a table."""
+    problem: Problem
+    judge: _Judge
+
+    def isotropy(self, h: int, g: int) -> float:
+        """Return the stored measure."""
+        table, row = divmod(h, self.size)
+        return float(self.tables[table].scores.isotropy[row, g])
+
+    def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
+        """Return what Drake says of the stored solutions of reached pairs."""
+        findings = []
+        for h, g in pairs:
+            table, row = divmod(h, self.size)
+            q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
+            findings.append(self.judge.check(h, g, q, self.isotropy(h, g)))
+            step()
+        return findings
+
+    def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool]:
+        """Return, for each solution a dense scan finds at unreached pairs, Drake's verdict."""
+        found, q = [], np.empty(7)
+        for h, g in pairs:
+            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
+            if value >= 0.0:
+                found.append(self.judge.check(h, g, q, value).is_true)
+            step()
+        return found
+
+    def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
+        """Return how much better the dense scan's measure is at reached pairs."""
+        short, q = [], np.empty(7)
+        for h, g in pairs:
+            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
+            short.append(max(0.0, value - self.isotropy(h, g)))
+            step()
+        return short
+
+
+def estimated_recall(
+    reached: int, sizes: list[int], scanned: list[int], missed: list[int]
+) -> tuple[float, tuple[float, float]]:
+    """Return the estimated recall and its 95 % interval.
+
+    Args:
+        reached: R, how many pairs are stored as reached.
+        sizes: U of each stratum, how many unreached pairs there are.
+        scanned: How many of them were scanned.
+        missed: How many of these turned out to be reachable.
+
+    Returns:
+        R / (R + sum of U x missed / scanned), and the same at the Clopper-Pearson limits of each
+        stratum, which together are on the safe side.
+
+    >>> estimated_recall(990, [1000], [100], [1])[0]
+    0.99
+    """
+    # Imported where it is needed: scoring and drawing, which share this room, start faster.
+    from scipy.special import betaincinv
+
+    tail = (1.0 - CONFIDENCE) / 2.0
+    expected = lowest = highest = 0.0
+    for size, n, k in zip(sizes, scanned, missed, strict=True):
+        if n == 0:
+            # Nothing looked at: nothing known, unless there is nothing.
+            highest += size
+            continue
+        expected += size * k / n
+        if k > 0:
+            lowest += size * float(betaincinv(k, n - k + 1, tail))
+        highest += size * (float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0)
+    if reached == 0:
+        return (1.0, (0.0, 1.0)) if expected == 0.0 else (0.0, (0.0, 0.0))
+    return reached / (reached + expected), (
+        reached / (reached + highest),
+        reached / (reached + lowest),
+    )
+
+
+def _shares(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
+    """Return how many pairs of each stratum to scan: in proportion, none of them left out."""
+    sizes = {r: int(np.count_nonzero(reason == r)) for r in UNREACHED}
+    total = sum(sizes.values())
+    if total == 0 or dense == 0:
+        return dict.fromkeys(UNREACHED, 0)
+    first, second = UNREACHED
+    least = min(dense // 2, sizes[first], max(1, dense // 10)) if sizes[first] else 0
+    share = min(max(round(dense * sizes[first] / total), least), dense)
+    rest = min(dense - share, sizes[second])
+    if sizes[second]:
+        rest = max(rest, min(max(1, dense // 10), sizes[second]))
+    return {first: min(dense - rest, sizes[first]), second: rest}
+
+
+def _sample(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int) -> Pairs:
+    """Return up to `count` different random (h, g) at which `chosen` is true."""
+    flat = np.flatnonzero(chosen)
+    picked = rng.choice(flat, size=min(count, len(flat)), replace=False)
+    goals = chosen.shape[1]
+    return [(int(i // goals), int(i % goals)) for i in picked]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What Drake says of one solution."""
+
+    position_error: float
+    rotation_error: float
+    isotropy_error: float
+    limit_violations: int
+    contacts: int
+
+    @property
+    def is_true(self) -> bool:
+        """Whether the solution is at its goal, within its limits and free of contact."""
+        return (
+            self.position_error <= POSITION_BAR
+            and self.rotation_error <= ROTATION_BAR
+            and self.limit_violations == 0
+            and self.contacts == 0
+        )
+
+
+class _Judge:
+    """Drake's verdict on solutions of one job."""
+
+    def __init__(self, job: Job, scene: Scene, measure: str) -> None:
+        self._job, self._scene, self._measure = job, scene, measure
+        self._lower, self._upper = scene.arm_limits
+        self._grid = job.scored_grid
+        self._axes = [axis.name for axis in self._grid.environment_axes]
+
+    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
+        """Return what Drake finds at configuration h, goal g and joint angles q."""
+        scene = self._scene
+        at = self._grid.values(np.array([h]))
+        scene.place_base(*(float(at[name][0]) for name in ("base_x", "base_y", "base_yaw")))
+        scene.set_torso(float(at["torso"][0]))
+        for name in self._axes:
+            scene.set_joint(name, float(at[name][0]))
+        scene.set_arm(q)
+        X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
+        X_TG = X_WT.inverse() @ X_WG
+        rotation = X_TG.rotation().ToAngleAxis().angle()
+        contacts = [
+            distance
+            for first, second, distance in scene.violations()
+            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
+        ]
+        exact = measured(scene.tool_jacobian(), q, self._lower, self._upper, self._measure)
+        return Finding(
+            position_error=float(np.linalg.norm(X_TG.translation())),
+            rotation_error=float(rotation),
+            isotropy_error=abs(exact - float(value)),
+            limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
+            contacts=len(contacts),
+        )

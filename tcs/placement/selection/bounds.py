@@ -1,0 +1,147 @@
+"""Upper bounds on the utility of sets, from here: of groups, of their members, of single sets.
+
+A bound is either computed by the very operations of the utility on greater scores and smaller
+costs (rounding is monotone, so it cannot fall below), or widened by `SLACK`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.selection.index import GroupIndex
+from tcs.placement.selection.travel import Legs
+from tcs.placement.selection.utility import UtilityWeights
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SLACK = 1e-12
+"""Relative room for rounding in bounds that are not computed by the very operations of the
+utility: a dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could
+end up one bit below the utility it bounds, and lose a tie."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds for one query."""
+
+    index: GroupIndex
+    """The groups of sets."""
+    legs: Legs
+    """Travel costs from the current state."""
+    weights: UtilityWeights
+    """alpha, beta, gamma."""
+
+    @property
+    def travel(self) -> float:
+        """The weight of the travel cost, gamma."""
+        return float(self.weights.travel)
+
+    @cached_property
+    def groups(self) -> FloatArray:
+        """Bound on the utility of each group, shape (K,); -inf out of reach."""
+        index, legs = self.index, self.legs
+        bounds = self._group_gain - self.travel * self._driving
+        if index.members > 2:
+            # A path of several legs was not summed as the cost is.
+            bounds += self._room
+        # Each member's best set is no better than this, and the way to it no shorter.
+        by_cell = np.maximum.reduceat(self._rest[index.all.sets.by_cell], index.all.start)
+        rest = by_cell[index.cells[0]]
+        for cells in index.cells[1:]:
+            rest = np.minimum(rest, by_cell[cells])
+        np.minimum(bounds, rest - self.travel * self._driving + self._room, out=bounds)
+        if not np.all(legs.reachable):
+            for cells in index.cells:
+                bounds[~legs.reachable[cells]] = -np.inf
+        return bounds
+
+    def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
+        """Return a bound on the sets of a group that a candidate is in, shape (n,)."""
+        gain = np.minimum(self._rest[member], self._group_gain[group] - self._levels[member])
+        return gain - (self.travel * self._driving[group] - self._room[group])
+
+    def of_two(self, group: IntArray, a: IntArray, b: IntArray) -> FloatArray:
+        """Return a bound on the sets of a group that two candidates are in, shape (n,).
+
+        A tour through both pays at least the change from here to one and on to the other.
+        """
+        gain = np.minimum(self._member_gain[a], self._member_gain[b])
+        levels = np.minimum(self._levels[a], self._levels[b])
+        levels += self._paid(self.legs.levels_between(a, b))
+        rest = np.minimum(gain, self._group_gain[group]) - levels
+        # As many roundings again as in the bound of one member.
+        return rest - (self.travel * self._driving[group] - 2.0 * self._room[group])
+
+    def of_set(
+        self, group: IntArray, members: tuple[IntArray, ...], cost: FloatArray
+    ) -> FloatArray:
+        """Return a bound on the utility of sets whose cost is known, shape (n,)."""
+        gain = self._group_gain[group]
+        for member in members:
+            gain = np.minimum(gain, self._member_gain[member])
+        return gain - self.travel * cost
+
+    @cached_property
+    def _group_gain(self) -> FloatArray:
+        """Bound on alpha P_R + beta P_M of each group, shape (K,)."""
+        return self._gain(*self.index.group_scores)
+
+    @cached_property
+    def _member_gain(self) -> FloatArray:
+        """Bound on alpha P_R + beta P_M of the sets of each candidate, shape (C,)."""
+        return self._gain(*self.index.member_scores)
+
+    def _gain(
+        self, reachability: FloatArray, manipulability: FloatArray, total: FloatArray
+    ) -> FloatArray:
+        """Return a bound on alpha P_R + beta P_M from bounds on P_R, P_M and their sum."""
+        alpha, beta = float(self.weights.reachability), float(self.weights.manipulability)
+        # The best reachability and the best manipulability may belong to two different sets.
+        apart = alpha * reachability + beta * manipulability
+        # alpha P_R + beta P_M = (alpha - beta) P_R + beta (P_R + P_M), or with the roles swapped.
+        if alpha >= beta:
+            together = (alpha - beta) * reachability + beta * total
+        else:
+            together = alpha * total + (beta - alpha) * manipulability
+        return np.minimum(apart, together + SLACK * (alpha + beta))
+
+    @cached_property
+    def _driving(self) -> FloatArray:
+        """Cost of driving to the nearest cell of each group and through all of them, shape (K,)."""
+        here = self.legs.here_to_cell
+        approach = here[self.index.cells[0]]
+        for cells in self.index.cells[1:]:
+            approach = np.minimum(approach, here[cells])
+        return np.asarray(approach + self.legs.metre * self.index.path(self.legs.ways))
+
+    @cached_property
+    def _levels(self) -> FloatArray:
+        """Gamma times the least cost of everything but driving with each candidate, shape (C,).
+
+        Turning, lifting and moving the bed obey the triangle inequality: a tour pays at least
+        the direct change from the current state to each of its members.
+        """
+        return self._paid(self.legs.levels_from_here)
+
+    def _paid(self, levels: FloatArray) -> FloatArray:
+        """Return gamma times a cost of changing levels, rounded down."""
+        # Wrapping an angle leaves an absolute rounding error of some 1e-15 rad.
+        wrapping = SLACK * sum(self.legs.level_weights)
+        return self.travel * np.maximum(levels * (1.0 - SLACK) - wrapping, 0.0)
+
+    @cached_property
+    def _rest(self) -> FloatArray:
+        """What is left of the gain with each candidate after that cost, shape (C,)."""
+        return self._member_gain - self._levels
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """Room for rounding in the difference of gain, levels and driving, shape (K,)."""
+        most = float(self.weights.reachability) + float(self.weights.manipulability)
+        most += float(self._levels.max(initial=0.0))
+        return SLACK * (most + self.travel * self._driving)

@@ -1,0 +1,222 @@
+"""Choose the set to use now: the online part of TCS."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tcs.errors import SelectionError
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.selection.estimated import best_estimated, check_estimated
+from tcs.placement.selection.index import SetIndex
+from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.search import best_set
+from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
+from tcs.placement.selection.utility import UtilityWeights, utility
+from tcs.placement.store import ScoreFile
+from tcs.placement.tables import SetTable, SuccessTable
+from tcs.placement.tables.sets import MOST_MEMBERS
+
+_DEFAULT_WEIGHTS = UtilityWeights()
+_DEFAULT_TRAVEL = TravelWeights()
+
+
+@dataclass(frozen=True)
+class SelectionTables:
+    """What can be chosen from: the sets, and the grid their members are of.
+
+    Keeps what the search derives from the sets, so that later choices from the same tables
+    are faster than the first.
+    """
+
+    sets: SetTable
+    """The kept sets."""
+    grid: Grid
+    """The grid of initial configurations."""
+    success: SuccessTable | None = None
+    """Estimated success under error of some of the sets."""
+
+    @classmethod
+    def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
+        """Return one of the tables of a loaded score file, the nominal one by default."""
+        chosen = file.nominal if table is None else file.tables[table]
+        return cls(chosen.sets, Grid.from_dict(file.grid), chosen.success)
+
+    @cached_property
+    def index(self) -> SetIndex:
+        """The sets, prepared for the search."""
+        return SetIndex(self.sets)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The set with the greatest utility, and what it was chosen for."""
+
+    members: tuple[InitialConfiguration, ...]
+    """The members, in the order of their configuration indices."""
+    indices: tuple[int, ...]
+    """Flat configuration indices of the members, ascending."""
+    order: tuple[int, ...]
+    """Order in which to visit `members`: the shortest tour."""
+    reachability: float
+    """P_R of the set, TCS eq. (1)."""
+    manipulability: float
+    """P_M of the set, TCS eq. (4)."""
+    cost: float
+    """D of the set from the current state."""
+    utility: float
+    """alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where delta is not 0; P_S is
+    the lower end of `success_ci95`."""
+    success: float | None
+    """Estimated success of the set under error; None where it was not estimated."""
+    success_ci95: tuple[float, float] | None
+    """Its 95 % interval."""
+    cut_off: int
+    """How many candidates were left out because there is no way to them from here."""
+    gap: float
+    """By how much a set of those that are held may be better at most; 0, the search is exact."""
+    seconds: float
+    """How long choosing took [s]."""
+    match: Match | None = None
+    """Which table of the file was chosen from, and how far it is from what was observed."""
+
+
+def select(
+    source: ScoreFile | SelectionTables,
+    here: InitialConfiguration,
+    *,
+    weights: UtilityWeights = _DEFAULT_WEIGHTS,
+    travel: TravelWeights = _DEFAULT_TRAVEL,
+    max_members: int | None = None,
+    observed: Mapping[str, float] | None = None,
+    seen: Mapping[str, Sequence[float]] | None = None,
+) -> Choice:
+    """Return the stored set with the greatest utility from where the robot is.
+
+    The result equals a search through all stored sets; where delta is above 0, through all sets
+    whose success under error was estimated (`tcs.placement.robustness`). Of sets with the same
+    utility the first wins: singles by configuration index, then pairs and then triples in
+    lexicographic order.
+
+    Args:
+        source: A loaded score file; or its tables, which is faster when choosing repeatedly.
+        here: The current state of robot and environment, h_0, in the environment frame.
+        weights: alpha, beta, gamma, delta.
+        travel: What each kind of motion costs.
+        max_members: 1 to choose a single configuration, 2 to allow a pair, 3 a triple; by default
+            whatever is stored.
+        observed: How the person is found: values of the file's observed axes [m or rad]. The
+            table scored for the nearest values is used; what is not told counts as zero.
+        seen: The same told by places of body frames in W [m], by name.
+
+    Raises:
+        SelectionError: If no goal is reached from anywhere, the current state is not finite or
+            lacks an axis that costs something, `max_members` is not stored, there is no way
+            around the furniture to anywhere, or delta is above 0 and no set has an estimate,
+            or no set of three where three are asked for.
+        UnknownNameError: If an environment axis has no such name.
+
+    Source:
+        TCS eq. (5). The paper leaves D open; ours is the shortest tour through the members.
+    """
+    start = time.perf_counter()
+    match = None
+    if isinstance(source, ScoreFile):
+        match = nearest_table(source, here, observed, seen)
+        tables = SelectionTables.of(source, match.index)
+    elif observed or seen:
+        raise SelectionError(
+            "Observations choose among the tables of a score file, but one table was given. "
+            "Give the file."
+        )
+    else:
+        tables = source
+    sets = tables.sets
+    if max_members is None:
+        max_members = sets.max_members
+    elif weights.success > 0.0:
+        check_estimated(sets, tables.success, max_members)
+    _check_members(max_members, sets.max_members)
+    if not len(sets.candidates):
+        raise SelectionError(
+            "Nothing to choose from: no goal is reached from any initial configuration. Look at "
+            "the reasons in the score table, then change the task, the grid or the environment."
+        )
+    legs = legs_from(
+        here, tables.grid, sets.candidates, sets.cell, tables.index.ways[travel.route], travel
+    )
+    if not np.any(legs.reachable):
+        raise SelectionError(
+            f"From ({here.base_x:.2f}, {here.base_y:.2f}) m there is no way around the furniture "
+            "to any place worth standing at. Check the place, or take straight lines."
+        )
+    if weights.success > 0.0:
+        chosen = best_estimated(sets, tables.success, legs, weights, max_members)
+        return _choice(tables, legs, weights, chosen, start, match)
+    singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)
+    singles[~legs.reachable[sets.cell]] = -np.inf
+    single = int(np.argmax(singles))
+    rows: tuple[int, ...] = (single,)
+    best = float(singles[single])
+    for groups in tables.index.groups[: max_members - 1]:
+        found = best_set(groups, legs, weights, best)
+        if found is not None:
+            rows, best = found.members, found.utility
+    return _choice(tables, legs, weights, rows, start, match)
+
+
+def _check_members(asked: int, held: int) -> None:
+    """Refuse a number of members that is none, or greater than what the table holds."""
+    if asked < 1:
+        raise SelectionError(f"At most {asked} members asked for; must be 1 or more.")
+    if asked > held:
+        sizes = " and ".join(str(n) for n in range(1, held + 1))
+        raise SelectionError(
+            f"At most {asked} members asked for, but the table holds sets of {sizes} only. "
+            + (
+                f"Score the task again: tcs score ... --max-members {asked}."
+                if asked <= MOST_MEMBERS
+                else f"No set has more than {MOST_MEMBERS}."
+            )
+        )
+
+
+def _choice(
+    tables: SelectionTables,
+    legs: Legs,
+    weights: UtilityWeights,
+    rows: tuple[int, ...],
+    start: float,
+    match: Match | None,
+) -> Choice:
+    """Return the choice of the candidates with these numbers, begun at time `start`."""
+    member = np.array(rows)
+    between = legs.between(member[:, None], member[None, :])
+    cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
+    indices = tuple(int(h) for h in tables.sets.candidates[member])
+    reachability, manipulability = tables.sets.scores_of(indices)
+    row = tables.success.row_of(indices) if tables.success is not None else None
+    success, interval, sure = None, None, None
+    if tables.success is not None and row is not None:
+        success = float(tables.success.success[row])
+        interval = (float(tables.success.low[row]), float(tables.success.high[row]))
+        sure = interval[0]
+    return Choice(
+        members=tuple(tables.grid.configuration(h) for h in indices),
+        indices=indices,
+        order=order,
+        reachability=reachability,
+        manipulability=manipulability,
+        cost=cost,
+        utility=utility(reachability, manipulability, cost, weights, sure),
+        success=success,
+        success_ci95=interval,
+        cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
+        gap=0.0,
+        seconds=time.perf_counter() - start,
+        match=match,
+    )

@@ -1,0 +1,97 @@
+"""Choose among the sets whose success under error was estimated: few enough to look at each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError
+from tcs.placement.selection.search import tour_costs
+from tcs.placement.selection.travel import Legs
+from tcs.placement.selection.utility import UtilityWeights, utility
+from tcs.placement.tables import SetTable, SuccessTable, tc_manipulability, tc_reachability
+
+
+def best_estimated(
+    sets: SetTable,
+    success: SuccessTable | None,
+    legs: Legs,
+    weights: UtilityWeights,
+    max_members: int,
+) -> tuple[int, ...]:
+    """Return the estimated set with the greatest utility, the first among equals.
+
+    Args:
+        sets: The kept sets.
+        success: Estimates for some of them.
+        legs: Travel costs from the current state.
+        weights: alpha, beta, gamma, delta.
+        max_members: Sets of at most so many members.
+
+    Returns:
+        Candidate numbers of its members, ascending.
+
+    Raises:
+        SelectionError: If no set has an estimate, or there is no way to any that has.
+    """
+    if success is None:
+        raise SelectionError(
+            "Weight delta asks for the success under error, which was estimated for no set of this "
+            "table. Estimate it first: tcs robustify FILE."
+        )
+    best: tuple[int, ...] | None = None
+    most = -np.inf
+    for size in range(1, max_members + 1):
+        rows = success.of_size(size)
+        members = np.searchsorted(sets.candidates, success.members[rows, :size])
+        able = np.all(legs.reachable[sets.cell[members]], axis=1)
+        rows, members = rows[able], members[able]
+        if not rows.size:
+            continue
+        found = _utilities(sets, success.low[rows], legs, weights, members)
+        first = int(np.argmax(found))
+        # The table is in the order that breaks ties.
+        if found[first] > most:
+            most = float(found[first])
+            best = tuple(int(i) for i in members[first])
+    if best is None:
+        raise SelectionError(
+            "There is no way from here to any set whose success under error was estimated, or none "
+            "has so few members. Take --delta 0, or estimate more sets: tcs robustify FILE --sets."
+        )
+    return best
+
+
+def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: int) -> None:
+    """Refuse to choose among sets of three by a success that was estimated for smaller ones only.
+
+    Raises:
+        SelectionError: If there are sets of three, and none has an estimate.
+    """
+    if max_members < 3 or success is None or sets.triples is None or not sets.triples.kept:
+        return
+    if not success.of_size(3).size:
+        raise SelectionError(
+            "max_members is 3 and weight delta above 0, but the success under error was estimated "
+            "for no set of three. Take max_members 2, or delta 0."
+        )
+
+
+def _utilities(
+    sets: SetTable,
+    success: NDArray[np.float64],
+    legs: Legs,
+    weights: UtilityWeights,
+    members: NDArray[np.intp],
+) -> NDArray[np.float64]:
+    """Return the utility of sets of one size, given their candidates, shape (n, size)."""
+    columns = tuple(np.ascontiguousarray(column) for column in members.T)
+    reached = np.logical_or.reduce([sets.reached[column] for column in columns], axis=0)
+    isotropy = np.maximum.reduce([sets.isotropy[column] for column in columns], axis=0)
+    return utility(
+        tc_reachability(reached, sets.weights),
+        tc_manipulability(isotropy, sets.weights),
+        tour_costs(legs, columns),
+        weights,
+        success,
+    )

@@ -1,0 +1,125 @@
+"""What the search needs of a set table, independent of the query."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.selection.ways import StraightWays, Ways, WaysAround
+from tcs.placement.tables import SetTable
+from tcs.placement.tables.groups import Groups
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SetIndex:
+    """The candidates, by cell and by goal."""
+
+    sets: SetTable
+    """The table."""
+
+    @cached_property
+    def groups(self) -> tuple[GroupIndex, ...]:
+        """The groups of pairs, and of triples where the table holds them."""
+        kinds = [self.sets.pairs]
+        if self.sets.triples is not None:
+            kinds.append(self.sets.triples)
+        return tuple(GroupIndex(self, kind) for kind in kinds)
+
+    @cached_property
+    def ways(self) -> dict[str, Ways]:
+        """Distances between the cells by each of the routes."""
+        xy = self.sets.cell_xy
+        return {"straight": StraightWays(xy), "around": WaysAround(xy, self.sets.floor)}
+
+    @cached_property
+    def start(self) -> IntArray:
+        """Where each cell starts in `by_cell`, shape (N,)."""
+        return self.sets.cell_start[:-1]
+
+    @cached_property
+    def size(self) -> IntArray:
+        """How many candidates each cell has, shape (N,)."""
+        return np.asarray(np.diff(self.sets.cell_start))
+
+    @cached_property
+    def earliest(self) -> IntArray:
+        """Least candidate number in each cell, shape (N,)."""
+        return self.sets.by_cell[self.start]
+
+    @cached_property
+    def isotropy(self) -> FloatArray:
+        """Isotropy in double precision, one contiguous row for each goal, shape (G, C)."""
+        return np.ascontiguousarray(self.sets.isotropy.T, dtype=np.float64)
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Whether a goal is reached, one contiguous row for each goal, shape (G, C)."""
+        return np.ascontiguousarray(self.sets.reached.T)
+
+
+@dataclass(frozen=True)
+class GroupIndex:
+    """Groups of sets of m members with the same base cells."""
+
+    all: SetIndex
+    """The candidates."""
+    groups: Groups
+    """The groups."""
+    _paths: dict[type[Ways], FloatArray] = field(default_factory=dict, repr=False)
+    """Shortest paths through the cells of each group that were asked for, by kind of way."""
+
+    @property
+    def members(self) -> int:
+        """m, how many members each set has."""
+        return int(self.groups.cells.shape[1])
+
+    @cached_property
+    def cells(self) -> tuple[IntArray, ...]:
+        """First, second, ... cell of each group, shapes (K,)."""
+        return tuple(np.ascontiguousarray(column, dtype=np.int64) for column in self.groups.cells.T)
+
+    @cached_property
+    def group_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Bounds on P_R, P_M and P_R + P_M of each group in double precision, shapes (K,).
+
+        Products with float32 arrays would round to float32, and might round a bound down.
+        """
+        groups = self.groups
+        return (
+            groups.reachability,
+            groups.manipulability.astype(np.float64),
+            groups.total.astype(np.float64),
+        )
+
+    @cached_property
+    def member_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The same of the kept sets that each candidate is in, shapes (C,)."""
+        groups = self.groups
+        return (
+            groups.member_reachability,
+            groups.member_manipulability.astype(np.float64),
+            groups.member_total.astype(np.float64),
+        )
+
+    @cached_property
+    def candidates_within(self) -> IntArray:
+        """How many candidates there are in the cells of each group, shape (K,)."""
+        return np.asarray(sum(self.all.size[cells] for cells in self.cells))
+
+    def path(self, ways: Ways) -> FloatArray:
+        """Return the least distance to drive between the cells of each group [m], shape (K,)."""
+        if type(ways) not in self._paths:
+            legs = [
+                ways.between(first, second)
+                for i, first in enumerate(self.cells)
+                for second in self.cells[i + 1 :]
+            ]
+            # Of three legs a path takes two.
+            self._paths[type(ways)] = np.sort(legs, axis=0)[: self.members - 1].sum(axis=0)
+        return self._paths[type(ways)]

@@ -1,0 +1,233 @@
+"""What it costs to get from the current state to a set: D(h_k, h_0) in TCS eq. (5).
+
+D is the shortest open tour that starts at the current state h_0 and visits every
+member of the set. A leg is driven straight, or around the furniture: see
+`tcs.placement.selection.ways`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError, UnknownNameError
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.selection.checks import check_coordinate, check_weight
+from tcs.placement.selection.ways import ROUTES, Ways
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TravelWeights:
+    """What each kind of motion costs; by default only metres of driving do.
+
+    Each is a number from 0 to 1e9. D has the unit of the driven metres.
+    """
+
+    metre: float = 1.0
+    """Per metre driven."""
+    turn: float = 0.0
+    """Per radian between base headings, the shorter way round (0 to pi)."""
+    torso: float = 0.0
+    """Per metre of torso lift."""
+    environment: tuple[tuple[str, float], ...] = ()
+    """Per metre or radian of each named environment axis, e.g. ("bed_height", 2.0)."""
+    route: str = "straight"
+    """How the base drives: "straight", as in the paper, or "around" the furniture."""
+
+    def __post_init__(self) -> None:
+        """Refuse weights that are negative or not finite, and unknown routes.
+
+        Raises:
+            SelectionError: If a weight is no number from 0 to 1e9, or an axis is named twice.
+            UnknownNameError: If there is no such route.
+        """
+        if self.route not in ROUTES:
+            raise UnknownNameError("route", str(self.route), ROUTES, where="travel")
+        for name in ("metre", "turn", "torso"):
+            check_weight(f"of travel per {name}", getattr(self, name))
+        for name, value in self.environment:
+            check_weight(f"of travel along '{name}'", value)
+        names = [name for name, _ in self.environment]
+        if len(set(names)) < len(names):
+            raise SelectionError(f"Travel weights name an environment axis twice: {names}.")
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Costs of single legs between the current state, candidates and base cells.
+
+    A leg is summed in a fixed order, driving first: then driving alone is never more than the
+    whole leg, in floating point too, and can bound it.
+    """
+
+    cell: NDArray[np.int32]
+    """Base cells of the candidates, shape (C,)."""
+    ways: Ways
+    """Distances between the cells."""
+    here_to_cell: FloatArray
+    """Cost of driving from the current place to each cell, 0 where there is no way, shape (N,)."""
+    reachable: NDArray[np.bool_]
+    """Whether there is a way from the current place to each cell, shape (N,)."""
+    levels: FloatArray
+    """What else the candidates differ in and costs something: heading if it has a weight,
+    torso, environment axes [rad or m], shape (C, L)."""
+    level_weights: tuple[float, ...]
+    """Weight of each column of `levels`."""
+    turns: bool
+    """Whether the first column of `levels` is the heading, which wraps round."""
+    here_levels: FloatArray
+    """The current values of `levels`, shape (L,)."""
+    metre: float
+    """Weight of driving, per metre."""
+
+    def between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
+        """Return the cost of the leg between candidates a and b, shape (...)."""
+        driving = self.metre * self.ways.between(self.cell[a], self.cell[b])
+        return self._with_levels(driving, self.levels[a], self.levels[b])
+
+    @cached_property
+    def from_here(self) -> FloatArray:
+        """Cost of the leg from the current state to each candidate, shape (C,)."""
+        return self._with_levels(self.here_to_cell[self.cell], self.here_levels, self.levels)
+
+    @cached_property
+    def levels_from_here(self) -> FloatArray:
+        """Cost of that leg without the driving, shape (C,)."""
+        nothing = np.zeros(len(self.cell))
+        return self._with_levels(nothing, self.here_levels, self.levels)
+
+    def levels_between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
+        """Return the cost of the leg between candidates without the driving, shape (...)."""
+        return self._with_levels(np.zeros(np.shape(a)), self.levels[a], self.levels[b])
+
+    def _with_levels(
+        self, driving: FloatArray, from_levels: FloatArray, to_levels: FloatArray
+    ) -> FloatArray:
+        """Return the cost of legs whose driving is already known, shape (...)."""
+        cost = driving
+        for column, weight in enumerate(self.level_weights):
+            change = np.abs(to_levels[..., column] - from_levels[..., column])
+            if column == 0 and self.turns:
+                change = np.abs(np.mod(change + np.pi, 2.0 * np.pi) - np.pi)
+            cost = cost + weight * change
+        return cost
+
+
+def legs_from(
+    here: InitialConfiguration,
+    grid: Grid,
+    candidates: NDArray[np.int32],
+    cell: NDArray[np.int32],
+    ways: Ways,
+    weights: TravelWeights,
+) -> Legs:
+    """Return the legs between the current state and the candidates of a grid.
+
+    Args:
+        here: The current state h_0. Environment axes matter only where they have a weight.
+        grid: Grid of the candidates.
+        candidates: Flat indices of the candidates, shape (C,).
+        cell: Their base cells, shape (C,).
+        ways: Distances between the cells.
+        weights: What each kind of motion costs.
+
+    Raises:
+        UnknownNameError: If a weight names an axis that the environment does not have.
+        SelectionError: If the current state is not finite, lacks an axis with a weight, or is no
+            place from which there is a way anywhere.
+    """
+    names, level_weights = _weighted_levels(grid, weights)
+    current = current_values(here, grid, names)
+    # Columns are read only when they cost something: looking them up takes longer than choosing.
+    values = grid.values(candidates) if names else {}
+    levels = [values[name] for name in names]
+    metres = ways.from_place(float(here.base_x), float(here.base_y))
+    reachable = np.isfinite(metres)
+    return Legs(
+        cell=cell,
+        ways=ways,
+        here_to_cell=float(weights.metre) * np.where(reachable, metres, 0.0),
+        reachable=reachable,
+        levels=np.stack(levels, axis=1) if names else np.zeros((len(candidates), 0)),
+        level_weights=level_weights,
+        turns=weights.turn > 0.0,
+        here_levels=np.array([current[name] for name in names], dtype=np.float64),
+        metre=float(weights.metre),
+    )
+
+
+def shortest_tour(from_here: Sequence[float], between: FloatArray) -> tuple[float, tuple[int, ...]]:
+    """Return the cost of the shortest open tour through all members, and the order of visits.
+
+    Args:
+        from_here: Cost of the leg from the current state to each member, shape (m,), m >= 1.
+        between: Cost of the leg between two members, symmetric, shape (m, m).
+
+    Returns:
+        Cost D, and the members in the order they are visited; ties go to the first in
+        lexicographic order.
+
+    >>> shortest_tour([5.0, 1.0], np.array([[0.0, 2.0], [2.0, 0.0]]))
+    (3.0, (1, 0))
+    """
+    best, best_order = math.inf, tuple(range(len(from_here)))
+    for order in itertools.permutations(range(len(from_here))):
+        cost = float(from_here[order[0]])
+        for a, b in itertools.pairwise(order):
+            cost += float(between[a, b])
+        if cost < best:
+            best, best_order = cost, order
+    return best, best_order
+
+
+def _weighted_levels(
+    grid: Grid, weights: TravelWeights
+) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Return names and weights of the axes beside x and y that cost something, heading first."""
+    known = [axis.name for axis in grid.environment_axes]
+    for name, _ in weights.environment:
+        if name not in known:
+            raise UnknownNameError("environment axis", name, known, where="travel weights")
+    levels = (("base_yaw", weights.turn), ("torso", weights.torso), *weights.environment)
+    used = [(name, float(weight)) for name, weight in levels if weight > 0.0]
+    return tuple(name for name, _ in used), tuple(weight for _, weight in used)
+
+
+def current_values(
+    here: InitialConfiguration, grid: Grid, names: tuple[str, ...]
+) -> dict[str, float]:
+    """Return the current value of every axis that is needed, checked."""
+    values = {
+        "base_x": here.base_x,
+        "base_y": here.base_y,
+        "base_yaw": here.base_yaw,
+        "torso": here.torso,
+    }
+    known = {axis.name: axis.held_unit for axis in grid.environment_axes}
+    for (name, value), unit in zip(here.environment, here.environment_units, strict=True):
+        if name not in known:
+            raise UnknownNameError("environment axis", name, known, where="current state")
+        if unit != known[name]:
+            raise SelectionError(
+                f"Current state: '{name}' is given in '{unit}'; must be in '{known[name]}'."
+            )
+        values[name] = value
+    for name, value in values.items():
+        check_coordinate(name, value)
+    # Whole turns mean nothing, and would take digits from the differences of headings.
+    values["base_yaw"] = math.remainder(here.base_yaw, 2.0 * math.pi)
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise SelectionError(
+            f"Current state lacks {', '.join(missing)}, which the travel weights charge for. "
+            "Give its current value, or weight 0."
+        )
+    return values

@@ -1,0 +1,73 @@
+"""How good a set is now: its two scores against the way there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.selection.checks import check_weight
+
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UtilityWeights:
+    """Weights of the terms of the utility, TCS eq. (5); each a number from 0 to 1e9.
+
+    The travel weight is per metre. It is 0.05 by default: one metre more is worth five percent
+    of the task. At 1 a metre would cancel a task that is reached in full.
+    """
+
+    reachability: float = 1.0
+    """alpha, the weight of TC-reachability P_R."""
+    manipulability: float = 1.0
+    """beta, the weight of TC-manipulability P_M."""
+    travel: float = 0.05
+    """gamma, the weight of the travel cost D."""
+    success: float = 0.0
+    """delta, the weight of the success under error P_S: the lower end of the 95 % interval of its
+    estimate, so that a lucky set of few samples is not ahead of a good one of many. Above 0, only
+    sets with an estimate can be chosen."""
+
+    def __post_init__(self) -> None:
+        """Refuse weights that are negative or not finite.
+
+        Raises:
+            SelectionError: If a weight is no number from 0 to 1e9.
+        """
+        check_weight("alpha (reachability)", self.reachability)
+        check_weight("beta (manipulability)", self.manipulability)
+        check_weight("gamma (travel)", self.travel)
+        check_weight("delta (success)", self.success)
+
+
+def utility(
+    reachability: Number,
+    manipulability: Number,
+    cost: Number,
+    weights: UtilityWeights,
+    success: Number | None = None,
+) -> Number:
+    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where that is given.
+
+    The order of the operations is part of the contract: the search bounds the
+    utility by the same operations on greater scores and smaller costs, and
+    rounding keeps that order.
+
+    Args:
+        reachability: P_R of the sets.
+        manipulability: P_M of the sets.
+        cost: D of the sets.
+        weights: alpha, beta, gamma, delta.
+        success: P_S of the sets, what they reach under error.
+
+    >>> utility(1.0, 0.5, 2.0, UtilityWeights())
+    1.4
+    """
+    without_error = (
+        float(weights.reachability) * reachability + float(weights.manipulability) * manipulability
+    ) - float(weights.travel) * cost
+    return without_error if success is None else without_error + float(weights.success) * success

@@ -1,0 +1,198 @@
+"""Turn a set table into plain containers and small arrays, and back."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import StoreFormatError
+from tcs.files.compression import MAX_BYTES, fold, small, unfolded
+from tcs.placement.tables import Floor, SetTable
+from tcs.placement.tables.floor import MOVES
+from tcs.placement.tables.groups import ARRAYS, Groups
+
+_PLAIN = {
+    "rule": str,
+    "max_members": int,
+    "min_distance": float,
+    "same_environment": bool,
+    "state_size": int,
+}
+"""Fields of a set table that are single values, and the type of each."""
+
+
+def packed_sets(sets: SetTable) -> dict[str, Any]:
+    """Return the plain containers that `unpacked_sets` takes."""
+    cells = len(sets.cell_xy)
+    numbers = sets.pair_cells[:, 0].astype(np.int64) * cells + sets.pair_cells[:, 1]
+    # There are few different values: one for each subset of the goals at most.
+    values, code = np.unique(sets.pair_reachability, return_inverse=True)
+    return {
+        "rule": sets.rule,
+        "max_members": int(sets.max_members),
+        "min_distance": float(sets.min_distance),
+        "same_environment": bool(sets.same_environment),
+        "state_size": int(sets.state_size),
+        "weights": fold(sets.weights),
+        # Steps from one to the next are mostly small, and compress to little.
+        "candidate_step": fold(_steps(sets.candidates.astype(np.int64))),
+        "reached": fold(sets.reached.astype(np.uint8)),
+        "isotropy": fold(sets.isotropy[sets.reached]),
+        "cell": fold(small(sets.cell.astype(np.int64))),
+        "cell_xy": fold(sets.cell_xy),
+        "pair_step": fold(_steps(numbers)),
+        "pair_count": fold(small(sets.pair_count)),
+        "reachability_values": fold(values),
+        "reachability_code": fold(small(code.astype(np.int64))),
+        "pair_manipulability": fold(sets.pair_manipulability),
+        "pair_sum": fold(sets.pair_sum),
+        "member_reachability": fold(sets.member_reachability),
+        "member_manipulability": fold(sets.member_manipulability),
+        "member_sum": fold(sets.member_sum),
+        "triples": None if sets.triples is None else _packed_groups(sets.triples, cells),
+        "best": list(sets.best),
+        "best_single": list(sets.best_single),
+        "floor": {
+            "start": list(sets.floor.start),
+            "step": list(sets.floor.step),
+            "shape": list(sets.floor.shape),
+            "moves": fold(np.packbits(sets.floor.moves)),
+        },
+    }
+
+
+def unpacked_sets(packed: dict[str, Any]) -> SetTable:
+    """Return the sets that were packed.
+
+    Raises:
+        StoreFormatError: If something is missing or out of range.
+        TcsError: If the sets contradict themselves.
+    """
+    for name, kind in _PLAIN.items():
+        if type(packed.get(name)) is not kind:
+            raise StoreFormatError(f"has sets without '{name}'")
+    weights = unfolded(packed, "weights", "f8", (None,))
+    # A table has at most 20 million configurations: see `tcs.model.grid.MAX_CONFIGURATIONS`.
+    candidates = _ascending(unfolded(packed, "candidate_step", "u", (None,)), 2**31, "candidates")
+    reached = unfolded(packed, "reached", "u1", (candidates.size, weights.size)) != 0
+    isotropy = np.zeros(reached.shape, dtype=np.float32)
+    isotropy[reached] = unfolded(packed, "isotropy", "f4", (int(np.count_nonzero(reached)),))
+    cell_xy = unfolded(packed, "cell_xy", "f8", (None, 2))
+    values = unfolded(packed, "reachability_values", "f8", (None,))
+    step = unfolded(packed, "pair_step", "u", (None,))
+    kept = (step.size,)
+    numbers = _ascending(step, len(cell_xy) ** 2 + 1, "pairs of cells")
+    code = unfolded(packed, "reachability_code", "u", kept).astype(np.int64)
+    if np.any(code >= values.size):
+        raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
+    pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
+    return SetTable(
+        **{name: packed[name] for name in _PLAIN},
+        weights=weights,
+        candidates=candidates.astype(np.int32),
+        reached=reached,
+        isotropy=isotropy,
+        cell=_int32(unfolded(packed, "cell", "u", candidates.shape)),
+        cell_xy=cell_xy,
+        pair_cells=pair_cells.astype(np.int32),
+        pair_count=unfolded(packed, "pair_count", "u", kept).astype(np.int64),
+        pair_reachability=values[code],
+        pair_manipulability=unfolded(packed, "pair_manipulability", "f4", kept),
+        pair_sum=unfolded(packed, "pair_sum", "f4", kept),
+        member_reachability=unfolded(packed, "member_reachability", "f8", candidates.shape),
+        member_manipulability=unfolded(packed, "member_manipulability", "f4", candidates.shape),
+        member_sum=unfolded(packed, "member_sum", "f4", candidates.shape),
+        triples=_unpacked_groups(packed.get("triples"), len(cell_xy)),
+        best=_indices(packed, "best"),
+        best_single=_indices(packed, "best_single"),
+        floor=_unpacked_floor(packed.get("floor")),
+    )
+
+
+def _packed_groups(groups: Groups, cells: int) -> dict[str, Any]:
+    """Return the plain containers that `_unpacked_groups` takes."""
+    number = np.zeros(len(groups.cells), dtype=np.int64)
+    for column in groups.cells.T.astype(np.int64):
+        number = number * cells + column
+    return {
+        "least": float(groups.least),
+        "step": fold(_steps(number)),
+        **{name: fold(getattr(groups, name)) for name in ARRAYS if name != "count"},
+        "count": fold(small(groups.count)),
+    }
+
+
+def _unpacked_groups(packed: object, cells: int) -> Groups | None:
+    """Return the sets of three that were packed, checked; None where there are none."""
+    if packed is None:
+        return None
+    if not isinstance(packed, dict) or type(packed.get("least")) is not float:
+        raise StoreFormatError("has sets of three that are none")
+    number = _ascending(unfolded(packed, "step", "u", (None,)), cells**3 + 1, "triples of cells")
+    wide = {"reachability": "f8", "member_reachability": "f8"}
+    return Groups(
+        least=packed["least"],
+        cells=np.stack(
+            [number // cells**2, number // cells % cells, number % cells]
+            if cells
+            else [number] * 3,
+            axis=1,
+        ).astype(np.int32),
+        count=unfolded(packed, "count", "u", number.shape).astype(np.int64),
+        **{
+            name: unfolded(packed, name, wide.get(name, "f4"), (None,))
+            for name in ARRAYS
+            if name != "count"
+        },
+    )
+
+
+def _unpacked_floor(packed: object) -> Floor:
+    """Return where the base can drive, checked."""
+    if not isinstance(packed, dict):
+        raise StoreFormatError("has sets without a floor")
+    pairs = {}
+    for name, kind in (("start", float), ("step", float), ("shape", int)):
+        values = packed.get(name)
+        if not isinstance(values, list) or [type(value) for value in values] != [kind] * 2:
+            raise StoreFormatError(f"has a floor without '{name}'")
+        pairs[name] = values
+    shape = (len(MOVES), *pairs["shape"])
+    if min(shape) < 1 or math.prod(shape) > MAX_BYTES:
+        raise StoreFormatError(f"has a floor of shape {shape}")
+    bits = unfolded(packed, "moves", "u1", (-(-math.prod(shape) // 8),))
+    moves = np.unpackbits(bits, count=math.prod(shape)).astype(np.bool_).reshape(shape)
+    return Floor(
+        start=(pairs["start"][0], pairs["start"][1]),
+        step=(pairs["step"][0], pairs["step"][1]),
+        moves=moves,
+    )
+
+
+def _ascending(step: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
+    """Return the sums of steps, all of them below `end`."""
+    # Summed in floating point first: forged steps must not wrap round to valid ones.
+    if step.sum(dtype=np.float64) >= float(end):
+        raise StoreFormatError(f"has {what} that do not exist")
+    return np.cumsum(step.astype(np.int64))
+
+
+def _indices(packed: dict[str, Any], name: str) -> tuple[int, ...]:
+    members = packed.get(name)
+    if not isinstance(members, list) or not all(type(h) is int and 0 <= h < 2**31 for h in members):
+        raise StoreFormatError(f"has a '{name}' that is no list of configurations")
+    return tuple(members)
+
+
+def _int32(values: NDArray[Any]) -> NDArray[np.int32]:
+    if np.any(values > np.iinfo(np.int32).max):
+        raise StoreFormatError("has a number of a cell that is out of range")
+    return values.astype(np.int32)
+
+
+def _steps(ascending: NDArray[np.int64]) -> NDArray[Any]:
+    """Return the differences of ascending numbers, from 0."""
+    return small(np.asarray(np.diff(ascending, prepend=0), dtype=np.int64))

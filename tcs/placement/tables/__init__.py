@@ -1,0 +1,19 @@
+"""Plain data of placement: scores, sets, success under error, maps of places (numpy only)."""
+
+from __future__ import annotations
+
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.floor import Floor
+from tcs.placement.tables.scores import Reason, ScoreTable
+from tcs.placement.tables.sets import SetTable
+from tcs.placement.tables.success import SuccessTable
+
+__all__ = [
+    "Floor",
+    "Reason",
+    "ScoreTable",
+    "SetTable",
+    "SuccessTable",
+    "tc_manipulability",
+    "tc_reachability",
+]

@@ -1,0 +1,55 @@
+"""The floor round the furniture: a lattice of places, and the moves between neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.tables.checks import read_only, require
+
+MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
+"""Steps along x and y of the four kinds of moves; each also goes backward."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Floor:
+    """Where the base can drive: X by Y places, and the straight moves between neighbours.
+
+    The lattice reaches beyond the grid of base places. All floor beyond the lattice is free.
+    """
+
+    start: tuple[float, float]
+    """x and y of the first place in W [m]."""
+    step: tuple[float, float]
+    """Distance of neighbours along x and along y [m]; positive."""
+    moves: NDArray[np.bool_]
+    """Whether the base can move from place (i, j) by each of `MOVES`, shape (4, X, Y)."""
+
+    def __post_init__(self) -> None:
+        """Check the lattice and make its array read-only.
+
+        Raises:
+            TcsError: If a number is not finite, a step not positive, there are fewer than two
+                places along an axis, or a move leads out of the lattice.
+        """
+        moves = read_only("floor: moves", self.moves, np.bool_, (len(MOVES), None, None))
+        object.__setattr__(self, "moves", moves)
+        numbers = (*self.start, *self.step)
+        require(
+            len(self.start) == len(self.step) == 2
+            and all(isinstance(value, float) and abs(value) < np.inf for value in numbers)
+            and min(self.step) > 0.0,
+            "floor: start and step must be two finite numbers each, the steps positive.",
+        )
+        require(min(self.shape) >= 2, "floor: needs at least two places along each axis.")
+        for along, (dx, dy) in zip(moves, MOVES, strict=True):
+            leaving = np.ones(self.shape, dtype=np.bool_)
+            leaving[: self.shape[0] - dx, max(0, -dy) : self.shape[1] - max(0, dy)] = False
+            require(not np.any(along & leaving), "floor: a move leads out of the lattice.")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many places there are along x and y."""
+        return self.moves.shape[1], self.moves.shape[2]

@@ -1,0 +1,157 @@
+"""The score table: what the arm can do at each goal from each initial configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+
+WEIGHT_SUM_TOLERANCE = 1e-9
+"""Weights must sum to 1; dividing by the sum leaves 1e-16 per goal, this leaves room for
+millions of goals and still refuses weights that were never normalised."""
+
+
+class Reason(IntEnum):
+    """Why a goal is or is not reached from an initial configuration."""
+
+    REACHED = 0
+    TOO_FAR = 1
+    JOINT_LIMITS = 2
+    BODY_BLOCKED = 3
+    GRIPPER_BLOCKED = 4
+    ARM_BLOCKED = 5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreTable:
+    """Scores of H initial configurations at G goals; arrays are read-only.
+
+    Rows follow the flat order of the grid: C order over (environment state, base x,
+    base y, base yaw, torso level).
+    """
+
+    isotropy: NDArray[np.float32]
+    """Best measure over all collision-free solutions, 0 where not reached, shape (H, G)."""
+    reason: NDArray[np.uint8]
+    """A `Reason` for each pair of configuration and goal, shape (H, G)."""
+    pair: NDArray[np.int32]
+    """The bodies in contact, as index into `pair_names`; -1 where none, shape (H, G)."""
+    pair_names: tuple[tuple[str, str], ...]
+    """Names of two bodies in contact."""
+    arm_joints: NDArray[np.float32]
+    """Winning arm joints [rad] of the R reached pairs, row-major in (h, g), shape (R, 7)."""
+    weights: NDArray[np.float64]
+    """Weights of the goals, sum 1, shape (G,)."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        goals = self.weights.size if isinstance(self.weights, np.ndarray) else None
+        rows = len(self.isotropy) if isinstance(self.isotropy, np.ndarray) else None
+        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+            "weights": (np.float64, (goals,)),
+            "isotropy": (np.float32, (rows, goals)),
+            "reason": (np.uint8, (rows, goals)),
+            "pair": (np.int32, (rows, goals)),
+            "arm_joints": (np.float32, (None, 7)),
+        }
+        for name, (dtype, shape) in shapes.items():
+            view = read_only(f"score table: {name}", getattr(self, name), dtype, shape)
+            object.__setattr__(self, name, view)
+        self._check_ranges()
+
+    def _check_ranges(self) -> None:
+        """Refuse values that no scoring could have produced."""
+        weights, reached = self.weights, self.reached
+        require(
+            weights.size > 0
+            and bool(np.all(weights >= 0.0))
+            and abs(float(weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
+            "score table: weights must be >= 0 and sum to 1.",
+        )
+        require(
+            bool(np.all(self.reason <= max(Reason))),
+            f"score table: reason outside 0..{max(Reason):d}.",
+        )
+        require(
+            bool(np.all((self.isotropy >= 0.0) & (self.isotropy < np.inf))),
+            "score table: isotropy must be finite and >= 0.",
+        )
+        require(
+            not np.any(self.isotropy[~reached]),
+            "score table: isotropy must be 0 where the goal is not reached.",
+        )
+        require(
+            bool(np.all((self.pair >= -1) & (self.pair < len(self.pair_names)))),
+            f"score table: pair outside -1..{len(self.pair_names) - 1}.",
+        )
+        require(
+            len(self.arm_joints) == np.count_nonzero(reached),
+            f"score table: {len(self.arm_joints)} rows of arm joints for "
+            f"{np.count_nonzero(reached)} reached pairs; must be as many.",
+        )
+        require(bool(np.all(np.isfinite(self.arm_joints))), "score table: arm joints not finite.")
+
+    @property
+    def configurations(self) -> int:
+        """H, the number of initial configurations."""
+        return len(self.isotropy)
+
+    @property
+    def goals(self) -> int:
+        """G, the number of goals."""
+        return self.weights.size
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Whether the goal is reached, shape (H, G)."""
+        reached = np.asarray(self.reason == Reason.REACHED)
+        reached.flags.writeable = False
+        return reached
+
+    @cached_property
+    def _reached_pairs(self) -> NDArray[np.intp]:
+        """Flat (h, g) numbers of the reached pairs, ascending, shape (R,)."""
+        return np.flatnonzero(self.reached)
+
+    def reachability(self) -> NDArray[np.float64]:
+        """Return P_R of each configuration by itself, TCS eq. (1), shape (H,)."""
+        return tc_reachability(self.reached, self.weights)
+
+    def manipulability(self) -> NDArray[np.float64]:
+        """Return P_M of each configuration by itself, TCS eq. (4), shape (H,)."""
+        return tc_manipulability(self.isotropy, self.weights)
+
+    def reason_counts(self) -> dict[str, int]:
+        """Return how many pairs of configuration and goal have each reason, by its name."""
+        counts = np.bincount(self.reason.ravel(), minlength=len(Reason))
+        return {reason.name.lower(): int(counts[reason]) for reason in Reason}
+
+    def joints_of(self, h: int, g: int) -> NDArray[np.float32] | None:
+        """Return the winning arm joints [rad], shape (7,), or None where not reached.
+
+        Args:
+            h: Flat index of the initial configuration.
+            g: Number of the goal.
+
+        Raises:
+            TcsError: If there is no such configuration or goal.
+        """
+        require(
+            0 <= h < self.configurations and 0 <= g < self.goals,
+            f"No pair of configuration {h} and goal {g}: the table has "
+            f"{self.configurations} configurations and {self.goals} goals, counted from 0.",
+        )
+        if not self.reached[h, g]:
+            return None
+        row = int(np.searchsorted(self._reached_pairs, h * self.goals + g))
+        return np.asarray(self.arm_joints[row])

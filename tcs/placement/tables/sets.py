@@ -1,0 +1,270 @@
+"""The set table: every set of initial configurations worth choosing from.
+
+Pairs of configurations come in tens of millions, so they are not listed. They
+are grouped by the two base cells (x-y places) of their members, and for each
+pair of cells the table holds how many pairs were kept and upper bounds on
+their scores. That is enough to find the best pair exactly (see `tcs.select`),
+because the score of a pair follows from the isotropy of its two members.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.floor import Floor
+from tcs.placement.tables.groups import Groups
+from tcs.placement.tables.rules import RULES, PairLimits, pair_limits
+
+MOST_MEMBERS = 3
+"""Most members a set may have."""
+
+_BOUNDS = tuple(
+    f"{of}_{what}"
+    for of in ("pair", "member")
+    for what in ("reachability", "manipulability", "sum")
+)
+
+DISTANCE_TOLERANCE = 1e-9
+"""Grid steps such as 0.05 are no binary fractions: 8 of them can come out 1e-16 short of 0.40 m,
+or 1e-15 far from the origin. Places that differ by a nanometre are the same place."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SetTable:
+    """All kept sets (tau in the TCS paper) of C candidates in N base cells; read-only.
+
+    Order of the sets, which also breaks ties: the singles by configuration index, then the
+    pairs (a, b), a < b, in lexicographic order, then the triples likewise.
+    """
+
+    rule: str
+    """Which sets are kept: one of `RULES`."""
+    max_members: int
+    """Sets of one to so many members are held."""
+    min_distance: float
+    """Least base x-y distance between two members of a set [m]."""
+    same_environment: bool
+    """Whether all members of a set share the state of the environment, e.g. the bed's height."""
+    state_size: int
+    """How many configurations each state of the environment has: h // state_size is its number."""
+    weights: NDArray[np.float64]
+    """Weights of the goals, sum 1, shape (G,)."""
+    candidates: NDArray[np.int32]
+    """Flat indices of the configurations kept as singles, ascending, shape (C,)."""
+    reached: NDArray[np.bool_]
+    """Whether a candidate reaches a goal, shape (C, G). Not the same as isotropy > 0, which
+    a singular arm posture can have at a goal it does reach."""
+    isotropy: NDArray[np.float32]
+    """Isotropy of the candidates, 0 where not reached, shape (C, G)."""
+    cell: NDArray[np.int32]
+    """Base cell of each candidate, shape (C,)."""
+    cell_xy: NDArray[np.float64]
+    """x and y of each base cell in W [m], shape (N, 2)."""
+    pair_cells: NDArray[np.int32]
+    """Two cells, first <= second, with at least one kept pair; lexicographic, shape (K, 2)."""
+    pair_count: NDArray[np.int64]
+    """How many pairs are kept between the two cells, shape (K,)."""
+    pair_reachability: NDArray[np.float64]
+    """Greatest P_R of those pairs, exact, shape (K,)."""
+    pair_manipulability: NDArray[np.float32]
+    """Greatest P_M of those pairs, rounded upward, shape (K,)."""
+    pair_sum: NDArray[np.float32]
+    """Greatest P_R + P_M of those pairs, rounded upward, shape (K,)."""
+    member_reachability: NDArray[np.float64]
+    """Greatest P_R of the kept pairs that a candidate is in, exact, 0 if in none, shape (C,)."""
+    member_manipulability: NDArray[np.float32]
+    """Greatest P_M of those pairs, rounded upward, shape (C,)."""
+    member_sum: NDArray[np.float32]
+    """Greatest P_R + P_M of those pairs, rounded upward, shape (C,)."""
+    triples: Groups | None
+    """Kept sets of three; None where `max_members` is less."""
+    best: tuple[int, ...]
+    """Configuration indices of the best set: greatest P_R + P_M, or P_R before P_M by the rule
+    "code2015"; () without candidates."""
+    best_single: tuple[int, ...]
+    """The same among sets of one."""
+    floor: Floor
+    """Where the base can drive."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        count = self.candidates.size if isinstance(self.candidates, np.ndarray) else None
+        goals = self.weights.size if isinstance(self.weights, np.ndarray) else None
+        kept = len(self.pair_cells) if isinstance(self.pair_cells, np.ndarray) else None
+        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+            "weights": (np.float64, (goals,)),
+            "candidates": (np.int32, (count,)),
+            "reached": (np.bool_, (count, goals)),
+            "isotropy": (np.float32, (count, goals)),
+            "cell": (np.int32, (count,)),
+            "cell_xy": (np.float64, (None, 2)),
+            "pair_cells": (np.int32, (kept, 2)),
+            "pair_count": (np.int64, (kept,)),
+            "pair_reachability": (np.float64, (kept,)),
+            "pair_manipulability": (np.float32, (kept,)),
+            "pair_sum": (np.float32, (kept,)),
+            "member_reachability": (np.float64, (count,)),
+            "member_manipulability": (np.float32, (count,)),
+            "member_sum": (np.float32, (count,)),
+        }
+        for name, (dtype, shape) in shapes.items():
+            view = read_only(f"set table: {name}", getattr(self, name), dtype, shape)
+            object.__setattr__(self, name, view)
+        require(
+            self.rule in RULES, f"set table: unknown rule '{self.rule}'. Known: {', '.join(RULES)}."
+        )
+        require(
+            1 <= self.max_members <= MOST_MEMBERS,
+            f"set table: max_members must be 1 to {MOST_MEMBERS}.",
+        )
+        require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
+        require(self.state_size > 0, "set table: state_size must be positive.")
+        require(isinstance(self.floor, Floor), "set table: floor must be a Floor.")
+        self._check_candidates()
+        self._check_pairs()
+        require(
+            isinstance(self.triples, Groups) and self.triples.cells.shape[1] == MOST_MEMBERS
+            if self.max_members == MOST_MEMBERS
+            else self.triples is None,
+            "set table: triples must be there where max_members is 3, and only there.",
+        )
+        if self.triples is not None:
+            self.triples.check(np.diff(self.cell_start))
+
+    def _check_candidates(self) -> None:
+        """Refuse candidates or cells that do not exist, and a best set of other members."""
+        increasing = bool(np.all(np.diff(self.candidates) > 0)) and np.all(self.candidates >= 0)
+        require(increasing, "set table: candidates must be ascending and >= 0.")
+        require(
+            bool(np.all((self.cell >= 0) & (self.cell < len(self.cell_xy)))),
+            f"set table: cell outside 0..{len(self.cell_xy) - 1}.",
+        )
+        require(bool(np.all(np.diff(self.cell_start) > 0)), "set table: a cell has no candidate.")
+        require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
+        along = (self.cell_xy - self.floor.start) / self.floor.step
+        inside = (np.rint(along) >= 0) & (np.rint(along) < self.floor.shape)
+        # A millionth of a step: what rounding leaves of some dozen steps, and to spare.
+        require(
+            bool(np.all(inside & (np.abs(along - np.rint(along)) < 1e-6))),
+            "set table: cell_xy must be places of the floor.",
+        )
+        for name, size in (("best", self.max_members), ("best_single", 1)):
+            members = getattr(self, name)
+            require(
+                isinstance(members, tuple)
+                and (1 <= len(members) <= size if len(self.candidates) else members == ())
+                and all(isinstance(h, int) for h in members)
+                and bool(np.all(np.isin(np.array(members, dtype=np.int64), self.candidates))),
+                f"set table: {name} must name one to {size} candidates.",
+            )
+
+    def _check_pairs(self) -> None:
+        """Refuse an index of cell pairs that is out of order or out of range."""
+        first, second = self.pair_cells.T.astype(np.int64)
+        cells = len(self.cell_xy)
+        require(
+            bool(np.all((first >= 0) & (first <= second) & (second < cells)))
+            and bool(np.all(np.diff(first * cells + second) > 0)),
+            f"set table: pair_cells must be ascending, first <= second, within 0..{cells - 1}.",
+        )
+        size = np.diff(self.cell_start)
+        require(
+            bool(np.all((self.pair_count > 0) & (self.pair_count <= size[first] * size[second]))),
+            "set table: pair_count does not fit the number of candidates in its cells.",
+        )
+        for name in _BOUNDS:
+            bound = getattr(self, name)
+            require(
+                bool(np.all((bound >= 0.0) & (bound < np.inf))),
+                f"set table: {name} must be finite and >= 0.",
+            )
+
+    @property
+    def kept_pairs(self) -> int:
+        """Number of sets of two."""
+        return int(self.pair_count.sum())
+
+    @property
+    def sets(self) -> int:
+        """Number of sets: singles, kept pairs and kept triples."""
+        triples = self.triples.kept if self.triples is not None else 0
+        return len(self.candidates) + self.kept_pairs + triples
+
+    @cached_property
+    def single_reachability(self) -> NDArray[np.float64]:
+        """P_R of each candidate by itself, TCS eq. (1), shape (C,)."""
+        return tc_reachability(self.reached, self.weights)
+
+    @cached_property
+    def single_manipulability(self) -> NDArray[np.float64]:
+        """P_M of each candidate by itself, TCS eq. (4), shape (C,)."""
+        return tc_manipulability(self.isotropy, self.weights)
+
+    @cached_property
+    def limits(self) -> PairLimits:
+        """What the scores of a pair must come up to, to be kept."""
+        return pair_limits(self.rule, self.single_reachability, self.single_manipulability)
+
+    @cached_property
+    def pairs(self) -> Groups:
+        """The kept sets of two."""
+        return Groups(
+            least=self.limits.manipulability,
+            cells=self.pair_cells,
+            count=self.pair_count,
+            reachability=self.pair_reachability,
+            manipulability=self.pair_manipulability,
+            total=self.pair_sum,
+            member_reachability=self.member_reachability,
+            member_manipulability=self.member_manipulability,
+            member_total=self.member_sum,
+        )
+
+    @cached_property
+    def state(self) -> NDArray[np.int64]:
+        """Number of the environment's state of each candidate, shape (C,)."""
+        return self.candidates.astype(np.int64) // self.state_size
+
+    @cached_property
+    def by_cell(self) -> NDArray[np.int64]:
+        """Candidate numbers (rows of `candidates`) sorted by cell, then number, shape (C,)."""
+        return np.argsort(self.cell, kind="stable").astype(np.int64)
+
+    @cached_property
+    def cell_start(self) -> NDArray[np.int64]:
+        """Where each cell starts in `by_cell`, shape (N + 1,)."""
+        sizes = np.bincount(self.cell, minlength=len(self.cell_xy))
+        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+    def scores_of(self, members: tuple[int, ...]) -> tuple[float, float]:
+        """Return P_R and P_M of a set, TCS eq. (1) and (4): per goal, its best member counts.
+
+        Args:
+            members: Flat configuration indices, all of them candidates.
+
+        Raises:
+            TcsError: If the set is empty or a member is no candidate.
+        """
+        rows = np.searchsorted(self.candidates, members)
+        require(
+            len(members) > 0
+            and bool(np.all(rows < len(self.candidates)))
+            and bool(np.all(self.candidates[rows] == members)),
+            f"Set {members}: every member must be a configuration that reaches a goal.",
+        )
+        reached = np.logical_or.reduce(self.reached[rows], axis=0)
+        isotropy = np.maximum.reduce(self.isotropy[rows], axis=0)
+        return (
+            float(tc_reachability(reached, self.weights)),
+            float(tc_manipulability(isotropy, self.weights)),
+        )

@@ -1,0 +1,125 @@
+"""Estimates of how much of a task sets of configurations do when the room is a little off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.sets import MOST_MEMBERS, SetTable
+
+NOBODY = -1
+"""Stands where a set has fewer members than others in the table."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SuccessTable:
+    """Estimated success of K sets under error; read-only.
+
+    The success of a set is the probability that a goal, drawn by its weight, is reached by any
+    member in a room that is off by a random error: the mean of P_R under error, as Table I of the
+    TCS paper gives it.
+
+    Order of the sets: singles by configuration index, then pairs in lexicographic order, then
+    triples, as in `SetTable`.
+    """
+
+    members: NDArray[np.int32]
+    """Flat configuration indices, ascending, NOBODY after the last, shape (K, m)."""
+    success: NDArray[np.float64]
+    """Mean over the samples, shape (K,)."""
+    low: NDArray[np.float64]
+    """Lower end of its 95 % interval, shape (K,)."""
+    high: NDArray[np.float64]
+    """Upper end, shape (K,)."""
+    samples: NDArray[np.int32]
+    """How many samples it is the mean of, shape (K,)."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        count = len(self.members) if isinstance(self.members, np.ndarray) else None
+        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+            "members": (np.int32, (count, None)),
+            "success": (np.float64, (count,)),
+            "low": (np.float64, (count,)),
+            "high": (np.float64, (count,)),
+            "samples": (np.int32, (count,)),
+        }
+        for name, (dtype, shape) in shapes.items():
+            view = read_only(f"success table: {name}", getattr(self, name), dtype, shape)
+            object.__setattr__(self, name, view)
+        require(
+            1 <= self.members.shape[1] <= MOST_MEMBERS,
+            f"success table: sets must have 1 to {MOST_MEMBERS} members.",
+        )
+        inside = (self.low >= 0.0) & (self.low <= self.success)
+        inside &= (self.success <= self.high) & (self.high <= 1.0)
+        # Rounding of a mean of ones must not refuse it.
+        require(bool(np.all(inside)), "success table: 0 <= low <= success <= high <= 1 must hold.")
+        require(bool(np.all(self.samples > 0)), "success table: samples must be positive.")
+        self._check_members()
+
+    def _check_members(self) -> None:
+        """Refuse sets that are none, or out of order."""
+        members = self.members.astype(np.int64)
+        there = members != NOBODY
+        ascending = (members[:, :-1] < members[:, 1:]) | ~there[:, 1:]
+        gapless = there[:, :-1] | ~there[:, 1:]
+        require(
+            bool(np.all(members >= NOBODY) and np.all(there[:, 0]))
+            and bool(np.all(ascending) and np.all(gapless)),
+            "success table: members of a set must be ascending configuration indices.",
+        )
+        keys = [self.sizes, *members.T]
+        earlier = np.zeros(max(len(members) - 1, 0), dtype=np.bool_)
+        tied = np.ones_like(earlier)
+        for key in keys:
+            earlier |= tied & (key[:-1] < key[1:])
+            tied &= key[:-1] == key[1:]
+        require(bool(np.all(earlier)), "success table: sets must be in order, each of them once.")
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """How many members each set has, shape (K,)."""
+        return np.asarray(np.count_nonzero(self.members != NOBODY, axis=1), dtype=np.int64)
+
+    def of_size(self, members: int) -> NDArray[np.int64]:
+        """Return the rows of the sets with so many members."""
+        return np.flatnonzero(self.sizes == members)
+
+    def surest(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
+        """Return the configuration indices of the surest set; () where there is none.
+
+        The surest has the greatest lower end of its interval: by its mean alone a lucky set of a
+        few samples would be ahead of a good one of many. Of equals the one with the greatest
+        P_R + P_M counts, then the first.
+
+        Args:
+            sets: The sets that these are estimates for.
+            max_members: Sets of at most so many members.
+        """
+        rows = np.flatnonzero(self.sizes <= max_members)
+        if not rows.size:
+            return ()
+        rows = rows[self.low[rows] == self.low[rows].max()]
+        scores = [sum(sets.scores_of(self.set_at(int(row)))) for row in rows]
+        return self.set_at(int(rows[np.argmax(scores)]))
+
+    def set_at(self, row: int) -> tuple[int, ...]:
+        """Return the configuration indices of a set."""
+        return tuple(int(h) for h in self.members[row] if h != NOBODY)
+
+    def row_of(self, members: tuple[int, ...]) -> int | None:
+        """Return the row of a set, given ascending configuration indices; None if it has none."""
+        if len(members) > self.members.shape[1]:
+            return None
+        wanted = np.full(self.members.shape[1], NOBODY, dtype=np.int32)
+        wanted[: len(members)] = members
+        found = np.flatnonzero(np.all(self.members == wanted, axis=1))
+        return int(found[0]) if found.size else None

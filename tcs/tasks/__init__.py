@@ -1,8 +1,0 @@
-"""Tasks: a few tool poses on the body, written as YAML."""
-
-from __future__ import annotations
-
-from tcs.tasks.files import load_task, task_names
-from tcs.tasks.task import Goal, Task
-
-__all__ = ["Goal", "Task", "load_task", "task_names"]

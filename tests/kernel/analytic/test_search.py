@@ -1,0 +1,52 @@
+"""Where the kernel looks for solutions, held against where the twin looks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel.analytic.arcs import elbow_arcs
+from tcs.kernel.analytic.ik import wrist_goal
+from tcs.kernel.analytic.search import find_candidates, new_search
+from tcs.kernel.analytic.solver import arm_solver
+from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification.reference import free_joint
+from tests.kernel.judge import chain_of
+from tests.kernel.toy import goal_in_base, size_of, toy_grid, toy_scene
+
+# Arm and room, configuration, goal: here rounding used to decide how many lanes an arc gets
+# (103, 151), whether its outermost lane is feasible (119), and whether two arcs are one (the rest).
+TIES = [(103, 6, 4), (151, 45, 1), (119, 131, 3), (69, 124, 4), (127, 8, 4), (213, 32, 1)]
+
+
+def angles_of_both(chain, X_AG):
+    """Return the feasible angles that kernel and twin find, in order."""
+    arm, search = arm_solver(chain), new_search()
+    wrist_goal(arm, X_AG[0], X_AG[1], search.goal)
+    count, _ = elbow_arcs(arm, search.goal, search.arcs)
+    found = find_candidates(arm, search, count)
+    arcs, _ = reference_pairs.elbow_arcs(chain, X_AG)
+    twin = reference_pairs.find_candidates(chain, X_AG, arcs)
+    free = free_joint(chain)
+    assert count == len(arcs)
+    return np.sort(search.found_angle[:found]), np.sort([candidate.q[free] for candidate in twin])
+
+
+@pytest.mark.parametrize(("seed", "h", "g"), TIES, ids=str)
+def test_ties_are_not_left_to_rounding(lowered, seed, h, g):
+    chain = chain_of(seed, lowered)
+    scene = toy_scene(chain, seed, obstacles=seed % 14)
+    kernel, twin = angles_of_both(chain, goal_in_base(scene, toy_grid(), h, g))
+    # Ends of arcs as arc cosines, 1e-16 becomes 1e-8 in its angle where the cosine is flat.
+    np.testing.assert_allclose(kernel, twin, atol=1e-7)
+
+
+@pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
+@pytest.mark.parametrize("seed", range(1, 41, 2))
+def test_the_kernel_looks_where_the_twin_looks(lowered, seed, mirrored):
+    rng = np.random.default_rng(seed)
+    chain = chain_of(seed, lowered, mirrored=mirrored)
+    scene, grid = toy_scene(chain, seed, obstacles=0), toy_grid()
+    for h, g in zip(rng.integers(size_of(grid), size=3), rng.integers(5, size=3), strict=True):
+        kernel, twin = angles_of_both(chain, goal_in_base(scene, grid, h, g))
+        np.testing.assert_allclose(kernel, twin, atol=1e-7)

@@ -1,0 +1,212 @@
+"""Drafting robot files: what is found in a URDF, and one clear line when it cannot be used."""
+
+import pytest
+
+from tcs.errors import OutputError, RobotError, UnknownNameError
+from tcs.model.robots import load_robot
+from tcs.model.robots.draft import draft_robot, write_draft
+from tcs.model.robots.enclosure import enclosure
+from tcs.model.robots.self_collision import SelfCollision, sample_positions
+from tests.model.robots.made_up import urdf
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "made_up.urdf"
+    file.write_text(urdf())
+    return file
+
+
+@pytest.fixture(scope="module")
+def drafted(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drafted")
+    (folder / "made_up.urdf").write_text(urdf())
+    draft = draft_robot(folder / "made_up.urdf", "tool")
+    write_draft(draft, folder / "mine.yaml")
+    return draft, folder / "mine.yaml"
+
+
+def test_arm_and_torso_are_found(drafted):
+    robot = drafted[0].robot
+    assert robot.arm_joints == tuple(f"a{i}" for i in range(1, 8))
+    assert robot.arm_base == "mast"
+    assert robot.torso_joint == "lift"
+    assert robot.root_body == "floor"
+    assert robot.standing_bodies == ("base",)
+    assert any("a1, a2, a3, a4, a5, a6, a7" in remark for remark in drafted[0].remarks)
+
+
+def test_other_joints_stand_at_zero_or_mid_range(drafted):
+    robot = drafted[0].robot
+    assert robot.postures == {"drafted": {"pan": 0.0, "nod": 0.5}}
+    assert robot.grippers == {"drafted": {"grip": 0.02}}
+
+
+def test_a_posture_of_rest_is_found_where_zero_will_not_do(tmp_path):
+    """A wall in front of the mast, in which the arm would stand at zero."""
+    wall = (
+        '<link name="wall"><visual><geometry><box size="0.2 0.4 0.4"/></geometry></visual></link>'
+    )
+    carried = (
+        '<joint name="wall_joint" type="fixed"><parent link="mast"/><child link="wall"/>'
+        '<origin xyz="0.1 0 1.3"/></joint>'
+    )
+    file = tmp_path / "walled.urdf"
+    file.write_text(urdf().replace("</robot>", f"{wall}{carried}</robot>"))
+    robot = draft_robot(file, "tool").robot
+    assert set(robot.rest) == set(robot.arm_joints)
+    write_draft(draft_robot(file, "tool"), tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    still = robot.with_mimics(robot.joint_positions())
+    judge = SelfCollision(robot)
+    met = [{frozenset(p) for p in judge.touching(still | arm)} - off for arm in ({}, robot.rest)]
+    assert any("wall" in pair for pair in met[0])
+    assert not any("wall" in pair for pair in met[1])
+
+
+def test_written_file_says_the_same(drafted):
+    draft, file = drafted
+    robot = load_robot(file)
+    assert robot.model() == draft.robot.model()
+    same = {"urdf", "primitives", "name"}
+    assert robot.model_dump(exclude=same) == draft.robot.model_dump(exclude=same)
+    assert robot.load_primitives() == draft.primitives
+    # Its URDF is named from where the file lies, so the folder may move.
+    assert "urdf: made_up.urdf\n" in file.read_text()
+
+
+def test_shapes_enclose(drafted):
+    assert [found.body for found in enclosure(load_robot(drafted[1])) if found.outside] == []
+
+
+def test_pairs_that_need_no_check_cannot_meet(drafted):
+    """Neighbours or parts of one joint apart, the surfaces of exempt pairs never touch.
+
+    The made-up robot is of boxes, so its hulls are its surfaces.
+    """
+    robot = load_robot(drafted[1])
+    hulls = SelfCollision(robot, hulls=True)
+    touching = set().union(*(hulls.touching(q) for q in sample_positions(robot, 500, seed=9)))
+    for group in robot.disabled_groups:
+        assert len(group.reason) > 10
+        if "cannot meet" in group.reason:
+            assert not touching & set(group.pairs)
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    met = {frozenset(pair) for pair in touching} - off
+    # Folded back, the hand meets the mast, the base or the upper arm: these stay checked.
+    assert met
+
+
+def test_arm_base_may_be_named(path):
+    assert draft_robot(path, "tool", base="base").robot.arm_base == "mast"
+    assert draft_robot(path, "tool", base="mast").robot.arm_base == "mast"
+    with pytest.raises(RobotError, match="only 6 in a row"):
+        draft_robot(path, "tool", base="arm1")
+    with pytest.raises(RobotError, match="does not hang on base 'head'"):
+        draft_robot(path, "tool", base="head")
+
+
+def test_too_few_joints_are_one_clear_line(tmp_path):
+    file = tmp_path / "short.urdf"
+    file.write_text(urdf(joints=5))
+    found = r"only 5 in a row lead there \(a1, a2, a3, a4, a5; 'lift' before them slides\)"
+    with pytest.raises(RobotError, match=found) as e:
+        draft_robot(file, "tool")
+    assert "\n" not in str(e.value)
+
+
+def test_unknown_tool_names_the_nearest(path):
+    with pytest.raises(UnknownNameError, match="Did you mean 'tool'"):
+        draft_robot(path, "toool")
+    with pytest.raises(UnknownNameError, match="Did you mean 'mast'"):
+        draft_robot(path, "tool", base="maast")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "revolute",
+            "prismatic",
+            r"only 3 in a row lead there \(a5, a6, a7; 'a4' before them slides",
+        ),
+        ("revolute", "revolute", r"\(a5, a6, a7; 'a4' before them mimics another\)"),
+    ],
+    ids=["slides", "mimics"],
+)
+def test_a_joint_that_ends_the_arm_too_soon_is_named(tmp_path, old, new, message):
+    mimic = '<mimic joint="a3"/>' if old == new else ""
+    file = tmp_path / "short.urdf"
+    joint = '<joint name="a4" type="{}">'
+    file.write_text(urdf().replace(joint.format(old), joint.format(new) + mimic))
+    with pytest.raises(RobotError, match=message):
+        draft_robot(file, "tool")
+
+
+def test_missing_meshes_are_named(tmp_path):
+    text = urdf().replace(
+        '<box size="0.1 0.1 0.1"/>', '<mesh filename="package://gone/arm.stl"/>', 1
+    )
+    file = tmp_path / "no_mesh.urdf"
+    file.write_text(text)
+    with pytest.raises(RobotError, match="package 'gone' is neither installed nor a folder above"):
+        draft_robot(file, "tool")
+
+
+def test_a_robot_without_any_shape_is_refused(tmp_path):
+    file = tmp_path / "bare.urdf"
+    file.write_text(urdf().replace("visual>", "ignored>"))
+    with pytest.raises(RobotError, match="nothing could ever collide"):
+        draft_robot(file, "tool")
+
+
+def test_flat_parts_get_a_shape(tmp_path):
+    flat = tmp_path / "plate.stl"
+    flat.write_text(
+        "solid plate\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0.1 0 0\n"
+        "vertex 0 0.1 0\nendloop\nendfacet\nendsolid plate\n"
+    )
+    file = tmp_path / "plate.urdf"
+    box = '<box size="0.08 0.08 0.12"/>'
+    file.write_text(urdf().replace(box, '<mesh filename="plate.stl"/>', 1))
+    draft = draft_robot(file, "tool")
+    assert [shape.body for shape in draft.primitives].count("arm2") == 1
+
+
+def test_nothing_is_overwritten(drafted, tmp_path):
+    draft = drafted[0]
+    kept = tmp_path / "mine_primitives.csv"
+    kept.write_text("mine")
+    with pytest.raises(OutputError, match=r"mine_primitives\.csv' is already there"):
+        write_draft(draft, tmp_path / "mine.yaml")
+    assert not (tmp_path / "mine.yaml").exists()
+    assert kept.read_text() == "mine"
+    with pytest.raises(OutputError, match=r"must end in \.yaml"):
+        write_draft(draft, tmp_path / "mine.txt")
+
+
+def test_both_files_or_neither(drafted, tmp_path, monkeypatch):
+    def refuse(path, *arguments, **options):
+        raise OutputError("no room")
+
+    monkeypatch.setattr("tcs.model.robots.draft.whole_file", refuse)
+    with pytest.raises(OutputError, match="no room"):
+        write_draft(drafted[0], tmp_path / "mine.yaml")
+    assert list(tmp_path.iterdir()) == []
+
+
+PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
+
+
+@pytest.mark.slow
+def test_the_real_panda_is_drafted(tmp_path):
+    draft = draft_robot(PANDA, "panda_hand_tcp")
+    write_draft(draft, tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    assert robot.arm_joints == tuple(f"panda_joint{i}" for i in range(1, 8))
+    assert (robot.torso_joint, robot.urdf) == (None, PANDA)
+    assert robot.grippers == {"drafted": {"panda_finger_joint1": 0.02}}
+    assert not any(found.outside for found in enclosure(robot))
+    moved = [found for found in enclosure(robot) if found.body != "panda_link0"]
+    assert max(found.excess for found in moved) <= 2.0

@@ -1,0 +1,80 @@
+"""The mesh cache: made once, by content, never half written."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from tcs.errors import OutputError, RobotError
+from tcs.model.robots import as_obj
+from tcs.model.robots.meshes import mesh_triangles
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("TCS_CACHE_DIR", str(folder))
+    return folder / "meshes"
+
+
+@pytest.fixture
+def stl(tmp_path):
+    path = tmp_path / "part.stl"
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(path)
+    return path
+
+
+def test_conversion_keeps_the_triangles(stl, cache):
+    obj = as_obj(stl)
+    assert obj.parent == cache
+    before = np.sort(mesh_triangles(stl).reshape(-1, 9), axis=0)
+    after = np.sort(mesh_triangles(obj).reshape(-1, 9), axis=0)
+    # STL holds single precision, OBJ eight digits.
+    np.testing.assert_allclose(after, before, atol=1e-7)
+
+
+def test_second_call_reads_the_cache(stl):
+    obj = as_obj(stl)
+    written = obj.stat().st_mtime_ns
+    assert as_obj(stl) == obj
+    assert obj.stat().st_mtime_ns == written
+
+
+def test_edited_mesh_is_converted_anew(stl):
+    first = as_obj(stl)
+    trimesh.creation.box((0.1, 0.2, 0.4)).export(stl)
+    second = as_obj(stl)
+    assert second != first
+    # Single precision again.
+    assert np.ptp(mesh_triangles(second)[..., 2]) == pytest.approx(0.4, abs=1e-7)
+
+
+def test_no_temporary_file_is_left(stl, cache):
+    as_obj(stl)
+    assert [path.suffix for path in cache.iterdir()] == [".obj"]
+
+
+def test_obj_is_used_as_it_is(tmp_path, cache):
+    path = tmp_path / "part.obj"
+    trimesh.creation.box((1, 1, 1)).export(path)
+    assert as_obj(path) == path
+    assert not cache.exists()
+
+
+def test_unreadable_meshes_are_refused(tmp_path):
+    with pytest.raises(RobotError, match="cannot be read"):
+        as_obj(tmp_path / "gone.stl")
+    broken = tmp_path / "broken.stl"
+    broken.write_text("solid nothing")
+    with pytest.raises(RobotError, match=r"broken\.stl"):
+        as_obj(broken)
+
+
+def test_cache_that_cannot_be_written_is_told(stl, tmp_path, monkeypatch):
+    blocked = tmp_path / "blocked"
+    blocked.mkdir()
+    (blocked / "meshes").write_text("a file where a folder should be")
+    monkeypatch.setenv("TCS_CACHE_DIR", str(blocked))
+    with pytest.raises(
+        OutputError, match=r"cache folder .*meshes' cannot be made: File exists\. Set TCS_"
+    ):
+        as_obj(stl)

@@ -1,0 +1,105 @@
+"""Primitives: what they contain, how large they are, and their file."""
+
+import numpy as np
+import pytest
+
+from tcs.errors import RobotError
+from tcs.model.robots import Primitive, read_primitives, union_volume, write_primitives
+from tcs.model.robots.primitives import quaternion_of_rpy, rotation_of
+
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
+
+
+def shape(kind="box", size=(2.0, 4.0, 6.0), xyz=(0.0, 0.0, 0.0), quaternion=IDENTITY):
+    return Primitive(body="b", kind=kind, size=size, xyz=xyz, quaternion=quaternion)
+
+
+def test_box_contains_its_corners_only_just():
+    assert shape().contains(np.array([1.0, 2.0, 3.0]))
+    assert not shape().contains(np.array([1.0, 2.0, 3.001]))
+
+
+def test_capsule_ends_in_half_spheres():
+    capsule = shape("capsule", (1.0, 2.0))
+    points = np.array([[0, 0, 2.0], [1, 0, 1], [0.8, 0, 1.59], [0.8, 0, 1.61], [1.001, 0, 0]])
+    np.testing.assert_array_equal(capsule.contains(points), [True, True, True, False, False])
+
+
+def test_pose_is_that_of_the_shape_in_the_body():
+    turned = shape(xyz=(10.0, 0.0, 0.0), quaternion=quaternion_of_rpy((0, 0, np.pi / 2)))
+    # Its long side of 4 now lies along x.
+    assert turned.contains(np.array([11.9, 0.9, 2.9]))
+    assert not turned.contains(np.array([10.0, 1.1, 0.0]))
+
+
+def test_rotation_is_that_of_roll_pitch_yaw():
+    c, s = np.cos(0.3), np.sin(0.3)
+    np.testing.assert_allclose(
+        rotation_of(quaternion_of_rpy((0.3, 0.0, 0.0))),
+        [[1, 0, 0], [0, c, -s], [0, s, c]],
+        atol=1e-15,  # rounding
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "volume"),
+    [
+        ("box", (2.0, 3.0, 4.0), 24.0),
+        ("sphere", (2.0,), 4 / 3 * np.pi * 8),
+        ("capsule", (2.0, 3.0), 4 / 3 * np.pi * 8 + np.pi * 4 * 3),
+    ],
+)
+def test_volumes_match_closed_form(kind, size, volume):
+    assert shape(kind, size).volume == pytest.approx(volume, rel=1e-15)
+    assert union_volume([shape(kind, size)]) == shape(kind, size).volume
+
+
+def test_union_counts_the_overlap_once():
+    halves = [shape(size=(2.0, 1.0, 1.0)), shape(size=(2.0, 1.0, 1.0), xyz=(1.0, 0.0, 0.0))]
+    # Each point counts 1 or 1/2, half of them either: sd 0.25 over 20,000 points in each of two
+    # boxes of volume 2 gives a standard error of 0.005; four of these.
+    assert union_volume(halves) == pytest.approx(3.0, abs=0.02)
+    apart = [shape(size=(1.0, 1.0, 1.0)), shape("sphere", (1.0,), xyz=(5.0, 0.0, 0.0))]
+    assert union_volume(apart) == pytest.approx(1 + 4 / 3 * np.pi, rel=1e-12)
+
+
+def test_union_is_the_same_each_time():
+    shapes = [shape(), shape(xyz=(0.5, 0.5, 0.5))]
+    assert union_volume(shapes) == union_volume(shapes)
+
+
+def test_triangle_needs_all_corners():
+    triangle = np.array([[[0.0, 0, 0], [0.9, 0, 0], [1.1, 0, 0]]])
+    assert not shape().contains_triangles(triangle)[0]
+    assert shape().shrunk(-0.2).contains_triangles(triangle)[0]
+
+
+def test_file_holds_what_was_written(tmp_path):
+    path = tmp_path / "p.csv"
+    shapes = (
+        shape(size=(0.1, 0.2, 0.3), xyz=(-0.123456, 0.0, 1.0)),
+        shape("capsule", (0.05, 0.25)),
+        shape("sphere", (0.5,), quaternion=(0.6, 0.0, 0.8, 0.0)),
+    )
+    write_primitives(path, shapes)
+    assert read_primitives(path) == shapes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("box", "cone", "line 2.*'cone' is none of"),
+        ("0.100000", "-0.100000", "line 2.*positive"),
+        ("0.100000", "wide", "line 2.*wide"),
+        ("1.000000000", "0.900000000", "line 2.*length 1"),
+        ("size_a", "width", "line 2: its columns must be"),
+        ("0.300000", "", "line 2.*needs 3"),
+    ],
+)
+def test_broken_files_get_one_clear_line(old, new, message, tmp_path):
+    path = tmp_path / "p.csv"
+    write_primitives(path, [shape(size=(0.1, 0.2, 0.3))])
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(RobotError, match=message) as caught:
+        read_primitives(path)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,243 @@
+"""Robot files: what the PR2's says, and what a wrong one gets."""
+
+import pickle
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.files.paths import data_folder
+from tcs.model.robots import load_robot, robot_names
+
+FOLDER = data_folder() / "models" / "robots"
+
+
+@pytest.fixture
+def content():
+    return yaml.safe_load((FOLDER / "pr2.yaml").read_text())
+
+
+def write(folder: Path, content) -> Path:
+    shutil.copy(FOLDER / "pr2_primitives.csv", folder)
+    path = folder / "mine.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_every_shipped_robot_loads():
+    assert "pr2" in robot_names()
+    for name in robot_names():
+        assert load_robot(name).name == name
+
+
+def test_copy_elsewhere_is_the_same_robot(content, tmp_path, pr2):
+    copy = load_robot(write(tmp_path, content))
+    assert copy.primitives != pr2.primitives
+    assert copy.model_copy(update={"primitives": pr2.primitives}) == pr2
+    assert copy.load_primitives() == pr2.load_primitives()
+
+
+def test_value_semantics(pr2):
+    again = load_robot("pr2")
+    assert again == pr2
+    assert hash(again) == hash(pr2)
+    assert pickle.loads(pickle.dumps(pr2)) == pr2
+    assert pr2.with_choices(gripper="closed") != pr2
+
+
+def test_soft_limits_come_from_the_urdf(pr2):
+    # The safety_controller elements of the PR2's URDF.
+    limits = pr2.joint_limits()
+    assert limits["l_shoulder_lift_joint"] == (-0.3536, 1.2963)
+    assert limits["l_elbow_flex_joint"] == (-2.1213, -0.15)
+    assert limits["torso_lift_joint"] == (0.0115, 0.305)
+    assert limits["l_wrist_roll_joint"] == (-np.inf, np.inf)
+
+
+def test_hard_limits_on_request(pr2):
+    limits = pr2.with_choices(limits="hard").joint_limits()
+    assert limits["l_shoulder_lift_joint"] == (-0.5236, 1.3963)
+    assert limits["torso_lift_joint"] == (0.0, 0.31)
+
+
+def test_positions_hold_everything_but_arm_and_torso(pr2):
+    positions = pr2.joint_positions()
+    movable = {joint.name for joint in pr2.model().joints.values() if joint.is_movable}
+    assert set(positions) == movable - {*pr2.arm_joints, pr2.torso_joint}
+
+
+def test_fingers_mimic_the_opening(pr2):
+    positions = pr2.joint_positions()
+    assert positions["l_gripper_l_finger_joint"] == 0.54
+    assert positions["l_gripper_r_finger_tip_joint"] == 0.54
+    # The URDF gives this one the multiplier -1.
+    assert positions["l_gripper_r_parallel_root_joint"] == -0.54
+    assert pr2.with_choices(gripper="closed").joint_positions()["l_gripper_r_finger_joint"] == 0.0
+
+
+def test_other_arm_follows_the_posture(pr2):
+    assert pr2.joint_positions()["r_elbow_flex_joint"] == pytest.approx(np.radians(-120), abs=1e-6)
+    straight = pr2.with_choices(posture="paper2015").joint_positions()
+    assert straight["r_elbow_flex_joint"] == -0.15
+
+
+def test_joints_nobody_names_stay_within_limits(pr2):
+    bare = pr2.model_copy(update={"posture": None})
+    # Zero is beyond the elbow's soft limit.
+    assert bare.joint_positions()["r_elbow_flex_joint"] == -0.15
+
+
+def test_groups_found_under_soft_limits_do_not_hold_under_hard_ones(pr2):
+    soft = set(pr2.disabled_pairs)
+    hard = set(pr2.with_choices(limits="hard").disabled_pairs)
+    assert ("l_forearm_link", "l_upper_arm_link") in soft - hard
+    assert hard < soft
+
+
+def test_unknown_names_are_told_with_the_nearest():
+    with pytest.raises(UnknownNameError, match="Did you mean 'pr2'"):
+        load_robot("pr3")
+
+
+def change(field, value):
+    return lambda content: content.update({field: value})
+
+
+def put(field, name, value):
+    return lambda content: content[field].update({name: value})
+
+
+WRONG = {
+    "unknown tool frame": (
+        change("tool_frame", "l_gripper_tool_fram"),
+        "tool_frame: unknown .*'l_gripper_tool_fram'.*Did you mean 'l_gripper_tool_frame'",
+    ),
+    "unknown key": (change("tol_frame", "x"), "unknown key 'tol_frame'.*Did you mean 'tool_frame'"),
+    "missing key": (lambda content: content.pop("urdf"), "field 'urdf' is missing"),
+    "unknown arm joint": (
+        lambda content: content["arm_joints"].__setitem__(3, "l_elbow_flx_joint"),
+        "arm_joints: unknown joint.*Did you mean 'l_elbow_flex_joint'",
+    ),
+    "six arm joints": (
+        lambda content: content["arm_joints"].pop(),
+        r"field 'arm_joints' is .*, but list should have at least 7",
+    ),
+    "wrong order": (
+        lambda content: content["arm_joints"].reverse(),
+        "arm_joints: from 'torso_lift_link' to 'l_gripper_tool_frame' the URDF has l_shoulder_pan",
+    ),
+    "tool of the other arm": (change("tool_frame", "r_gripper_tool_frame"), "arm_joints: from"),
+    "root that is carried": (change("root_body", "base_link"), "must be the root.*base_footprint"),
+    "torso that turns": (change("torso_joint", "head_pan_joint"), "must be prismatic"),
+    "posture beyond its limits": (
+        put("postures", "wild", {"r_elbow_flex_joint": 0.3}),
+        r"postures.wild: 'r_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
+    ),
+    "posture of an unknown joint": (
+        put("postures", "wild", {"r_elbow": 0.0}),
+        "postures.wild: unknown joint 'r_elbow'",
+    ),
+    "posture of the scored arm": (
+        put("postures", "wild", {"l_elbow_flex_joint": -1.0}),
+        "'l_elbow_flex_joint' is scored",
+    ),
+    "posture of a fixed joint": (
+        put("postures", "wild", {"base_laser_joint": 0.0}),
+        "'base_laser_joint' is fixed",
+    ),
+    "posture that is no number": (
+        put("postures", "wild", {"r_elbow_flex_joint": "bent"}),
+        r"field 'postures\.wild\.r_elbow_flex_joint' is 'bent', but must be a valid number",
+    ),
+    "rest of another joint": (
+        change("rest", {"r_elbow_flex_joint": -1.0}),
+        "rest: unknown joint of the arm 'r_elbow_flex_joint'.*Did you mean 'l_elbow_flex_joint'",
+    ),
+    "rest beyond its limits": (
+        change("rest", {"l_elbow_flex_joint": 0.3}),
+        r"rest: 'l_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
+    ),
+    "unknown posture": (change("posture", "tuckd"), "unknown posture 'tuckd'.*Did you mean"),
+    "unknown gripper": (change("gripper", "ajar"), "unknown gripper 'ajar'"),
+    "limits of another kind": (
+        change("limits", "none"),
+        "field 'limits' is 'none', but must be 'soft' or 'hard'",
+    ),
+    "URDF not there": (change("urdf", "nowhere.urdf"), "there is no file"),
+    "package not there": (
+        change("urdf", "package://no_such_robot/a.urdf"),
+        "'no_such_robot' is neither installed nor a folder above",
+    ),
+    "primitives not there": (change("primitives", "nowhere.csv"), "cannot be read"),
+    "disabled pair of an unknown body": (
+        change(
+            "disabled_groups", [{"reason": "because I say so", "pairs": [["l_arm", "base_link"]]}]
+        ),
+        "disabled_groups: unknown link or frame 'l_arm'",
+    ),
+    "disabled pair without reason": (
+        change("disabled_groups", [{"pairs": [["base_link", "torso_lift_link"]]}]),
+        r"field 'disabled_groups\[0\]\.reason' is missing",
+    ),
+    "extra frame with a taken name": (
+        change("frames", [{"name": "base_link", "parent": "base_footprint"}]),
+        "this name is taken",
+    ),
+    "extra frame on itself": (
+        change("frames", [{"name": "tip", "parent": "tip"}]),
+        "'tip': it hangs on itself",
+    ),
+    "extra frame on an unknown parent": (
+        change("frames", [{"name": "tip", "parent": "l_palm"}]),
+        "parent: unknown link or frame 'l_palm'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG, ids=lambda case: case.replace(" ", "-"))
+def test_wrong_files_get_one_clear_line(case, content, tmp_path):
+    spoil, message = WRONG[case]
+    spoil(content)
+    with pytest.raises((RobotError, UnknownNameError)) as caught:
+        load_robot(write(tmp_path, content))
+    assert re.search(message, str(caught.value))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["- a\n- b\n", "a: [", "", "\tx"])
+def test_what_is_no_robot_file_is_refused(text, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=r"mine\.yaml"):
+        load_robot(path)
+
+
+def test_a_key_that_comes_twice_is_refused(content, tmp_path):
+    path = write(tmp_path, content)
+    path.write_text(path.read_text() + "title: another\n")
+    with pytest.raises(
+        RobotError, match=r"mine\.yaml' is no sound YAML: line .*'title' is there tw"
+    ):
+        load_robot(path)
+
+
+def test_held_tool_brings_its_own_frame_and_shapes(content, tmp_path):
+    content["bodies"] = [
+        {
+            "name": "razor",
+            "parent": "l_gripper_tool_frame",
+            "xyz": [0.05, 0.0, 0.0],
+            "primitives": [{"kind": "capsule", "size": [0.01, 0.1], "rpy_deg": [0, 90, 0]}],
+        }
+    ]
+    content["frames"] = [{"name": "blade", "parent": "razor", "xyz": [0.06, 0.0, 0.0]}]
+    content["tool_frame"] = "blade"
+    robot = load_robot(write(tmp_path, content))
+    razor = robot.load_primitives()[-1]
+    assert razor.body == "razor"
+    # Turned by 90 degrees about y, the capsule's z axis lies along x.
+    np.testing.assert_allclose(razor.rotation[:, 2], [1, 0, 0], atol=1e-15)

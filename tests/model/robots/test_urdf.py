@@ -1,0 +1,126 @@
+"""Reading a URDF, and what a broken one gets."""
+
+import numpy as np
+import pytest
+
+from tcs.errors import RobotError, UnknownNameError
+from tcs.model.robots import read_urdf
+from tcs.model.robots.geometry import body_triangles
+from tcs.model.robots.packages import resolve_uri
+
+TWO_LINKS = """<robot name="two">
+  <link name="a"/>
+  <link name="b">
+    <visual><geometry>{geometry}</geometry></visual>
+  </link>
+  <joint name="hinge" type="{kind}">
+    <parent link="{parent}"/><child link="b"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="2" effort="1" velocity="1"/>
+    {more}
+  </joint>
+</robot>"""
+
+
+def two_links(folder, **changes):
+    parts = {"geometry": '<sphere radius="1"/>', "kind": "revolute", "parent": "a", "more": ""}
+    path = folder / "two.urdf"
+    path.write_text(TWO_LINKS.format(**(parts | changes)))
+    return path
+
+
+def test_soft_limits_never_exceed_hard_ones(tmp_path):
+    more = '<safety_controller soft_lower_limit="-5" soft_upper_limit="1.5" k_velocity="1"/>'
+    joint = read_urdf(two_links(tmp_path, more=more)).joints["hinge"]
+    assert joint.hard == (-1.0, 2.0)
+    assert joint.soft == (-1.0, 1.5)
+
+
+def test_without_safety_controller_hard_limits_hold(tmp_path):
+    joint = read_urdf(two_links(tmp_path)).joints["hinge"]
+    assert joint.soft == joint.hard == (-1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"kind": "floating"}, "type 'floating' is not supported"),
+        ({"parent": "c"}, "unknown link 'c'"),
+        ({"parent": "b"}, "no single tree"),
+        ({"geometry": '<mesh filename="gone.stl"/>'}, "there is no file"),
+        ({"geometry": '<cone radius="1"/>'}, "'cone' is none of"),
+        ({"geometry": '<sphere radius="wide"/>'}, "'wide' must be 1 finite number"),
+        ({"more": '<mimic joint="hinge"/>'}, "'hinge' must be another joint"),
+        ({"more": '<mimic joint="lever"/>'}, "unknown joint 'lever'"),
+        (
+            {"more": '<safety_controller soft_lower_limit="3" soft_upper_limit="4"/>'},
+            "no position within",
+        ),
+    ],
+)
+def test_broken_models_get_one_clear_line(changes, message, tmp_path):
+    with pytest.raises((RobotError, UnknownNameError), match=message) as caught:
+        read_urdf(two_links(tmp_path, **changes))
+    assert "two.urdf" in str(caught.value) or "gone.stl" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot", "is no sound XML"),
+        ("<sdf/>", "the root element is 'sdf', but must be 'robot'"),
+        (XACRO, r"holds xacro macros\. Expand them first: xacro no\.urdf"),
+    ],
+    ids=["no XML", "another format", "macros"],
+)
+def test_what_is_no_urdf_is_refused(text, message, tmp_path):
+    path = tmp_path / "no.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=rf"no\.urdf.*{message}"):
+        read_urdf(path)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "reach"),
+    [
+        ('<sphere radius="0.5"/>', 0.5),
+        ('<cylinder radius="0.5" length="0.2"/>', np.hypot(0.5, 0.1)),
+        ('<box size="0.2 0.4 0.4"/>', 0.3),
+    ],
+)
+def test_round_bodies_become_polyhedra_around_them(geometry, reach, tmp_path):
+    triangles = body_triangles(read_urdf(two_links(tmp_path, geometry=geometry)))["b"]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # No face cuts into a ball inside the body; 1e-12 is rounding.
+    inner = 0.1
+    assert np.abs(np.einsum("ij,ij->i", normals, triangles[:, 0])).min() >= inner - 1e-12
+    corners = np.linalg.norm(triangles, axis=2).max()
+    # Polyhedra of 48 and more sides stand out by a few percent at most.
+    assert reach - 1e-12 <= corners <= 1.1 * reach
+
+
+def test_sphere_lies_inside_its_polyhedron(tmp_path):
+    triangles = body_triangles(read_urdf(two_links(tmp_path)))["b"]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    distance = np.einsum("ij,ij->i", normals, triangles[:, 0])
+    assert distance.min() >= 1 - 1e-12  # rounding of unit coordinates
+
+
+def test_frame_markers_are_no_surface(tmp_path):
+    assert (
+        body_triangles(read_urdf(two_links(tmp_path, geometry='<box size="0.01 0.01 0.01"/>')))
+        == {}
+    )
+
+
+def test_a_package_may_be_a_folder_above(tmp_path):
+    mesh = tmp_path / "my_robot" / "meshes" / "arm.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.touch()
+    urdf_folder = tmp_path / "my_robot" / "urdf"
+    assert resolve_uri("package://my_robot/meshes/arm.stl", urdf_folder) == mesh

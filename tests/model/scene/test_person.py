@@ -1,0 +1,175 @@
+"""Wheelchair and person against the published figures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.geometry import Role
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial.transform import Rotation
+
+from tests.model.scene.rooms import RoomAlone, numbers, rows
+
+
+@pytest.fixture(scope="module")
+def room():
+    return RoomAlone("wheelchair")
+
+
+@pytest.mark.parametrize("row", rows("human_frames_chair.csv"), ids=lambda row: row["link"])
+def test_body_frames_lie_where_the_original_had_them(room, row):
+    X_WL = room.pose(f"person::{row['link']}")
+    p_WL = numbers(row, "w_x", "w_y", "w_z")
+    R_WL = Rotation.from_quat(numbers(row, "w_qx", "w_qy", "w_qz", "w_qw"))
+    # The rows are rounded to a micrometre and seven digits of a quaternion; a wrong figure would
+    # be off by more than a millimetre or a tenth of a degree.
+    np.testing.assert_allclose(X_WL.translation(), p_WL, atol=1e-6)
+    turned = R_WL.inv() * Rotation.from_matrix(X_WL.rotation().matrix())
+    assert turned.magnitude() < 1e-6
+    if row["jo_x"]:
+        X_WP = room.pose(f"person::{row['parent']}")
+        X_PL = RigidTransform(
+            RotationMatrix(
+                Rotation.from_quat(numbers(row, "jo_qx", "jo_qy", "jo_qz", "jo_qw")).as_matrix()
+            ),
+            numbers(row, "jo_x", "jo_y", "jo_z"),
+        )
+        np.testing.assert_allclose((X_WP @ X_PL).GetAsMatrix34(), X_WL.GetAsMatrix34(), atol=1e-12)
+
+
+def test_every_body_part_can_be_named_by_a_goal(room):
+    frames = room.environment.body_frames
+    parts = {f"person::{row['link']}" for row in rows("human_frames_chair.csv")}
+    not_parts = {f"person::{n}_link" for n in ("body_th_move", "body_x_move", "body_y_move")}
+    assert set(frames.values()) == parts - not_parts - {"person::base_link"}
+    assert len(frames) == 17
+    assert frames["head"] == "person::head_center"
+
+
+@pytest.mark.parametrize(
+    ("item", "lower", "upper"),
+    [
+        # hrl_base_selection's wheelchair mesh: each part's extent in the world, or, for wheels,
+        # the box around the cylinder (centre -+ radius).
+        ("rear wheel left", (0.0, 0.2775, 0.0), (0.61, 0.3325, 0.61)),
+        ("front wheel right", (0.625, -0.3075, 0.0), (0.885, -0.2375, 0.26)),
+        ("seat", (0.28, -0.2775, 0.46), (0.725, 0.2775, 0.47)),
+        ("back rest", (0.28, -0.2775, 0.46), (0.305, 0.2775, 0.86)),
+        ("push handle right", (0.16, -0.2775, 0.85), (0.305, -0.2475, 0.89)),
+        # A 0.33 x 0.02 plate rising forward at 45 deg: half extent (0.33 + 0.02) / 2 / sqrt 2.
+        ("foot plate left", (1.04076, 0.02995, 0.03976), (1.28824, 0.27745, 0.28724)),
+    ],
+)
+def test_furniture_stands_where_the_mesh_has_it(room, item, lower, upper):
+    lowest, highest = room.reach(f"wheelchair::{item}")
+    # The figures have five digits.
+    np.testing.assert_allclose(lowest, lower, atol=1e-5)
+    np.testing.assert_allclose(highest, upper, atol=1e-5)
+
+
+def test_the_chair_is_as_large_as_its_mesh(room):
+    chair = {part.name for part in room.parts if part.name.startswith("wheelchair::")}
+    assert len(chair) == 22
+    lowest, highest = room.reach(*chair)
+    # Box of the whole mesh; our own parts follow it to within 3 mm.
+    np.testing.assert_allclose(lowest, [0.0, -0.3325, 0.0], atol=0.003)
+    np.testing.assert_allclose(highest, [1.2884, 0.3325, 0.89], atol=0.003)
+
+
+def test_the_chair_turns_and_shifts_about_its_own_origin(room):
+    X_WC = room.pose("wheelchair::base_link", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1)
+    np.testing.assert_allclose(X_WC.translation(), [0.1, -0.2, 0.0], atol=1e-15)
+    np.testing.assert_allclose(
+        X_WC.rotation().matrix(), Rotation.from_euler("z", 1).as_matrix(), atol=1e-15
+    )
+    nominal = room.pose("person::head_center")
+    carried = room.pose(
+        "person::head_center", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1
+    )
+    np.testing.assert_allclose(
+        carried.GetAsMatrix34(), (X_WC @ nominal).GetAsMatrix34(), atol=1e-15
+    )
+
+
+def test_the_person_shifts_along_their_own_axes_after_the_turn(room):
+    seat = np.array([0.403, 0.0, 0.47])
+    offset = room.pose("person::head_center").translation() - seat
+    for joints, shift in (
+        # Axes of the original: positive x backward, positive y to the right.
+        ({"person_x": 0.05}, [-0.05, 0, 0]),
+        ({"person_y": 0.05}, [0, -0.05, 0]),
+        ({"person_x": 0.03, "person_y": -0.02}, [-0.03, 0.02, 0]),
+    ):
+        for turn in (0.0, 0.4):
+            # Positive yaw turns to the person's right.
+            R = Rotation.from_euler("z", -turn).as_matrix()
+            got = room.pose("person::head_center", person_yaw=turn, **joints).translation()
+            np.testing.assert_allclose(got, seat + R @ (offset + shift), atol=1e-12)
+
+
+def test_the_head_tilts_up_about_its_own_centre(room):
+    nominal = room.pose("person::head_center")
+    tilted = room.pose("person::head_center", head_tilt=0.3)
+    np.testing.assert_allclose(tilted.translation(), nominal.translation(), atol=1e-15)
+    face = tilted.rotation().matrix()[:, 0]
+    np.testing.assert_allclose(face, [np.cos(0.3), 0, np.sin(0.3)], atol=1e-12)
+    np.testing.assert_array_equal(
+        room.pose("person::neck_link", head_tilt=0.3).GetAsMatrix34(),
+        room.pose("person::neck_link").GetAsMatrix34(),
+    )
+
+
+@pytest.fixture(scope="module")
+def skin(room):
+    return room.exposed_skin()
+
+
+def test_most_of_the_skin_is_judged(skin):
+    # Otherwise the two tests below would pass by leaving everything out.
+    assert len(skin) > 3000
+    assert len({link for link, _ in skin}) == 17
+
+
+def test_padding_covers_the_inward_error_of_every_part(room, skin):
+    inward = dict.fromkeys(room.environment.body_frames.values(), -np.inf)
+    for link, distances in skin:
+        inward[link] = max(inward[link], min(distances.values()))
+    padding = room.environment.padding
+    assert {link: d for link, d in inward.items() if d > padding[link]} == {}
+    # It is a fit, not an enclosure: skin does stand out, or these points judge nothing.
+    assert max(inward.values()) > 0.01
+
+
+def test_padded_shapes_enclose_the_exposed_skin(room, skin):
+    padding = room.environment.padding
+    outside = [
+        (link, worst)
+        for link, distances in skin
+        if (worst := min(d - padding[other] for other, d in distances.items())) > 0
+    ]
+    assert outside == []
+
+
+def test_models_load_without_a_word_from_drake(caplog):
+    RoomAlone("wheelchair")
+    assert caplog.records == []
+
+
+def test_pictures_show_what_is_checked(room):
+    for link, body in room.room.links.items():
+        checked = {
+            (
+                repr(room.inspector.GetShape(g)),
+                tuple(room.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
+            )
+            for g in room.plant.GetCollisionGeometriesForBody(body)
+        }
+        frame = room.plant.GetBodyFrameIdOrThrow(body.index())
+        shown = {
+            (
+                repr(room.inspector.GetShape(g)),
+                tuple(room.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
+            )
+            for g in room.inspector.GetGeometries(frame, Role.kIllustration)
+        }
+        assert shown == checked, link

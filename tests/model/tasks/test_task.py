@@ -1,0 +1,113 @@
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from tcs.errors import TaskError, UnknownNameError
+from tcs.model.tasks import Goal, Task
+
+HALF = math.sqrt(0.5)
+
+
+def goal(**changes: object) -> Goal:
+    values = {
+        "body_frame": "head",
+        "position": [0.1, 0.0, -0.1],
+        "quaternion": [HALF, 0.0, 0.0, HALF],
+        "weight": 1.0,
+    }
+    return Goal(**{**values, **changes})
+
+
+def task(**changes: object) -> Task:
+    values = {
+        "name": "wiping",
+        "title": "Wiping the mouth",
+        "goals": (goal(),),
+        "environments": ("wheelchair",),
+        "source": "made up",
+    }
+    return Task(**{**values, **changes})
+
+
+def test_quaternion_is_normalised():
+    # 7e-6 off unit length: what figures of six digits may be off.
+    written = np.array([0.5, 0.5, 0.5, 0.5]) * (1 + 7e-6)
+    length = np.linalg.norm(goal(quaternion=written).quaternion)
+    assert length == pytest.approx(1.0, abs=4e-16)  # rounding of one division
+
+
+def test_arrays_are_read_only_copies():
+    position = np.array([0.1, 0.2, 0.3])
+    made = goal(position=position)
+    position[0] = 9.0
+    assert made.position[0] == 0.1
+    with pytest.raises(ValueError, match="read-only"):
+        made.position[0] = 9.0
+
+
+def test_equal_goals_are_equal_and_hash_alike():
+    assert goal() == goal()
+    assert len({goal(), goal(), goal(weight=2.0)}) == 2
+    assert goal() != goal(position=[0.1, 0.0, -0.2])
+    assert goal() != "head"
+
+
+def test_weights_sum_to_one_in_proportion():
+    weights = task(goals=(goal(weight=1), goal(weight=3))).weights
+    assert weights.tolist() == [0.25, 0.75]
+
+
+def test_tasks_go_to_other_processes():
+    sent = task(grids={"wheelchair": {"torso": {"count": 1}}})
+    assert pickle.loads(pickle.dumps(sent)) == sent
+    assert hash(sent) == hash(pickle.loads(pickle.dumps(sent)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"body_frame": ""}, "field 'body_frame' is empty"),
+        ({"position": [0.1, 0.2]}, "must be 3 finite numbers (x, y, z)"),
+        ({"position": [0.1, math.nan, 0.2]}, "must be 3 finite numbers"),
+        ({"position": ["a", 0, 0]}, "must be 3 finite numbers"),
+        ({"position": [133.7, 1.8, -109.8]}, "Write metres"),
+        ({"quaternion": [1, 0, 0]}, "must be 4 finite numbers (w, x, y, z)"),
+        ({"quaternion": [math.inf, 0, 0, 0]}, "must be 4 finite numbers"),
+        ({"quaternion": [1, 0, 0, 0.01]}, "has length 1.00005, but must be a unit quaternion"),
+        ({"quaternion": [0, 0, 0, 0]}, "has length 0, but must be a unit quaternion"),
+        ({"weight": 0}, "field 'weight' is 0, but must be a positive number"),
+        ({"weight": -1.0}, "field 'weight' is -1.0"),
+        ({"weight": math.nan}, "field 'weight' is nan"),
+        ({"weight": math.inf}, "field 'weight' is inf"),
+    ],
+    ids=str,
+)
+def test_what_is_no_goal_is_refused(changes, said):
+    with pytest.raises(TaskError) as caught:
+        goal(**changes)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"name": ""}, "field 'name' is empty"),
+        ({"goals": ()}, "needs at least one goal"),
+        ({"environments": ()}, "needs at least one environment"),
+        ({"environments": ("bed", "bed")}, "'bed' is there twice"),
+    ],
+    ids=["name", "goals", "environments", "twice"],
+)
+def test_what_is_no_task_is_refused(changes, said):
+    with pytest.raises(TaskError, match=said):
+        task(**changes)
+
+
+def test_grid_is_changed_only_where_the_task_applies():
+    changed = task(grids={"wheelchair": {"torso": {"count": 1}}})
+    assert changed.grid_changes("wheelchair") == {"torso": {"count": 1}}
+    assert changed.grid_changes("somewhere") == {}
+    with pytest.raises(UnknownNameError, match="Did you mean 'wheelchair'"):
+        task(grids={"wheelchiar": {}})

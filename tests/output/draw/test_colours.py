@@ -1,0 +1,71 @@
+"""Colours are told apart whichever cones somebody has."""
+
+from __future__ import annotations
+
+import itertools
+
+import matplotlib
+import numpy as np
+import pytest
+
+from tcs.output.draw import Kind, colours
+from tests.output.draw.vision import VISION, as_seen, difference
+
+CLEAR = 15.0
+"""A difference seen at a glance: 2.3 is just noticeable (Mahy, Van Eycken and Oosterlinck, 1994),
+this is six times as much."""
+SCALE = [tuple(c) for c in matplotlib.colormaps[colours.SCALE](np.linspace(0.0, 1.0, 65))[:, :3]]
+IN_SPACE = {kind.label: kind.colour for kind in Kind}
+FROM_ABOVE = {
+    "furniture": colours.FURNITURE,
+    "person": colours.PERSON,
+    "blocked": colours.BLOCKED,
+    "empty": colours.EMPTY,
+    "member": colours.MEMBER,
+    "here": colours.HERE,
+}
+
+
+def test_the_simulation_knows_what_is_known():
+    # Red and green of the same lightness: apart with all cones, hard to tell without the middle
+    # ones. White has no colour for anybody.
+    assert difference("#c05050", "#6f7f35", "all cones") > 50
+    assert difference("#c05050", "#6f7f35", "deuteranopia") < 20
+    for vision in VISION:
+        # The matrices are given to six digits, and lightness goes with 116 times the cube root.
+        np.testing.assert_allclose(as_seen("white", vision), [100.0, 0.0, 0.0], atol=1e-2)
+
+
+@pytest.mark.parametrize("vision", VISION)
+@pytest.mark.parametrize("palette", [IN_SPACE, FROM_ABOVE], ids=["in space", "from above"])
+def test_what_a_legend_names_is_told_apart(palette, vision):
+    close = {
+        (first, second): round(difference(palette[first], palette[second], vision), 1)
+        for first, second in itertools.combinations(palette, 2)
+        if difference(palette[first], palette[second], vision) < CLEAR
+    }
+    assert close == {}
+
+
+@pytest.mark.parametrize("vision", VISION)
+def test_a_better_score_is_lighter_for_everybody(vision):
+    lightness = [as_seen(colour, vision)[0] for colour in SCALE]
+    assert np.all(np.diff(lightness) > 0.0)
+    assert lightness[-1] - lightness[0] > 60.0
+
+
+@pytest.mark.parametrize("vision", VISION)
+@pytest.mark.parametrize("line", [colours.MEMBER, colours.HERE])
+def test_cased_lines_stand_out_on_every_score(line, vision):
+    worst = min(
+        max(difference(line, score, vision), difference(colours.CASING, score, vision))
+        for score in SCALE
+    )
+    assert worst > 2 * CLEAR
+
+
+@pytest.mark.parametrize("vision", VISION)
+def test_where_nothing_is_scored_looks_like_no_score(vision):
+    # The lowest score with a colour is next to the dark end; grey and white are light.
+    for colour in (colours.BLOCKED, colours.EMPTY):
+        assert min(difference(colour, score, vision) for score in SCALE[:32]) > CLEAR

@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from tcs.kernel.arrays import BOX, SPHERE
+from tcs.output.draw import Kind, Solid, View, draw_scene, primitive_corners
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    monkeypatch.setattr("tcs.output.draw.picture._SIZE", (240, 200))
+
+
+def ball(kind, at, radius=0.3):
+    return Solid.placed(kind, primitive_corners(SPHERE, (radius, 0.0, 0.0)), np.eye(3), at)
+
+
+# Seen from +x, the picture is 1.6 m high where they are.
+SUBJECT = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 1.8]])
+
+
+def view(*solids, azimuths=(0.0,), subject=SUBJECT):
+    return View(solids, subject, azimuths, "caption")
+
+
+def picture(figure, panel=0):
+    return np.asarray(figure.axes[panel].images[0].get_array())
+
+
+def share(image, kind):
+    """Share of the pixels with the hue of a kind."""
+    colour = np.array(to_rgb(kind.colour))
+    wanted = colour / np.linalg.norm(colour)
+    hue = image / np.maximum(np.linalg.norm(image, axis=-1, keepdims=True), 1e-9)
+    return float(np.mean(hue @ wanted > 0.9995))
+
+
+def test_what_is_nearer_hides_what_is_behind():
+    # The camera looks from +x.
+    near, far = [1.0, 0.0, 1.3], [-1.0, 0.0, 0.6]
+    for kinds in ((Kind.ARM, Kind.PERSON), (Kind.PERSON, Kind.ARM)):
+        image = picture(
+            draw_scene([view(ball(kinds[0], near), ball(kinds[1], far, 0.1))], title="")
+        )
+        assert share(image, kinds[0]) > 0.01
+        assert share(image, kinds[1]) == 0.0
+
+
+def test_solids_that_pass_through_one_another_are_both_seen():
+    both = (ball(Kind.ARM, [0.0, -0.1, 1.0]), ball(Kind.PERSON, [0.0, 0.1, 1.0]))
+    image = picture(draw_scene([view(*both)], title=""))
+    arm, person = share(image, Kind.ARM), share(image, Kind.PERSON)
+    # Mirror images of one another but for the light.
+    assert arm == pytest.approx(person, rel=0.15)
+    assert arm > 0.01
+
+
+@pytest.mark.parametrize("order", [(0.0, np.pi), (np.pi, 0.0)])
+def test_the_side_that_shows_the_goals_is_taken(order):
+    wall = primitive_corners(BOX, (0.05, 2.0, 2.0))
+    solids = (
+        Solid.placed(Kind.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
+        ball(Kind.GOAL, [0.0, 0.0, 1.0], 0.2),
+    )
+    # From +x the wall is in the way.
+    image = picture(draw_scene([view(*solids, azimuths=order)], title=""))
+    assert share(image, Kind.GOAL) > 0.002
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize("subject", ["high", "wide"])
+def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    ends = {"high": [[0, 0, 0.1], [0, 0, 1.9]], "wide": [1.3 * across, -1.3 * across]}[subject]
+    solids = [ball(Kind.ARM, end, 0.1) for end in ends]
+    points = np.concatenate([solid.corners for solid in solids])
+    image = picture(draw_scene([view(*solids, azimuths=(azimuth,), subject=points)], title=""))
+    hit = np.abs(image - np.array(to_rgb(Kind.ARM.colour))).max(axis=-1) < 0.5
+    blue = hit & (image[..., 2] > image[..., 0] + 0.1)
+    rows, columns = np.flatnonzero(blue.any(axis=1)), np.flatnonzero(blue.any(axis=0))
+    found = rows if subject == "high" else columns
+    size = image.shape[0 if subject == "high" else 1]
+    # 94 % of the picture, in the middle; the outline takes a pixel at each end.
+    assert np.ptp(found) + 1 == pytest.approx(0.94 * size, abs=4)
+    assert found.min() + found.max() == pytest.approx(size - 1, abs=4)
+
+
+def test_the_other_side_of_the_subject_is_in_the_picture_too():
+    corners = np.array(np.meshgrid([-1.0, 1.0], [-0.7, 0.7], [0.0, 1.5])).reshape(3, -1).T
+    marks = [ball(Kind.CURRENT_GOAL, corner, 0.06) for corner in corners]
+    for azimuth in np.linspace(0.0, 2 * np.pi, 7):
+        points = np.concatenate([mark.corners for mark in marks])
+        image = picture(draw_scene([view(*marks, azimuths=(azimuth,), subject=points)], title=""))
+        red = np.array(to_rgb(Kind.CURRENT_GOAL.colour))
+        assert np.all(np.abs(image[[0, -1]] - red).max(axis=-1) > 0.2)
+        assert np.all(np.abs(image[:, [0, -1]] - red).max(axis=-1) > 0.2)
+
+
+def test_no_edge_within_a_surface_that_two_solids_share():
+    corners = primitive_corners(BOX, (0.3, 0.3, 0.3))
+    turned = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    # One cube twice, cut into other triangles: which is nearer is up to rounding, pixel by pixel.
+    cubes = [Solid.placed(Kind.ARM, corners, R, [0, 0, 1]) for R in (turned, turned @ quarter)]
+    one, both = (picture(draw_scene([view(*some)], title="")) for some in (cubes[:1], cubes))
+    # Within a face: away from where it ends, and from the floor.
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    spread = maximum_filter(one, (7, 7, 1)) - minimum_filter(one, (7, 7, 1))
+    within = (spread.max(axis=-1) < 0.01) & (one[..., 2] > one[..., 0] + 0.1)
+    assert within.sum() > 500
+    np.testing.assert_allclose(both[within], one[within], atol=0.02)
+
+
+def test_goals_have_the_colour_of_the_legend():
+    image = picture(draw_scene([view(ball(Kind.GOAL, [0.0, 0.0, 1.0]))], title=""))
+    middle = image[image.shape[0] // 2, image.shape[1] // 2]
+    np.testing.assert_allclose(middle, to_rgb(Kind.GOAL.colour), atol=1e-6)
+
+
+def test_one_panel_for_each_view_and_a_legend():
+    views = [view(ball(Kind.ARM, [0, 0, 1])), view(ball(Kind.CURRENT_GOAL, [0, 0, 1]))]
+    figure = draw_scene(views, title="both stops")
+    assert len(figure.axes) == 2
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [Kind.ARM.label, Kind.CURRENT_GOAL.label]
+
+
+def test_what_is_behind_the_camera_is_left_out():
+    image = picture(draw_scene([view(ball(Kind.ARM, [18.0, 0.0, 7.0]))], title=""))
+    assert share(image, Kind.ARM) == 0.0

@@ -1,0 +1,59 @@
+"""A real but small study: shaving beside the wheelchair, from a few places."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from tcs.output.report import Paper, Plan, load_paper, study_row
+from tcs.placement.robustness import robustify
+from tcs.placement.scoring import score
+from tcs.placement.store import save_scores
+from tests.rooms import BESIDE, write_room
+
+PLAN = Plan(samples=60, sets=12, set_samples=6)
+
+
+@pytest.fixture(scope="session")
+def plan():
+    return PLAN
+
+
+@pytest.fixture(scope="session")
+def score_path(tmp_path_factory):
+    """A score file."""
+    folder = tmp_path_factory.mktemp("study")
+    room = write_room(folder, "small-room", BESIDE)
+    path = folder / "shaving-small-room-pr2.tcs"
+    file = score("shaving", room)
+    save_scores(path, robustify(file, sets=12, samples=32))
+    return path
+
+
+@pytest.fixture(scope="session")
+def paper():
+    """The paper, as if its wheelchair were the small room."""
+    plain = load_paper().model_dump(by_alias=True)
+    for table in ("table_1", "table_3"):
+        for row in plain[table]:
+            if row["environment"] == "wheelchair":
+                row["environment"] = "small-room"
+    return Paper.model_validate(plain)
+
+
+@pytest.fixture(scope="session")
+def study(score_path, paper):
+    """The study of that file, with the comparison of Table III."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tcs.output.report.study.load_paper", lambda: paper)
+        return study_row(score_path, PLAN)
+
+
+@pytest.fixture(scope="session")
+def lossless(study):
+    """The same row, had everything been reached in every sample."""
+    best = dataclasses.replace(study.best, reached=study.best.reached | True)
+    return dataclasses.replace(
+        study, task="brushing", best=best, losses=dataclasses.replace(study.losses, goals=())
+    )

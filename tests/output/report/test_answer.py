@@ -1,0 +1,300 @@
+"""The report of one score file, of a real but small one."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import shlex
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tcs.cli.app import app
+from tcs.model.grid import InitialConfiguration
+from tcs.output.report import Check, answer_of, answer_page, as_html, as_markdown
+from tcs.output.report.answer_tables import (
+    goals_table,
+    joints_table,
+    pairs_table,
+    reasons_table,
+    stops_table,
+    success_table,
+    verification_table,
+)
+from tcs.output.report.reproduce import robustify_command, score_command
+from tcs.placement.scoring import score
+from tcs.placement.store import Scored, load_scores, save_scores
+from tcs.placement.tables import Reason
+from tests.output.report.test_page import Reader
+from tests.output.report.test_robustness_report import column
+from tests.rooms import write_room
+
+FAR = {
+    "base_x": (5, 0.1, 3),
+    "base_y": (5, 0.1, 2),
+    "base_yaw": (0, 90, 4),
+    "torso": (0.15, 0.15, 1),
+}
+"""Where nothing is in reach."""
+CHECK = Check(pairs=12, dense=6, seed=3)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_pictures():
+    """Pictures that take a tenth of the time; what is on them is tested elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tcs.output.draw.picture._SIZE", (300, 260))
+        patch.setattr("tcs.output.report.answer._DPI", 30)
+        yield
+
+
+@pytest.fixture(scope="module")
+def answer(score_path, _small_pictures):
+    return answer_of(score_path, check=CHECK)
+
+
+@pytest.fixture(scope="module")
+def single(score_path, _small_pictures):
+    """About one place only, which does not reach every goal."""
+    return answer_of(score_path, max_members=1, check=Check(pairs=0, dense=0))
+
+
+@pytest.fixture(scope="module")
+def page(answer):
+    return answer_page(answer, command="tcs report f.tcs --out r.html")
+
+
+def test_the_page_has_every_part_and_needs_nothing_else(page):
+    html = as_html(page)
+    reader = Reader()
+    reader.feed(html)
+    assert reader.open == []
+    assert all(link.startswith(("#", "data:image/png;base64,")) for link in reader.links)
+    # A map, no states in a wheelchair, and a picture of each of the two stops.
+    assert reader.tags.count("img") == 3
+    said = "".join(reader.text)
+    for part in ("In short", "Each stop", "Goal by goal", "Why not elsewhere", "Checked again"):
+        assert part in said
+    assert "tcs report f.tcs --out r.html" in said
+    assert "For each state of the room" not in said
+    assert as_markdown(page).count("\n## ") == len(page.sections)
+
+
+def test_each_goal_is_told_as_the_file_has_it(answer, score_path):
+    table, scores = goals_table(answer), load_scores(score_path).nominal.scores
+    members = list(answer.shown.indices)
+    best = scores.isotropy[members].argmax(axis=0)
+    for goal, said in enumerate(column(table, "Reached from")):
+        reached = scores.reached[members, goal].any()
+        assert said == (f"stop {best[goal] + 1}" if reached else "nowhere")
+    for number, h in enumerate(members):
+        for goal, said in enumerate(column(table, f"At stop {number + 1}")):
+            if scores.reached[h, goal]:
+                assert float(said) == pytest.approx(scores.isotropy[h, goal], abs=5e-4)
+            else:
+                assert not said[0].isdigit()
+    share = scores.reached.mean(axis=0)
+    for goal, said in enumerate(column(table, "Of the grid")):
+        assert float(said.removesuffix(" %")) == pytest.approx(100 * share[goal], abs=5.1e-3)
+    assert set(column(table, "Drake")) == {"confirms it"}
+
+
+def test_joints_and_stops_are_those_of_the_file(answer):
+    scores = answer.scored.scores
+    for row in joints_table(answer).texts():
+        goal, stop = int(row[0]), int(row[1]) - 1
+        expected = np.degrees(scores.joints_of(answer.shown.indices[stop], goal))
+        np.testing.assert_allclose([float(cell) for cell in row[2:]], expected, atol=0.0051)
+    table = stops_table(answer)
+    for number, member in enumerate(answer.shown.members):
+        assert float(column(table, "x [m]")[number]) == pytest.approx(member.base_x, abs=5e-3)
+        heading = math.degrees(member.base_yaw) % 360
+        assert float(column(table, "heading [deg]")[number]) == pytest.approx(heading, abs=0.5)
+    listed = " ".join(column(table, "Best at goals")).split()
+    assert sorted(map(int, listed)) == [g for g, at in enumerate(answer.server) if at is not None]
+
+
+def test_every_configuration_counts_once_for_each_goal(answer):
+    for row in reasons_table(answer).texts():
+        # Six shares rounded to a hundredth.
+        assert sum(float(cell) for cell in row[2:]) == pytest.approx(100.0, abs=0.03)
+    scores = answer.scored.scores
+    counts = {}
+    for row in pairs_table(answer).texts():
+        counts[row[0]] = counts.get(row[0], 0) + int(row[3].replace(",", ""))
+    for name, reason in (
+        ("body blocked", Reason.BODY_BLOCKED),
+        ("arm blocked", Reason.ARM_BLOCKED),
+    ):
+        assert counts.get(name, 0) == np.count_nonzero(scores.reason == reason)
+
+
+def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
+    assert single.unreached
+    said = as_markdown(answer_page(single, command="c"))
+    for goal in single.unreached:
+        assert f"Goal {goal} would be reached from stop 1 so: " in said
+    assert f"Not reached: {', '.join(map(str, single.unreached))}." in said
+    assert "Nothing was re-checked" in said
+    assert "Of the sets of at most 1 that the file keeps, it is the one with the greatest" in said
+    assert all(single.server[goal] is None for goal in single.unreached)
+    assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
+
+
+def test_the_set_is_the_one_to_choose_from_here(score_path):
+    here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
+    found = answer_of(score_path, here=here, check=Check(pairs=0, dense=0))
+    said = as_markdown(answer_page(found, command="c"))
+    assert "the set to choose for a robot at x 0.6 m, y 0.7 m, heading 0 deg" in said
+
+
+@pytest.fixture(scope="module")
+def false_path(score_path, tmp_path_factory):
+    """The file with the postures of all pairs a degree off at one joint."""
+    file = load_scores(score_path)
+    scores = file.nominal.scores
+    path = tmp_path_factory.mktemp("false") / "false.tcs"
+    joints = scores.arm_joints + np.float32([0, 0, 0, math.radians(1.0), 0, 0, 0])
+    wrong = dataclasses.replace(scores, arm_joints=joints)
+    table = Scored.of(wrong, file.nominal.sets)
+    save_scores(path, dataclasses.replace(file, tables=(table,)))
+    return path
+
+
+def test_a_false_answer_is_told(false_path):
+    found = answer_of(false_path, check=CHECK)
+    assert not found.is_sound
+    assert set(column(goals_table(found), "Drake")) == {"REFUSES IT"}
+    assert column(verification_table(found), "Found")[1] == "12"
+    said = as_markdown(answer_page(found, command="c"))
+    assert "SOME ANSWERS OF THE FILE ARE FALSE" in said
+    assert "every answer holds" not in said
+
+
+def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_path):
+    file = load_scores(score_path)
+    scores = file.nominal.scores
+    h = file.nominal.sets.best[0]
+    goal = int(scores.isotropy[h].argmax())
+    row = np.flatnonzero(np.flatnonzero(scores.reached) == h * scores.goals + goal)
+    joints = scores.arm_joints.copy()
+    joints[row, 0] += np.float32(0.01)
+    path = tmp_path / "one.tcs"
+    table = Scored.of(dataclasses.replace(scores, arm_joints=joints), file.nominal.sets)
+    save_scores(path, dataclasses.replace(file, tables=(table,)))
+    # Nothing is drawn at random.
+    found = answer_of(path, check=Check(pairs=0, dense=0))
+    assert found.verification.is_sound
+    assert not found.is_sound
+    assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
+    assert column(verification_table(found), "Found")[-1].startswith("THESE HOLD, BUT NOT ALL")
+
+
+def test_what_was_rechecked_is_told(answer):
+    found = dict(
+        zip(*(column(verification_table(answer), t) for t in ("Check", "Found")), strict=True)
+    )
+    assert found["Stored answers re-checked with Drake, drawn at random"] == "12"
+    assert found["of them false"] == "0"
+    assert found["Verdict"] == "every answer holds"
+    assert "seed 3" in verification_table(answer).caption
+
+
+def test_estimates_of_success_are_those_of_the_file(answer):
+    success, table = answer.success, success_table(answer)
+    assert success is not None
+    for name, most in (("the surest set of one", 1), ("the surest set of up to 2", 2)):
+        row = success.row_of(success.surest(answer.scored.sets, max_members=most))
+        said = column(table, "Under error")[column(table, "Set").index(name)]
+        assert float(said.removesuffix(" %")) == pytest.approx(
+            100 * success.success[row], abs=0.051
+        )
+        ends = column(table, "95 %")[column(table, "Set").index(name)].split(" to ")
+        assert list(map(float, ends)) == pytest.approx(
+            [100 * success.low[row], 100 * success.high[row]], abs=0.051
+        )
+    file = dataclasses.replace(
+        answer.file, tables=tuple(Scored.of(t.scores, t.sets) for t in answer.file.tables)
+    )
+    plain = dataclasses.replace(answer, file=file)
+    assert success_table(plain) is None
+    assert "tcs robustify" in as_markdown(answer_page(plain, command="c"))
+
+
+def test_commands_make_the_same_again(answer, score_path):
+    words = shlex.split(score_command(answer))
+    room = str(score_path.parent / "small-room.yaml")
+    assert words[:7] == ["tcs", "score", "shaving", "--environment", room, "--robot", "pr2"]
+    options = dict(zip(words[7::2], words[8::2], strict=True))
+    assert options == {
+        "--measure": "isotropy",
+        "--rules": "paper",
+        "--max-members": "2",
+        "--out": str(score_path),
+    }
+    said = robustify_command(answer)
+    assert said == f"tcs robustify {score_path} --sets 12 --samples 32 --seed 0"
+    digest = hashlib.sha256(score_path.read_bytes()).hexdigest()
+    made = as_markdown(answer_page(answer, command="c"))
+    assert digest in made
+    assert answer.file.metadata["scene_digest"] in made
+
+
+def test_on_the_command_line(score_path, tmp_path):
+    out = tmp_path / "page.html"
+    words = ("report", score_path, "--out", out, "--md", "--pairs", 3, "--dense", 2, "--json")
+    ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert ran.exit_code == 0
+    told = json.loads(ran.stdout)
+    assert told["files"] == [str(out), str(out.with_suffix(".md"))]
+    assert told["bytes"] == [path.stat().st_size for path in (out, out.with_suffix(".md"))]
+    assert told["is_sound"] is True
+    assert told["verification"]["checked"] == 3
+    assert out.read_text().startswith("<!doctype html>")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.md"]
+
+
+def test_nothing_in_reach_is_a_page_too(tmp_path):
+    path = tmp_path / "far.tcs"
+    save_scores(path, score("shaving", write_room(tmp_path, "far", FAR)))
+    found = answer_of(path, check=CHECK)
+    assert found.is_sound
+    said = as_markdown(answer_page(found, command="c"))
+    assert "None of the 8 goals is reached from anywhere" in said
+    assert said.count("what came nearest was stopped by this: too far for the arm.") == 2
+    assert "Nothing was re-checked with Drake." in said
+    assert found.views == ()
+
+
+def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
+    out = tmp_path / "page.md"
+    words = ("report", false_path, "--out", out, "--pairs", 2, "--dense", 0)
+    ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert ran.exit_code == 1
+    assert "some answers in" in ran.stderr
+    assert "SOME ANSWERS OF THE FILE ARE FALSE" in out.read_text()
+
+
+def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path):
+    file = load_scores(score_path)
+    scores = file.nominal.scores
+    better = np.where(scores.reached, scores.isotropy + np.float32(1e-3), scores.isotropy)
+    table = Scored.of(
+        dataclasses.replace(scores, isotropy=better),
+        dataclasses.replace(
+            file.nominal.sets,
+            isotropy=np.where(
+                file.nominal.sets.reached,
+                file.nominal.sets.isotropy + np.float32(1e-3),
+                file.nominal.sets.isotropy,
+            ),
+        ),
+    )
+    path = tmp_path / "better.tcs"
+    save_scores(path, dataclasses.replace(file, tables=(table,)))
+    found = answer_of(path, check=Check(pairs=0, dense=0))
+    assert all(one.is_true for one in found.findings.values())
+    assert not found.is_sound

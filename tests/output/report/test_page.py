@@ -1,0 +1,123 @@
+"""Pages as HTML and as Markdown."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from tcs.output.report import Page, Section, as_html, as_markdown
+from tcs.output.report.blocks import (
+    Bullets,
+    Cell,
+    Code,
+    Column,
+    Facts,
+    Folded,
+    Picture,
+    Table,
+    Text,
+)
+
+PNG = b"\x89PNG not really"
+SVG = b"""<?xml version="1.0"?>\n<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0 0"/></svg>"""
+HOSTILE = "<script>alert('x')</script> & \"quotes\" | `code` *stars*"
+EMPTY = {"br", "img", "meta", "link", "path"}
+
+
+class Reader(HTMLParser):
+    """Checks that tags are closed in order, and collects what they say."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.tags, self.links, self.text = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.links += [value for key, value in attributes if key in ("src", "href", "xlink:href")]
+        if tag not in EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in EMPTY:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def read(page):
+    reader = Reader()
+    reader.feed(as_html(page))
+    assert reader.open == []
+    return reader
+
+
+def page_of(*blocks):
+    return Page("A title", "The lead.", [Section("One: first", blocks), Section("Two", [])], "foot")
+
+
+@pytest.fixture
+def everything():
+    """A page with a block of every kind, all of it hostile."""
+    table = Table(HOSTILE, [Column(HOSTILE, is_number=False), Column("n")], [[HOSTILE, "1"]])
+    return page_of(
+        Text(HOSTILE),
+        Bullets([HOSTILE, "b"]),
+        Code(HOSTILE),
+        Facts([(HOSTILE, HOSTILE)]),
+        table,
+        Picture(PNG, "png", HOSTILE, HOSTILE),
+        Picture(SVG, "svg", HOSTILE, "drawn"),
+        Folded(HOSTILE, [Text("within"), table]),
+    )
+
+
+def test_whatever_is_said_stays_text(everything):
+    reader = read(everything)
+    assert "script" not in reader.tags
+    assert "".join(reader.text).count(HOSTILE) == 13
+
+
+def test_the_page_needs_nothing_else(everything):
+    reader = read(everything)
+    assert all(link.startswith(("#", "data:image/png;base64,")) for link in reader.links)
+    assert "default-src 'none'" in as_html(everything)
+    assert reader.tags.count("svg") == 1
+    assert "<?xml" not in as_html(everything)
+
+
+def test_links_at_the_top_lead_to_sections(everything):
+    html = as_html(everything)
+    for link in re.findall(r'href="#([^"]*)"', html):
+        assert f'id="{link}"' in html
+    assert html.count('href="#') == 2
+
+
+def test_tones_are_classes_beside_the_words():
+    table = Table("t", [Column("x")], [[Cell("-3.6", "bad")], ["0.0"]])
+    html = as_html(page_of(table))
+    assert '<td class="number bad">-3.6</td>' in html
+    assert '<td class="number">0.0</td>' in html
+
+
+@pytest.mark.parametrize("write", [as_html, as_markdown])
+def test_what_is_no_block_is_named(write):
+    with pytest.raises(TypeError, match=r"no block of type float.*tcs\.report\.blocks"):
+        write(page_of(1.5))
+
+
+def test_rows_have_as_many_cells_as_columns():
+    with pytest.raises(AssertionError):
+        Table("t", [Column("a"), Column("b")], [["1"]])
+
+
+def test_markdown_has_every_table_and_no_sign_that_means_something(everything):
+    text = as_markdown(everything)
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    # Two tables of a head, a rule and a row; a bar that is text is not a border.
+    assert len(rows) == 6
+    assert all(len(re.findall(r"(?<!\\)\|", row)) == 3 for row in rows)
+    assert re.search(r"(?<!\\)<script", text.replace("```sh\n" + HOSTILE, "")) is None
+    assert text.startswith("# A title\n\nThe lead.\n\n## One: first\n")

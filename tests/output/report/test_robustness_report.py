@@ -1,0 +1,107 @@
+"""The robustness report as a reader gets it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError
+from tcs.output.report import as_html, as_markdown, robustness_page, write_report
+from tcs.output.report.tables import is_short, losses_table, table_1, table_3
+from tcs.output.report.words import REASONS, goes_with, lost_goal
+from tests.output.report.test_page import Reader
+
+
+@pytest.fixture(scope="module")
+def page(study, lossless, paper, plan):
+    return robustness_page([study, lossless], paper, plan, seconds=12.0, command="python it.py")
+
+
+def column(table, title):
+    """The texts of one column."""
+    titles = [column.title for column in table.columns]
+    return [row[titles.index(title)] for row in table.texts()]
+
+
+def test_table_1_puts_the_papers_figure_and_the_difference_beside_ours(study, lossless, paper):
+    table = table_1([study, lossless], paper)
+    ours = column(table, "Ours")
+    assert ours[1] == "100.0 (0.0)"
+    mean = float(ours[0].split(" ")[0])
+    assert mean == pytest.approx(100.0 * np.mean(study.best.shares), abs=0.05)
+    assert column(table, "Paper") == ["99.9 (1.6)", "100.0 (0.0)"]
+    differences = column(table, "Difference")
+    assert float(differences[0]) == pytest.approx(mean - 99.9, abs=0.11)
+    assert differences[1] == "0.0"
+
+
+def test_a_row_is_short_when_its_printed_mean_is_below_the_papers(study, lossless, paper):
+    assert is_short(study, paper)
+    assert not is_short(lossless, paper)
+
+
+def test_table_3_says_na_where_the_paper_does(study, paper):
+    feeding = dataclasses.replace(study, task="feeding")
+    table = table_3([study, feeding], paper)
+    assert column(table, "Places") == ["1", "2", "1", "2"]
+    assert column(table, "Paper's")[1] == "94.0 (11.6)"
+    assert column(table, "Paper's")[3] == "N/A"
+    shares = study.methods.cells[2, True].shares
+    with_two = float(column(table, "With")[1].split(" ")[0])
+    assert with_two == pytest.approx(100.0 * shares.mean(), abs=0.05)
+
+
+def test_a_short_row_is_explained_from_its_losses(page, study):
+    text = as_markdown(page)
+    worst = study.losses.goals[0]
+    assert "Below the paper: shaving, small-room. Of all that is lost, " in text
+    assert f"Goal {worst.goal} (head) is reached in {100.0 * worst.success:.1f} %" in text
+    table = losses_table(study)
+    assert column(table, "Goal") == [str(loss.goal) for loss in study.losses.goals]
+    assert [float(cell) / 100.0 for cell in column(table, "Reached")] == pytest.approx(
+        [loss.success for loss in study.losses.goals], abs=0.0005001
+    )
+    assert "Nothing is lost in any sample: brushing, small-room." in text
+
+
+def test_a_loss_is_told_with_its_reasons(study):
+    loss = study.losses.goals[0]
+    reason, share = next(iter(loss.reasons.items()))
+    assert f"{REASONS[reason]} ({100.0 * share:.0f} %)" in lost_goal(loss)
+    assert goes_with(loss).startswith(loss.joint.replace("_", " "))
+
+
+def test_the_page_is_whole_and_needs_nothing_else(page):
+    html = as_html(page)
+    reader = Reader()
+    reader.feed(html)
+    assert reader.open == []
+    pictures = ("#", "data:image/")
+    assert all(link.startswith(pictures) for link in reader.links)
+    # Names of XML's own are no addresses to load.
+    addresses = set(re.findall(r"https?://[^\"'<> )]*", html))
+    assert addresses == {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+
+
+def test_inner_names_of_drawings_are_told_apart(page):
+    html = as_html(page)
+    names = re.findall(r'<(?:clipPath|path|g|defs)[^>]* id="([^"]*)"', html)
+    clips = [name for name in names if name.startswith("p") and len(name) > 8]
+    assert len(clips) == len(set(clips)) > 3
+
+
+def test_files_are_written_whole(study, plan, tmp_path):
+    folder = tmp_path / "a" / "b"
+    paths = write_report(folder, [study], plan, seconds=1.0, command="it")
+    assert sorted(folder.iterdir()) == sorted(paths)
+    assert paths[0].read_text().startswith("<!doctype html>")
+    assert paths[2].read_text().count("\n") == 10 * plan.samples + 1
+
+
+def test_a_place_that_takes_no_folder_is_told(study, plan, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be made"):
+        write_report(tmp_path / "file" / "x", [study], plan, seconds=1.0, command="it")

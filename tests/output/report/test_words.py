@@ -1,0 +1,55 @@
+"""Findings in words: what is told, what is left out, and how numbers are rounded."""
+
+from __future__ import annotations
+
+import pytest
+
+from tcs.output.report.words import goes_with, lost_goal, p_value, percent, signed, stopped_by
+from tcs.placement.robustness import Loss
+from tcs.placement.tables import Reason
+
+
+def loss(reasons, pair=None, pair_share=0.0, tilt=-1.26):
+    return Loss(
+        goal=3, body_frame="forearm_left", success=0.625, member=0, reasons=reasons, pair=pair,
+        pair_share=pair_share, joint="person_y", tilt=tilt,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("p", "said"),
+    [(0.0, "< 0.0001"), (9.9e-5, "< 0.0001"), (1e-4, "0.0001"), (0.00312, "0.0031"), (0.5, "0.5")],
+)
+def test_a_p_is_a_number_down_to_a_ten_thousandth(p, said):
+    assert p_value(p) == said
+
+
+def test_reasons_are_told_from_one_in_twenty_on():
+    said = stopped_by(
+        loss({Reason.ARM_BLOCKED: 0.91, Reason.TOO_FAR: 0.05, Reason.JOINT_LIMITS: 0.04})
+    )
+    assert said == "every arm posture would touch something (91 %), too far for the arm (5 %)"
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.19, False), (0.2, True), (1.0, True)])
+def test_a_pair_is_told_where_it_is_in_the_way_in_one_of_five(share, is_told):
+    pair = ("l_forearm_link", "bed::pillow")
+    said = stopped_by(loss({Reason.ARM_BLOCKED: 1.0}, pair, share))
+    assert said.endswith("; most often l forearm and pillow") == is_told
+
+
+def test_a_lost_goal_is_a_sentence():
+    assert lost_goal(loss({Reason.TOO_FAR: 1.0})) == (
+        "Goal 3 (forearm left) is reached in 62.5 % of the samples; in the others: too far for the "
+        "arm (100 %)."
+    )
+
+
+@pytest.mark.parametrize(("tilt", "said"), [(-1.26, "person y -1.3"), (0.84, "person y +0.8")])
+def test_an_error_is_told_with_its_side(tilt, said):
+    assert goes_with(loss({Reason.TOO_FAR: 1.0}, tilt=tilt)) == said
+
+
+def test_shares_and_points():
+    assert (percent(0.98407), percent(0.5, 0)) == ("98.4", "50")
+    assert (signed(2.349), signed(-0.04), signed(-0.06)) == ("+2.3", "0.0", "-0.1")

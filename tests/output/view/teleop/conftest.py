@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from tcs.output.view import open_meshcat
+from tcs.output.view.teleop import LivePage, Stage
+from tcs.output.view.teleop.controls import Reading, buttons, sliders
+from tcs.teleop import Command, Mode, Settings, Teleoperation, load_arm
+from tcs.teleop.trial import run_of
+
+MODES = (Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.POSE)
+
+
+@pytest.fixture(scope="session")
+def iiwa():
+    return load_arm("iiwa7")
+
+
+@pytest.fixture(scope="session")
+def iiwa_stage(iiwa):
+    return Stage(iiwa, meshes=False)
+
+
+@pytest.fixture
+def ready():
+    """A posture of the iiwa in the middle of its workspace, elbow up [rad]."""
+    return np.array([0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def shared_meshcat():
+    return open_meshcat()
+
+
+@pytest.fixture
+def meshcat(shared_meshcat):
+    yield shared_meshcat
+    shared_meshcat.Delete()
+    shared_meshcat.Delete("/Cameras/default/rotated/<object>/panel")
+    shared_meshcat.DeleteAddedControls()
+
+
+class Instead:
+    """A Meshcat of which some functions are a test's own.
+
+    A class made inside a test holds its Meshcat in a cycle, which whichever thread collects
+    garbage takes apart: Drake ends the process where that is not the one that made it.
+    """
+
+    def __init__(self, meshcat, **own):
+        self.__dict__.update(own, meshcat=meshcat)
+
+    def __getattr__(self, name):
+        return getattr(self.meshcat, name)
+
+
+@dataclass
+class Desk:
+    """Controls that a test moves."""
+
+    sliders: dict[str, float] = field(
+        default_factory=lambda: {name: value for name, (*_, value) in sliders().items()}
+    )
+    clicks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(buttons(4), 0))
+    pad: object = None
+    watched: bool = True
+
+    def press(self, name, times=1):
+        self.clicks[name] += times
+
+    def read(self):
+        return Reading(dict(self.sliders), dict(self.clicks), self.pad, self.watched)
+
+    def zero(self):
+        for name in self.sliders:
+            if "key" not in name:
+                self.sliders[name] = 0.0
+
+
+@pytest.fixture
+def desk():
+    return Desk()
+
+
+@pytest.fixture
+def told():
+    return []
+
+
+@pytest.fixture
+def page(meshcat, iiwa_stage, iiwa, ready, told, desk):
+    """A live page whose controls are the desk's."""
+    found = LivePage(
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=told.append
+    )
+    found.hand.source = desk
+    return found
+
+
+@pytest.fixture(scope="session")
+def driven(iiwa):
+    """A run of 9 s: down to a limit, a joint group, and out to where the arm is stretched."""
+    session = Teleoperation(iiwa, [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
+    asked = [(Command(linear=(0.0, 0.0, -0.2)), 300)]
+    asked += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
+    asked += [(Command(mode=Mode.END_EFFECTOR, linear=(0.25, 0.0, 0.1)), 500)]
+    rows = [(command, session.step(command)) for command, count in asked for _ in range(count)]
+    return run_of(iiwa, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"})

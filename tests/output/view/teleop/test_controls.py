@@ -1,0 +1,213 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.output.view.teleop.controls import (
+    BACK,
+    CLUTCH,
+    DEAD_LINEAR,
+    MOST_LINEAR,
+    MOVES,
+    NEXT_MODE,
+    RATE_SLIDERS,
+    SPEED,
+    STOP,
+    TAP,
+    TURN_DOWN,
+    TURN_SPEED,
+    TURN_UP,
+    Hand,
+    buttons,
+    group_button,
+    sliders,
+)
+from tcs.output.view.teleop.gamepad import Pad
+from tcs.teleop import Mode
+from tests.output.view.teleop.conftest import MODES
+
+X = RATE_SLIDERS[0]
+
+
+@pytest.fixture
+def hand(desk):
+    return Hand(desk, MODES, 4)
+
+
+def twist(heard):
+    return np.array([*heard.command.linear, *heard.command.angular])
+
+
+def test_every_button_has_a_key_of_its_own_and_none_folds_the_controls():
+    keys = list(buttons(4).values())
+    assert len(keys) == len(set(keys))
+    # H hides the browser's own controls.
+    assert "KeyH" not in keys
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_a_press_moves_one_way_for_a_moment(hand, desk, name):
+    axis, way, _ = MOVES[name]
+    assert not twist(hand.listen(0.0)).any()
+    desk.press(name)
+    expected = np.zeros(6)
+    expected[axis] = way * desk.sliders[SPEED if axis < 3 else TURN_SPEED]
+    np.testing.assert_allclose(twist(hand.listen(1.0)), expected)
+    np.testing.assert_allclose(twist(hand.listen(1.0 + 0.9 * TAP)), expected)
+    assert not twist(hand.listen(1.0 + 1.01 * TAP)).any()
+
+
+def test_a_held_key_goes_on_by_its_repeats(hand, desk):
+    for i in range(50):
+        desk.press("ahead")
+        assert twist(hand.listen(0.1 * i))[0] > 0.0
+
+
+def test_sliders_move_and_have_a_dead_zone(hand, desk):
+    desk.sliders[X] = 0.9 * DEAD_LINEAR
+    assert not twist(hand.listen(0.0)).any()
+    desk.sliders[X] = 0.1
+    assert twist(hand.listen(0.1))[0] == pytest.approx(0.1)
+
+
+def test_nothing_asks_for_more_than_the_most(hand, desk):
+    desk.sliders[X] = desk.sliders[SPEED] = MOST_LINEAR
+    desk.press("ahead")
+    assert twist(hand.listen(0.0))[0] == MOST_LINEAR
+
+
+def test_space_stops_everything_and_puts_sliders_back(hand, desk):
+    desk.sliders[X] = 0.2
+    desk.press("up")
+    assert twist(hand.listen(0.0)).any()
+    desk.press(STOP)
+    assert not twist(hand.listen(0.01)).any()
+    assert not twist(hand.listen(0.02)).any()
+    assert desk.sliders[X] == 0.0
+    # Speeds are no rates: they stay.
+    assert desk.sliders[SPEED] == sliders()[SPEED][3]
+
+
+def test_modes_take_turns_and_groups_turn_only_in_theirs(hand, desk):
+    desk.press(TURN_UP)
+    heard = hand.listen(0.0)
+    assert heard.command.sign == 0
+    assert "null-space mode" in heard.hint
+    desk.press(NEXT_MODE)
+    assert hand.listen(0.01).command.sign == 0
+    desk.press(group_button(2))
+    desk.press(TURN_DOWN)
+    command = hand.listen(0.02).command
+    assert (command.mode, command.group, command.sign) == (Mode.NULL_SPACE, 2, -1)
+    later = hand.listen(0.02 + 1.01 * TAP).command
+    assert (later.group, later.sign) == (None, 0)
+    desk.press(NEXT_MODE)
+    hand.listen(1.0)
+    desk.press(TURN_UP)
+    command = hand.listen(1.01).command
+    assert (command.mode, command.group, command.sign) == (Mode.POSE, None, 1)
+    desk.press(NEXT_MODE)
+    assert hand.listen(2.0).command.mode is Mode.END_EFFECTOR
+
+
+def test_tool_rates_are_not_sent_while_the_tool_is_held(hand, desk):
+    desk.sliders[X] = 0.2
+    desk.press(NEXT_MODE)
+    hand.listen(0.0)
+    desk.press("ahead")
+    heard = hand.listen(0.01)
+    assert not twist(heard).any()
+    assert "held" in heard.hint
+
+
+def test_one_mode_alone_says_so(desk):
+    hand = Hand(desk, (Mode.END_EFFECTOR,), 4)
+    desk.press(NEXT_MODE)
+    heard = hand.listen(0.0)
+    assert heard.command.mode is Mode.END_EFFECTOR
+    assert "only" in heard.hint
+
+
+def test_clutch_stays_until_it_is_pressed_again(hand, desk):
+    desk.press(CLUTCH)
+    assert hand.listen(0.0).command.clutch
+    assert hand.listen(5.0).command.clutch
+    desk.press(CLUTCH)
+    assert not hand.listen(6.0).command.clutch
+
+
+def test_without_a_browser_the_arm_is_held_and_sliders_go_back(hand, desk):
+    desk.sliders[X] = 0.2
+    hand.listen(0.0)
+    desk.watched = False
+    heard = hand.listen(0.01)
+    assert heard.command.clutch
+    assert not twist(heard).any()
+    assert "no browser" in heard.lost
+    desk.watched = True
+    assert not twist(hand.listen(0.02)).any()
+
+
+def test_what_a_gamepad_said_to_a_browser_that_is_gone_is_forgotten(hand, desk):
+    rest, push = Pad((0.0,) * 4, ()), Pad((0.0, -1.0, 0.0, 0.0), ())
+    desk.pad = rest
+    hand.listen(0.0)
+    hand.listen(0.01)
+    desk.pad = push
+    assert twist(hand.listen(0.02))[0] == pytest.approx(desk.sliders[SPEED])
+    desk.watched = False
+    hand.listen(0.03)
+    desk.watched = True
+    for now in (0.04, 0.05, 9.0):
+        assert not twist(hand.listen(now)).any()
+    desk.pad = rest
+    hand.listen(9.1)
+    desk.pad = push
+    assert twist(hand.listen(9.2))[0] > 0.0
+
+
+def test_a_lost_gamepad_holds_the_arm_until_space(hand, desk):
+    desk.pad = Pad((0.0,) * 4, ())
+    hand.listen(0.0)
+    hand.listen(0.01)
+    desk.sliders[X] = 0.2
+    desk.pad = None
+    heard = hand.listen(0.02)
+    assert heard.command.clutch
+    assert "gamepad lost" in heard.lost
+    desk.press("ahead")
+    assert "gamepad lost" in hand.listen(0.5).lost
+    desk.press(STOP)
+    hand.listen(1.0)
+    assert hand.listen(1.01).lost == ""
+    desk.press("ahead")
+    assert twist(hand.listen(1.1))[0] > 0.0
+
+
+def test_gamepad_chooses_mode_and_group(hand, desk):
+    def push(*pressed):
+        desk.pad = Pad((0.0,) * 4, tuple(float(i in pressed) for i in range(17)))
+
+    push()
+    hand.listen(0.0)
+    push()
+    hand.listen(0.01)
+    push(0)
+    assert hand.listen(0.02).command.mode is Mode.NULL_SPACE
+    push(13)
+    hand.listen(0.03)
+    assert hand.group == 3
+    push(12)
+    hand.listen(0.04)
+    push(15)
+    command = hand.listen(0.05).command
+    assert (command.group, command.sign) == (0, 1)
+
+
+def test_back_to_the_start_holds_for_a_step(hand, desk):
+    desk.sliders[X] = 0.2
+    desk.press(BACK)
+    heard = hand.listen(0.0)
+    assert heard.back
+    assert not twist(heard).any()
+    assert not hand.listen(0.01).back

@@ -1,0 +1,276 @@
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError
+from tcs.output.view import open_meshcat
+from tcs.output.view.teleop import LivePage, Recorder, Stage, start_posture
+from tcs.output.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
+from tcs.output.view.teleop.live import key_name
+from tcs.output.view.teleop.panel import LIMIT, SINGULAR, readout
+from tcs.teleop import Mode, Settings, load_arm
+from tests.output.view.teleop.conftest import MODES, Instead
+
+FORWARD, DOWN = "move x [m/s]", "move z [m/s]"
+
+
+def drive(page, steps):
+    for _ in range(steps):
+        page.step()
+
+
+def test_a_slider_moves_the_tool(page, desk):
+    before = page.last.p.copy()
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 50)
+    moved = page.last.p - before
+    # Half a second at 0.1 m/s, less what it takes to start.
+    assert 0.03 < moved[0] <= 0.05
+    assert np.abs(moved[1:]).max() < 1e-3
+
+
+def test_a_group_turns_while_the_tool_stays(page, desk):
+    desk.press(NEXT_MODE)
+    drive(page, 1)
+    before, elbow = page.last.p.copy(), page.session.arm.link_poses(page.last.joints)[3, :3, 3]
+    assert page.last.mode is Mode.NULL_SPACE
+    for _ in range(20):
+        desk.press(TURN_UP)
+        drive(page, 5)
+    after = page.session.arm.link_poses(page.last.joints)[3, :3, 3]
+    # The bound on the tool is 0.1 mm.
+    assert np.linalg.norm(page.last.p - before) < 1e-4
+    assert np.linalg.norm(after - elbow) > 0.02
+
+
+def test_back_to_the_start(page, desk, ready, meshcat):
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 50)
+    for _ in range(5):
+        drive(page, 10)
+        page.show()
+    assert meshcat.HasPath("path")
+    desk.press(BACK)
+    drive(page, 2)
+    assert not meshcat.HasPath("path")
+    np.testing.assert_array_equal(page.last.joints, ready)
+    assert not page.last.rates.any()
+
+
+def test_a_lost_browser_is_told_once_and_recorded_as_a_stop(page, desk, told):
+    desk.sliders[FORWARD] = 0.1
+    drive(page, 20)
+    desk.watched = False
+    drive(page, 200)
+    assert page.last.stopped
+    assert not page.last.rates.any()
+    assert told == ["no browser looks at this page: the arm holds still until one does."]
+
+
+def test_what_is_said_stays_to_be_read(page, desk):
+    desk.watched = False
+    drive(page, 1)
+    said = page.last.reason
+    desk.watched = True
+    drive(page, 1)
+    assert page.last.reason == ""
+    begun = page._said_until
+    assert page.said(begun - 0.01) == said
+    assert page.said(begun + 0.01) == ""
+
+
+def test_a_limit_turns_its_bar_red_and_names_the_joint(page, desk, iiwa):
+    desk.sliders[DOWN] = -0.25
+    drive(page, 400)
+    page.show()
+    at = np.flatnonzero(page.last.limits)
+    assert len(at)
+    now = readout(iiwa, page.last.joints, page.last.limits, page.last.singular, "", "")
+    assert all(now.states[i] == LIMIT for i in at)
+    assert f"joint {at[0] + 1}" in page.said(page._said_until + 1.0)
+
+
+def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
+    desk.sliders[FORWARD] = 0.25
+    drive(page, 400)
+    assert page.last.singular
+    now = readout(iiwa, page.last.joints, page.last.limits, True, "", "")
+    assert SINGULAR in now.states
+    assert "singular" in page.said(page._said_until + 1.0)
+
+
+def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, desk):
+    recorder = Recorder(iiwa)
+    page = LivePage(
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=lambda _: None,
+        on_step=recorder.add,
+    )  # fmt: skip
+    page.hand.source = desk
+    desk.watched = False
+    drive(page, 5)
+    assert recorder.run({}) is None
+    desk.watched = True
+    drive(page, 5)
+    assert len(recorder.run({})) == 5
+
+
+def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
+    from tcs.output.view.teleop import recorder as module
+    from tcs.teleop import Command, Teleoperation
+    from tcs.teleop.trial import run_of
+
+    monkeypatch.setattr(module, "_BLOCK", 10)
+    session = Teleoperation(iiwa, ready)
+    asked = [Command(linear=(0.1, 0.0, 0.0)), Command(mode=Mode.NULL_SPACE, group=0, sign=1)]
+    rows = [(asked[i > 20], session.step(asked[i > 20])) for i in range(33)]
+    found = Recorder(iiwa)
+    for row in rows:
+        found.add(*row)
+    assert len(found) == 33
+    run, whole = found.run({"robot": "iiwa7"}), run_of(iiwa, rows, {})
+    assert run.metadata == {"robot": "iiwa7"}
+    for name in ("time", "joints", "position", "quaternion", "linear", "group", "mode", "limits"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(whole, name), err_msg=name)
+
+
+def test_the_page_has_all_its_controls(page, meshcat):
+    names = {f"{name} ({key_name(key)})" for name, key in buttons(4).items()}
+    assert set(meshcat.GetButtonNames()) >= names
+    assert set(meshcat.GetSliderNames()) >= set(sliders())
+
+
+@pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
+def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
+    arm = load_arm(name, lift=0.1)
+    stage = Stage(arm, meshes=False)
+    start = start_posture(arm, stage)
+    assert arm.beyond(start) == ""
+    stage.poses(start)
+    assert stage.contacts() is None
+    np.testing.assert_array_equal(start, start_posture(arm, stage))
+    page = LivePage(
+        meshcat, stage, arm, start, settings=Settings(), modes=MODES, tell=lambda _: None
+    )
+    before = page.last.p.copy()
+    assert before[0] > arm.frames[0, 0, 3]
+    assert not page.last.singular
+    page.hand.source = None
+    for way in np.vstack([np.eye(3), -np.eye(3)]):
+        page.session.place(start)
+        for _ in range(60):
+            last = page.session.step(_towards(0.1 * way))
+        assert (last.p - before) @ way > 0.03, f"{name} is blocked along {way}"
+
+
+def _towards(linear):
+    from tcs.teleop import Command
+
+    return Command(linear=linear)
+
+
+def test_stage_moves_what_hangs_on_the_arm_and_nothing_else(iiwa_stage, iiwa, ready):
+    poses = iiwa_stage.poses(ready)
+    # Seven links; column and base stand still.
+    assert len(poses) == 7
+    tool = iiwa.kinematics(ready).p
+    farthest = max(poses.values(), key=lambda one: one.translation()[0]).translation()
+    # The last link's frame lies within its flange's length of the tool.
+    assert np.linalg.norm(farthest - tool) < 0.1
+
+
+def test_a_posture_that_touches_itself_is_told(page, iiwa_stage, iiwa, ready):
+    folded = ready.copy()
+    folded[[1, 3]] = 2.0, -2.0
+    page.session.place(folded)
+    drive(page, 1)
+    for _ in range(8):
+        page.show()
+    assert "touches" in page.said(page._said_until + 1.0)
+
+
+def test_a_port_that_is_taken_is_told(shared_meshcat):
+    with pytest.raises(OutputError, match=f"port {shared_meshcat.port()}"):
+        open_meshcat(shared_meshcat.port())
+
+
+def test_a_run_at_the_pace_of_the_clock(page):
+    page.run(duration=0.3)
+    # 30 steps in 0.3 s; a busy machine may drop some, and a step may fall on either end.
+    assert page.steps.count + page.dropped in range(28, 34)
+    # A loop that is late takes up to 7 steps from picture to picture.
+    assert page.pictures.count - 1 >= page.steps.count // 7
+
+
+def test_an_arm_that_never_points_ahead_begins_in_the_middle(iiwa, iiwa_stage, monkeypatch):
+    monkeypatch.setattr("tcs.output.view.teleop.start._AHEAD", 1.1)
+    np.testing.assert_allclose(start_posture(iiwa, iiwa_stage), np.zeros(7), atol=1e-12)
+
+
+def test_a_reason_that_comes_and_goes_is_told_once(page, desk, told):
+    for i in range(6):
+        desk.watched = bool(i % 2)
+        drive(page, 1)
+    assert len(told) == 1
+    page._said_until = 0.0
+    desk.watched = False
+    drive(page, 1)
+    assert len(told) == 2
+
+
+def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
+    assert page.mode_line() == "end-effector mode"
+    desk.press("clutch")
+    drive(page, 1)
+    assert page.mode_line() == "end-effector mode; clutch in"
+    desk.press("clutch")
+    desk.watched = False
+    drive(page, 1)
+    assert page.mode_line() == "end-effector mode"
+
+
+def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
+    moved = {}
+
+    monkeypatch.setattr(page, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))
+    desk.sliders[FORWARD] = 0.2
+    drive(page, 4)
+    page.show()
+    np.testing.assert_allclose(moved["target"].translation(), page.last.target_p, atol=1e-12)
+    np.testing.assert_allclose(moved["tool"].translation(), page.last.p, atol=1e-12)
+    # It runs ahead of a tool that has to speed up first.
+    assert (page.last.target_p - page.last.p)[0] > 1e-4
+
+
+def test_a_key_moves_the_arm_for_a_moment_of_the_clock(page, desk):
+    desk.press("ahead")
+    drive(page, 5)
+    assert np.any(page._heard.command.linear)
+    time.sleep(TAP)
+    drive(page, 1)
+    assert not np.any(page._heard.command.linear)
+
+
+def test_hints_are_said(page, desk):
+    desk.press(TURN_UP)
+    drive(page, 1)
+    assert "null-space mode" in page.said(time.perf_counter())
+
+
+def test_postures_that_touch_are_passed_over(iiwa, iiwa_stage):
+    class Touchy:
+        looked = 0
+
+        def poses(self, joints):
+            return iiwa_stage.poses(joints)
+
+        def contacts(self):
+            self.looked += 1
+            return ("arm", "column") if self.looked < 3 else None
+
+    stage = Touchy()
+    other = start_posture(iiwa, stage)
+    assert stage.looked == 3
+    assert not np.array_equal(other, start_posture(iiwa, iiwa_stage))

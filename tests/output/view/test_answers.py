@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.errors import GridError
+from tcs.output.view import Answers, legend
+from tcs.output.view.answers import COLOUR_NAMES, COLOURS
+from tcs.placement.tables import Reason
+from tests.output.view.conftest import made, one_configuration
+from tests.placement.tables.small import small_grid
+
+
+def test_verdict_is_what_the_table_holds(bed):
+    scores = bed.scores
+    for index in (0, 17, bed.grid.size - 1):
+        verdict = bed.verdict(index)
+        assert verdict.configuration == bed.grid.configuration(index)
+        assert verdict.reasons == tuple(Reason(code) for code in scores.reason[index])
+        assert verdict.reached == tuple(np.flatnonzero(scores.reached[index]))
+        assert verdict.reachability == pytest.approx(scores.reachability()[index])
+        assert verdict.manipulability == pytest.approx(scores.manipulability()[index])
+        for pair, named in zip(scores.pair[index], verdict.pairs, strict=True):
+            assert named == (None if pair < 0 else scores.pair_names[pair])
+
+
+def test_verdict_of_no_configuration_is_refused(bed):
+    with pytest.raises(GridError, match="no configuration"):
+        bed.verdict(bed.grid.size)
+
+
+def test_line_tells_each_goal_that_is_missed():
+    grid = small_grid(1, 1, 1, 1)
+    scores = one_configuration(
+        [Reason.REACHED, Reason.TOO_FAR, Reason.ARM_BLOCKED, Reason.TOO_FAR], [-1, -1, 0, -1]
+    )
+    verdict = Answers(grid, scores, (0,), None).verdict(0)
+    assert verdict.line(0) == (
+        "goal 0 reached; 1 of 4 goals, P_R 25%, P_M 0.125; too far: 1 3; arm blocked: 2"
+    )
+    assert verdict.line(2).startswith("goal 2 not reached: arm blocked (forearm at head); ")
+
+
+def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
+    served = [bed.served(number) for number in range(len(bed.members))]
+    together = sorted(goal for goals in served for goal in goals)
+    reached = bed.scores.reached[list(bed.members)].any(axis=0)
+    assert together == np.flatnonzero(reached).tolist()
+    for number, goals in enumerate(served):
+        best = bed.scores.isotropy[list(bed.members)].max(axis=0)
+        for goal in goals:
+            assert bed.scores.isotropy[bed.members[number], goal] == best[goal]
+
+
+def test_a_goal_that_nobody_reaches_is_served_by_nobody():
+    answers = made(small_grid(), 4, (), share=0.3)
+    reached = answers.scores.reached
+    first = int(np.flatnonzero(reached.sum(axis=1) == 1)[0])
+    answers = dataclasses.replace(answers, members=(first,))
+    assert answers.served(0) == tuple(np.flatnonzero(reached[first]))
+
+
+def test_joints_are_those_of_the_table(bed):
+    index = bed.members[0]
+    for goal in range(bed.goals):
+        joints = bed.joints(index, goal)
+        assert (joints is not None) == bed.scores.reached[index, goal]
+
+
+def test_every_reason_has_a_colour_of_its_own():
+    assert set(COLOURS) == set(COLOUR_NAMES) == set(Reason)
+    assert len(set(COLOURS.values())) == len(set(COLOUR_NAMES.values())) == len(Reason)
+    assert all(name in legend() for name in COLOUR_NAMES.values())

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.model.scene import Scene
+from tcs.output.view import Props, Viewer, open_meshcat
+from tests.output.view.browser import chromium
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def page():
+    yield from chromium()
+
+
+@pytest.fixture
+def viewer(spec, shaving, shaving_answers):
+    props = Props(Scene(spec, meshes=True), shaving, shaving_answers, meshes=True)
+    meshcat = open_meshcat()
+    found = Viewer(meshcat, props, shaving_answers, lambda _: None)
+    found.url = meshcat.web_url()
+    return found
+
+
+@pytest.fixture
+def live(page, viewer):
+    """The viewer, seen in the browser."""
+    page.open(viewer.url, "robot")
+    page.wait(lambda: page.has("room") and page.has("floor"))
+    return page
+
+
+def expected(answers, index):
+    """The arrows that should be seen."""
+    return {g: [one.name.lower()] for g, one in enumerate(answers.verdict(index).reasons)}
+
+
+def changed(before, after):
+    """How many pixels look different."""
+    return np.count_nonzero(np.any(abs(before - after) > 20, axis=2))
+
+
+def controller(page, name):
+    """The slider of that name, as an element to click at."""
+    return page.driver.execute_script(
+        "return [...document.querySelectorAll('.dg .cr')].find(row => "
+        "row.querySelector('.property-name')?.textContent === arguments[0])"
+        "?.querySelector('.slider')",
+        name,
+    )
+
+
+def test_viewer_shows_and_answers(live, viewer, shaving_answers):
+    assert changed(live.picture(), live.picture("robot")) > 3000
+    assert changed(live.picture(), live.picture("room")) > 3000
+    assert changed(live.picture(), live.picture("goals")) > 50
+    # The map lies under both.
+    bare = live.picture("robot", "room")
+    assert changed(bare, live.picture("robot", "room", "floor")) > 300
+    here = int(shaving_answers.grid.flat(viewer.state.along))
+    assert live.arrows() == expected(shaving_answers, here)
+    assert live.complaints() == []
+    ours = (viewer.url, "data:", "blob:")
+    assert [name for name in live.fetched() if not name.startswith(ours)] == []
+
+
+def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_answers):
+    from selenium.webdriver import ActionChains
+
+    live.driver.execute_script("viewer.gui.open()")
+    names = live.driver.execute_script("return Object.keys(viewer.gui_controllers)")
+    assert {"set member", "goal", "stand at x [m]", "heading [deg]"} <= set(names)
+    before = live.arrows()
+    slider = controller(live, "stand at x [m]")
+    live.driver.execute_script("arguments[0].scrollIntoView()", slider)
+    right = slider.size["width"] // 2 - 3
+    ActionChains(live.driver).move_to_element_with_offset(slider, right, 0).click().perform()
+    live.wait(viewer.look)
+    there = int(shaving_answers.grid.flat(viewer.state.along))
+    assert shaving_answers.grid.configuration(there).base_x == pytest.approx(-0.1)
+    live.wait(lambda: live.arrows() == expected(shaving_answers, there))
+    assert live.arrows() != before
+    goal = viewer.state.goal
+    ActionChains(live.driver).send_keys("g").perform()
+    live.wait(viewer.look)
+    assert viewer.state.goal == (goal + 1) % shaving_answers.goals
+    assert live.complaints() == []

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.model.scene import Scene
+from tcs.output.view import Answers, Props, export, open_meshcat, page, script
+from tests.output.view.browser import chromium
+
+
+def test_every_goal_of_the_set_is_shown_once_at_the_member_that_serves_it_best(bed):
+    steps = script(bed)
+    reached = bed.scores.reached[list(bed.members)].any(axis=0)
+    assert sorted(step.goal for step in steps) == list(reached.nonzero()[0])
+    for step in steps:
+        assert bed.members[step.member] == step.index
+        assert bed.joints(step.index, step.goal) is not None
+
+
+def test_without_a_set_something_is_shown_all_the_same(props, shaving_answers):
+    nothing = Answers(shaving_answers.grid, shaving_answers.scores, (), None)
+    assert len(script(nothing)) == 1
+    assert "No goal is reached" in page(open_meshcat(), props, nothing, title="Nothing")
+
+
+def test_page_tells_what_it_is_and_fits_into_three_megabytes(props, shaving_answers):
+    text = page(
+        open_meshcat(), props, shaving_answers, title="Shaving & more", notes=["By <nobody>."]
+    )
+    assert "Shaving &amp; more" in text
+    assert "By &lt;nobody&gt;." in text
+    assert text.count("</body>") == 1
+    assert len(text.encode()) < 3e6
+
+
+class Recorder:
+    """An animation that tells what it was told."""
+
+    def __init__(self, rate):
+        self.poses, self.shown = {}, {}
+
+    def SetTransform(self, frame, path, pose):
+        self.poses.setdefault(path, {})[frame] = pose.GetAsMatrix34()
+
+    def SetProperty(self, frame, path, name, visible):
+        assert name == "visible"
+        self.shown.setdefault(path, {})[frame] = visible
+
+
+def test_whatever_is_shown_stands_still_until_the_next_goal(props, shaving_answers, monkeypatch):
+    """The browser moves things in straight lines between keys: there must be none to move along."""
+    monkeypatch.setattr(export, "MeshcatAnimation", Recorder)
+    shots = [props.snapshot(step.index, step.goal) for step in script(shaving_answers)]
+    seen = [set(map(str, shot.arrows)) for shot in shots]
+    assert len({frozenset(one) for one in seen}) > 1
+    found = export._animation(shots, seen)
+    hold = export._HOLD
+    moved = 0
+    for path, keys in found.poses.items():
+        frames = sorted(keys)
+        moved += len(frames) > 2
+        for number, shot in enumerate(shots):
+            for frame in (number * hold, number * hold + hold // 2, (number + 1) * hold - 1):
+                before = max(key for key in frames if key <= frame)
+                after = min((key for key in frames if key >= frame), default=before)
+                np.testing.assert_array_equal(keys[before], shot.poses[path])
+                np.testing.assert_array_equal(keys[after], shot.poses[path])
+    assert moved > 1
+    for path, keys in found.shown.items():
+        for number, one in enumerate(seen):
+            assert keys[max(key for key in keys if key <= number * hold)] == (path in one)
+
+
+def test_captions_tell_when_each_member_is_shown(shaving_answers):
+    steps = script(shaving_answers)
+    lines = export._captions(shaving_answers, steps)
+    times = [tuple(map(float, line.split(" s:")[0].split(" to "))) for line in lines]
+    assert times[0][0] == 0.0
+    assert [start for start, _ in times[1:]] == [end for _, end in times[:-1]]
+    assert times[-1][1] == pytest.approx(len(steps) * 1.5)
+
+
+@pytest.mark.parametrize("name", ["pr2", "tiago"])
+@pytest.mark.slow
+def test_page_with_meshes_fits_into_fifteen_megabytes(
+    spec, shaving, shaving_answers, name, request
+):
+    from tcs.model.robots import load_robot
+
+    scene = Scene(dataclasses.replace(spec, robot=load_robot(name)), meshes=True)
+    props = Props(scene, shaving, shaving_answers, meshes=True)
+    text = page(open_meshcat(), props, shaving_answers, title="Meshes")
+    assert 3e6 < len(text.encode()) < 15e6
+
+
+@pytest.fixture(scope="module")
+def browser():
+    yield from chromium()
+
+
+@pytest.mark.slow
+def test_page_plays_through_the_set_without_a_server(browser, props, shaving_answers, tmp_path):
+    meshcat = open_meshcat()
+    path = tmp_path / "scene.html"
+    path.write_text(page(meshcat, props, shaving_answers, title="Shaving"))
+    del meshcat
+    browser.open(path.as_uri(), "robot")
+    steps = script(shaving_answers)
+    seek = "viewer.animator.pause(); viewer.animator.seek(arguments[0]);"
+    where = """
+    const p = viewer.scene_tree.find(["drake", "robot"]).object.position; return [p.x, p.y, p.z];
+    """
+    for number, step in enumerate(steps):
+        # In the middle of its second and a half.
+        browser.driver.execute_script(seek, 1.5 * number + 0.75)
+        verdict = shaving_answers.verdict(step.index)
+        shown = {g: [one.name.lower()] for g, one in enumerate(verdict.reasons)}
+        assert browser.arrows() == shown
+        at = verdict.configuration
+        x, y, z = browser.driver.execute_script(where)
+        assert (x, y, z) == pytest.approx((at.base_x, at.base_y, 0.0), abs=1e-6)
+    assert {step.member for step in steps} == {0, 1}
+    assert browser.complaints() == []
+    assert [name for name in browser.fetched() if not name.startswith(("data:", "blob:"))] == []
+    whole = browser.picture()
+    assert (abs(whole - browser.picture("robot")) > 20).any(axis=2).sum() > 3000
+    assert (abs(whole - browser.picture("room")) > 20).any(axis=2).sum() > 3000

@@ -1,0 +1,57 @@
+"""Real but small rows: a few places beside the wheelchair and the bed."""
+
+from __future__ import annotations
+
+import pytest
+
+from tcs.placement.robustness import Trials
+from tcs.placement.scoring import score
+from tests.rooms import BESIDE, write_room
+
+BED = {
+    "bed_height": (0, 0.2, 2),
+    "head_rest": (35, 35, 2),
+    "base_x": (0.4, 0.3, 4),
+    "base_y": (-1, 1.8, 2),
+    "base_yaw": (0, 90, 4),
+    "torso": (0.15, 0.15, 2),
+}
+FOUND = {"person_y": (0, 0.05, 2)}
+
+
+@pytest.fixture(scope="session")
+def rooms(tmp_path_factory):
+    """Paths of two environment files of the user's own, by name."""
+    folder = tmp_path_factory.mktemp("rooms")
+    return {
+        "chair": write_room(folder, "small-chair", BESIDE),
+        "bed": write_room(folder, "small-bed", BED, based_on="bed", observed=FOUND),
+    }
+
+
+@pytest.fixture(scope="session")
+def chair_file(rooms):
+    """Shaving in the wheelchair, from a few places."""
+    return score("shaving", rooms["chair"])
+
+
+@pytest.fixture(scope="session")
+def bed_file(rooms):
+    """Bathing on the bed, from a few places, for two shifts of the person."""
+    return score("bathing", rooms["bed"])
+
+
+@pytest.fixture(scope="session")
+def chair_trials(chair_file):
+    return Trials.of(chair_file)
+
+
+@pytest.fixture(scope="session")
+def bed_trials(bed_file):
+    return Trials.of(bed_file)
+
+
+@pytest.fixture(scope="session", params=["chair", "bed"])
+def trials(request):
+    """Both, one after the other."""
+    return request.getfixturevalue(f"{request.param}_trials")

@@ -1,0 +1,131 @@
+"""Why goals are lost when the room is off."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tcs.placement.robustness import evaluate, losses
+from tcs.placement.tables import Reason
+
+
+@pytest.fixture(scope="module")
+def found(trials):
+    evaluation = evaluate(trials, samples=150)
+    return evaluation, losses(trials, evaluation).goals
+
+
+def test_every_goal_that_is_lost_is_told_with_its_success(found):
+    evaluation, told = found
+    lost = {loss.goal: loss.success for loss in told}
+    assert lost == {
+        goal: pytest.approx(share, abs=1e-12)
+        for goal, share in enumerate(evaluation.per_goal)
+        if share < 1.0
+    }
+    assert [loss.success for loss in told] == sorted(lost.values())
+
+
+def test_no_set_reaches_more_than_the_ceiling(trials):
+    evaluation = evaluate(trials, samples=150)
+    ceiling = losses(trials, evaluation).ceiling
+    # Means of the same samples: exact but for the order of adding up.
+    assert evaluation.summary.mean <= ceiling + 1e-12 <= 1.0 + 2e-12
+
+
+def test_reasons_are_those_of_losses_alone(found):
+    _, told = found
+    assert told
+    for loss in told:
+        assert sum(loss.reasons.values()) == pytest.approx(1.0, abs=1e-12)
+        assert Reason.REACHED not in loss.reasons
+        # The base is not checked again.
+        assert Reason.BODY_BLOCKED not in loss.reasons
+        assert (loss.pair is None) == (loss.pair_share == 0.0)
+        blocked = (Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED)
+        assert loss.pair_share <= sum(loss.reasons.get(r, 0.0) for r in blocked) + 1e-12
+
+
+def test_the_joint_that_is_told_is_off_in_the_losses(trials, found):
+    evaluation, told = found
+    for loss in told:
+        rows = ~evaluation.reached[:, loss.goal]
+        off = evaluation.offsets[loss.joint]
+        assert loss.tilt == pytest.approx(off[rows].mean() / off.std(), abs=1e-12)
+
+
+def test_a_person_lifted_away_is_too_far(chair_trials):
+    evaluation = evaluate(chair_trials, samples=4)
+    away = {name: np.zeros(3) for name in evaluation.offsets}
+    # The seated person's x points backwards: -0.9 m is far in front of the chair.
+    away["person_x"] = np.array([0.0, -0.9, 0.9])
+    found = chair_trials.outcome(int(evaluation.sets[0][0]), away)
+    assert (found.reason[0] == Reason.REACHED).any()
+    assert not (found.reason[1:] == Reason.REACHED).all(axis=1).any()
+    assert (found.reason[1:] == Reason.TOO_FAR).any()
+
+
+def by_hand():
+    """Four samples, three goals, two members whose outcomes are written down, and their room."""
+    reached, far, gripper, arm = (
+        Reason.REACHED, Reason.TOO_FAR, Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED,
+    )  # fmt: skip
+    # Bodies of the robot: base 0, hand 1; then a contact is robot body * 5 + other, where others
+    # are bed 0, person 1, chair 2, base 3, hand 4.
+    outcomes = [
+        SimpleNamespace(
+            reason=np.array([[reached, gripper, reached], [reached, gripper, far],
+                             [arm, gripper, reached], [reached, reached, reached]]),
+            contact=np.array([[-1, 5, -1], [-1, 5, -1], [6, 5, -1], [-1, -1, -1]]),
+        ),
+        SimpleNamespace(
+            reason=np.array([[far, gripper, far], [far, far, far],
+                             [arm, gripper, far], [far, far, far]]),
+            contact=np.array([[-1, 5, -1], [-1, -1, -1], [8, 5, -1], [-1, -1, -1]]),
+        ),
+    ]  # fmt: skip
+    best = np.any([found.reason == Reason.REACHED for found in outcomes], axis=0)
+    trials = SimpleNamespace(
+        outcome=lambda h, offsets: outcomes[h],
+        lowered=SimpleNamespace(
+            robot_bodies=("base", "hand"), room_bodies=("bed", "person", "chair")
+        ),
+        job=SimpleNamespace(task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3)),
+    )
+    evaluation = SimpleNamespace(
+        reached=best, sets=np.array([[0, 1]]), weights=np.array([0.5, 0.25, 0.25]),
+        offsets={"chair_x": np.array([0.1, 0.1, 0.2, 0.0]), "person_y": np.array([1, 1, -3, 1.0])},
+    )  # fmt: skip
+    return trials, evaluation
+
+
+def test_losses_by_hand():
+    found = losses(*by_hand())
+    told = {loss.goal: loss for loss in found.goals}
+    assert [loss.goal for loss in found.goals] == [1, 0, 2]
+    assert [told[g].success for g in range(3)] == [0.75, 0.25, 0.75]
+    # Only where the gripper is in the way from both places can no set do better: goal 1, in
+    # samples 0 and 2.
+    assert found.ceiling == pytest.approx(1.0 - 0.25 * 2 / 4)
+    assert (told[0].pair, told[0].pair_share) == (("hand", "person"), 1.0)
+    assert (told[1].pair, told[1].pair_share) == (("hand", "bed"), 1.0)
+    assert told[2].pair is None
+    assert told[0].reasons == {Reason.ARM_BLOCKED: 1.0}
+    assert told[1].reasons == {Reason.GRIPPER_BLOCKED: 1.0}
+    # Sample 2 loses goal 0: the chair is 0.2 / 0.0707 of its deviations off, the person -3 / 1.73.
+    assert told[0].joint == "chair_x"
+    assert told[0].tilt == pytest.approx(2.0 * np.sqrt(2.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_error_to_either_side_may_tell_losses_best(sign):
+    trials, evaluation = by_hand()
+    evaluation.offsets = {
+        "chair_x": np.array([0.1, -0.1, 0.05, 0.0]),
+        "person_y": sign * np.array([1.0, 1.0, -3.0, 1.0]),
+    }
+    (loss,) = (loss for loss in losses(trials, evaluation).goals if loss.goal == 0)
+    assert loss.joint == "person_y"
+    assert loss.tilt == pytest.approx(-sign * 3.0 / np.sqrt(3.0))

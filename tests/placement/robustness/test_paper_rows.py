@@ -1,0 +1,37 @@
+"""Every row of Table I: without error, evaluations are the offline scores, goal by goal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.model.scene import JointError
+from tcs.placement.robustness import Trials, evaluate
+from tcs.placement.scoring import all_rows, score
+
+NOTHING = {
+    "bed": {"person_x": JointError(distribution="normal", std=0.0)},
+    "wheelchair": {
+        "wheelchair_yaw": JointError(distribution="normal", std_deg=0.0),
+        "head_tilt": JointError(distribution="uniform", half_width_deg=0.0),
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("task", "environment"), all_rows())
+def test_without_error_every_row_gives_its_offline_score(task, environment, rng):
+    file = score(task, environment)
+    trials = Trials.of(file, errors=NOTHING[environment.split("-")[0]])
+    sets = file.nominal.sets
+    for select in ("best", "single"):
+        found = evaluate(trials, samples=2, select=select)
+        assert np.all(found.shares == found.reachability)
+    members = rng.choice(sets.candidates, 200, replace=False)
+    reached = trials.reached(members, trials.errors.draw(1, 0))[:, 0]
+    assert np.array_equal(reached, sets.reached[np.searchsorted(sets.candidates, members)])
+    # Configurations whose base is blocked reach nothing offline, and here when it is checked.
+    everywhere = rng.choice(trials.job.grid.size, 2000, replace=False)
+    checked = Trials.of(file, errors=trials.errors.errors, check_base=True)
+    again = checked.reached(everywhere, trials.errors.draw(1, 0))[:, 0]
+    assert np.array_equal(again, file.nominal.scores.reached[everywhere])

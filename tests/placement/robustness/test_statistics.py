@@ -1,0 +1,130 @@
+"""Means, intervals and tests, against closed forms and scipy on known samples."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tcs.placement.robustness import mean_of, rank_sum, signed_rank
+
+
+def test_mean_std_and_interval_by_hand():
+    found = mean_of([0.25, 0.5, 0.5, 0.75])
+    assert found.mean == 0.5
+    assert found.std == pytest.approx(math.sqrt(0.125 / 3))
+    # With a 0 and a 1: squares about 0.5 add up to 0.125 + 0.5. Student's t at 97.5 % of five
+    # degrees of freedom, from a printed table.
+    half = 2.5706 * math.sqrt(0.625 / 5) / math.sqrt(6)
+    assert found.ci95 == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
+
+
+def test_the_interval_stays_within_what_is_possible():
+    assert mean_of([0.0, 1.0, 1.0]).ci95 == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
+def test_equal_samples_claim_no_certainty(value):
+    found = mean_of(np.full(1000, value))
+    low, high = found.ci95
+    assert found.std == 0.0
+    assert low <= value <= high
+    # Something never seen in n samples happens in fewer than 3.7 / n of them (97.5 %).
+    assert 0.5e-3 < high - low < 3.7e-3
+    assert mean_of([value]).std == 0.0
+
+
+@pytest.mark.parametrize("count", [10, 64, 1024])
+def test_a_failure_never_makes_surer(count):
+    ends = []
+    for failures in range(6):
+        samples = np.ones(count)
+        samples[:failures] = 0.5
+        found = mean_of(samples)
+        assert found.ci95[0] <= found.mean <= found.ci95[1]
+        ends.append(found.ci95)
+    assert ends == sorted(ends, reverse=True)
+    assert len({low for low, _ in ends}) == 6
+
+
+@pytest.mark.parametrize("chance", [0.95, 0.99, 0.998])
+def test_the_interval_of_rare_failures_covers_as_often_as_it_says(rng, chance):
+    covered = 0
+    for _ in range(400):
+        low, high = mean_of(rng.binomial(1, chance, 500)).ci95
+        covered += low <= chance <= high
+    # Four standard errors of a share of 0.95 in 400; more often is no fault.
+    assert covered / 400 > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 400)
+
+
+def test_the_interval_covers_the_mean_as_often_as_it_says(rng):
+    # Shares of eight goals, each reached with probability 0.8.
+    covered = 0
+    for _ in range(400):
+        low, high = mean_of(rng.binomial(8, 0.8, 50) / 8).ci95
+        covered += low <= 0.8 <= high
+    # Four standard errors of a share of 0.95 in 400.
+    assert abs(covered / 400 - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 400)
+
+
+def test_rank_sum_is_scipys_with_ties_corrected(rng):
+    first, second = rng.binomial(8, 0.8, 200) / 8, rng.binomial(8, 0.7, 250) / 8
+    found = rank_sum(first, second)
+    assert found.test == "rank sum"
+    assert found.mean == pytest.approx(first.mean() - second.mean())
+    assert found.p == stats.mannwhitneyu(first, second, method="asymptotic").pvalue
+    # Without ties it is the rank sum of textbooks, but for the correction for continuity.
+    one, other = rng.normal(size=60), rng.normal(0.3, size=60)
+    assert rank_sum(one, other).p == pytest.approx(stats.ranksums(one, other).pvalue, rel=0.02)
+
+
+def test_ranks_do_not_see_the_rounding_of_shares(rng):
+    ones = rng.integers(0, 8, 200)
+    others = np.clip(ones + rng.integers(-1, 2, 200), 0, 7)
+    weights = np.full(7, 1 / 7)
+    # Shares as they come about, by adding up weights, in two different orders.
+    first = np.array([weights[:n].sum() for n in ones])
+    second = np.array([1.0 - weights[n:].sum() for n in others])
+    assert len(np.unique(np.abs(first - second))) > len(np.unique(np.abs(ones - others)))
+    for test in (rank_sum, signed_rank):
+        assert test(first, second).p == test(ones / 7.0, others / 7.0).p
+        assert test(first, second).p == pytest.approx(test(1.0 * ones, 1.0 * others).p, rel=1e-12)
+
+
+def test_zero_differences_take_their_ranks_as_pratt_has_it(rng):
+    """The normal approximation written out: zeros are ranked, and then left out of both sums."""
+    first, second = rng.binomial(8, 0.8, (2, 60)) / 8
+    off = first - second
+    n, zeros = off.size, int((off == 0.0).sum())
+    assert 5 < zeros < 40
+    sizes = np.abs(off)
+    ranks = np.array([(sizes < d).sum() + ((sizes == d).sum() + 1) / 2 for d in sizes])
+    mean = (n * (n + 1) - zeros * (zeros + 1)) / 4
+    variance = (n * (n + 1) * (2 * n + 1) - zeros * (zeros + 1) * (2 * zeros + 1)) / 24
+    ties = [int((sizes == d).sum()) for d in np.unique(sizes) if d > 0.0]
+    variance -= sum(t**3 - t for t in ties) / 48
+    z = abs(ranks[off > 0.0].sum() - mean) / math.sqrt(variance)
+    assert signed_rank(first, second).p == pytest.approx(math.erfc(z / math.sqrt(2)), rel=1e-9)
+
+
+def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
+    luck = rng.normal(size=100)
+    first, second = luck + 0.05, luck + rng.normal(0, 0.05, 100)
+    assert signed_rank(first, second).p < 1e-6
+    assert rank_sum(first, second).p > 0.1
+    low, high = signed_rank(first, second).ci95
+    assert low < 0.05 < high
+
+
+def test_equal_samples_do_not_differ():
+    ones = np.ones(10)
+    assert rank_sum(ones, ones).p == signed_rank(ones, ones).p == 1.0
+    assert signed_rank(ones, ones).ci95 == (0.0, 0.0)
+
+
+def test_p_is_even_where_nothing_differs(rng):
+    found = [signed_rank(*rng.binomial(8, 0.8, (2, 80)) / 8).p < 0.05 for _ in range(400)]
+    # Four standard errors of a share of 0.05 in 400.
+    assert abs(np.mean(found) - 0.05) < 4 * math.sqrt(0.05 * 0.95 / 400)

@@ -1,0 +1,229 @@
+"""Trials: no error changes nothing, and Drake confirms every solution in a displaced room."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tcs.errors import GridError, SelectionError, StoreMismatchError, TcsError
+from tcs.kernel.arrays import GridArrays
+from tcs.model.scene import JointError, environment_at, goal_poses
+from tcs.placement.robustness import Trials
+from tcs.placement.robustness import trials as trials_module
+from tcs.placement.scoring.verify import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
+from tcs.placement.tables import Reason
+from tests.kernel.judge import is_true
+
+
+def no_error(trials, samples):
+    return {name: np.zeros(samples) for name in trials.errors.errors}
+
+
+def some(rng, trials, count):
+    """Some of the configurations that reach a goal."""
+    return np.sort(rng.choice(trials.scored.sets.candidates, count, replace=False))
+
+
+def test_without_error_every_candidate_reaches_what_it_was_scored_to(trials):
+    for table in range(len(trials.file.tables)):
+        here = trials.at_table(table)
+        sets = here.scored.sets
+        assert len(sets.candidates) > 30
+        found = here.reached(sets.candidates, no_error(here, 2))
+        assert np.array_equal(found[:, 0], sets.reached)
+        assert np.array_equal(found[:, 1], sets.reached)
+
+
+def test_without_error_the_joints_are_the_stored_ones(bed_trials, rng):
+    scores = bed_trials.scored.scores
+    for h in some(rng, bed_trials, 10):
+        reached, joints = bed_trials.solutions(int(h), no_error(bed_trials, 1))
+        for g in np.flatnonzero(reached[0]):
+            assert np.array_equal(joints[0, g], scores.joints_of(int(h), int(g)))
+
+
+def test_a_blocked_base_counts_only_where_it_is_checked(chair_file, chair_trials):
+    # Configurations whose base touches the chair: all goals blocked, offline.
+    scores = chair_trials.scored.scores
+    blocked = np.flatnonzero(np.all(scores.reason == Reason.BODY_BLOCKED, axis=1))
+    nothing = no_error(chair_trials, 1)
+    checked = Trials.of(chair_file, check_base=True)
+    assert not checked.reached(blocked, nothing).any()
+    assert chair_trials.reached(blocked, nothing).any()
+    everything = np.arange(chair_trials.job.grid.size)
+    assert np.array_equal(checked.reached(everything, nothing)[:, 0], scores.reached)
+
+
+def test_checking_the_base_never_adds_a_goal(chair_file, chair_trials, rng):
+    # The chair comes at the robot from aside: a base that stood free no longer does.
+    members, offsets = some(rng, chair_trials, 30), {"wheelchair_y": np.linspace(-0.4, 0.4, 20)}
+    free = chair_trials.reached(members, offsets)
+    checked = Trials.of(chair_file, check_base=True).reached(members, offsets)
+    assert not np.any(checked & ~free)
+    assert np.count_nonzero(checked) < np.count_nonzero(free)
+
+
+def test_neither_threads_nor_batches_change_anything(trials, rng, monkeypatch):
+    members, offsets = some(rng, trials, 30), trials.errors.draw(25, 0)
+    found = trials.reached(members, offsets, jobs=1)
+    assert np.array_equal(trials.reached(members, offsets, jobs=3), found)
+    monkeypatch.setattr(trials_module, "AT_ONCE", 7)
+    monkeypatch.setattr(trials_module, "BATCH", 3)
+    assert np.array_equal(trials.reached(members, offsets), found)
+    assert np.array_equal(trials.reached(members[::-1], offsets)[::-1], found)
+
+
+def test_each_in_its_own_sample_is_the_diagonal_of_all(trials, rng):
+    members, offsets = some(rng, trials, 30), trials.errors.draw(30, 0)
+    every = trials.reached(members, offsets)
+    each = trials.reached_each(members, offsets)
+    assert np.array_equal(each, every[np.arange(30), np.arange(30)])
+    with pytest.raises(TcsError, match="29 configurations for 30 samples"):
+        trials.reached_each(members[1:], offsets)
+
+
+def test_progress_ends_with_everything_done(bed_trials, rng):
+    seen = []
+    members, offsets = some(rng, bed_trials, 5), bed_trials.errors.draw(4, 0)
+    bed_trials.reached(members, offsets, on_progress=lambda *step: seen.append(step))
+    assert seen[-1] == (20, 20)
+    assert [done for done, _ in seen] == sorted({done for done, _ in seen})
+
+
+def test_an_interrupt_in_the_middle_gets_through(bed_trials, rng):
+    def stop(_done, _total):
+        raise KeyboardInterrupt
+
+    before = bed_trials.scene.positions()
+    with pytest.raises(KeyboardInterrupt):
+        bed_trials.reached(some(rng, bed_trials, 5), bed_trials.errors.draw(9, 0), on_progress=stop)
+    assert np.array_equal(bed_trials.scene.positions(), before)
+
+
+def put(trials, member, offsets, sample):
+    """Set the live scene as the sample has it, by hand: robot, bed, and every joint that is off."""
+    scene, place = trials.scene, trials.job.grid.configuration(int(member))
+    scene.place_base(place.base_x, place.base_y, place.base_yaw)
+    scene.set_torso(place.torso)
+    believed = {**trials.file.observed_states[trials.table], **dict(place.environment)}
+    for name, value in {**dict.fromkeys(offsets, 0.0), **believed}.items():
+        off = offsets[name][sample] if name in offsets else 0.0
+        scene.set_joint(name, value + off)
+
+
+def test_drake_confirms_solutions_in_displaced_rooms(trials, rng):
+    """Random samples and members: the tool is at the displaced goal, and nothing touches."""
+    scene = trials.scene
+    offsets = trials.errors.draw(6, 11)
+    before, judged = scene.positions(), 0
+    for member in some(rng, trials, 12):
+        reached, joints = trials.solutions(int(member), offsets)
+        for sample, g in np.argwhere(reached):
+            put(trials, member, offsets, sample)
+            scene.set_arm(joints[sample, g])
+            X_TG = scene.tool_pose().inverse() @ goal_poses(scene, trials.job.task)[g]
+            assert np.linalg.norm(X_TG.translation()) < POSITION_BAR
+            assert X_TG.rotation().ToAngleAxis().angle() < ROTATION_BAR
+            for first, second, distance in scene.violations():
+                slack = scene.required_clearance(first, second) - CLEARANCE_ROUNDING
+                base_and_room = is_of_base(scene, first) and is_of_room(scene, second)
+                # The base is not checked, on purpose.
+                assert base_and_room or distance >= slack, (first, second, distance)
+            judged += 1
+    scene.restore(before)
+    assert judged > 50
+
+
+def is_of_base(scene, name):
+    return any(part.name == name and part.group.name == "BODY" for part in scene.built.parts)
+
+
+def is_of_room(scene, name):
+    return any(part.name == name and part.group.name == "ROOM" for part in scene.built.parts)
+
+
+@pytest.mark.slow
+def test_the_twin_confirms_solutions_in_displaced_rooms(trials, rng):
+    """The plain-loop twin, on arrays of one displaced room, with the base let through."""
+    offsets = trials.errors.draw(2, 5)
+    judged = 0
+    for member in some(rng, trials, 3):
+        reached, joints = trials.solutions(int(member), offsets)
+        place = trials.job.grid.configuration(int(member))
+        level = int(member) % trials.job.grid.axis("torso").count
+        believed = {**trials.file.observed_states[trials.table], **dict(place.environment)}
+        for sample in range(2):
+            state = {
+                name: believed.get(name, 0.0) + (offsets[name][sample] if name in offsets else 0.0)
+                for name in {**offsets, **believed}
+            }
+            arrays = environment_at(trials.lowered, trials.scene, trials.job.task, [state])
+            only = slice(level, level + 1)
+            arrays = arrays._replace(
+                arm_base_R=arrays.arm_base_R[only],
+                arm_base_p=arrays.arm_base_p[only],
+                body=arrays.body._replace(R=arrays.body.R[only], p=arrays.body.p[only]),
+                body_vs_room=np.zeros_like(arrays.body_vs_room),
+            )
+            at = (np.array([v]) for v in (place.base_x, place.base_y, place.base_yaw))
+            grid = GridArrays(1, *at, 1)
+            for g in np.flatnonzero(reached[sample]):
+                assert is_true(arrays, grid, 0, g, joints[sample, g])
+                judged += 1
+    assert judged > 2
+
+
+def test_a_joint_stops_at_its_limit(bed_file):
+    errors = {"head_rest": JointError(distribution="uniform", half_width_deg=20.0)}
+    trials = Trials.of(bed_file, errors=errors)
+    sets = trials.scored.sets
+    flat, high = (sets.candidates[sets.state % 2 == side][:1] for side in (0, 1))
+    up = {"head_rest": np.radians([-20.0, 5.0, 20.0])}
+    # The bed's head rest goes to 80 deg: 70 + 20 is beyond it, 35 + 20 is not.
+    assert trials.clipped(flat[None].astype(int), up) == 0
+    assert trials.clipped(high[None].astype(int), up) == 1
+    at_limit = {"head_rest": np.radians([10.0, 20.0, 500.0])}
+    found = trials.reached(high, at_limit)[0]
+    assert np.array_equal(found[0], found[1])
+    assert np.array_equal(found[0], found[2])
+
+
+def test_a_joint_that_is_stopped_counts_whatever_the_others_do(bed_trials):
+    member = bed_trials.scored.sets.candidates[None, :1].astype(int)
+    beyond, within = np.radians([200.0, 0.0, -200.0]), np.array([0.01, 0.01, 0.01])
+    for offsets in (
+        {"head_rest": beyond, "person_x": within},
+        {"person_x": within, "head_rest": beyond},
+    ):
+        assert bed_trials.clipped(member, offsets) == 2
+
+
+def test_a_joint_a_rounding_beyond_its_limit_stays_where_it_is(bed_trials):
+    """The last step of a grid may be; to move it back would be an error that nobody drew."""
+    believed = bed_trials._positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
+    limits = (believed + 1e-12, believed + 1.0)
+    joints = SimpleNamespace(limits=lambda name: limits)
+    scene = SimpleNamespace(built=SimpleNamespace(room_joints=joints))
+    found = dataclasses.replace(bed_trials, scene=scene)
+    positions, stopped = found._positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
+    assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]
+    assert stopped.tolist() == [False, False, True, True]
+
+
+def test_what_is_not_there_is_refused(bed_file, bed_trials):
+    offsets = no_error(bed_trials, 1)
+    with pytest.raises(GridError, match="no configuration 10000000"):
+        bed_trials.reached([10_000_000], offsets)
+    with pytest.raises(SelectionError, match="no table 7; the file has 2"):
+        Trials.of(bed_file, table=7)
+    with pytest.raises(TcsError, match="as many for each joint"):
+        bed_trials.reached([0], {"person_x": np.zeros(2), "person_y": np.zeros(3)})
+
+
+def test_a_file_of_other_models_is_refused(bed_file):
+    other = dataclasses.replace(bed_file, metadata={**bed_file.metadata, "scene_digest": "5f" * 32})
+    with pytest.raises(StoreMismatchError, match="from other models"):
+        Trials.of(other)

@@ -1,0 +1,141 @@
+"""The re-check of stored answers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.errors import StoreMismatchError, TcsError
+from tcs.model.grid import Grid
+from tcs.placement.scoring import build_sets, load_job, score, summary, verify
+from tcs.placement.scoring.verify import estimated_recall
+from tcs.placement.store import Scored
+
+
+def test_stored_answers_are_true(small_file):
+    found = verify(small_file, pairs=40, dense=20)
+    assert found.is_sound
+    assert found.checked == 40
+    assert found.false_reached == found.limit_violations == found.unconfirmed_hits == 0
+    assert 0.0 < found.max_position_error <= 1e-6
+    assert found.max_isotropy_error <= 1e-6
+    assert found.shortfall_checked == 20
+    assert set(found.to_json()) >= {"checked", "false_reached", "recall", "recall_ci95"}
+
+
+@pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited"])
+def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_room, measure):
+    file = score("shaving", small_room, measure=measure)
+    assert file.metadata["measure"] == summary(file)["measure"] == measure
+    found = verify(file, pairs=40, dense=10)
+    assert found.is_sound
+    assert found.measure == found.to_json()["measure"] == measure
+    # Refinement leaves next to nothing, by this measure too.
+    assert found.mean_shortfall < 1e-3
+    # The same answers, but by another measure: every number is off.
+    forged = dataclasses.replace(file, metadata={**file.metadata, "measure": "isotropy"})
+    wrong = verify(forged, pairs=40, dense=0)
+    assert wrong.false_reached == 0
+    assert wrong.max_isotropy_error > 1e-3
+    assert not wrong.is_sound
+    # Which goals are reached does not depend on the measure; how well they are, does.
+    np.testing.assert_array_equal(file.nominal.scores.reason, small_file.nominal.scores.reason)
+    reached = file.nominal.scores.reached
+    assert np.any(
+        file.nominal.scores.isotropy[reached] < small_file.nominal.scores.isotropy[reached]
+    )
+
+
+def with_joints(file, change):
+    joints = file.nominal.scores.arm_joints.copy()
+    change(joints)
+    scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
+    return dataclasses.replace(file, tables=(Scored.of(scores, file.nominal.sets),))
+
+
+def test_a_joint_moved_by_a_hundredth_is_found(small_file):
+    def nudge(joints):
+        joints[:, 3] -= 0.01
+
+    found = verify(with_joints(small_file, nudge), pairs=10, dense=0)
+    assert found.false_reached == 10
+    assert found.max_position_error > 1e-3
+    assert not found.is_sound
+
+
+def test_a_joint_beyond_its_limit_is_found(small_file):
+    def bend(joints):
+        joints[:, 3] = -0.1
+
+    found = verify(with_joints(small_file, bend), pairs=10, dense=0)
+    assert found.limit_violations == 10
+    assert not found.is_sound
+
+
+def test_an_arm_too_close_to_the_person_is_found(small_file, small_room):
+    # The same answers in a room that asks for 25 cm of distance: only contact differs.
+    text = small_room.read_text().replace("name: small-room", "name: tight-room")
+    tight = small_room.parent / "tight-room.yaml"
+    tight.write_text(text + "contact_margin: 0.25\n")
+    job = load_job("shaving", tight, "pr2")
+    metadata = {
+        **small_file.metadata,
+        "environment": str(tight),
+        "scene_digest": job.lowered(job.scene()).digest(),
+    }
+    found = verify(dataclasses.replace(small_file, metadata=metadata), pairs=20, dense=0)
+    assert found.false_reached == 20
+    assert found.max_position_error <= 1e-6
+
+
+def test_a_file_of_other_models_is_refused(small_file):
+    metadata = {**small_file.metadata, "scene_digest": "0" * 64}
+    with pytest.raises(StoreMismatchError, match="Score the task again"):
+        verify(dataclasses.replace(small_file, metadata=metadata))
+
+
+def test_reached_pairs_taken_away_are_missed(small_file):
+    # Declare every second reached pair blocked: the dense scan must find about all of them.
+    scores = small_file.nominal.scores
+    reason, isotropy = scores.reason.copy(), scores.isotropy.copy()
+    taken = np.argwhere(scores.reached)[::2]
+    reason[taken[:, 0], taken[:, 1]] = 5
+    isotropy[taken[:, 0], taken[:, 1]] = 0.0
+    kept = np.ones(len(scores.arm_joints), dtype=bool)
+    kept[::2] = False
+    stripped = dataclasses.replace(
+        scores, reason=reason, isotropy=isotropy, arm_joints=scores.arm_joints[kept]
+    )
+    sets = build_sets(stripped, Grid.from_dict(small_file.grid))
+    forged = dataclasses.replace(small_file, tables=(Scored.of(stripped, sets),))
+    found = verify(forged, pairs=0, dense=60)
+    assert found.missed > 0
+    assert found.recall < 0.9
+    assert found.recall_ci95[0] <= found.recall <= found.recall_ci95[1]
+
+
+def test_the_same_seed_checks_the_same_pairs(small_file):
+    first, again, other = (verify(small_file, pairs=10, dense=5, seed=s) for s in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+@pytest.mark.parametrize("bad", [{"pairs": -1}, {"dense": -1}])
+def test_negative_numbers_are_refused(small_file, bad):
+    with pytest.raises(TcsError, match="neither may be negative"):
+        verify(small_file, **bad)
+
+
+def test_recall_of_one_stratum_is_the_textbook_formula():
+    recall, (low, high) = estimated_recall(900, [500], [100], [4])
+    assert recall == pytest.approx(900 / (900 + 500 * 4 / 100))
+    # Clopper-Pearson limits of 4 in 100, from tables: 0.0110 and 0.0993.
+    assert low == pytest.approx(900 / (900 + 500 * 0.0993), rel=1e-4)
+    assert high == pytest.approx(900 / (900 + 500 * 0.0110), rel=1e-4)
+
+
+def test_an_unscanned_stratum_leaves_recall_open():
+    _, (low, high) = estimated_recall(100, [100], [0], [0])
+    assert (low, high) == (0.5, 1.0)

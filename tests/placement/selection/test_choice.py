@@ -1,0 +1,339 @@
+import dataclasses
+import itertools
+import math
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+
+from tcs.errors import SelectionError, UnknownNameError
+from tcs.model.grid import InitialConfiguration
+from tcs.placement.scoring.floor import floor_of
+from tcs.placement.scoring.sets import build_sets
+from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
+from tcs.placement.tables import Reason, ScoreTable
+from tests.placement.tables.small import all_sets, random_scores, small_grid
+
+HERE = InitialConfiguration(base_x=-2.0, base_y=0.5, base_yaw=0.0, torso=0.0)
+
+
+def leg(p, q, travel):
+    """Cost of one leg between two configurations, in plain numbers."""
+    dx, dy = q.base_x - p.base_x, q.base_y - p.base_y
+    cost = travel.metre * math.sqrt(dx * dx + dy * dy)
+    turn = abs(q.base_yaw - p.base_yaw)
+    cost += travel.turn * abs((turn + math.pi) % (2 * math.pi) - math.pi)
+    cost += travel.torso * abs(q.torso - p.torso)
+    before, after = dict(p.environment), dict(q.environment)
+    for name, weight in travel.environment:
+        cost += weight * abs(after[name] - before[name])
+    return cost
+
+
+def brute_force(kept, grid, here, weights, travel):
+    """Members, utility and cost of the first best of all kept sets."""
+    best = None
+    configuration = {h: grid.configuration(h) for members in kept for h in members}
+    for members, (reachability, manipulability) in kept.items():
+        tours = []
+        for order in itertools.permutations(members):
+            stops = [here, *(configuration[h] for h in order)]
+            cost = 0.0
+            for p, q in itertools.pairwise(stops):
+                cost += leg(p, q, travel)
+            tours.append(cost)
+        cost = min(tours)
+        value = (
+            weights.reachability * reachability + weights.manipulability * manipulability
+        ) - weights.travel * cost
+        if best is None or value > best[1]:
+            best = (members, value, cost)
+    return best
+
+
+weight = st.one_of(st.just(0.0), st.sampled_from([0.05, 0.5, 1.0, 10.0]), st.floats(0.0, 3.0))
+utility_weights = st.builds(
+    UtilityWeights, reachability=weight, manipulability=weight, travel=weight
+)
+place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0, 3.0))
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    goals=st.integers(1, 5),
+    levels=st.sampled_from([0, 1, 2]),
+    share=st.sampled_from([0.1, 0.5, 1.0]),
+    beds=st.sampled_from([(0, 0), (2, 0), (2, 2)]),
+    min_distance=st.sampled_from([0.0, 0.4]),
+    weights=utility_weights,
+    travel=st.tuples(weight, weight, weight, weight, weight),
+    where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.3)),
+    bed_now=st.floats(0.0, 0.3),
+    first_candidates=st.sampled_from([1, 5, search.FIRST_CANDIDATES]),
+    options=st.fixed_dictionaries(
+        {
+            "rule": st.sampled_from(["paper", "code2015"]),
+            "same_environment": st.booleans(),
+            "max_members": st.sampled_from([1, 2, 3]),
+        }
+    ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
+    at_once=st.sampled_from([3, search.AT_ONCE]),
+)
+def test_equals_brute_force_over_all_kept_sets(
+    seed,
+    goals,
+    levels,
+    share,
+    beds,
+    min_distance,
+    weights,
+    travel,
+    where,
+    bed_now,
+    first_candidates,
+    options,
+    at_once,
+):
+    bed, head = beds
+    grid = small_grid(nx=5, ny=2, yaws=3, torsos=2 if not bed else 1, bed=bed, head=head)
+    scores = random_scores(grid, goals, seed, levels=levels, share=share)
+    kept = all_sets(scores, grid, min_distance, **options)
+    assume(kept)
+    axes = grid.environment_axes
+    travel = TravelWeights(
+        metre=travel[0],
+        turn=travel[1],
+        torso=travel[2],
+        environment=tuple((axis.name, w) for axis, w in zip(axes, travel[3:], strict=False)),
+    )
+    here = InitialConfiguration(
+        base_x=where[0],
+        base_y=where[1],
+        # A heading beyond half a turn means the same as one within.
+        base_yaw=math.remainder(where[2], 2 * math.pi),
+        torso=where[3],
+        environment=tuple((axis.name, bed_now) for axis in axes),
+        environment_units=tuple(axis.held_unit for axis in axes),
+    )
+    tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance, **options), grid)
+    with pytest.MonkeyPatch.context() as patch:
+        # Small tables open everything in the first round, unless it is made small too.
+        patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
+        patch.setattr(search, "AT_ONCE", at_once)
+        choice = select(tables, here, weights=weights, travel=travel)
+    members, value, cost = brute_force(kept, grid, here, weights, travel)
+    assert choice.indices == members
+    assert (choice.utility, choice.cost) == (value, cost)
+    assert (choice.reachability, choice.manipulability) == kept[members]
+
+
+def floor_with_walls(grid, seed, share):
+    """A floor on which so many places of the grid can't be driven to, nor away from."""
+    rng = np.random.default_rng(seed)
+    blocked = rng.random((grid.axis("base_x").count, grid.axis("base_y").count)) < share
+    reason = np.full((grid.size, 1), Reason.TOO_FAR, dtype=np.uint8)
+    along = grid.indices(np.arange(grid.size))[:, -4:]
+    reason[blocked[along[:, 0], along[:, 1]]] = Reason.BODY_BLOCKED
+    scores = ScoreTable(
+        isotropy=np.zeros((grid.size, 1), dtype=np.float32),
+        reason=reason,
+        pair=np.full((grid.size, 1), -1, dtype=np.int32),
+        pair_names=(),
+        arm_joints=np.zeros((0, 7), dtype=np.float32),
+        weights=np.ones(1),
+    )
+    return floor_of(scores, grid)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    levels=st.sampled_from([0, 1, 2]),
+    blocked=st.sampled_from([0.1, 0.5, 0.8]),
+    weights=utility_weights,
+    metre=weight,
+    turn=weight,
+    where=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
+)
+def test_equals_brute_force_around_the_furniture(
+    seed, levels, blocked, weights, metre, turn, where
+):
+    grid = small_grid(nx=6, ny=5, yaws=2, torsos=1)
+    scores = random_scores(grid, 3, seed, levels=levels, share=0.3)
+    sets = dataclasses.replace(
+        build_sets(scores, grid), floor=floor_with_walls(grid, seed, blocked)
+    )
+    kept = all_sets(scores, grid, 0.4)
+    tables = SelectionTables(sets, grid)
+    ways = tables.index.ways["around"]
+    here = state(base_x=where[0], base_y=where[1], base_yaw=1.0)
+    travel = TravelWeights(metre=metre, turn=turn, route="around")
+    try:
+        metres = ways.from_place(*where)
+    except SelectionError:
+        with pytest.raises(SelectionError, match="no way around the furniture starts there"):
+            select(tables, here, weights=weights, travel=travel)
+        return
+    cell = dict(zip(sets.candidates.tolist(), sets.cell.tolist(), strict=True))
+    yaw = {h: grid.configuration(h).base_yaw for h in cell}
+    best = None
+    for members, both in kept.items():
+        if not all(np.isfinite(metres[cell[h]]) for h in members):
+            continue
+        costs = []
+        for first, *rest in itertools.permutations(members):
+            cost = metre * metres[cell[first]] + turn * abs(yaw[first] - 1.0)
+            for h in rest:
+                driven = metre * ways.between(np.array(cell[first]), np.array(cell[h]))
+                cost += driven + turn * abs(yaw[h] - yaw[first])
+            costs.append(cost)
+        value = weights.reachability * both[0] + weights.manipulability * both[1]
+        value -= weights.travel * min(costs)
+        if best is None or value > best[1]:
+            best = (members, value, min(costs))
+    if best is None:
+        with pytest.raises(SelectionError, match="there is no way around the furniture"):
+            select(tables, here, weights=weights, travel=travel)
+        return
+    choice = select(tables, here, weights=weights, travel=travel)
+    assert choice.cut_off == sum(not np.isfinite(metres[c]) for c in cell.values())
+    assert choice.utility == pytest.approx(best[1], rel=1e-12, abs=1e-12)
+    if not turn:
+        # Turns go through a modulus there and not here, which may cost a tie its last bit.
+        assert (choice.indices, choice.utility, choice.cost) == best
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("levels", [0, 2, 50], ids=["distinct", "many ties", "some ties"])
+def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
+    monkeypatch.setattr(search, "FIRST_CANDIDATES", 8)
+    grid = small_grid(nx=12, ny=8, yaws=2, torsos=1, step=0.15)
+    scores = random_scores(grid, 8, seed, levels=levels, share=0.2)
+    kept = all_sets(scores, grid, 0.4)
+    tables = SelectionTables(build_sets(scores, grid), grid)
+    assert tables.sets.kept_pairs > 100  # else the first round would open them all
+    rng = np.random.default_rng(seed)
+    members = list(kept)
+    reachability, manipulability = np.array(list(kept.values())).T
+    xy = {
+        h: (c.base_x, c.base_y)
+        for (h,) in members[: len(tables.sets.candidates)]
+        for c in [grid.configuration(h)]
+    }
+    for alpha, beta, gamma in [
+        (1, 1, 0.05),
+        (1, 0, 0),
+        (0, 1, 0),
+        (1, 1, 3),
+        (0.3, 2, 0.1),
+        (0, 0, 1),
+        (0, 0, 0),
+        (1, 0, 0.05),
+    ]:
+        x, y = rng.uniform(-3.0, 3.0, 2)
+        here = InitialConfiguration(base_x=x, base_y=y, base_yaw=0.0, torso=0.0)
+        legs = {h: math.sqrt((p[0] - x) ** 2 + (p[1] - y) ** 2) for h, p in xy.items()}
+        cost = [
+            legs[m[0]]
+            if len(m) == 1
+            else min(legs[m[0]], legs[m[1]])
+            + math.sqrt((xy[m[1]][0] - xy[m[0]][0]) ** 2 + (xy[m[1]][1] - xy[m[0]][1]) ** 2)
+            for m in members
+        ]
+        values = (alpha * reachability + beta * manipulability) - gamma * np.array(cost)
+        first = int(np.argmax(values))
+        weights = UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma)
+        choice = select(tables, here, weights=weights)
+        assert choice.indices == members[first]
+        assert choice.utility == values[first]
+
+
+@pytest.fixture(scope="module")
+def tables():
+    grid = small_grid(nx=8, ny=4, bed=2)
+    return SelectionTables(build_sets(random_scores(grid, 5, seed=1, share=0.3), grid), grid)
+
+
+def test_choice_says_what_was_chosen(tables):
+    choice = select(tables, HERE, weights=UtilityWeights(travel=0.0))
+    assert choice.indices == tables.sets.best
+    assert len(choice.indices) == 2
+    assert choice.members == tuple(tables.grid.configuration(h) for h in choice.indices)
+    assert sorted(choice.order) == [0, 1]
+    assert choice.seconds > 0.0
+    visits = [HERE, *(choice.members[i] for i in choice.order)]
+    legs = [
+        math.dist((p.base_x, p.base_y), (q.base_x, q.base_y)) for p, q in itertools.pairwise(visits)
+    ]
+    # Two legs, each rounded once.
+    assert choice.cost == pytest.approx(sum(legs), rel=1e-14)
+
+
+def test_one_member_at_most(tables):
+    free = UtilityWeights(travel=0.0)
+    assert select(tables, HERE, weights=free, max_members=1).indices == tables.sets.best_single
+    with pytest.raises(SelectionError, match="At most 0 members"):
+        select(tables, HERE, max_members=0)
+    held = "holds sets of 1 and 2 only. Score the task again: tcs score ... --max-members 3."
+    with pytest.raises(SelectionError, match=held):
+        select(tables, HERE, max_members=3)
+    with pytest.raises(SelectionError, match="No set has more than 3"):
+        select(tables, HERE, max_members=4)
+
+
+def test_whole_turns_of_the_robot_change_nothing(tables):
+    travel = TravelWeights(turn=0.5)
+    turned = InitialConfiguration(base_x=-2.0, base_y=0.5, base_yaw=2 * math.pi, torso=0.0)
+    one, two = select(tables, HERE, travel=travel), select(tables, turned, travel=travel)
+    assert (one.indices, one.cost) == (two.indices, two.cost)
+
+
+def test_dear_travel_stays_near(tables):
+    near = select(tables, HERE, weights=UtilityWeights(travel=1e6))
+    sets = tables.sets
+    nearest = np.hypot(*(sets.cell_xy - [HERE.base_x, HERE.base_y]).T).min()
+    assert near.cost == pytest.approx(nearest, rel=1e-14)
+    assert len(near.indices) == 1
+
+
+def test_nothing_reached_anywhere():
+    grid = small_grid()
+    sets = build_sets(random_scores(grid, 3, seed=0, share=0.0), grid)
+    with pytest.raises(SelectionError, match="no goal is reached from any initial configuration"):
+        select(SelectionTables(sets, grid), HERE)
+
+
+def state(**changes):
+    plain = {"base_x": 0.0, "base_y": 0.0, "base_yaw": 0.0, "torso": 0.0}
+    return InitialConfiguration(**(plain | changes))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e7, None, "1"])
+@pytest.mark.parametrize("axis", ["base_x", "base_yaw", "torso"])
+def test_an_impossible_place_is_refused(tables, axis, value):
+    with pytest.raises(SelectionError, match=f"Current state: {axis} is"):
+        select(tables, state(**{axis: value}))
+
+
+def test_the_bed_is_needed_only_where_it_costs(tables):
+    select(tables, state())
+    travel = TravelWeights(environment=(("bed_height", 1.0),))
+    with pytest.raises(SelectionError, match="lacks bed_height"):
+        select(tables, state(), travel=travel)
+    with pytest.raises(SelectionError, match="'bed_height' is given in 'rad'; must be in 'm'"):
+        select(
+            tables,
+            state(environment=(("bed_height", 0.1),), environment_units=("rad",)),
+            travel=travel,
+        )
+
+
+def test_an_unknown_axis_is_named(tables):
+    travel = TravelWeights(environment=(("bed_heigth", 1.0),))
+    with pytest.raises(UnknownNameError, match="Did you mean 'bed_height'"):
+        select(tables, state(), travel=travel)
+    other = state(environment=(("table_height", 0.1),), environment_units=("m",))
+    with pytest.raises(UnknownNameError, match=r"current state: unknown .* 'table_height'"):
+        select(tables, other)

@@ -1,0 +1,134 @@
+"""Which table of a file is chosen from."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from tcs.errors import SelectionError, UnknownNameError
+from tcs.model.grid import InitialConfiguration
+from tcs.placement.selection import SelectionTables, nearest_table, select
+from tests.placement.store.example import score_file
+from tests.placement.tables.small import small_grid
+
+SHIFTS = {"name": "person_y", "unit": "m", "start": -0.1, "step": 0.05, "count": 5}
+TILTS = {"name": "head_tilt", "unit": "deg", "start": -20.0, "step": 20.0, "count": 3}
+
+
+def at(**environment):
+    return InitialConfiguration(
+        base_x=0.0,
+        base_y=-2.0,
+        base_yaw=0.0,
+        torso=0.0,
+        environment=tuple(environment.items()),
+        environment_units=("m",) * len(environment),
+    )
+
+
+@pytest.fixture(scope="module")
+def file():
+    """Five shifts in two heights of the bed; the head is where both put it."""
+    grid = small_grid(nx=6, ny=4, bed=2)
+    head = [
+        [0.3, shift, 0.7 + height]
+        for shift, height in itertools.product((-0.1, -0.05, 0.0, 0.05, 0.1), (0.0, 0.1))
+    ]
+    frames = {"head": list(itertools.chain(*head)), "chest": [1.0] * 30}
+    return score_file(grid=grid, tables=5, observed=[SHIFTS], body_frames=frames)
+
+
+@pytest.mark.parametrize(
+    ("person_y", "index"),
+    [(0.0, 2), (0.024, 2), (0.026, 3), (-0.07, 1), (0.1, 4), (0.124, 4), (-0.125, 0)],
+)
+def test_the_nearest_shift_is_used(file, person_y, index):
+    match = nearest_table(file, at(), {"person_y": person_y})
+    assert match.index == index
+    scored = -0.1 + index * 0.05
+    assert match.state["person_y"] == pytest.approx(scored, abs=1e-12)
+    assert match.off["person_y"] == pytest.approx(person_y - scored, abs=1e-12)
+
+
+def test_what_is_not_told_is_nominal(file):
+    match = nearest_table(file)
+    assert (match.index, match.off) == (file.nominal_index, {})
+    assert nearest_table(score_file(), at()).index == 0
+
+
+@pytest.mark.parametrize(
+    ("step", "near", "far"),
+    [(0.05, (0.276, 0.324), (0.274, 5.0)), (0.0, (0.21, 0.39), (0.19, -5.0))],
+)
+def test_a_single_value_does_not_stand_for_everything(step, near, far):
+    alone = {**SHIFTS, "start": 0.3, "step": step, "count": 1}
+    file = score_file(observed=[alone])
+    assert nearest_table(file).index == 0
+    for told in near:
+        assert nearest_table(file, at(), {"person_y": told}).off["person_y"] == pytest.approx(
+            told - 0.3, abs=1e-12
+        )
+    for told in far:
+        with pytest.raises(SelectionError, match=r"scored is only 0\.3 m"):
+            nearest_table(file, at(), {"person_y": told})
+
+
+def test_two_axes_are_matched_one_by_one():
+    file = score_file(tables=15, observed=[SHIFTS, TILTS])
+    match = nearest_table(file, at(), {"head_tilt": math.radians(12.0), "person_y": -0.04})
+    assert match.state["person_y"] == pytest.approx(-0.05, abs=1e-12)
+    assert match.state["head_tilt"] == pytest.approx(math.radians(20.0), abs=1e-12)
+    assert file.observed_states[match.index] == match.state
+
+
+def test_the_choice_is_that_of_the_table(file):
+    for i, shift in enumerate((-0.1, -0.05, 0.0, 0.05, 0.1)):
+        choice = select(file, at(), observed={"person_y": shift})
+        alone = select(SelectionTables.of(file, i), at())
+        assert (choice.indices, choice.utility) == (alone.indices, alone.utility)
+        assert choice.match.index == i
+
+
+@pytest.mark.parametrize(
+    ("seen", "here", "index", "off"),
+    [
+        ({"head": (0.3, 0.06, 0.7)}, at(), 3, 0.01),
+        ({"head": (0.3, 0.06, 0.8)}, at(), 3, 0.01),
+        # Told how high the bed is, the head is expected there.
+        ({"head": (0.3, 0.06, 0.75)}, at(bed_height=0.1), 3, math.hypot(0.01, 0.05)),
+        ({"head": (0.3, -0.1, 0.7), "chest": (1.0, 1.0, 1.0)}, at(), 0, 0.0),
+    ],
+)
+def test_frames_seen_tell_the_shift(file, seen, here, index, off):
+    match = nearest_table(file, here, seen=seen)
+    assert match.index == index
+    assert match.frames_off == pytest.approx(off, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("told", "error", "said"),
+    [
+        ({"observed": {"person_y": 0.13}}, SelectionError, "scored are only -0.1 to 0.1 m, 5 val"),
+        ({"observed": {"person_y": np.nan}}, SelectionError, "must be a finite number"),
+        ({"observed": {"person_x": 0.0}}, UnknownNameError, "person_y"),
+        ({"seen": {"heat": (0, 0, 0)}}, UnknownNameError, "head"),
+        ({"seen": {"head": (0.3, 0.3, 0.7)}}, SelectionError, "0.20 m from where it was scored"),
+        ({"seen": {"head": (0.3, 0.3)}}, SelectionError, "three finite numbers"),
+        (
+            {"seen": {"head": (0.3, 0.0, 0.7)}, "observed": {"person_y": 0.0}},
+            SelectionError,
+            "Give one of them",
+        ),
+    ],
+)
+def test_what_was_not_scored_is_told(file, told, error, said):
+    with pytest.raises(error, match=said):
+        nearest_table(file, at(), **told)
+
+
+def test_tables_by_themselves_cannot_be_observed(file):
+    with pytest.raises(SelectionError, match="Give the file"):
+        select(SelectionTables.of(file), at(), observed={"person_y": 0.0})

@@ -1,0 +1,388 @@
+import dataclasses
+import errno
+import os
+import resource
+import zlib
+
+import joblib
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError, StoreError, StoreFormatError
+from tcs.files.compression import fold, unfolded
+from tcs.placement.store import FORMAT_VERSION, ScoreFile, load_scores, save_scores
+from tcs.placement.store.packing import pack
+from tests.placement.store.example import SHIFT, score_file
+from tests.placement.tables.small import small_grid
+
+
+@pytest.fixture(scope="module")
+def file():
+    return score_file()
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "shaving.tcs"
+
+
+def assert_same(one, two):
+    for field in dataclasses.fields(one):
+        a, b = getattr(one, field.name), getattr(two, field.name)
+        if field.name == "tables":
+            for of_one, of_two in zip(a, b, strict=True):
+                assert_same(of_one.sets, of_two.sets)
+                assert_same(of_one.scores, of_two.scores)
+        elif dataclasses.is_dataclass(a):
+            assert_same(a, b)
+        elif isinstance(a, np.ndarray):
+            assert a.dtype == b.dtype
+            np.testing.assert_array_equal(a, b)
+        else:
+            assert a == b
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"rule": "code2015", "same_environment": True}, {"max_members": 3}, {"max_members": 1}],
+)
+@pytest.mark.parametrize("share", [0.0, 0.1, 1.0])
+def test_load_of_save_is_the_same(path, share, options):
+    file = score_file(share=share, options=options)
+    save_scores(path, file)
+    loaded = load_scores(path)
+    assert isinstance(loaded, ScoreFile)
+    assert_same(file, loaded)
+    # No member of it can be changed by accident.
+    with pytest.raises(ValueError, match="read-only"):
+        loaded.nominal.scores.isotropy[0, 0] = 1.0
+
+
+def test_joblib_reads_it_too(path, file):
+    save_scores(path, file)
+    content = joblib.load(path)
+    assert content["format"] == "tcs scores"
+    assert content["metadata"] == file.metadata
+
+
+def test_a_compressed_file_is_read_too(path, file):
+    joblib.dump(pack(file), path, compress=3)
+    assert_same(file, load_scores(path))
+
+
+def test_names_may_be_text_or_paths(path, file):
+    save_scores(str(path), file)
+    assert_same(load_scores(str(path)), load_scores(path))
+
+
+def test_nothing_but_the_file_is_left(path, file):
+    save_scores(path, file)
+    save_scores(path, file)
+    assert [found.name for found in path.parent.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("place", "raised"),
+    [
+        ("joblib.dump", KeyboardInterrupt()),
+        ("os.fsync", KeyboardInterrupt()),
+        ("os.fsync", OSError(errno.ENOSPC, "No space left on device")),
+        ("pathlib.Path.replace", PermissionError(errno.EACCES, "Permission denied")),
+        ("pathlib.Path.replace", KeyboardInterrupt()),
+    ],
+    ids=lambda value: getattr(value, "strerror", None) or str(value) or "Ctrl-C",
+)
+def test_a_failure_leaves_the_old_file_and_no_half_one(path, file, monkeypatch, place, raised):
+    path.write_bytes(b"the old file")
+
+    def fail(*arguments, **options):
+        # Half a file is there by now.
+        if place == "joblib.dump":
+            arguments[1].write(b"half")
+        raise raised
+
+    with monkeypatch.context() as patch:
+        patch.setattr(place, fail)
+        expected = OutputError if isinstance(raised, OSError) else KeyboardInterrupt
+        with pytest.raises(expected) as caught:
+            save_scores(path, file)
+    if expected is OutputError:
+        assert raised.strerror in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert path.read_bytes() == b"the old file"
+    assert [found.name for found in path.parent.iterdir()] == [path.name]
+
+
+def test_a_full_disk_is_told(path, file):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot be written: File too large"):
+            save_scores(path, file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(path.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("folder", ["missing", "a file"])
+def test_an_impossible_folder_is_told(tmp_path, file, folder):
+    (tmp_path / "a file").write_text("x")
+    with pytest.raises(OutputError, match="existing, writable folder"):
+        save_scores(tmp_path / folder / "shaving.tcs", file)
+
+
+def test_a_folder_is_no_target(tmp_path, file):
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_scores(tmp_path, file)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_folder_is_told(path, file, monkeypatch):
+    # Permissions do not stop root, who runs many a container; a refusal by the system does.
+    def refuse(*_arguments, **_options):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.open", refuse)
+    with pytest.raises(OutputError, match=r"cannot be written: Permission denied\. Name a file"):
+        save_scores(path, file)
+    assert list(path.parent.iterdir()) == []
+
+
+def test_a_missing_file_is_told(path):
+    with pytest.raises(StoreError, match="cannot be read: No such file"):
+        load_scores(path)
+
+
+def test_a_folder_or_pipe_is_no_file(tmp_path):
+    with pytest.raises(StoreError, match="no regular file"):
+        load_scores(tmp_path)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(StoreError, match="no regular file"):
+        load_scores(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_told(path, file, share):
+    save_scores(path, file)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(StoreFormatError, match=r"truncated|empty|damaged"):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
+def test_a_truncated_uncompressed_file_is_told(path, file, share):
+    joblib.dump(pack(file), path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+def test_a_flipped_bit_is_told(path, file):
+    save_scores(path, file)
+    whole = bytearray(path.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    path.write_bytes(whole)
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+def test_flipped_bytes_never_crash(tmp_path, file):
+    """Whatever a byte turns into, the answer is a sound file or one of our errors."""
+    joblib.dump(pack(file), tmp_path / "whole")
+    whole = (tmp_path / "whole").read_bytes()
+    rng = np.random.default_rng(0)
+    told = []
+    for _ in range(400):
+        broken = bytearray(whole)
+        for position in rng.integers(0, len(whole), 3):
+            broken[position] = rng.integers(0, 256)
+        (tmp_path / "broken").write_bytes(broken)
+        try:
+            load_scores(tmp_path / "broken")
+        except StoreError as error:
+            told.append(str(error))
+    assert len(told) > 100
+    assert not any("\n" in message for message in told)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"Dear reader,\n", b"\x1f\x8b\x08\x00 gzip", b"PK\x03\x04", b"\x80", b"\x80\x04.", bytes(100)],
+    ids=["text", "gzip", "zip", "one byte", "empty pickle", "zeros"],
+)
+def test_a_foreign_file_is_told(path, content):
+    path.write_bytes(content)
+    with pytest.raises(StoreFormatError):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("content", [[1, 2], {"a": np.zeros(3)}, None, {"format": "other"}, "x"])
+@pytest.mark.parametrize("compress", [0, 3])
+def test_another_joblib_file_is_told(path, content, compress):
+    joblib.dump(content, path, compress=compress)
+    with pytest.raises(StoreFormatError, match="tcs"):
+        load_scores(path)
+
+
+def test_a_longer_file_is_told(path, file):
+    save_scores(path, file)
+    path.write_bytes(path.read_bytes() + b"more")
+    with pytest.raises(StoreFormatError, match="goes on after its end"):
+        load_scores(path)
+
+
+def test_a_file_from_the_future_is_told(path, file):
+    joblib.dump(pack(file) | {"format_version": FORMAT_VERSION + 1}, path)
+    with pytest.raises(StoreFormatError, match="reads version 2: update tcs"):
+        load_scores(path)
+
+
+def changed(file, section, name, change):
+    content = pack(file)
+    place = content
+    if section in ("scores", "sets"):
+        content["tables"] = [dict(content["tables"][0])]
+        place = content["tables"][0]
+    place[section] = dict(place[section])
+    old = place[section][name]
+    if isinstance(old, dict) and "bytes" in old:
+        kind = old["type"][0] if old["type"][0] == "u" else old["type"]
+        array = unfolded({name: old}, name, kind, (None,) * len(old["shape"]))
+        new = change(array)
+        place[section][name] = fold(new) if isinstance(new, np.ndarray) else new
+    else:
+        place[section][name] = change(old)
+    return content
+
+
+FORGED = {
+    "weights as float32": ("sets", "weights", lambda a: a.astype(np.float32)),
+    "weights of another task": ("sets", "weights", lambda a: a[1:]),
+    "candidates beyond the grid": ("sets", "candidate_step", lambda a: a + a.dtype.type(9)),
+    "candidates that wrap round": (
+        "sets",
+        "candidate_step",
+        lambda a: np.full(a.shape, 2**63, dtype=np.uint64),
+    ),
+    "a goal more reached": ("sets", "reached", lambda a: a | np.uint8(1)),
+    "isotropy too short": ("sets", "isotropy", lambda a: a[:-1]),
+    "isotropy of doubles": ("sets", "isotropy", lambda a: a.astype(np.float64)),
+    "cell beyond the last": ("sets", "cell", lambda a: a + np.uint8(200)),
+    "cell too short": ("sets", "cell", lambda a: a[1:]),
+    "cells elsewhere": ("sets", "cell_xy", lambda a: a + 1.0),
+    "cells nowhere": ("sets", "cell_xy", lambda a: a[:0]),
+    "pairs of cells beyond": ("sets", "pair_step", lambda a: a + a.dtype.type(7)),
+    "pairs that wrap round": (
+        "sets",
+        "pair_step",
+        lambda a: np.full(a.shape, 2**63, dtype=np.uint64),
+    ),
+    "pairs out of order": ("sets", "pair_step", lambda a: a * a.dtype.type(0)),
+    "count of pairs": ("sets", "pair_count", lambda a: a + a.dtype.type(100)),
+    "bound not a number": ("sets", "pair_sum", lambda a: a * np.float32(np.nan)),
+    "bound too short": ("sets", "pair_sum", lambda a: a[1:]),
+    "code beyond the values": ("sets", "reachability_values", lambda a: a[:1]),
+    "an array that is none": ("sets", "cell", lambda a: "cell"),
+    "an array missing": ("sets", "pair_sum", lambda a: None),
+    "rule unknown": ("sets", "rule", lambda rule: "mine"),
+    "rule missing": ("sets", "rule", lambda rule: None),
+    "distance missing": ("sets", "min_distance", lambda distance: None),
+    "members missing": ("sets", "max_members", lambda members: True),
+    "states of another grid": ("sets", "state_size", lambda size: size + 1),
+    "environment no yes or no": ("sets", "same_environment", lambda same: 1),
+    "floor missing": ("sets", "floor", lambda floor: None),
+    "floor without a step": ("sets", "floor", lambda floor: floor | {"step": [0.1]}),
+    "floor of another shape": ("sets", "floor", lambda floor: floor | {"shape": [3, 3]}),
+    "floor without places": ("sets", "floor", lambda floor: floor | {"shape": [0, 3]}),
+    "enormous floor": ("sets", "floor", lambda floor: floor | {"shape": [2**40, 2**40]}),
+    "triples where none belong": ("sets", "triples", lambda triples: {"least": 0.5}),
+    "triples missing": ("sets", "max_members", lambda members: 3),
+    "best no candidate": ("sets", "best", lambda best: [2**30]),
+    "best no number": ("sets", "best", lambda best: ["x"]),
+    "best huge": ("sets", "best_single", lambda best: [2**70]),
+    "no axes": ("grid", "axes", lambda axes: []),
+    "enormous grid": ("grid", "axes", lambda axes: [a | {"count": 10**6} for a in axes]),
+    "another grid": (
+        "grid",
+        "axes",
+        lambda axes: small_grid(nx=4, ny=6, bed=2).to_dict()["axes"],
+    ),
+    "no digest": ("metadata", "scene_digest", lambda digest: None),
+    "array among the metadata": ("metadata", "created", lambda created: np.zeros(3)),
+    "a body frame too short": ("body_frames", "head", lambda places: places[:-1]),
+    "a body frame nowhere": ("body_frames", "head", lambda places: [np.inf] * len(places)),
+}
+
+FORGED_SCORES = {
+    "reason with a row too few": ("scores", "reason", lambda a: a[1:]),
+    "reason beyond the last": ("scores", "reason", lambda a: a + np.uint8(6)),
+    "reason flat": ("scores", "reason", lambda a: a.ravel()),
+    "reason missing": ("scores", "reason", lambda a: None),
+    "reached by no candidate": ("scores", "reason", lambda a: a * np.uint8(0)),
+    "joints of another arm": ("scores", "arm_joints", lambda a: a[:, :-1]),
+    "joints missing": ("scores", "arm_joints", lambda a: a[:-1]),
+    "joints not finite": ("scores", "arm_joints", lambda a: a * np.float32(np.inf)),
+    "names missing": ("scores", "pair_names", lambda names: names[:1]),
+    "names no pairs": ("scores", "pair_names", lambda names: [["arm"]] * 3),
+    "names no list": ("scores", "pair_names", lambda names: "arm"),
+}
+"""Found when the scores are first asked for: choosing never reads them."""
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "change"),
+    [*FORGED.values(), *FORGED_SCORES.values()],
+    ids=[*FORGED, *FORGED_SCORES],
+)
+def test_a_forged_file_is_told_in_one_line(path, file, section, name, change):
+    joblib.dump(changed(file, section, name, change), path, compress=3)
+    loaded = load_scores(path) if section == "scores" else None
+    with pytest.raises(StoreFormatError) as caught:
+        _ = loaded.nominal.scores if loaded else load_scores(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "tcs score" in message
+    assert "while reading" not in message  # found by a check, not by stumbling
+    assert "\n" not in message
+
+
+def test_a_folded_array_may_not_swell(path, file):
+    """What unfolds to more than its shape says is refused before it fills the memory."""
+    content = pack(file)
+    bomb = np.frombuffer(zlib.compress(bytes(100_000_000)), dtype=np.uint8)
+    content["tables"][0]["sets"]["pair_sum"]["bytes"] = bomb
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match="damaged array 'pair_sum'"):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("section", ["metadata", "task", "grid", "observed", "tables"])
+def test_a_missing_section_is_told(path, file, section):
+    content = pack(file)
+    del content[section]
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match=f"has no {section}"):
+        load_scores(path)
+
+
+@pytest.mark.parametrize("section", ["scores", "sets"])
+def test_a_missing_half_of_a_table_is_told(path, file, section):
+    content = pack(file)
+    del content["tables"][0][section]
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match=f"has no {section}"):
+        load_scores(path)
+
+
+def test_each_observed_state_has_a_table(path):
+    file = score_file(observed=[SHIFT], tables=3)
+    assert [state["person_y"] for state in file.observed_states] == [-0.05, 0.0, 0.05]
+    assert file.nominal is file.tables[1]
+    save_scores(path, file)
+    assert_same(file, load_scores(path))
+    with pytest.raises(StoreError, match="2 tables for 3 observed states"):
+        score_file(observed=[SHIFT], tables=2)
+    with pytest.raises(StoreError, match="more than 1000 states"):
+        score_file(observed=[SHIFT | {"count": 10**9}], tables=1)

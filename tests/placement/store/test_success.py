@@ -1,0 +1,79 @@
+"""Estimates in score files: they survive, old files do without, forged ones are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.errors import StoreError, TcsError
+from tcs.files.compression import fold
+from tcs.placement.store import load_scores, save_scores
+from tcs.placement.store.packing import pack, unpack
+from tcs.placement.tables import SuccessTable
+from tests.placement.store.example import score_file
+
+
+def with_estimates(**changes):
+    file = score_file()
+    table = file.tables[0]
+    first, second = (int(h) for h in table.sets.candidates[:2])
+    parts = {
+        "members": np.array([[first, -1], [first, second]], dtype=np.int32),
+        "success": np.array([0.5, 0.625]),
+        "low": np.array([0.4, 0.6]),
+        "high": np.array([0.6, 0.7]),
+        "samples": np.array([64, 1024], dtype=np.int32),
+    }
+    success = SuccessTable(**(parts | changes))
+    return dataclasses.replace(file, tables=(dataclasses.replace(table, success=success),))
+
+
+def test_what_is_saved_is_loaded(tmp_path):
+    path, file = tmp_path / "file.tcs", with_estimates()
+    save_scores(path, file)
+    back = load_scores(path).nominal.success
+    for name in ("members", "success", "low", "high", "samples"):
+        written, read = getattr(file.nominal.success, name), getattr(back, name)
+        assert np.array_equal(written, read)
+        assert written.dtype == read.dtype
+
+
+def test_files_from_before_there_were_estimates_load():
+    packed = pack(score_file())
+    assert packed["format_version"] == 2
+    del packed["tables"][0]["success"]
+    assert unpack(packed).nominal.success is None
+
+
+def test_estimates_of_sets_that_are_not_held_are_refused():
+    nobody = np.setdiff1d(np.arange(500), score_file().tables[0].sets.candidates)[0]
+    with pytest.raises(StoreError, match="not held"):
+        with_estimates(members=np.array([[nobody, -1], [nobody, 10**6]], dtype=np.int32))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("members_plus_one", fold(np.array([[2**32 - 1, 0]] * 2, dtype=np.uint32))),
+        ("members_plus_one", fold(np.array([1, 2], dtype=np.uint8))),
+        ("members_plus_one", None),
+        ("samples", fold(np.array([2**31, 1], dtype=np.uint32))),
+        ("samples", fold(np.array([0, 1], dtype=np.uint8))),
+        ("success", fold(np.array([7.0, 0.5]))),
+        ("low", fold(np.array([0.1]))),
+        ("high", fold(np.array([0.1, 0.2], dtype=np.float32))),
+        (None, 3),
+        (None, []),
+    ],
+)
+def test_forged_estimates_are_refused(name, value):
+    packed = pack(with_estimates())
+    table = packed["tables"][0]
+    if name is None:
+        table["success"] = value
+    else:
+        table["success"] = {**table["success"], name: value}
+    with pytest.raises(TcsError):
+        unpack(packed)
