@@ -1,0 +1,139 @@
+"""Print the size and the language of the code: lines, lengths, and private words that are left.
+
+Usage: python scripts/house.py [--words] [--below FOLDER]
+
+Private words are those that a roboticist who knows Drake, MoveIt and the papers would not use;
+`WORDS` lists them with the field's word. Identifiers are split at underscores and capitals first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+TEXT = {".py", ".md", ".yaml", ".toml", ".css"}
+# The change log quotes the past, and this file quotes the words.
+LEFT_OUT = {"CHANGELOG.md", "scripts/house.py", "LICENSE"}
+WORDS = {
+    r"ways? along|bends?\b(?! its| the knee)": "null-space direction, tangent; curvature",
+    r"rooms?": "environment, scene; package, module",
+    r"lanes?": "samples of the free joint",
+    r"hunts?|looks? closer|closer looks?|looked closer": "search; refine",
+    r"squeez(?:e|es|ed|ing)": "bisect",
+    r"rides?|rides on": "torso-mounted",
+    r"balls?(?! joint)": "bounding sphere",
+    r"on loan|borrow(?:s|ed|ing)?|lent|lends?": "unowned view, non-owning reference",
+    r"(?:mirrored|reversed|upright) arms?": "spherical-wrist or spherical-shoulder arm",
+    r"told|tells?|telling|said|asks?|asked|asking": "message, reported, requested",
+    r"a little off|off at random|rooms? off|how far off|m off|rad off": "error, pose error",
+    r"(?:the|a|which|what) shares?(?= of| that)": "fraction, percentage",
+    r"surest": "greatest lower confidence bound",
+    r"rac(?:e|es|ed|ing)(?! condition)": "successive halving",
+    r"cut offs?": "unreachable from here",
+    r"lift(?:s|ed|ing)?": "torso height",
+    r"turns? on and on|turning on and on|on and on": "continuous joint",
+    r"driven arms?|who(?:m)?ever|who drives": "teleoperated arm, operator",
+    r"reshap(?:e|es|ed|ing)": "self-motion, null-space motion",
+    r"leash(?:es)?|ran ahead|runs? ahead": "target lead limit",
+    r"wish(?:es|ed)?|situations?": "rate command, control state",
+    r"wander(?:s|ed|ing)?": "Gauss-Markov process",
+    r"clutch parts": "clutch decouples master and slave",
+    r"folds?|folded|folding|unfold(?:s|ed|ing)?|packing": "compress, encode",
+    r"twins?": "reference implementation",
+    r"nobody|somebody": "(name the reader or the program)",
+    r"kinds?": "type, class",
+    r"(?:it|he|she) itself[.]|all of it[.]|is none of|is one way|the latter|the former(?! one)": (
+        "(a sentence with a subject)"
+    ),
+    r"yardsticks?|safeguards?|way there|ways? from here|found to be|in hand|all but": (
+        "(plain technical English)"
+    ),
+}
+PATTERNS = {word: re.compile(rf"(?<![\w-])(?:{word})(?![\w])", re.IGNORECASE) for word in WORDS}
+# Options and keys that other programs call, names of other packages, and words of the trade.
+ALLOWED = re.compile(
+    r"--ask\b|\.kind\b|\bkind=\"(?:stable|linear|cubic)\"|\bmanager, kind\b|torso[_ ]lift|"
+    r"torso_lift\w*|shoulder_lift\w*|race condition|living room|head[- ]?room",
+    re.IGNORECASE,
+)
+
+
+def main() -> int:
+    """Print the figures; with `--words`, each private word with file and line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--words", action="store_true", help="list every private word")
+    parser.add_argument("--below", default="", help="only files whose path starts so")
+    options = parser.parse_args()
+    files = [path for path in tracked() if str(path).startswith(options.below)]
+    for folder in ("tcs", "tests"):
+        sizes(folder, [path for path in files if path.parts[0] == folder])
+    found = [hit for path in files for hit in private_words(path)]
+    if options.words:
+        for path, number, word, better in found:
+            print(f"{path}:{number}: {word} -> {better}")
+    counts: dict[str, int] = {}
+    for path, _, _, _ in found:
+        top = "/".join(
+            path.parts[: 3 if path.parts[0] in ("tcs", "tests") else 1][:-1] or path.parts
+        )
+        counts[top] = counts.get(top, 0) + 1
+    for place, count in sorted(counts.items(), key=lambda item: -item[1]):
+        print(f"{count:6} private words in {place}")
+    print(f"{len(found):6} private words in all, {len(files)} files read")
+    return 0
+
+
+def tracked() -> list[Path]:
+    """Return the text files that git tracks, from the checkout's root."""
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=CHECKOUT, check=True, capture_output=True, text=True
+    ).stdout.splitlines()
+    paths = (Path(line) for line in listed)
+    return [p for p in paths if p.suffix in TEXT and str(p) not in LEFT_OUT and exists(p)]
+
+
+def exists(path: Path) -> bool:
+    """Return whether a tracked file is still there."""
+    return (CHECKOUT / path).is_file()
+
+
+def sizes(folder: str, files: list[Path]) -> None:
+    """Print how many lines a folder has, and how long its modules and functions are."""
+    modules, functions = [], []
+    for path in files:
+        if path.suffix != ".py":
+            continue
+        text = (CHECKOUT / path).read_text(encoding="utf-8")
+        modules.append(len(text.splitlines()))
+        functions += [
+            node.end_lineno - node.lineno + 1
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.end_lineno
+        ]
+    if modules:
+        print(f"{folder}: {len(modules)} modules, {sum(modules)} lines; {len(functions)} functions")
+        for name, lengths in (("module", modules), ("function", functions)):
+            median, ninth = statistics.median(lengths), statistics.quantiles(lengths, n=10)[-1]
+            print(f"{folder}: {name} length: median {median:g}, 90th percentile {ninth:g} lines")
+
+
+def private_words(path: Path) -> list[tuple[Path, int, str, str]]:
+    """Return file, line, word and the field's word of every private word in a file."""
+    hits = []
+    lines = (CHECKOUT / path).read_text(encoding="utf-8").splitlines()
+    for number, line in enumerate(lines, start=1):
+        plain = ALLOWED.sub(" ", line)
+        plain = re.sub(r"(?<=[a-z])(?=[A-Z])|_", " ", plain)
+        for word, pattern in PATTERNS.items():
+            hits += [(path, number, hit[0], WORDS[word]) for hit in pattern.finditer(plain)]
+    return hits
+
+
+if __name__ == "__main__":
+    sys.exit(main())
