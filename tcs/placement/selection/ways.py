@@ -1,7 +1,7 @@
 """How far it is to drive: in straight lines, or around the furniture.
 
 Around the furniture means along the lattice of `tcs.placement.tables.Floor`, whose moves go to the
-eight neighbours of a place. In the open such a path is up to 8 percent longer than the straight line.
+eight neighbours of a cell. In the open such a path is up to 8 percent longer than a straight line.
 """
 
 from __future__ import annotations
