@@ -95,7 +95,7 @@ def judged(live: ScoreFile, members: tuple[int, ...]) -> tuple[float, float]:
     rows = list(members)
     reached = scores.reached[rows].any(axis=0)
     return float(reached @ scores.weights), float(
-        scores.isotropy[rows].max(axis=0).astype(np.float64) @ scores.weights
+        scores.dexterity[rows].max(axis=0).astype(np.float64) @ scores.weights
     )
 
 

@@ -149,8 +149,8 @@ def utility_of_pairs(sets: SetTable, legs, weights, a, b):
     """Return the utility of every pair, -inf where it is not kept, shape (len(a), len(b))."""
     manipulability, reachability = np.zeros((a.size, b.size)), np.zeros((a.size, b.size))
     for g, weight in enumerate(sets.weights):
-        isotropy = sets.isotropy[:, g].astype(np.float64)
-        manipulability += float(weight) * np.maximum(isotropy[a], isotropy[b])
+        dexterity = sets.dexterity[:, g].astype(np.float64)
+        manipulability += float(weight) * np.maximum(dexterity[a], dexterity[b])
         reachability += float(weight) * (sets.reached[a, g] | sets.reached[b, g])
     xy = sets.cell_xy[sets.cell]
     apart = np.hypot(*np.moveaxis(xy[a] - xy[b], -1, 0)) >= sets.min_distance - 1e-9
@@ -182,7 +182,7 @@ def bed_grid() -> Grid:
 def bed_like_scores(grid: Grid) -> ScoreTable:
     """Return made-up scores: goals along a bed, reached best from an arm's length beside them.
 
-    Isotropy falls off smoothly with the distance from the shoulder, the height difference and the
+    Dexterity falls off smoothly with the distance from the shoulder, the height difference and the
     turn, with ripples so that no two places are alike.
     """
     at = grid.values(np.arange(grid.size))
@@ -193,7 +193,7 @@ def bed_like_scores(grid: Grid) -> ScoreTable:
     blocked = np.maximum(outside_x, outside_y) < 0.33
     shoulder_x, shoulder_y = x - 0.19 * np.sin(yaw), y + 0.19 * np.cos(yaw)
     rng = np.random.default_rng(0)
-    isotropy = np.zeros((grid.size, GOALS), dtype=np.float32)
+    dexterity = np.zeros((grid.size, GOALS), dtype=np.float32)
     for g, along in enumerate(np.linspace(0.15, 1.75, GOALS)):
         lifted = np.sin(at["head_rest"]) * (along < 0.9)
         goal_x = along + rng.uniform(-0.05, 0.05) - 0.15 * lifted
@@ -205,15 +205,15 @@ def bed_like_scores(grid: Grid) -> ScoreTable:
         turn = np.abs(np.mod(turn + np.pi, 2.0 * np.pi) - np.pi)
         ripples = 0.05 * np.sin(7.0 * x + 5.0 * g) * np.cos(6.0 * y + g)
         good = 0.65 - ((reach - 0.55) / 0.22) ** 2 - 0.36 * turn**2 - 4.0 * up**2 + ripples
-        isotropy[:, g] = np.where((good > 0.0) & ~blocked, 0.3 + 0.5 * np.minimum(good, 1.0), 0.0)
-    reason = np.where(isotropy > 0.0, Reason.REACHED, Reason.TOO_FAR).astype(np.uint8)
+        dexterity[:, g] = np.where((good > 0.0) & ~blocked, 0.3 + 0.5 * np.minimum(good, 1.0), 0.0)
+    reason = np.where(dexterity > 0.0, Reason.REACHED, Reason.TOO_FAR).astype(np.uint8)
     reason[blocked] = Reason.BODY_BLOCKED
     return ScoreTable(
-        isotropy=isotropy,
+        dexterity=dexterity,
         reason=reason,
-        pair=np.full(isotropy.shape, -1, dtype=np.int32),
+        pair=np.full(dexterity.shape, -1, dtype=np.int32),
         pair_names=(),
-        arm_joints=np.zeros((int(np.count_nonzero(isotropy)), 7), dtype=np.float32),
+        arm_joints=np.zeros((int(np.count_nonzero(dexterity)), 7), dtype=np.float32),
         weights=np.full(GOALS, 1.0 / GOALS),
     )
 

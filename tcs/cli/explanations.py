@@ -41,7 +41,7 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
         off = ", ".join(_with_unit(axis, value) for axis, value in explained["off"].items())
         out.print(f"The nearest that was scored is {name}; the place is off by {off}.")
     if explained["reached"]:
-        out.print(f"It is reached from {name}, {result['measure']} {explained['isotropy']:.3f}.")
+        out.print(f"It is reached from {name}, {result['measure']} {explained['dexterity']:.3f}.")
         return
     pair = ""
     if explained["pair"] is not None:
@@ -74,7 +74,7 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
     goals = ", ".join(map(str, fix["reached_goals"]))
     out.print(
         f"It reaches {'goals' if len(fix['reached_goals']) > 1 else 'goal'} {goals}{loses}; "
-        f"manipulability {fix['manipulability']:.3f}, at this goal {fix['isotropy']:.3f}."
+        f"manipulability {fix['manipulability']:.3f}, at this goal {fix['dexterity']:.3f}."
     )
     out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")
     if fix["route"] != result["weights"]["route"]:

@@ -23,7 +23,7 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
 
     Returns:
         Columns: the observed axes and the axes of the grid (angles as `..._deg`), `reachability`
-        (P_R), `manipulability` (P_M), and for each goal g `reason_g` and `isotropy_g`. The flat
+        (P_R), `manipulability` (P_M), and for each goal g `reason_g` and `dexterity_g`. The flat
         indices start again for each observed state.
     """
     states = zip(file.observed_states, file.tables, strict=True)
@@ -50,7 +50,7 @@ def _frame(
     names = [reason.name.lower() for reason in Reason]
     for g in range(scores.goals):
         columns[f"reason_{g}"] = pd.Categorical.from_codes(scores.reason[rows, g], pd.Index(names))
-        columns[f"isotropy_{g}"] = scores.isotropy[rows, g]
+        columns[f"dexterity_{g}"] = scores.dexterity[rows, g]
     return pd.DataFrame(columns, index=pd.Index(rows, name="configuration"))
 
 

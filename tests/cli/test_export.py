@@ -24,7 +24,7 @@ def test_table_holds_the_scores(tcs_command, small_file, tmp_path):
             assert row[name] == pytest.approx(value, rel=1e-8, abs=1e-12)
         for g in range(file.nominal.scores.goals):
             assert row[f"reason_{g}"] == Reason(file.nominal.scores.reason[h, g]).name.lower()
-            assert np.float32(row[f"isotropy_{g}"]) == file.nominal.scores.isotropy[h, g]
+            assert np.float32(row[f"dexterity_{g}"]) == file.nominal.scores.dexterity[h, g]
     np.testing.assert_allclose(table["reachability"], file.nominal.scores.reachability(), rtol=1e-8)
     np.testing.assert_allclose(
         table["manipulability"], file.nominal.scores.manipulability(), rtol=1e-8

@@ -50,7 +50,7 @@ def test_number_of_jobs_changes_nothing(tcs_command, corner, corner_file, tmp_pa
     ran = tcs_command("score", "shaving", "--environment", corner, "--jobs", 1, "--out", path)
     assert ran.code == 0
     one, two = tcs.load(path), tcs.load(corner_file)
-    np.testing.assert_array_equal(one.nominal.scores.isotropy, two.nominal.scores.isotropy)
+    np.testing.assert_array_equal(one.nominal.scores.dexterity, two.nominal.scores.dexterity)
     np.testing.assert_array_equal(one.nominal.scores.arm_joints, two.nominal.scores.arm_joints)
 
 

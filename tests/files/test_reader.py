@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from tcs.errors import StoreFormatError, UnsafeStoreError
-from tcs.placement.store import load_scores, reader
+from tcs.files import reader
+from tcs.placement.store import load_scores
 from tcs.placement.store.packing import pack
 from tests.placement.store.example import score_file
 
@@ -53,7 +54,7 @@ def attacks(mark):
         "numpy.load": Call(np.load, str(mark), None, True),
         "numpy scalar": np.float64(1.0),
         "array of objects": objects,
-        "array of objects in a dict": {"scores": {"isotropy": objects}},
+        "array of objects in a dict": {"scores": {"dexterity": objects}},
         "structured array of objects": structured,
         "joblib.load": Call(joblib.load, str(mark)),
         "a class of ours": Call(type(reader._Known.ARRAY), ("numpy", "ndarray")),

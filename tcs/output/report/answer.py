@@ -15,7 +15,7 @@ from tcs.output.report.pictures import Shown, map_figure, member_figure, serves,
 from tcs.output.report.states import has_states, states_figure
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
-from tcs.placement.scoring.verify import ISOTROPY_BAR, Finding, check_pairs
+from tcs.placement.scoring.verify import DEXTERITY_BAR, Finding, check_pairs
 from tcs.placement.store import Scored, ScoreFile, load_scores
 from tcs.placement.tables import Reason, SuccessTable
 
@@ -110,7 +110,7 @@ class Answer:
                 Verdict(
                     reason=Reason(scores.reason[h, g]),
                     pair=scores.pair_names[scores.pair[h, g]] if scores.pair[h, g] >= 0 else None,
-                    measure=float(scores.isotropy[h, g]),
+                    measure=float(scores.dexterity[h, g]),
                 )
                 for g in range(self.goals)
             )
@@ -125,7 +125,7 @@ class Answer:
     def is_confirmed(self, goal: int) -> bool:
         """Return whether Drake confirms the posture shown at a goal, and its measure."""
         finding = self.findings[goal]
-        return finding.is_true and finding.isotropy_error <= ISOTROPY_BAR
+        return finding.is_true and finding.dexterity_error <= DEXTERITY_BAR
 
     @cached_property
     def server(self) -> tuple[int | None, ...]:

@@ -180,8 +180,8 @@ def serves(file: ScoreFile, shown: Shown, number: int) -> tuple[int, ...]:
         shown: The set.
         number: Number of the member, from 0.
     """
-    isotropy = file.tables[shown.table].scores.isotropy[list(shown.indices)]
-    mine = (isotropy.argmax(axis=0) == number) & (isotropy[number] > 0.0)
+    dexterity = file.tables[shown.table].scores.dexterity[list(shown.indices)]
+    mine = (dexterity.argmax(axis=0) == number) & (dexterity[number] > 0.0)
     return tuple(np.flatnonzero(mine).tolist())
 
 
@@ -214,7 +214,7 @@ def _view(
     _set_room(scene, (member,))
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)
-    current = max(served, key=lambda g: float(scores.isotropy[h, g]), default=None)
+    current = max(served, key=lambda g: float(scores.dexterity[h, g]), default=None)
     joints = scores.joints_of(h, current) if current is not None else None
     if joints is not None:
         scene.set_arm(joints)

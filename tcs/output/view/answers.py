@@ -132,7 +132,7 @@ class Answers:
             reasons=tuple(Reason(code) for code in scores.reason[index]),
             pairs=tuple(names[i] if i >= 0 else None for i in scores.pair[index].tolist()),
             reachability=float(tc_reachability(scores.reached[index], scores.weights)),
-            manipulability=float(tc_manipulability(scores.isotropy[index], scores.weights)),
+            manipulability=float(tc_manipulability(scores.dexterity[index], scores.weights)),
         )
 
     def joints(self, index: int, goal: int) -> NDArray[np.float32] | None:
@@ -154,7 +154,7 @@ class Answers:
             several serve alike counts for the first of them.
         """
         rows = list(self.members)
-        measure = np.where(self.scores.reached[rows], self.scores.isotropy[rows], -1.0)
+        measure = np.where(self.scores.reached[rows], self.scores.dexterity[rows], -1.0)
         mine = (measure.argmax(axis=0) == number) & self.scores.reached[rows[number]]
         return tuple(np.flatnonzero(mine).tolist())
 

@@ -88,7 +88,7 @@ def _values(answers: Answers, rows: slice, kind: str) -> FloatArray:
     if kind == REACHABILITY:
         return np.asarray(tc_reachability(scores.reached[rows], scores.weights))
     if kind == MANIPULABILITY:
-        return np.asarray(tc_manipulability(scores.isotropy[rows], scores.weights))
+        return np.asarray(tc_manipulability(scores.dexterity[rows], scores.weights))
     values = np.zeros(rows.stop - rows.start)
     success = answers.success
     if success is not None:

@@ -49,7 +49,7 @@ class Fix:
     route: str
     """How it drives: "around" the furniture; "straight" where that was asked for, or where the
     base cannot be."""
-    isotropy: float
+    dexterity: float
     """How evenly the arm can move at the goal from there."""
     reachability: float
     """P_R of this configuration by itself."""
@@ -86,7 +86,7 @@ class Fix:
             "route": self.route,
             "ahead": round(ahead, 9),
             "left": round(left, 9),
-            "isotropy": self.isotropy,
+            "dexterity": self.dexterity,
             # Seven sevenths add up to 1 only after rounding.
             "reachability": round(self.reachability, 12),
             "manipulability": round(self.manipulability, 12),
@@ -169,7 +169,7 @@ def nearest_fix(
     if cut_off == len(rows):
         return None, cut_off
     near = np.flatnonzero(cost <= cost.min() + TIE)
-    manipulability = tc_manipulability(scores.isotropy[rows[near]], scores.weights)
+    manipulability = tc_manipulability(scores.dexterity[rows[near]], scores.weights)
     best = int(near[np.argmax(manipulability)])
     driving = ways.from_place(standing.place.base_x, standing.place.base_y)[best]
     index = int(rows[best])
@@ -181,9 +181,9 @@ def nearest_fix(
         cost=float(cost[best]),
         driving=float(driving),
         route=route,
-        isotropy=float(scores.isotropy[index, goal]),
+        dexterity=float(scores.dexterity[index, goal]),
         reachability=float(tc_reachability(there, scores.weights)),
-        manipulability=float(tc_manipulability(scores.isotropy[index], scores.weights)),
+        manipulability=float(tc_manipulability(scores.dexterity[index], scores.weights)),
         reached=tuple(np.flatnonzero(there).tolist()),
         lost=tuple(np.flatnonzero(here & ~there).tolist()),
     )

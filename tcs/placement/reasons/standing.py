@@ -29,7 +29,7 @@ class Standing:
     """Whether the goal is reached, or why not."""
     pair: tuple[str, str] | None
     """The two bodies that block, if any do. Where the arm does: those of the best solution."""
-    isotropy: float
+    dexterity: float
     """How evenly the arm can move at the goal; 0 where it is not reached."""
 
     @classmethod
@@ -60,7 +60,7 @@ class Standing:
             place=place,
             reason=Reason(scores.reason[index, goal]),
             pair=scores.pair_names[pair] if pair >= 0 else None,
-            isotropy=float(scores.isotropy[index, goal]),
+            dexterity=float(scores.dexterity[index, goal]),
         )
 
     @property
@@ -83,7 +83,7 @@ class Standing:
             "reached": self.is_reached,
             "reason": self.reason.name.lower(),
             "pair": None if self.pair is None else list(self.pair),
-            "isotropy": self.isotropy,
+            "dexterity": self.dexterity,
         }
 
 

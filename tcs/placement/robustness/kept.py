@@ -111,7 +111,7 @@ def _kept(
     first, second = first[once], second[once]
     reachability, manipulability = np.zeros(first.size), np.zeros(first.size)
     for g, weight in enumerate(sets.weights):
-        column = sets.isotropy[:, g].astype(np.float64)
+        column = sets.dexterity[:, g].astype(np.float64)
         manipulability += float(weight) * np.maximum(column[first], column[second])
         reachability += float(weight) * (sets.reached[first, g] | sets.reached[second, g])
     limits = sets.limits

@@ -112,7 +112,7 @@ def build_sets(
         weights=scores.weights,
         candidates=candidates,
         reached=scores.reached[candidates],
-        isotropy=scores.isotropy[candidates],
+        dexterity=scores.dexterity[candidates],
         cell=cell,
         cell_xy=cell_xy,
         pair_cells=pair_cells.astype(np.int32),
@@ -190,19 +190,19 @@ def _grouped(
     """Return what the kernel needs, candidates sorted by cell."""
     number = np.argsort(cell, kind="stable").astype(np.int64)
     start = np.searchsorted(cell[number], np.arange(len(cell_xy) + 1)).astype(np.int64)
-    isotropy = scores.isotropy[candidates[number]].astype(np.float64)
+    dexterity = scores.dexterity[candidates[number]].astype(np.float64)
     reached = scores.reached[candidates[number]]
-    single = tc_manipulability(isotropy, scores.weights)
+    single = tc_manipulability(dexterity, scores.weights)
     limits = pair_limits(rule, tc_reachability(reached, scores.weights), single)
     return SetArrays(
         number=number,
         start=start,
         state=state[number],
         xy=spaced_places(rule, cell_xy),
-        isotropy=isotropy,
+        isotropy=dexterity,
         reached=reached,
         single=single,
-        peak=np.maximum.reduceat(isotropy, start[:-1], axis=0) if len(number) else isotropy,
+        peak=np.maximum.reduceat(dexterity, start[:-1], axis=0) if len(number) else dexterity,
         weights=scores.weights,
         least_distance=min_distance - DISTANCE_TOLERANCE,
         least_reachability=limits.reachability,
@@ -277,7 +277,7 @@ def _best_sets(
     keys = order_keys(
         rule,
         tc_reachability(scores.reached[candidates], scores.weights),
-        tc_manipulability(scores.isotropy[candidates], scores.weights),
+        tc_manipulability(scores.dexterity[candidates], scores.weights),
     )
     single = np.lexsort((-keys[1], -keys[0]))[0]
     best_single: tuple[int, ...] = (int(candidates[single]),)
@@ -306,8 +306,8 @@ def _with_triples(
     if not members:
         return triples, best
     reached = np.logical_or.reduce(scores.reached[list(best)], axis=0)
-    isotropy = np.maximum.reduce(scores.isotropy[list(best)], axis=0)
-    so_far = tc_reachability(reached, scores.weights) + tc_manipulability(isotropy, scores.weights)
+    dexterity = np.maximum.reduce(scores.dexterity[list(best)], axis=0)
+    so_far = tc_reachability(reached, scores.weights) + tc_manipulability(dexterity, scores.weights)
     # Smaller sets come first, so a triple has to be better, not as good.
     if total > so_far:
         best = tuple(int(h) for h in candidates[list(members)])

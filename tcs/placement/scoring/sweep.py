@@ -82,14 +82,14 @@ def sweep(
     starts = range(0, size, SLICE)
     reason = np.empty((size, goals), np.uint8)
     contact = np.empty((size, goals), np.int32)
-    isotropy = np.empty((size, goals), np.float32)
+    dexterity = np.empty((size, goals), np.float32)
     joints = []
     done = 0
     for part in Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
         delayed(_slice)(problem, grippers, start, min(start + SLICE, size)) for start in starts
     ):
         rows = slice(done, done + len(part.reason))
-        reason[rows], contact[rows], isotropy[rows] = part.reason, part.contact, part.isotropy
+        reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.isotropy
         # Only the joints of reached pairs are worth keeping: one pair in ten.
         joints.append(part.joints[part.reason == 0])
         done += len(part.reason)
@@ -101,7 +101,7 @@ def sweep(
     winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
     parts = tuple(
         ScoreTable(
-            isotropy=isotropy[rows],
+            dexterity=dexterity[rows],
             reason=reason[rows],
             pair=contact[rows],
             pair_names=names,

@@ -27,7 +27,7 @@ the tool by up to 1.2e-7 rad x 1 m for each of the seven joints, 4e-7 m in pract
 ROTATION_BAR = 2e-6
 """Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
 8.4e-7, and reading an angle off a rotation matrix near the identity loses as much again."""
-ISOTROPY_BAR = 1e-6
+DEXTERITY_BAR = 1e-6
 """Greatest difference of a stored measure from that of Drake's Jacobian. Float32 keeps 6e-8; a
 least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
 CLEARANCE_ROUNDING = 2e-6
@@ -56,7 +56,7 @@ class Verification:
     max_rotation_error: float
     """Greatest rotation of the tool from its goal [rad]."""
     max_isotropy_error: float
-    """Greatest difference of the file's measure, isotropy or another, from that of Drake's
+    """Greatest difference of the stored dexterity from that of Drake's
     Jacobian."""
     limit_violations: int
     """Joints beyond their limits."""
@@ -84,7 +84,7 @@ class Verification:
             and self.unconfirmed_hits == 0
             and self.max_position_error <= POSITION_BAR
             and self.max_rotation_error <= ROTATION_BAR
-            and self.max_isotropy_error <= ISOTROPY_BAR
+            and self.max_isotropy_error <= DEXTERITY_BAR
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -153,7 +153,7 @@ def verify(
         false_reached=sum(not finding.is_true for finding in findings),
         max_position_error=max((finding.position_error for finding in findings), default=0.0),
         max_rotation_error=max((finding.rotation_error for finding in findings), default=0.0),
-        max_isotropy_error=max((finding.isotropy_error for finding in findings), default=0.0),
+        max_isotropy_error=max((finding.dexterity_error for finding in findings), default=0.0),
         limit_violations=sum(finding.limit_violations for finding in findings),
         dense_checked=sum(scanned),
         missed=sum(missed),
@@ -197,10 +197,10 @@ class _Check:
     problem: Problem
     judge: _Judge
 
-    def isotropy(self, h: int, g: int) -> float:
+    def dexterity(self, h: int, g: int) -> float:
         """Return the stored measure."""
         table, row = divmod(h, self.size)
-        return float(self.tables[table].scores.isotropy[row, g])
+        return float(self.tables[table].scores.dexterity[row, g])
 
     def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
         """Return what Drake says of the stored solutions of reached pairs."""
@@ -208,7 +208,7 @@ class _Check:
         for h, g in pairs:
             table, row = divmod(h, self.size)
             q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
-            findings.append(self.judge.check(h, g, q, self.isotropy(h, g)))
+            findings.append(self.judge.check(h, g, q, self.dexterity(h, g)))
             step()
         return findings
 
@@ -227,7 +227,7 @@ class _Check:
         short, q = [], np.empty(7)
         for h, g in pairs:
             value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
-            short.append(max(0.0, value - self.isotropy(h, g)))
+            short.append(max(0.0, value - self.dexterity(h, g)))
             step()
         return short
 
@@ -301,7 +301,7 @@ class Finding:
 
     position_error: float
     rotation_error: float
-    isotropy_error: float
+    dexterity_error: float
     limit_violations: int
     contacts: int
 
@@ -346,7 +346,7 @@ class _Judge:
         return Finding(
             position_error=float(np.linalg.norm(X_TG.translation())),
             rotation_error=float(rotation),
-            isotropy_error=abs(exact - float(value)),
+            dexterity_error=abs(exact - float(value)),
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
             contacts=len(contacts),
         )

@@ -87,10 +87,10 @@ def _utilities(
     """Return the utility of sets of one size, given their candidates, shape (n, size)."""
     columns = tuple(np.ascontiguousarray(column) for column in members.T)
     reached = np.logical_or.reduce([sets.reached[column] for column in columns], axis=0)
-    isotropy = np.maximum.reduce([sets.isotropy[column] for column in columns], axis=0)
+    dexterity = np.maximum.reduce([sets.dexterity[column] for column in columns], axis=0)
     return utility(
         tc_reachability(reached, sets.weights),
-        tc_manipulability(isotropy, sets.weights),
+        tc_manipulability(dexterity, sets.weights),
         tour_costs(legs, columns),
         weights,
         success,

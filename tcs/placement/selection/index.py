@@ -53,9 +53,9 @@ class SetIndex:
         return self.sets.by_cell[self.start]
 
     @cached_property
-    def isotropy(self) -> FloatArray:
-        """Isotropy in double precision, one contiguous row for each goal, shape (G, C)."""
-        return np.ascontiguousarray(self.sets.isotropy.T, dtype=np.float64)
+    def dexterity(self) -> FloatArray:
+        """Dexterity in double precision, one contiguous row for each goal, shape (G, C)."""
+        return np.ascontiguousarray(self.sets.dexterity.T, dtype=np.float64)
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:

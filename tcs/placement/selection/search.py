@@ -196,10 +196,10 @@ def _best_of(
     members, cost = tuple(member[able] for member in members), cost[able]
     every, sets = bounds.index.all, bounds.index.all.sets
     manipulability = np.zeros(cost.size)
-    for isotropy, weight in zip(every.isotropy, sets.weights, strict=True):
-        most = isotropy[members[0]]
+    for dexterity, weight in zip(every.dexterity, sets.weights, strict=True):
+        most = dexterity[members[0]]
         for member in members[1:]:
-            most = np.maximum(most, isotropy[member])
+            most = np.maximum(most, dexterity[member])
         manipulability += float(weight) * most
     reachability = np.zeros(cost.size)
     for reached, weight in zip(every.reached, sets.weights, strict=True):

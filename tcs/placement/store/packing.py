@@ -17,7 +17,7 @@ from tcs.placement.tables import Reason, ScoreTable, SetTable
 FORMAT = "tcs scores"
 """What the file calls itself."""
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """Grows when the form of the file changes; other versions are refused."""
 
 Explain = Callable[[Callable[[], ScoreTable]], ScoreTable]
@@ -66,8 +66,8 @@ def unpack(content: object, explain: Explain = lambda read: read()) -> ScoreFile
         )
     if version < FORMAT_VERSION:
         raise StoreFormatError(
-            f"has format version {version} of an older tcs, and this program reads version "
-            f"{FORMAT_VERSION}"
+            f"has format version {version}, written by an older tcs, and this program reads "
+            f"version {FORMAT_VERSION}"
         )
     return ScoreFile(
         **{name: _dict(content.get(name), name) for name in DESCRIPTIONS},
@@ -96,8 +96,8 @@ def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
     rest = scores.reached.copy()
     rest[sets.candidates] = False
     return {
-        # The isotropy of the candidates is stored with the sets.
-        "isotropy_rest": fold(scores.isotropy[rest]),
+        # The dexterity of the candidates is stored with the sets.
+        "dexterity_rest": fold(scores.dexterity[rest]),
         "reason": fold(scores.reason),
         "pair_plus_one": fold(small(scores.pair.astype(np.int64) + 1)),
         "pair_names": [list(names) for names in scores.pair_names],
@@ -110,11 +110,11 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
     reason = unfolded(packed, "reason", "u1", (None, goals))
     if len(sets.candidates) and sets.candidates[-1] >= len(reason):
         raise StoreFormatError("has sets of more configurations than scores")
-    isotropy = np.zeros(reason.shape, dtype=np.float32)
-    isotropy[sets.candidates] = sets.isotropy
+    dexterity = np.zeros(reason.shape, dtype=np.float32)
+    dexterity[sets.candidates] = sets.dexterity
     rest = reason == Reason.REACHED
     rest[sets.candidates] = False
-    isotropy[rest] = unfolded(packed, "isotropy_rest", "f4", (int(np.count_nonzero(rest)),))
+    dexterity[rest] = unfolded(packed, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
     pair = unfolded(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
     names = packed.get("pair_names")
     if not isinstance(names, list) or not all(
@@ -125,7 +125,7 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
     if np.any(pair >= len(names)):
         raise StoreFormatError(f"has a pair of bodies beyond its {len(names)} pair_names")
     return ScoreTable(
-        isotropy=isotropy,
+        dexterity=dexterity,
         reason=reason,
         pair=pair.astype(np.int32),
         pair_names=tuple((first, second) for first, second in names),

@@ -87,7 +87,7 @@ class Scored:
             np.array_equal(sets.weights, scores.weights)
             and np.array_equal(sets.candidates, candidates)
             and np.array_equal(sets.reached, scores.reached[candidates])
-            and np.array_equal(sets.isotropy, scores.isotropy[candidates])
+            and np.array_equal(sets.dexterity, scores.dexterity[candidates])
         ):
             raise StoreError("sets do not belong to the scores.")
 

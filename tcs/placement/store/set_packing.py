@@ -40,7 +40,7 @@ def packed_sets(sets: SetTable) -> dict[str, Any]:
         # Steps from one to the next are mostly small, and compress to little.
         "candidate_step": fold(_steps(sets.candidates.astype(np.int64))),
         "reached": fold(sets.reached.astype(np.uint8)),
-        "isotropy": fold(sets.isotropy[sets.reached]),
+        "dexterity": fold(sets.dexterity[sets.reached]),
         "cell": fold(small(sets.cell.astype(np.int64))),
         "cell_xy": fold(sets.cell_xy),
         "pair_step": fold(_steps(numbers)),
@@ -78,8 +78,8 @@ def unpacked_sets(packed: dict[str, Any]) -> SetTable:
     # A table has at most 20 million configurations: see `tcs.model.grid.MAX_CONFIGURATIONS`.
     candidates = _ascending(unfolded(packed, "candidate_step", "u", (None,)), 2**31, "candidates")
     reached = unfolded(packed, "reached", "u1", (candidates.size, weights.size)) != 0
-    isotropy = np.zeros(reached.shape, dtype=np.float32)
-    isotropy[reached] = unfolded(packed, "isotropy", "f4", (int(np.count_nonzero(reached)),))
+    dexterity = np.zeros(reached.shape, dtype=np.float32)
+    dexterity[reached] = unfolded(packed, "dexterity", "f4", (int(np.count_nonzero(reached)),))
     cell_xy = unfolded(packed, "cell_xy", "f8", (None, 2))
     values = unfolded(packed, "reachability_values", "f8", (None,))
     step = unfolded(packed, "pair_step", "u", (None,))
@@ -94,7 +94,7 @@ def unpacked_sets(packed: dict[str, Any]) -> SetTable:
         weights=weights,
         candidates=candidates.astype(np.int32),
         reached=reached,
-        isotropy=isotropy,
+        dexterity=dexterity,
         cell=_int32(unfolded(packed, "cell", "u", candidates.shape)),
         cell_xy=cell_xy,
         pair_cells=pair_cells.astype(np.int32),

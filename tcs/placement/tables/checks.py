@@ -16,7 +16,7 @@ def read_only(
     """Return the array as a C-contiguous view that cannot be written through.
 
     Args:
-        what: Name for the error message, e.g. "score table: isotropy".
+        what: Name for the error message, e.g. "score table: dexterity".
         array: Array to check; not copied when it is already contiguous.
         dtype: Type it must have; a silent cast would hide a wrong array.
         shape: Shape it must have, None where any length will do.

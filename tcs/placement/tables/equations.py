@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 def tc_reachability(
     reached: NDArray[np.bool_], weights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return P_R, the weighted share of goals that can be reached: TCS eq. (1).
+    """Return P_R, the weighted fraction of goals that can be reached: TCS eq. (1).
 
     Args:
         reached: Whether a goal is reached, shape (..., goals).
@@ -34,12 +34,13 @@ def tc_reachability(
 
 
 def tc_manipulability(
-    isotropy: NDArray[np.float32] | NDArray[np.float64], weights: NDArray[np.float64]
+    dexterity: NDArray[np.float32] | NDArray[np.float64], weights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return P_M, the weighted kinematic isotropy over the goals: TCS eq. (4).
+    """Return P_M, the weighted dexterity over the goals: TCS eq. (4).
 
     Args:
-        isotropy: Best isotropy at each goal, 0 where it is not reached, shape (..., goals).
+        dexterity: Greatest dexterity at each goal (kinematic isotropy in the paper), 0 where it is
+            not reached, shape (..., goals).
         weights: Weights of the goals, sum 1, shape (goals,).
 
     Returns:
@@ -48,8 +49,8 @@ def tc_manipulability(
     >>> float(tc_manipulability(np.array([0.5, 0.0]), np.array([0.5, 0.5])))
     0.25
     """
-    total = np.zeros(isotropy.shape[:-1])
+    total = np.zeros(dexterity.shape[:-1])
     for g, weight in enumerate(weights):
         # Widen first: a float32 array times a Python float stays float32.
-        total += float(weight) * isotropy[..., g].astype(np.float64)
+        total += float(weight) * dexterity[..., g].astype(np.float64)
     return total

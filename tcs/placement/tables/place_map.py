@@ -86,14 +86,14 @@ class PlaceMap:
         def per_place(values: NDArray[Any]) -> NDArray[Any]:
             return np.asarray(values.reshape(shape).max(axis=others))
 
-        reached, isotropy = scores.reached[rows], scores.isotropy[rows]
+        reached, dexterity = scores.reached[rows], scores.dexterity[rows]
         # The body is in the way, or not, whatever the goal.
         blocked = (scores.reason[rows] == Reason.BODY_BLOCKED).any(axis=1)
         return cls(
             x=grid.axis("base_x").values,
             y=grid.axis("base_y").values,
             reachability=per_place(tc_reachability(reached, scores.weights)),
-            manipulability=per_place(tc_manipulability(isotropy, scores.weights)),
+            manipulability=per_place(tc_manipulability(dexterity, scores.weights)),
             free=per_place(~blocked),
             # An axis of one value leaves nothing to choose from. Headings and heights first.
             over=tuple(a.name for a in reversed(axes) if a.count > 1 and a.name not in _PLACE),

@@ -36,7 +36,7 @@ class ScoreTable:
     base y, base yaw, torso level).
     """
 
-    isotropy: NDArray[np.float32]
+    dexterity: NDArray[np.float32]
     """Best measure over all collision-free solutions, 0 where not reached, shape (H, G)."""
     reason: NDArray[np.uint8]
     """A `Reason` for each pair of configuration and goal, shape (H, G)."""
@@ -56,10 +56,10 @@ class ScoreTable:
             TcsError: If an array has the wrong type, shape or range.
         """
         goals = self.weights.size if isinstance(self.weights, np.ndarray) else None
-        rows = len(self.isotropy) if isinstance(self.isotropy, np.ndarray) else None
+        rows = len(self.dexterity) if isinstance(self.dexterity, np.ndarray) else None
         shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
             "weights": (np.float64, (goals,)),
-            "isotropy": (np.float32, (rows, goals)),
+            "dexterity": (np.float32, (rows, goals)),
             "reason": (np.uint8, (rows, goals)),
             "pair": (np.int32, (rows, goals)),
             "arm_joints": (np.float32, (None, 7)),
@@ -83,12 +83,12 @@ class ScoreTable:
             f"score table: reason outside 0..{max(Reason):d}.",
         )
         require(
-            bool(np.all((self.isotropy >= 0.0) & (self.isotropy < np.inf))),
-            "score table: isotropy must be finite and >= 0.",
+            bool(np.all((self.dexterity >= 0.0) & (self.dexterity < np.inf))),
+            "score table: dexterity must be finite and >= 0.",
         )
         require(
-            not np.any(self.isotropy[~reached]),
-            "score table: isotropy must be 0 where the goal is not reached.",
+            not np.any(self.dexterity[~reached]),
+            "score table: dexterity must be 0 where the goal is not reached.",
         )
         require(
             bool(np.all((self.pair >= -1) & (self.pair < len(self.pair_names)))),
@@ -104,7 +104,7 @@ class ScoreTable:
     @property
     def configurations(self) -> int:
         """H, the number of initial configurations."""
-        return len(self.isotropy)
+        return len(self.dexterity)
 
     @property
     def goals(self) -> int:
@@ -129,7 +129,7 @@ class ScoreTable:
 
     def manipulability(self) -> NDArray[np.float64]:
         """Return P_M of each configuration by itself, TCS eq. (4), shape (H,)."""
-        return tc_manipulability(self.isotropy, self.weights)
+        return tc_manipulability(self.dexterity, self.weights)
 
     def reason_counts(self) -> dict[str, int]:
         """Return how many pairs of configuration and goal have each reason, by its name."""

@@ -4,7 +4,7 @@ Pairs of configurations come in tens of millions, so they are not listed. They
 are grouped by the two base cells (x-y places) of their members, and for each
 pair of cells the table holds how many pairs were kept and upper bounds on
 their scores. That is enough to find the best pair exactly (see `tcs.select`),
-because the score of a pair follows from the isotropy of its two members.
+because the score of a pair follows from the dexterity of its two members.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ class SetTable:
     candidates: NDArray[np.int32]
     """Flat indices of the configurations kept as singles, ascending, shape (C,)."""
     reached: NDArray[np.bool_]
-    """Whether a candidate reaches a goal, shape (C, G). Not the same as isotropy > 0, which
+    """Whether a candidate reaches a goal, shape (C, G). Not the same as dexterity > 0, which
     a singular arm posture can have at a goal it does reach."""
-    isotropy: NDArray[np.float32]
-    """Isotropy of the candidates, 0 where not reached, shape (C, G)."""
+    dexterity: NDArray[np.float32]
+    """Dexterity of the candidates, 0 where not reached, shape (C, G)."""
     cell: NDArray[np.int32]
     """Base cell of each candidate, shape (C,)."""
     cell_xy: NDArray[np.float64]
@@ -105,7 +105,7 @@ class SetTable:
             "weights": (np.float64, (goals,)),
             "candidates": (np.int32, (count,)),
             "reached": (np.bool_, (count, goals)),
-            "isotropy": (np.float32, (count, goals)),
+            "dexterity": (np.float32, (count, goals)),
             "cell": (np.int32, (count,)),
             "cell_xy": (np.float64, (None, 2)),
             "pair_cells": (np.int32, (kept, 2)),
@@ -208,7 +208,7 @@ class SetTable:
     @cached_property
     def single_manipulability(self) -> NDArray[np.float64]:
         """P_M of each candidate by itself, TCS eq. (4), shape (C,)."""
-        return tc_manipulability(self.isotropy, self.weights)
+        return tc_manipulability(self.dexterity, self.weights)
 
     @cached_property
     def limits(self) -> PairLimits:
@@ -263,8 +263,8 @@ class SetTable:
             f"Set {members}: every member must be a configuration that reaches a goal.",
         )
         reached = np.logical_or.reduce(self.reached[rows], axis=0)
-        isotropy = np.maximum.reduce(self.isotropy[rows], axis=0)
+        dexterity = np.maximum.reduce(self.dexterity[rows], axis=0)
         return (
             float(tc_reachability(reached, self.weights)),
-            float(tc_manipulability(isotropy, self.weights)),
+            float(tc_manipulability(dexterity, self.weights)),
         )

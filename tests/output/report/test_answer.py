@@ -86,14 +86,14 @@ def test_the_page_has_every_part_and_needs_nothing_else(page):
 def test_each_goal_is_told_as_the_file_has_it(answer, score_path):
     table, scores = goals_table(answer), load_scores(score_path).nominal.scores
     members = list(answer.shown.indices)
-    best = scores.isotropy[members].argmax(axis=0)
+    best = scores.dexterity[members].argmax(axis=0)
     for goal, said in enumerate(column(table, "Reached from")):
         reached = scores.reached[members, goal].any()
         assert said == (f"stop {best[goal] + 1}" if reached else "nowhere")
     for number, h in enumerate(members):
         for goal, said in enumerate(column(table, f"At stop {number + 1}")):
             if scores.reached[h, goal]:
-                assert float(said) == pytest.approx(scores.isotropy[h, goal], abs=5e-4)
+                assert float(said) == pytest.approx(scores.dexterity[h, goal], abs=5e-4)
             else:
                 assert not said[0].isdigit()
     share = scores.reached.mean(axis=0)
@@ -178,7 +178,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     file = load_scores(score_path)
     scores = file.nominal.scores
     h = file.nominal.sets.best[0]
-    goal = int(scores.isotropy[h].argmax())
+    goal = int(scores.dexterity[h].argmax())
     row = np.flatnonzero(np.flatnonzero(scores.reached) == h * scores.goals + goal)
     joints = scores.arm_joints.copy()
     joints[row, 0] += np.float32(0.01)
@@ -281,15 +281,15 @@ def test_a_false_answer_ends_in_an_exit_code(false_path, tmp_path):
 def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path):
     file = load_scores(score_path)
     scores = file.nominal.scores
-    better = np.where(scores.reached, scores.isotropy + np.float32(1e-3), scores.isotropy)
+    better = np.where(scores.reached, scores.dexterity + np.float32(1e-3), scores.dexterity)
     table = Scored.of(
-        dataclasses.replace(scores, isotropy=better),
+        dataclasses.replace(scores, dexterity=better),
         dataclasses.replace(
             file.nominal.sets,
-            isotropy=np.where(
+            dexterity=np.where(
                 file.nominal.sets.reached,
-                file.nominal.sets.isotropy + np.float32(1e-3),
-                file.nominal.sets.isotropy,
+                file.nominal.sets.dexterity + np.float32(1e-3),
+                file.nominal.sets.dexterity,
             ),
         ),
     )

@@ -50,7 +50,7 @@ def one_configuration(reason, pair=None) -> ScoreTable:
     reason = np.array([reason], np.uint8)
     reached = reason == 0
     return ScoreTable(
-        isotropy=np.where(reached, np.float32(0.5), np.float32(0.0)),
+        dexterity=np.where(reached, np.float32(0.5), np.float32(0.0)),
         reason=reason,
         pair=np.array([pair or [-1] * reason.size], np.int32),
         pair_names=(("forearm", "head"),),

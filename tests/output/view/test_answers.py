@@ -49,9 +49,9 @@ def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
     reached = bed.scores.reached[list(bed.members)].any(axis=0)
     assert together == np.flatnonzero(reached).tolist()
     for number, goals in enumerate(served):
-        best = bed.scores.isotropy[list(bed.members)].max(axis=0)
+        best = bed.scores.dexterity[list(bed.members)].max(axis=0)
         for goal in goals:
-            assert bed.scores.isotropy[bed.members[number], goal] == best[goal]
+            assert bed.scores.dexterity[bed.members[number], goal] == best[goal]
 
 
 def test_a_goal_that_nobody_reaches_is_served_by_nobody():

@@ -36,7 +36,7 @@ def nearest(file, goal, before, weights):
             continue
         price = cost(before, grid.configuration(h), weights)
         value = sum(
-            float(w) * float(i) for w, i in zip(scores.weights, scores.isotropy[h], strict=True)
+            float(w) * float(i) for w, i in zip(scores.weights, scores.dexterity[h], strict=True)
         )
         if (
             best is None
@@ -119,14 +119,14 @@ def test_ties_go_to_the_greater_manipulability():
 
 
 def made(grid, outcome):
-    """A file of one goal: for each configuration its isotropy where reached, else the reason."""
+    """A file of one goal: for each configuration its dexterity where reached, else the reason."""
     outcomes = [outcome(h) for h in range(grid.size)]
     reached = np.array([not isinstance(one, Reason) for one in outcomes])
-    isotropy = np.where(reached, outcomes, 0.0).astype(np.float32)
+    dexterity = np.where(reached, outcomes, 0.0).astype(np.float32)
     reason = np.where(reached, Reason.REACHED, outcomes).astype(np.uint8)
     blocked = reason >= Reason.BODY_BLOCKED
     scores = ScoreTable(
-        isotropy=isotropy[:, None],
+        dexterity=dexterity[:, None],
         reason=reason[:, None],
         pair=np.where(blocked, 0, -1).astype(np.int32)[:, None],
         pair_names=(("base", "bed"),),

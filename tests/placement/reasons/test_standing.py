@@ -111,7 +111,7 @@ def test_standing_tells_what_the_table_holds():
         assert (standing.pair is None) == (scores.pair[index, 2] < 0)
         if standing.pair is not None:
             assert standing.pair == scores.pair_names[scores.pair[index, 2]]
-        assert standing.isotropy == scores.isotropy[index, 2]
+        assert standing.dexterity == scores.dexterity[index, 2]
         assert standing.off == {}
 
 

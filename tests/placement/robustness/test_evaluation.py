@@ -163,7 +163,7 @@ def test_nothing_reached_is_nothing_to_evaluate(bed_trials):
         none.scored.sets,
         candidates=np.empty(0, np.int32),
         reached=np.empty((0, 14), bool),
-        isotropy=np.empty((0, 14), np.float32),
+        dexterity=np.empty((0, 14), np.float32),
         cell=np.empty(0, np.int32),
         cell_xy=np.empty((0, 2)),
         pair_cells=np.empty((0, 2), np.int32),

@@ -11,7 +11,7 @@ def scores_with(grid, blocked):
     reason = np.full((grid.size, 1), Reason.TOO_FAR, dtype=np.uint8)
     reason[blocked] = Reason.BODY_BLOCKED
     return ScoreTable(
-        isotropy=np.zeros((grid.size, 1), dtype=np.float32),
+        dexterity=np.zeros((grid.size, 1), dtype=np.float32),
         reason=reason,
         pair=np.full((grid.size, 1), -1, dtype=np.int32),
         pair_names=(),

@@ -27,7 +27,7 @@ def test_scores_do_not_depend_on_the_number_of_threads(small_job):
     lowered = small_job.lowered(small_job.scene())
     one = sweep(lowered, small_job.task.weights, jobs=1).tables[0]
     two = sweep(lowered, small_job.task.weights, jobs=2).tables[0]
-    for name in ("reason", "isotropy", "pair", "arm_joints"):
+    for name in ("reason", "dexterity", "pair", "arm_joints"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert one.pair_names == two.pair_names
 

@@ -27,7 +27,7 @@ grid:
   base_yaw: {unit: deg, start: 90, step: 90, count: 2}
   torso: {unit: m, start: 0.15, step: 0.15, count: 1}
 """
-TABLES = ("reason", "isotropy", "arm_joints")
+TABLES = ("reason", "dexterity", "arm_joints")
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_a_stored_shift_gives_its_table_exactly(bed_scorer, bedside, shift):
 
 def test_scoring_leaves_no_trace_for_the_next(scorer, small_file):
     moved = scorer.score({"person_x": 0.05, "head_tilt": 0.1})
-    assert not np.array_equal(moved.nominal.scores.isotropy, small_file.nominal.scores.isotropy)
+    assert not np.array_equal(moved.nominal.scores.dexterity, small_file.nominal.scores.dexterity)
     assert_same_scores(scorer.score().nominal, small_file.nominal)
 
 
@@ -110,10 +110,10 @@ def test_moving_chair_and_robot_together_changes_nothing_that_is_reached(scorer,
     # grid with it. Chair and robot both stand on the same floor.
     moved = scorer.score({"wheelchair_x": 0.1}).nominal.scores
     rows = (8, 2, 4, 2, -1)
-    here = small_file.nominal.scores.isotropy.reshape(rows)[:-1]
-    there = moved.isotropy.reshape(rows)[1:]
+    here = small_file.nominal.scores.dexterity.reshape(rows)[:-1]
+    there = moved.dexterity.reshape(rows)[1:]
     # 0.1 m is no multiple of 2^-52: the last bits of the goals differ, and with them 1e-7 of the
-    # float32 isotropy.
+    # float32 dexterity.
     np.testing.assert_allclose(there, here, atol=1e-6)
 
 

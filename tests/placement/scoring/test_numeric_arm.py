@@ -115,6 +115,6 @@ def test_baxter_feeds_a_person_in_a_wheelchair():
 def test_jobs_do_not_matter(files, scored):
     robot, room = files
     one = score("feeding", room, robot, jobs=1)
-    for name in ("reason", "pair", "isotropy", "arm_joints"):
+    for name in ("reason", "pair", "dexterity", "arm_joints"):
         first, second = (getattr(f.nominal.scores, name) for f in (one, scored))
         assert (first == second).all(), name

@@ -180,7 +180,7 @@ def test_two_fifths_of_the_goals_are_kept_by_the_code_of_2015():
     grid = small_grid(nx=1, ny=1, yaws=1, torsos=2)
     reason = np.array([[0, 0, 1, 1, 1], [0, 1, 1, 1, 1]], dtype=np.uint8)
     scores = ScoreTable(
-        isotropy=np.where(reason == 0, np.float32(0.5), np.float32(0.0)),
+        dexterity=np.where(reason == 0, np.float32(0.5), np.float32(0.0)),
         reason=reason,
         pair=np.full((2, 5), -1, dtype=np.int32),
         pair_names=(),
@@ -195,10 +195,10 @@ def test_two_fifths_of_the_goals_are_kept_by_the_code_of_2015():
 def test_the_code_of_2015_puts_reachability_first():
     """The set with the greatest sum is not its best: fewer goals, better reached."""
     grid = small_grid(nx=1, ny=1, yaws=1, torsos=2)
-    isotropy = np.array([[0.1, 0.1, 0.1], [0.9, 0.9, 0.0]], dtype=np.float32)
+    dexterity = np.array([[0.1, 0.1, 0.1], [0.9, 0.9, 0.0]], dtype=np.float32)
     scores = ScoreTable(
-        isotropy=isotropy,
-        reason=np.where(isotropy > 0, 0, 1).astype(np.uint8),
+        dexterity=dexterity,
+        reason=np.where(dexterity > 0, 0, 1).astype(np.uint8),
         pair=np.full((2, 3), -1, dtype=np.int32),
         pair_names=(),
         arm_joints=np.zeros((5, 7), dtype=np.float32),
@@ -216,7 +216,7 @@ def test_places_a_rounding_error_short_of_the_distance_are_paired():
     reason[:10, 1] = reason[10:, 0] = 1
     reached = reason == 0
     scores = ScoreTable(
-        isotropy=np.where(reached, np.float32(0.5), np.float32(0.0)),
+        dexterity=np.where(reached, np.float32(0.5), np.float32(0.0)),
         reason=reason,
         pair=np.full((20, 2), -1, dtype=np.int32),
         pair_names=(),

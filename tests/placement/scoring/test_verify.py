@@ -44,7 +44,7 @@ def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_ro
     np.testing.assert_array_equal(file.nominal.scores.reason, small_file.nominal.scores.reason)
     reached = file.nominal.scores.reached
     assert np.any(
-        file.nominal.scores.isotropy[reached] < small_file.nominal.scores.isotropy[reached]
+        file.nominal.scores.dexterity[reached] < small_file.nominal.scores.dexterity[reached]
     )
 
 
@@ -99,14 +99,14 @@ def test_a_file_of_other_models_is_refused(small_file):
 def test_reached_pairs_taken_away_are_missed(small_file):
     # Declare every second reached pair blocked: the dense scan must find about all of them.
     scores = small_file.nominal.scores
-    reason, isotropy = scores.reason.copy(), scores.isotropy.copy()
+    reason, dexterity = scores.reason.copy(), scores.dexterity.copy()
     taken = np.argwhere(scores.reached)[::2]
     reason[taken[:, 0], taken[:, 1]] = 5
-    isotropy[taken[:, 0], taken[:, 1]] = 0.0
+    dexterity[taken[:, 0], taken[:, 1]] = 0.0
     kept = np.ones(len(scores.arm_joints), dtype=bool)
     kept[::2] = False
     stripped = dataclasses.replace(
-        scores, reason=reason, isotropy=isotropy, arm_joints=scores.arm_joints[kept]
+        scores, reason=reason, dexterity=dexterity, arm_joints=scores.arm_joints[kept]
     )
     sets = build_sets(stripped, Grid.from_dict(small_file.grid))
     forged = dataclasses.replace(small_file, tables=(Scored.of(stripped, sets),))

@@ -137,7 +137,7 @@ def floor_with_walls(grid, seed, share):
     along = grid.indices(np.arange(grid.size))[:, -4:]
     reason[blocked[along[:, 0], along[:, 1]]] = Reason.BODY_BLOCKED
     scores = ScoreTable(
-        isotropy=np.zeros((grid.size, 1), dtype=np.float32),
+        dexterity=np.zeros((grid.size, 1), dtype=np.float32),
         reason=reason,
         pair=np.full((grid.size, 1), -1, dtype=np.int32),
         pair_names=(),

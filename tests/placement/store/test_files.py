@@ -55,7 +55,7 @@ def test_load_of_save_is_the_same(path, share, options):
     assert_same(file, loaded)
     # No member of it can be changed by accident.
     with pytest.raises(ValueError, match="read-only"):
-        loaded.nominal.scores.isotropy[0, 0] = 1.0
+        loaded.nominal.scores.dexterity[0, 0] = 1.0
 
 
 def test_joblib_reads_it_too(path, file):
@@ -235,8 +235,18 @@ def test_a_longer_file_is_told(path, file):
 
 def test_a_file_from_the_future_is_told(path, file):
     joblib.dump(pack(file) | {"format_version": FORMAT_VERSION + 1}, path)
-    with pytest.raises(StoreFormatError, match="reads version 2: update tcs"):
+    with pytest.raises(StoreFormatError, match="reads version 3: update tcs"):
         load_scores(path)
+
+
+def test_an_older_file_gets_one_line_that_says_what_to_do(path, file):
+    joblib.dump(pack(file) | {"format_version": 2}, path)
+    with pytest.raises(StoreFormatError) as refused:
+        load_scores(path)
+    assert str(refused.value) == (
+        f"Score file '{path}': has format version 2, written by an older tcs, and this program "
+        "reads version 3. Make it again with `tcs score`."
+    )
 
 
 def changed(file, section, name, change):
@@ -267,8 +277,8 @@ FORGED = {
         lambda a: np.full(a.shape, 2**63, dtype=np.uint64),
     ),
     "a goal more reached": ("sets", "reached", lambda a: a | np.uint8(1)),
-    "isotropy too short": ("sets", "isotropy", lambda a: a[:-1]),
-    "isotropy of doubles": ("sets", "isotropy", lambda a: a.astype(np.float64)),
+    "dexterity too short": ("sets", "dexterity", lambda a: a[:-1]),
+    "dexterity of doubles": ("sets", "dexterity", lambda a: a.astype(np.float64)),
     "cell beyond the last": ("sets", "cell", lambda a: a + np.uint8(200)),
     "cell too short": ("sets", "cell", lambda a: a[1:]),
     "cells elsewhere": ("sets", "cell_xy", lambda a: a + 1.0),

@@ -31,16 +31,16 @@ def random_scores(grid, goals, seed, *, levels=0, share=0.5):
     """Random scores; `levels` > 0 allows only so many isotropies, so that sets tie."""
     rng = np.random.default_rng(seed)
     shape = (grid.size, goals)
-    isotropy = rng.random(shape, dtype=np.float32)
+    dexterity = rng.random(shape, dtype=np.float32)
     if levels:
-        isotropy = np.floor(isotropy * levels).astype(np.float32) / np.float32(levels)
+        dexterity = np.floor(dexterity * levels).astype(np.float32) / np.float32(levels)
     reached = rng.random(shape) < share
     blocked = rng.integers(Reason.TOO_FAR, len(Reason), size=shape)
     reason = np.where(reached, Reason.REACHED, blocked).astype(np.uint8)
     named = reason >= Reason.BODY_BLOCKED
     raw = rng.integers(1, 4, size=goals).astype(np.float64)
     return ScoreTable(
-        isotropy=np.where(reached, isotropy, np.float32(0.0)),
+        dexterity=np.where(reached, dexterity, np.float32(0.0)),
         reason=reason,
         pair=np.where(named, rng.integers(0, 3, size=shape), -1).astype(np.int32),
         pair_names=(("arm", "chair"), ("base", "chair"), ("gripper", "head")),
@@ -55,7 +55,7 @@ def set_scores(scores, members):
     for g, weight in enumerate(scores.weights.tolist()):
         if any(scores.reached[h, g] for h in members):
             reachability += weight
-        manipulability += weight * max(float(scores.isotropy[h, g]) for h in members)
+        manipulability += weight * max(float(scores.dexterity[h, g]) for h in members)
     return reachability, manipulability
 
 

@@ -12,9 +12,9 @@ def test_reachability_is_the_weighted_share():
     )
 
 
-def test_manipulability_is_the_weighted_isotropy():
-    isotropy = np.array([[0.5, 0.25], [0.0, 0.0]], dtype=np.float32)
-    np.testing.assert_array_equal(tc_manipulability(isotropy, np.array([0.5, 0.5])), [0.375, 0.0])
+def test_manipulability_is_the_weighted_dexterity():
+    dexterity = np.array([[0.5, 0.25], [0.0, 0.0]], dtype=np.float32)
+    np.testing.assert_array_equal(tc_manipulability(dexterity, np.array([0.5, 0.5])), [0.375, 0.0])
 
 
 def test_sums_are_those_of_plain_loops_to_the_last_bit():

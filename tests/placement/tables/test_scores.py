@@ -10,7 +10,7 @@ from tcs.placement.tables import Reason, ScoreTable
 def parts():
     """Two configurations, two goals, three reached pairs."""
     return {
-        "isotropy": np.array([[0.5, 0.25], [0.0, 0.75]], dtype=np.float32),
+        "dexterity": np.array([[0.5, 0.25], [0.0, 0.75]], dtype=np.float32),
         "reason": np.array([[0, 0], [5, 0]], dtype=np.uint8),
         "pair": np.array([[-1, -1], [0, -1]], dtype=np.int32),
         "pair_names": (("forearm", "headrest"),),
@@ -50,9 +50,9 @@ def test_joints_of_a_pair_that_does_not_exist(h, g):
         ScoreTable(**parts()).joints_of(h, g)
 
 
-def test_reached_with_isotropy_zero_counts_as_reached():
+def test_reached_with_dexterity_zero_counts_as_reached():
     singular = parts()
-    singular["isotropy"] = np.zeros((2, 2), dtype=np.float32)
+    singular["dexterity"] = np.zeros((2, 2), dtype=np.float32)
     scores = ScoreTable(**singular)
     np.testing.assert_array_equal(scores.reachability(), [1.0, 0.75])
     np.testing.assert_array_equal(scores.manipulability(), [0.0, 0.0])
@@ -70,11 +70,11 @@ def test_arrays_are_read_only():
 
 
 WRONG = {
-    "isotropy of double precision": ("isotropy", lambda a: a.astype(np.float64), "float32"),
-    "isotropy of another shape": ("isotropy", lambda a: a[:, :1].copy(), "shape"),
-    "isotropy below zero": ("isotropy", lambda a: a - 1.0, "isotropy"),
-    "isotropy not a number": ("isotropy", lambda a: a * np.float32(np.nan), "isotropy"),
-    "isotropy where not reached": ("isotropy", lambda a: a + np.float32(0.1), "not reached"),
+    "dexterity of double precision": ("dexterity", lambda a: a.astype(np.float64), "float32"),
+    "dexterity of another shape": ("dexterity", lambda a: a[:, :1].copy(), "shape"),
+    "dexterity below zero": ("dexterity", lambda a: a - 1.0, "dexterity"),
+    "dexterity not a number": ("dexterity", lambda a: a * np.float32(np.nan), "dexterity"),
+    "dexterity where not reached": ("dexterity", lambda a: a + np.float32(0.1), "not reached"),
     "reason unknown": ("reason", lambda a: a + np.uint8(1), r"outside 0\.\.5"),
     "pair unknown": ("pair", lambda a: a + np.int32(1), r"outside -1\.\.0"),
     "joints missing": ("arm_joints", lambda a: a[:2], "2 rows of arm joints for 3"),

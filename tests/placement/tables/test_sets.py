@@ -20,7 +20,7 @@ def parts():
         "weights": np.array([0.5, 0.5]),
         "candidates": np.array([4, 5, 7], dtype=np.int32),
         "reached": np.array([[True, False], [True, False], [False, True]]),
-        "isotropy": np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.25]], dtype=np.float32),
+        "dexterity": np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.25]], dtype=np.float32),
         "cell": np.array([0, 0, 1], dtype=np.int32),
         "cell_xy": np.array([[0.0, 0.0], [0.5, 0.0]]),
         "pair_cells": np.array([[0, 1]], dtype=np.int32),
