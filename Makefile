@@ -13,7 +13,7 @@ SHARED := --numprocesses=$(PROCESSES) --dist=loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint docs format benchmark benchmark-robots benchmark-peers clean
+.PHONY: help demo test test-all lint docs format figures benchmark benchmark-robots benchmark-peers clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -45,6 +45,9 @@ docs: $(STAMP)  ## Build the site into out/docs, every warning an error; needs n
 format: $(STAMP)  ## Rewrite the code in house format and fix what can be fixed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+figures: $(STAMP)  ## Rewrite the measured tables in README and docs from benchmarks/figures
+	$(BIN)/python scripts/figures.py
 
 benchmark: $(STAMP)  ## Print the measured numbers with machine, versions and spread
 	@mkdir -p $(OUT)

@@ -9,14 +9,13 @@ simulated, so that a few seeds are shown. Nothing here is a test: tests never de
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from table import header, row, spread
+from table import cell, header, parser, row, save, spread
 
 from tcs.capability import (
     BasePose,
@@ -49,13 +48,13 @@ HIGH, EXPERT, LOW = (0.75, 0.15, 0.0), (0.88, 0.20, 2.9), (0.55, -0.45, -90.0)
 
 def main() -> None:
     """Run every measurement and print it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--queries", type=int, default=40_000)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--pictures", type=Path)
-    options = parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--repeats", type=int, default=5)
+    command_line.add_argument("--queries", type=int, default=40_000)
+    command_line.add_argument("--seeds", type=int, default=5)
+    command_line.add_argument("--jobs", type=int, default=2)
+    command_line.add_argument("--pictures", type=Path)
+    options = command_line.parse_args()
     header()
     reach = Reach(load_robot("tiago"), lift=LIFT)
     compile_first(reach)
@@ -64,6 +63,7 @@ def main() -> None:
     inverting(reach, options.repeats)
     accuracy(reach, options.queries, options.jobs)
     thesis_task(reach, ihcm, options.seeds, options.pictures)
+    save(options)
 
 
 def compile_first(reach: Reach) -> None:
@@ -89,6 +89,7 @@ def making(reach: Reach, jobs: int) -> CapabilityMap:
         cells = f"{found.metadata['cells_asked']:,} cells asked, {len(found.cells):,} held"
         said = f"{wall:.1f} s on {jobs} threads, {cpu:.1f} s of the processor; {cells}"
         row(f"IHCM, radius {radius:.2f} m", said)
+        cell("times", f"IHCM, side and top grasps, 5 cm, pi/8, radius {radius:.2f} m", "time", said)
     return found
 
 
@@ -100,6 +101,12 @@ def merging(ihcm: CapabilityMap, repeats: int) -> None:
     for lift, name in ((None, "any lift"), (LIFT, "one lift")):
         wall = [timed(lambda lift=lift: merge(volume, task, lift=lift))[0] for _ in range(repeats)]
         row(f"merge, {name}", spread_ms(wall))
+        cell(
+            "times",
+            f"merge of the pick-and-place task, 12 tool poses, {name}",
+            "time",
+            spread_ms(wall),
+        )
 
 
 def inverting(reach: Reach, repeats: int) -> None:
@@ -113,7 +120,9 @@ def inverting(reach: Reach, repeats: int) -> None:
             R_AT, p_AT = reach.tool_poses(joints)
             grid.nearest(reach.R_BA @ R_AT, p_AT @ reach.R_BA.T + reach.p_BA)
 
-        row(f"800 grasps inverted, {grasps}", spread_ms([timed(invert)[0] for _ in range(repeats)]))
+        taken = spread_ms([timed(invert)[0] for _ in range(repeats)])
+        row(f"800 grasps inverted, {grasps}", taken)
+        cell("times", f"800 grasps inverted to cells, {grasps}", "time", taken)
 
 
 def accuracy(reach: Reach, queries: int, jobs: int) -> None:
@@ -136,6 +145,17 @@ def accuracy(reach: Reach, queries: int, jobs: int) -> None:
             shown = " ".join(f"{100 * share:6.2f}" for share in shares)
             grid_said = f"{step:g} m, {360 / turns:g} deg  {radius or reach.length:.2f}"
             print(f"{grasps:<7} {grid_said}  {shown}")
+            names = (
+                "reachable",
+                "accuracy",
+                "false positives",
+                "false negatives",
+                "recall",
+                "precision",
+            )
+            for name, share in zip(names, shares, strict=True):
+                line = f"{grasps}, {grid_said.replace('  ', ', radius ')} m"
+                cell("accuracy", line, f"{name} [%]", f"{100 * share:.1f}")
 
 
 def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | None) -> None:

@@ -15,7 +15,7 @@ import itertools
 import sys
 import time
 
-from table import header, row, spread
+from table import cell, header, parser, row, save, spread
 
 from tcs.model.robots import robot_names
 from tcs.placement.scoring import load_job, score, sweep, verify
@@ -27,21 +27,23 @@ RECALL = 0.998
 
 def main() -> int:
     """Run every measurement and print it; the exit code is 1 when an answer was false."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", default=",".join(robot_names()))
-    parser.add_argument("--tasks", default="shaving,feeding")
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--pairs", type=int, default=500)
-    parser.add_argument("--dense", type=int, default=1000)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--robots", default=",".join(robot_names()))
+    command_line.add_argument("--tasks", default="shaving,feeding")
+    command_line.add_argument("--repeats", type=int, default=5)
+    command_line.add_argument("--pairs", type=int, default=500)
+    command_line.add_argument("--dense", type=int, default=1000)
+    command_line.add_argument("--jobs", type=int, default=2)
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
     header()
     row("seed, threads", f"{options.seed}, {options.jobs}")
     works = list(itertools.product(options.tasks.split(","), options.robots.split(",")))
     times(works, options.repeats, options.jobs)
     # A list, so that one false answer does not keep the others from being looked for.
-    return 0 if all([verification(*work, options) for work in works]) else 1
+    sound = all([verification(*work, options) for work in works])
+    save(options)
+    return 0 if sound else 1
 
 
 def times(works: list[tuple[str, str]], repeats: int, jobs: int) -> None:
@@ -61,6 +63,12 @@ def times(works: list[tuple[str, str]], repeats: int, jobs: int) -> None:
         scores = reasons[task, robot]
         counts = ", ".join(f"{name} {n}" for name, n in scores.reason_counts().items())
         row(f"{task}, {robot}: scoring_seconds", spread(seconds))
+        line = f"{robot}, {task}"
+        cell(
+            "robots", line, "configurations x goals", f"{scores.configurations:,} x {scores.goals}"
+        )
+        cell("robots", line, "reached", f"{scores.reason_counts()['reached']:,}")
+        cell("robots", line, "scoring", spread(seconds))
         row("", f"{scores.configurations} x {scores.goals}: {counts}")
 
 
@@ -82,6 +90,12 @@ def verification(task: str, robot: str, options: argparse.Namespace) -> bool:
         f"recall {found.recall:.5f} ({low:.4f} .. {high:.4f}), "
         f"shortfall {found.mean_shortfall:.1e}, {time.perf_counter() - begun:.0f} s",
     )
+    line = f"{robot}, {task}"
+    cell(
+        "robots", line, "false, of those re-checked", f"{found.false_reached} of {found.checked:,}"
+    )
+    cell("robots", line, "missed, of those scanned", f"{found.missed} of {found.dense_checked:,}")
+    cell("robots", line, "recall (95 % interval)", f"{found.recall:.4f} ({low:.4f} .. {high:.4f})")
     if found.recall < RECALL:
         row("", f"recall is below {RECALL}")
     return found.is_sound

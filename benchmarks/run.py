@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from table import header, row, spread
+from table import cell, header, parser, row, save, spread
 
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification import reference_pairs
@@ -46,18 +46,25 @@ def main() -> int:
         select_times(path, options.seed)
         process_times(options.task, Path(folder) / "again.tcs", options.repeats)
         sound = verification(path, options)
+    save(options)
     return 0 if sound else 1
+
+
+def measured(name: str, text: str) -> None:
+    """Print one measured value, and record it for the docs."""
+    row(name, text)
+    cell("summary", name, "measured", text)
 
 
 def parse() -> argparse.Namespace:
     """Return the command line's options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--task", default="shaving")
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--pairs", type=int, default=2000)
-    parser.add_argument("--dense", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    return parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--task", default="shaving")
+    command_line.add_argument("--repeats", type=int, default=5)
+    command_line.add_argument("--pairs", type=int, default=2000)
+    command_line.add_argument("--dense", type=int, default=1000)
+    command_line.add_argument("--seed", type=int, default=0)
+    return command_line.parse_args()
 
 
 def lowered_times(options: argparse.Namespace) -> None:
@@ -77,15 +84,15 @@ def lowered_times(options: argparse.Namespace) -> None:
     row("configurations x goals", f"{scores.configurations} x {scores.goals}")
     row("reasons", ", ".join(f"{name} {n}" for name, n in scores.reason_counts().items()))
     for jobs, taken in times.items():
-        row(f"scoring_seconds, jobs {jobs}", spread(taken))
+        measured(f"scoring_seconds, jobs {jobs}", spread(taken))
     ratios = [one / two for one, two in zip(times[1], times[2], strict=True)]
-    row("thread scaling 1 -> 2", spread(ratios, "x"))
+    measured("thread scaling 1 -> 2", spread(ratios, "x"))
     building = []
     for _ in range(options.repeats):
         begun = time.perf_counter()
         sets = build_sets(scores, job.grid)
         building.append(time.perf_counter() - begun)
-    row("sets_seconds, jobs 2", f"{spread(building)}, {sets.sets} sets")
+    measured("sets_seconds, jobs 2", f"{spread(building)}, {sets.sets} sets")
     rng = np.random.default_rng(options.seed)
     kept = np.argwhere(scores.reason == Reason.REACHED)
     picked = kept[rng.choice(len(kept), REFERENCE_PAIRS, replace=False)]
@@ -104,7 +111,7 @@ def store_times(path: Path, repeats: int) -> None:
         begun = time.perf_counter()
         load_scores(path)
         taken.append(time.perf_counter() - begun)
-    row("store file", f"{path.stat().st_size / 1e6:.2f} MB, loaded in {spread(taken)}")
+    measured("store file", f"{path.stat().st_size / 1e6:.2f} MB, loaded in {spread(taken)}")
 
 
 def select_times(path: Path, seed: int) -> None:
@@ -117,7 +124,7 @@ def select_times(path: Path, seed: int) -> None:
         here = InitialConfiguration(base_x=x, base_y=y, base_yaw=yaw, torso=0.0)
         taken.append(select(tables, here).seconds)
     p50, p99 = np.quantile(taken, (0.5, 0.99))
-    row(
+    measured(
         f"select from {PLACES} places",
         f"p50 {1e3 * p50:.2f} ms, p99 {1e3 * p99:.2f} ms, max {1e3 * max(taken):.2f} ms",
     )
@@ -131,10 +138,10 @@ def process_times(task: str, path: Path, repeats: int) -> None:
         begun = time.perf_counter()
         subprocess.run([*command, "--out", str(path), "--json"], check=True, capture_output=True)
         taken.append(time.perf_counter() - begun)
-    row("tcs score, whole process", spread(taken))
+    measured("`tcs score`, whole process", spread(taken))
     # Linux counts in KiB.
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
-    row("peak memory of that process", f"{peak / 1e9:.2f} GB")
+    measured("peak memory of that process", f"{peak / 1e9:.2f} GB")
 
 
 def verification(path: Path, options: argparse.Namespace) -> bool:
@@ -142,7 +149,7 @@ def verification(path: Path, options: argparse.Namespace) -> bool:
     begun = time.perf_counter()
     found = verify(load_scores(path), pairs=options.pairs, dense=options.dense, seed=options.seed)
     for name, value in found.to_json().items():
-        row(f"verify: {name}", f"{value}")
+        measured(f"verify: {name}", f"{value}")
     row("verify took", f"{time.perf_counter() - begun:.1f} s")
     return found.is_sound
 

@@ -1,27 +1,88 @@
-"""What every benchmark prints: machine, versions, and measured numbers with their spread."""
+"""What every benchmark prints and saves: machine, versions, and measured values with their spread.
+
+A benchmark run with `--save` writes what it measured to `benchmarks/figures/<script>.json`. The
+tables in README and docs are made from those files by `make figures`.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import platform
+import shlex
 import statistics
+import sys
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from tcs.files.writing import whole_file
+
+FIGURES = Path(__file__).resolve().parent / "figures"
 PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
+_measured: dict[str, dict[str, dict[str, str]]] = {}
+"""Cells by table, row and column, in the order in which they were measured."""
+_began: dict[str, str] = {}
+
+
+def parser(description: str) -> argparse.ArgumentParser:
+    """Return a parser with the option `--save`, described by a docstring's first line."""
+    options = argparse.ArgumentParser(description=description.splitlines()[0])
+    options.add_argument(
+        "--save",
+        action="store_true",
+        help="write benchmarks/figures/<script>.json, from which `make figures` makes the docs",
+    )
+    return options
 
 
 def header(*packages: str) -> None:
-    """Print machine, load and versions: of our own packages, and of the others that are named."""
-    row("machine", f"{platform.machine()}, {processor()}")
-    row("load when it began", ", ".join(f"{load:.2f}" for load in os.getloadavg()))
-    row("python", platform.python_version())
-    row("versions", ", ".join(f"{name} {_version(name)}" for name in (*PACKAGES, *packages)))
+    """Print machine, load and versions, of our own packages and of the additional ones named."""
+    _began["machine"] = f"{platform.machine()}, {processor()}"
+    _began["load"] = ", ".join(f"{load:.2f}" for load in os.getloadavg())
+    _began["python"] = platform.python_version()
+    _began["versions"] = ", ".join(f"{name} {_version(name)}" for name in (*PACKAGES, *packages))
+    row("machine", _began["machine"])
+    row("load at the start", _began["load"])
+    row("python", _began["python"])
+    row("versions", _began["versions"])
 
 
 def row(name: str, text: str) -> None:
     """Print one line of the table."""
     print(f"{name:<34} {text}", flush=True)
+
+
+def cell(table: str, line: str, column: str, text: str) -> None:
+    """Record one cell of a table for the docs.
+
+    Args:
+        table: Name of the table, by which a page refers to it.
+        line: What was measured, with its unit: the first cell of the line.
+        column: Heading of the column, such as the robot.
+        text: The measured value.
+    """
+    _measured.setdefault(table, {}).setdefault(line, {})[column] = text
+
+
+def save(options: argparse.Namespace) -> None:
+    """Write the recorded tables where `--save` was given."""
+    if not options.save:
+        return
+    script = Path(sys.argv[0])
+    saved = {
+        "command": shlex.join(
+            ["python", f"benchmarks/{script.name}", *(a for a in sys.argv[1:] if a != "--save")]
+        ),
+        "date": datetime.now(UTC).date().isoformat(),
+        **_began,
+        "tables": _measured,
+    }
+    path = FIGURES / f"{script.stem}.json"
+    with whole_file(path, "Figures") as file:
+        file.write(json.dumps(saved, indent=1, ensure_ascii=False).encode() + b"\n")
+    print(f"wrote {path}")
 
 
 def spread(seconds: list[float], unit: str = "s", scale: float = 1.0) -> str:

@@ -8,12 +8,11 @@ wall: command in, joints, flags and reason out. Nothing here is a test: tests ne
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import time
 
 import numpy as np
-from table import header, row
+from table import cell, header, parser, row, save
 
 from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation, load_arm
 
@@ -25,11 +24,11 @@ SWEEP = np.radians(60.0)
 
 def main() -> None:
     """Measure and print everything."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=2000, help="steps in each mode")
-    parser.add_argument("--robots", nargs="*", default=ROBOTS, metavar="ROBOT")
-    parser.add_argument("--seed", type=int, default=0, help="of the random commands")
-    options = parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--steps", type=int, default=2000, help="steps in each mode")
+    command_line.add_argument("--robots", nargs="*", default=ROBOTS, metavar="ROBOT")
+    command_line.add_argument("--seed", type=int, default=0, help="of the random commands")
+    options = command_line.parse_args()
     header()
     row("seed", str(options.seed))
     for robot in options.robots:
@@ -44,6 +43,7 @@ def main() -> None:
     for robot in options.robots:
         for limits in ("paper", "clamped"):
             switches(load_arm(robot), Settings(limits=limits), options.steps, options.seed)
+    save(options)
 
 
 def times(arm: Arm, mode: Mode, steps: int, seed: int) -> None:
@@ -59,10 +59,16 @@ def times(arm: Arm, mode: Mode, steps: int, seed: int) -> None:
                 session.step(command)
                 wall.append(1e6 * (time.perf_counter() - begun))
                 cpu.append(1e6 * (time.process_time() - busy))
-    ninth = statistics.quantiles(wall, n=100)[98]
+    median, ninth = statistics.median(wall), statistics.quantiles(wall, n=100)[98]
+    cell(
+        "steps",
+        f"{mode}, median (99th percentile) [ms]",
+        arm.name,
+        f"{median / 1e3:.3f} ({ninth / 1e3:.2f})",
+    )
     row(
         f"{arm.name}, {mode}: one step",
-        f"{statistics.median(wall):.0f} us median, {ninth:.0f} us 99th percentile, processor "
+        f"{median:.0f} us median, {ninth:.0f} us 99th percentile, processor "
         f"{statistics.median(cpu):.0f} us ({len(wall)} steps)",
     )
 
@@ -81,6 +87,8 @@ def sweep(arm: Arm, settings: Settings) -> None:
         for _ in range(100):
             here = session.step(Command(group=0))
             gone.append(drift(here, start))
+    line = "tool displacement while joint 1 moves by 60 deg and back [mm]"
+    cell("holding", line, f"{arm.name}, {settings.limits}", f"{1e3 * max(gone):.4f}")
     row(
         f"{arm.name}, {settings.limits}: joint 1 by 60 deg",
         f"tool off by {1e3 * max(gone):.5f} mm at most, {1e3 * gone[-1]:.6f} mm in the end "
@@ -105,6 +113,8 @@ def switches(arm: Arm, settings: Settings, steps: int, seed: int) -> None:
                 largest = max(largest, float(np.abs(step.rates - before).max()))
                 before = step.rates
     bound = settings.acceleration * settings.period
+    line = f"largest change of a joint rate in a step [rad/s], bound {bound:g}, {settings.limits}"
+    cell("switches", line, arm.name, f"{largest:.4f}")
     row(
         f"{arm.name}, {settings.limits}: joint rates",
         f"change by {largest:.6f} rad/s in a step at most, bound {bound:g} ({count} switches)",
