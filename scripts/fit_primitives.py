@@ -16,8 +16,8 @@ import yaml
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, write_primitives
-from tcs.model.robots.disabled_pairs import propose_disabled_pairs
-from tcs.model.robots.fit_robot import fit_robot
+from tcs.model.robots.fitting import fit_robot
+from tcs.model.robots.self_collision import propose_disabled_pairs
 
 
 def main() -> int:

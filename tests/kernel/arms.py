@@ -11,7 +11,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from tcs.kernel.arrays import Chain
-from tcs.model.robots.kinematic import kinematic_urdf
+from tcs.model.robots.urdf.kinematic import kinematic_urdf
 from tcs.model.scene.chain import Axis, link_frames
 
 _ROBOTS = "package://example-robot-data/robots"

@@ -11,9 +11,9 @@ import numpy as np
 
 from tcs.model.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
 from tcs.model.robots import RobotFile
-from tcs.model.robots.enclosure import BodyEnclosure, enclosure
-from tcs.model.robots.geometry import body_triangles
-from tcs.model.robots.pose import pose_in_root
+from tcs.model.robots.fitting import BodyEnclosure, enclosure
+from tcs.model.robots.urdf.pose import pose_in_root
+from tcs.model.robots.urdf.surfaces import body_triangles
 from tcs.model.scene import NOWHERE, Contact, Scene, SceneSpec, arm_chain
 
 MOST_EXCESS = 2.0
@@ -152,9 +152,7 @@ class RobotCheck:
     @property
     def _moved(self) -> frozenset[str]:
         """Bodies of the URDF that the arm moves."""
-        model = self.robot.model()
-        first = model.joints[self.robot.arm_joints[0]].child
-        return frozenset(body for body in model.links if model.chain(first, body) is not None)
+        return self.robot.model().links_moved_by(self.robot.arm_joints[0])
 
     def to_json(self) -> dict[str, Any]:
         """Return everything as plain containers."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from tcs.model.robots.kinematic import kinematic_urdf, robot_urdf
-from tcs.model.robots.meshes import as_obj
+from tcs.model.robots.extras import robot_urdf
+from tcs.model.robots.loading import load_robot, robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
-from tcs.model.robots.robot_file import RobotFile, joint_limits, load_robot, robot_names
+from tcs.model.robots.robot_file import RobotFile, joint_limits
 from tcs.model.robots.urdf import Urdf, read_urdf
+from tcs.model.robots.urdf.kinematic import kinematic_urdf
+from tcs.model.robots.urdf.meshes import as_obj
 
 __all__ = [
     "Primitive",

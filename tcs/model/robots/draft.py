@@ -15,15 +15,14 @@ import yaml
 from tcs.errors import OutputError, RobotError, UnknownNameError
 from tcs.files.writing import whole_file
 from tcs.model.robots.checks import check_robot
-from tcs.model.robots.disabled_pairs import propose_disabled_pairs
-from tcs.model.robots.fit_robot import fit_robot
-from tcs.model.robots.geometry import body_triangles
-from tcs.model.robots.packages import resolve_uri
-from tcs.model.robots.pose import pose_in_root
+from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import RobotFile
-from tcs.model.robots.self_collision import DRAWS, free_posture
+from tcs.model.robots.self_collision import DRAWS, free_posture, propose_disabled_pairs
 from tcs.model.robots.urdf import Joint, Urdf, read_urdf
+from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.pose import pose_in_root
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 ARM_JOINTS = 7
 _VERTICAL = 0.99
@@ -234,7 +233,7 @@ def _positions(
     model: Urdf, arm: list[Joint], torso: Joint | None
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return where the other joints stand [rad or m]: those the hand carries apart."""
-    held = set(_moved_by(model, arm[-1]))
+    held = model.links_moved_by(arm[-1].name)
     posture: dict[str, float] = {}
     gripper: dict[str, float] = {}
     for joint in model.joints.values():
@@ -247,16 +246,12 @@ def _positions(
     return posture, gripper
 
 
-def _moved_by(model: Urdf, joint: Joint) -> tuple[str, ...]:
-    """Return every link that a joint moves."""
-    return tuple(link for link in model.links if model.chain(joint.child, link) is not None)
-
-
 def _standing(
     model: Urdf, posture: dict[str, float], arm: list[Joint], torso: Joint | None
 ) -> tuple[str, ...]:
     """Return the bodies that reach down to the floor, but for those that arm or torso move."""
-    moved = {link for joint in (arm[0], torso) if joint for link in _moved_by(model, joint)}
+    first = [joint.name for joint in (arm[0], torso) if joint is not None]
+    moved = frozenset[str]().union(*map(model.links_moved_by, first))
     found = []
     for body, triangles in body_triangles(model).items():
         R, p = pose_in_root(model, body, posture)

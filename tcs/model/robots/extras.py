@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.model.robots.robot_file import BodyPrimitive, RobotFile
 from tcs.model.robots.urdf import Geometry, Joint, Urdf
+from tcs.model.robots.urdf.kinematic import kinematic_urdf
 
 
 def model_with_extras(robot: RobotFile) -> Urdf:
@@ -22,9 +23,31 @@ def model_with_extras(robot: RobotFile) -> Urdf:
     """
     model = robot.model()
     links, joints = dict(model.links), dict(model.joints)
-    for extra in (*robot.frames, *robot.bodies):
-        links[extra.name] = ()
-        joint = Joint(
+    for joint in _extra_joints(robot):
+        links[joint.child] = ()
+        joints[joint.name] = joint
+    for body in robot.bodies:
+        links[body.name] = tuple(g for shape in body.primitives for g in _geometries(shape))
+    return Urdf(path=model.path, links=links, joints=joints)
+
+
+def robot_urdf(robot: RobotFile, meshes: bool = False) -> str:
+    """Return `kinematic_urdf` of a robot with its extra frames and bodies as further links.
+
+    Args:
+        robot: The robot.
+        meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
+
+    Raises:
+        RobotError: If the URDF or one of its meshes cannot be used.
+    """
+    return kinematic_urdf(robot.urdf_path(), meshes, _extra_joints(robot))
+
+
+def _extra_joints(robot: RobotFile) -> tuple[Joint, ...]:
+    """Return the fixed joints that carry a robot's extra frames and bodies."""
+    return tuple(
+        Joint(
             name=f"{extra.name}_joint",
             type="fixed",
             parent=extra.parent,
@@ -36,10 +59,8 @@ def model_with_extras(robot: RobotFile) -> Urdf:
             soft=(0.0, 0.0),
             mimic=None,
         )
-        joints[joint.name] = joint
-    for body in robot.bodies:
-        links[body.name] = tuple(g for shape in body.primitives for g in _geometries(shape))
-    return Urdf(path=model.path, links=links, joints=joints)
+        for extra in (*robot.frames, *robot.bodies)
+    )
 
 
 def _geometries(shape: BodyPrimitive) -> tuple[Geometry, ...]:

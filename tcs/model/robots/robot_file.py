@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, Number, Placed, PositiveNumber, checked, read_mapping
-from tcs.files.paths import named_file, shipped_files
-from tcs.model.robots.packages import resolve_uri
+from tcs.errors import UnknownNameError
+from tcs.files.documents import Document, Number, Placed, PositiveNumber
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import Urdf, read_urdf
+from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
 Positions = Mapping[Name, Number]
-
-_FILES = ("urdf", "primitives")
-"""Fields that name a file, relative to the robot file."""
-BASED_ON = "based_on"
-"""Key of a file that takes over whatever it does not say itself from another robot."""
 
 
 class _OnLink(Placed):
@@ -228,52 +222,3 @@ class RobotFile(Document):
 def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:
     """Return the limits in force of every movable joint; see `RobotFile.joint_limits`."""
     return robot.joint_limits()
-
-
-def robot_names() -> tuple[str, ...]:
-    """Return the names of the robots that ship with `tcs`, sorted."""
-    return tuple(_shipped())
-
-
-def load_robot(name_or_path: str | Path) -> RobotFile:
-    """Return a robot, checked against its URDF, the files it names as absolute paths.
-
-    Args:
-        name_or_path: One of `robot_names()`, or the path of a file: anything that ends in `.yaml`
-            or holds a path separator.
-
-    Raises:
-        UnknownNameError: If there is no robot of that name, or the file names something unknown.
-        RobotError: If the file, or a model it names, cannot be used.
-    """
-    from tcs.model.robots.checks import check_robot
-
-    path = named_file("robot", name_or_path, _shipped()).resolve()
-    where = f"robot file '{path}'"
-    content = _content(path)
-    robot = checked(content, RobotFile, where, RobotError, also_known=(BASED_ON,))
-    check_robot(robot, where=where)
-    return robot
-
-
-def _content(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Return what a file says, with what it takes over; `above` are the files based on it."""
-    where = f"robot file '{path}'"
-    content = read_mapping(path, where, RobotError, known=(*RobotFile.model_fields, BASED_ON))
-    for key in _FILES:
-        value = content.get(key)
-        if isinstance(value, str) and not value.startswith("package://"):
-            content[key] = str((path.parent / Path(value).expanduser()).resolve())
-    base = content.pop(BASED_ON, None)
-    if base is None:
-        return content
-    chain = (*above, path)
-    field = f"{where}, field '{BASED_ON}'"
-    file = named_file("robot", str(base), _shipped(), beside=path.parent, where=field).resolve()
-    if file in chain:
-        raise RobotError(f"{field}: '{base}' is based on this file in turn. Name another one.")
-    return {**_content(file, chain), **content}
-
-
-def _shipped() -> dict[str, Path]:
-    return shipped_files("models/robots/*.yaml")

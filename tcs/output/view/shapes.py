@@ -13,7 +13,7 @@ from pydrake.geometry import Box, Mesh, Meshcat, Rgba, Role, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
-from tcs.model.robots.meshes import mesh_triangles
+from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.scene import Scene
 from tcs.model.scene.contacts import Group
 from tcs.output.draw import Kind

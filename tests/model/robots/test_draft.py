@@ -5,7 +5,7 @@ import pytest
 from tcs.errors import OutputError, RobotError, UnknownNameError
 from tcs.model.robots import load_robot
 from tcs.model.robots.draft import draft_robot, write_draft
-from tcs.model.robots.enclosure import enclosure
+from tcs.model.robots.fitting.enclosure import enclosure
 from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tests.model.robots.made_up import urdf
 

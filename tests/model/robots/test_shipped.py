@@ -14,11 +14,11 @@ from tcs.errors import RobotError, UnknownNameError
 from tcs.files.paths import data_folder
 from tcs.model.robots import load_robot, read_urdf, robot_names
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.geometry import body_triangles
-from tcs.model.robots.packages import resolve_uri
-from tcs.model.robots.pose import pose_in_root
 from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf import Joint
+from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.pose import pose_in_root
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 FOLDER = data_folder() / "models" / "robots"
 BAXTER = "package://example-robot-data/robots/baxter_description/urdf/baxter.urdf"

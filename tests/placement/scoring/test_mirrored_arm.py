@@ -9,7 +9,7 @@ import pytest
 
 from tcs.kernel.analytic.solver import LAST
 from tcs.kernel.problem import build_problem
-from tcs.model.robots.kinematic import kinematic_urdf
+from tcs.model.robots.urdf.kinematic import kinematic_urdf
 from tcs.placement.scoring import load_job, score, verify
 
 PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"

@@ -6,13 +6,15 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 from pathlib import Path
 
-from tcs.model.robots.meshes import as_obj
-from tcs.model.robots.packages import resolve_uri
-from tcs.model.robots.robot_file import RobotFile
-from tcs.model.robots.urdf import Geometry, Joint, read_urdf
+from tcs.model.robots.urdf.meshes import as_obj
+from tcs.model.robots.urdf.model import Geometry, Joint
+from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.reading import read_urdf
 
 
-def kinematic_urdf(urdf: str | Path, meshes: bool = False) -> str:
+def kinematic_urdf(
+    urdf: str | Path, meshes: bool = False, extra_joints: Iterable[Joint] = ()
+) -> str:
     """Return the text of a URDF that Drake reads without a warning.
 
     Transmissions, sensors, simulator extensions, inertias, mimic and collision geometry are left
@@ -21,34 +23,12 @@ def kinematic_urdf(urdf: str | Path, meshes: bool = False) -> str:
     Args:
         urdf: The original: a path, or a `package://` address.
         meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
+        extra_joints: Fixed joints to add, each with the link that it carries.
 
     Raises:
         RobotError: If the URDF or one of its meshes cannot be used.
     """
-    return _text(_tree(resolve_uri(str(urdf), Path()), meshes))
-
-
-def robot_urdf(robot: RobotFile, meshes: bool = False) -> str:
-    """Return `kinematic_urdf` of a robot with its extra frames and bodies as further links.
-
-    Args:
-        robot: The robot.
-        meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
-
-    Raises:
-        RobotError: If the URDF or one of its meshes cannot be used.
-    """
-    root = _tree(robot.urdf_path(), meshes)
-    for extra in (*robot.frames, *robot.bodies):
-        ElementTree.SubElement(root, "link", name=extra.name)
-        joint = ElementTree.SubElement(root, "joint", name=f"{extra.name}_joint", type="fixed")
-        _add_origin(joint, extra.xyz, extra.rpy)
-        ElementTree.SubElement(joint, "parent", link=extra.parent)
-        ElementTree.SubElement(joint, "child", link=extra.name)
-    return _text(root)
-
-
-def _tree(path: Path, meshes: bool) -> ElementTree.Element:
+    path = resolve_uri(str(urdf), Path())
     model = read_urdf(path)
     root = ElementTree.Element("robot", name=path.stem)
     for name, geometries in model.links.items():
@@ -59,7 +39,11 @@ def _tree(path: Path, meshes: bool) -> ElementTree.Element:
                     _add_visual(link, geometry)
     for joint in model.joints.values():
         _add_joint(root, joint)
-    return root
+    for joint in extra_joints:
+        ElementTree.SubElement(root, "link", name=joint.child)
+        _add_joint(root, joint)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def _add_joint(root: ElementTree.Element, joint: Joint) -> None:
@@ -106,8 +90,3 @@ def _add_origin(element: ElementTree.Element, xyz: Iterable[float], rpy: Iterabl
 def _words(numbers: Iterable[float]) -> str:
     # repr gives a float back exactly, so Drake's kinematics are those of the original file.
     return " ".join(repr(float(number)) for number in numbers)
-
-
-def _text(root: ElementTree.Element) -> str:
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.boxes import (
+from tcs.model.robots.fitting.bounding import (
     best_candidate,
     enclose,
     hull_corners,

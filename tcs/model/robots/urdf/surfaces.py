@@ -9,8 +9,8 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.meshes import mesh_triangles
-from tcs.model.robots.urdf import Geometry, Urdf, Vector
+from tcs.model.robots.urdf.meshes import mesh_triangles
+from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
 
 FloatArray = NDArray[np.float64]
 

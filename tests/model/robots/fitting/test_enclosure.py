@@ -8,10 +8,10 @@ import trimesh
 from scipy import ndimage
 
 from tcs.model.robots import load_robot, robot_names
-from tcs.model.robots.enclosure import enclosure, surfaces_to_enclose
-from tcs.model.robots.geometry import body_triangles
+from tcs.model.robots.fitting.enclosure import enclosure, surfaces_to_enclose
 from tcs.model.robots.primitives import enclosed
 from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 PR2_ARM = (
     "shoulder_pan_link shoulder_lift_link upper_arm_roll_link upper_arm_link elbow_flex_link "

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.urdf import Urdf
+from tcs.model.robots.urdf.model import Urdf
 
 FloatArray = NDArray[np.float64]
 

@@ -25,19 +25,15 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.geometry import surface_geometries, welded_top
-from tcs.model.robots.kinematic import robot_urdf
-from tcs.model.robots.meshes import as_obj
+from tcs.model.robots.extras import robot_urdf
 from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Geometry, Urdf
+from tcs.model.robots.urdf.meshes import as_obj
+from tcs.model.robots.urdf.surfaces import surface_geometries, welded_top
 
 FloatArray = NDArray[np.float64]
 BodyPair = tuple[str, str]
-
-DRAWS = 500
-"""Random postures among which one that is free is looked for."""
 
 MARGIN = 0.001
 """Primitives closer than this [m] touch: what scoring counts as contact unless a room says more."""
@@ -98,65 +94,6 @@ class SelfCollision:
         self._plant.SetPositions(self._state, q)
         contacts = self._query_port.Eval(self._query_context).ComputePointPairPenetration()
         return frozenset(_pair(self._bodies[c.id_A], self._bodies[c.id_B]) for c in contacts)
-
-
-def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
-    """Return a posture of the scored arm in which no pair that scoring checks touches [rad].
-
-    Everything at 0, or at the nearest limit, is tried first, then the middle of every range, then
-    random postures; the torso is down.
-
-    Args:
-        robot: The robot.
-        seed: Seed of the draws.
-
-    Returns:
-        Positions by joint: none where 0 will do; None when nothing tried is free.
-    """
-    model, limits = model_with_extras(robot), robot.joint_limits()
-    moved, hand = (
-        {body for body in model.links if model.chain(model.joints[name].child, body) is not None}
-        for name in (robot.arm_joints[0], robot.arm_joints[-1])
-    )
-    off = {frozenset(pair) for pair in robot.disabled_pairs}
-    judge, standing = SelfCollision(robot), robot.joint_positions()
-    bounded = {name: tuple(np.clip(limits[name], -np.pi, np.pi)) for name in robot.arm_joints}
-    middle = {name: float(np.mean(pair)) for name, pair in bounded.items()}
-    draws = (
-        {name: sample[name] for name in robot.arm_joints}
-        for sample in sample_positions(robot, DRAWS, seed)
-    )
-    for drawn in ({}, middle, *draws):
-        # As it will be written: with few digits, and still within limits.
-        arm = {name: float(np.clip(round(q, 4), *limits[name])) for name, q in drawn.items()}
-        touching = judge.touching(robot.with_mimics({**standing, **arm}))
-        checked = (pair for pair in touching if moved & set(pair) and not set(pair) <= hand)
-        if not any(frozenset(pair) not in off for pair in checked):
-            return arm
-    return None
-
-
-def sample_positions(robot: RobotFile, count: int, seed: int) -> list[dict[str, float]]:
-    """Return postures spread uniformly over every joint's limits in force [rad or m].
-
-    Arm, torso, head, other arm and grippers all move; joints that mimic another follow it, and
-    those that turn on and on take one full turn.
-
-    Args:
-        robot: The robot.
-        count: How many postures.
-        seed: Seed of the draws.
-    """
-    rng = np.random.default_rng(seed)
-    joints = robot.model().joints
-    limits = robot.joint_limits()
-    free = [name for name in limits if joints[name].mimic is None]
-    lower = np.array([max(limits[name][0], -np.pi) for name in free])
-    upper = np.array([min(limits[name][1], np.pi) for name in free])
-    return [
-        robot.with_mimics(dict(zip(free, map(float, draw), strict=True)))
-        for draw in rng.uniform(lower, upper, size=(count, len(free)))
-    ]
 
 
 class _Adder:

@@ -5,8 +5,8 @@ import pytest
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.model.robots import read_urdf
-from tcs.model.robots.geometry import body_triangles
-from tcs.model.robots.packages import resolve_uri
+from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 TWO_LINKS = """<robot name="two">
   <link name="a"/>

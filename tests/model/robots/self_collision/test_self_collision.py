@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 
-from tcs.model.robots.disabled_pairs import (
+from tcs.model.robots.draft import draft_robot
+from tcs.model.robots.self_collision import (
+    SelfCollision,
+    propose_disabled_pairs,
+    sample_positions,
+)
+from tcs.model.robots.self_collision.clearance import (
     CLEAR,
-    Surfaces,
+    SurfaceDistance,
     free_joints,
     joints_between,
-    propose_disabled_pairs,
 )
-from tcs.model.robots.draft import draft_robot
-from tcs.model.robots.geometry import body_triangles, welded_top
-from tcs.model.robots.self_collision import SelfCollision, sample_positions
+from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 from tests.model.robots.made_up import urdf
 
 
@@ -87,7 +90,7 @@ def test_primitives_rarely_see_contact_that_hulls_do_not(pr2, judge, arm_bodies)
 def test_contact_of_hulls_that_primitives_miss_is_no_contact_of_surfaces(pr2, judge, arm_bodies):
     """A hull fills hollows, above all that over the low front of the base; the surface does not."""
     hulls = SelfCollision(pr2, hulls=True)
-    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
+    surfaces = SurfaceDistance(pr2.model(), body_triangles(pr2.model()))
     seen = 0
     for q in postures(pr2, 0.15, 150, seed=4):
         # The base's primitives enclose its wheels, too.
@@ -132,12 +135,12 @@ def test_disabled_pairs_lie_few_joints_apart(pr2):
 
 def test_surfaces_that_meet_are_found_to(pr2):
     # Guards the evidence: a search that found everything apart would prove nothing.
-    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
+    surfaces = SurfaceDistance(pr2.model(), body_triangles(pr2.model()))
     assert surfaces.closest_approach(("l_forearm_link", "l_gripper_palm_link"), pr2, 0) < CLEAR
 
 
 def test_pairs_that_cannot_meet_do_not(pr2):
-    surfaces = Surfaces(pr2.model(), body_triangles(pr2.model()))
+    surfaces = SurfaceDistance(pr2.model(), body_triangles(pr2.model()))
     pair = ("l_forearm_link", "l_upper_arm_link")
     assert pair in pr2.disabled_pairs
     assert surfaces.closest_approach(pair, pr2, seed=7) >= CLEAR

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.model.robots.boxes import hull_volume
-from tcs.model.robots.geometry import body_triangles, welded_top
+from tcs.model.robots.fitting.bounding import hull_volume
 from tcs.model.robots.primitives import Primitive, enclosed, union_volume
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Urdf
+from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 
 FloatArray = NDArray[np.float64]
 

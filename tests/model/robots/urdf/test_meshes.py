@@ -6,7 +6,7 @@ import trimesh
 
 from tcs.errors import OutputError, RobotError
 from tcs.model.robots import as_obj
-from tcs.model.robots.meshes import mesh_triangles
+from tcs.model.robots.urdf.meshes import mesh_triangles
 
 
 @pytest.fixture(autouse=True)

@@ -1,23 +1,19 @@
-"""Which pairs of a robot's bodies need no collision check, and the evidence for each."""
+"""How close the surfaces of two bodies of a robot can come."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
-from tcs.model.robots.enclosure import surfaces_to_enclose
-from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.geometry import body_triangles, welded_top
-from tcs.model.robots.pose import pose_in_root
-from tcs.model.robots.robot_file import DisabledGroup, RobotFile
-from tcs.model.robots.self_collision import BodyPair, SelfCollision, sample_positions
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.self_collision.plant import BodyPair
 from tcs.model.robots.urdf import Joint, Urdf
+from tcs.model.robots.urdf.pose import pose_in_root
+from tcs.model.robots.urdf.surfaces import welded_top
 
 FloatArray = NDArray[np.float64]
 
@@ -26,18 +22,16 @@ SPACING = 0.005
 CLEAR = 0.008
 """Surfaces whose points never come closer than this [m] do not meet: they are at least half of it
 apart even where both surfaces lie between their points."""
-_FINER = 0.2
+FINER = 0.2
 """Parts that glide past each other a few millimetres apart are looked at once more, with points
 and clearance smaller by this factor."""
-_MEETING = CLEAR * _FINER
+MEETING = CLEAR * FINER
 """Closer than this [m] is never clear: whoever comes so close meets, and need not be looked at
 further."""
 _FAR = 0.05
 """Distances beyond this [m] are not told apart."""
 _NEAR = 2 * CLEAR
 """Surfaces farther apart than this [m] as seen from points 5 mm apart are looked at no closer."""
-_MOST_JOINTS = 3
-"""Up to so many joints between two bodies, the closest approach is searched for."""
 _POINT_SEED = 0
 _DRAWS = 300
 _DESCENTS = 6
@@ -45,100 +39,7 @@ _AT_LIMIT = 0.3
 """Share of draws that put a joint at one of its limits, where bodies come closest."""
 
 
-def propose_disabled_pairs(
-    robot: RobotFile, *, postures: int = 2000, seed: int = 0
-) -> tuple[DisabledGroup, ...]:
-    """Return the pairs of bodies that need no check, in groups with their reason.
-
-    Only pairs with a body that the scored arm moves are looked at; others are never checked. A pair
-    whose primitives touch in none of the postures is left enabled, for its check costs little and
-    may yet catch something. Of the others a pair is proposed when
-
-    - one joint of the URDF connects the two: they touch where it turns, and its limits keep them
-      apart (an extra body, such as a tool, was not built that way and gets no such credit);
-    - no more than three joints lie between them, and the original surfaces never come close: what
-      touches then is the room that primitives take beyond them. If that needs the soft limits, the
-      group holds only while they are in force;
-    - its primitives touch in every posture, so that its check would forbid all of them.
-
-    Args:
-        robot: The robot; its present disabled pairs do not matter.
-        postures: Postures drawn uniformly within the hard limits.
-        seed: Seed of the draws.
-
-    Raises:
-        RobotError: If the robot's model cannot be used.
-    """
-    both = hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
-    model = model_with_extras(robot)
-    built = robot.model().links.keys()
-    judge = SelfCollision(robot)
-    sampled = sample_positions(hard, postures, seed)
-    counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
-    moved, hand = (_moved_by(model, robot.arm_joints[i]) for i in (0, -1))
-    triangles = _carried_triangles(robot, model)
-    surfaces = Surfaces(model, triangles)
-    fine = Surfaces(model, triangles, scale=_FINER, rough=surfaces)
-    found = _Found()
-    for pair, count in sorted(counts.items()):
-        if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
-            continue
-        joints = joints_between(model, *pair)
-        few = len(free_joints(model, joints)) <= _MOST_JOINTS
-        if len(joints) == 1 and built >= set(pair):
-            found.neighbours.append(pair)
-            continue
-        near = [surfaces.closest_approach(pair, limits, seed) if few else 0.0 for limits in both]
-        if near[0] >= CLEAR:
-            found.apart_hard[pair] = near[0]
-        elif count == postures:
-            found.always.append(pair)
-        elif near[1] >= CLEAR:
-            found.apart_soft[pair] = near[1]
-        elif set(pair) <= hand:
-            # Never checked either, so a long look would be wasted.
-            continue
-        elif near[0] >= _MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= _MEETING:
-            found.apart_hard[pair] = gap
-        elif near[1] >= _MEETING and (gap := fine.closest_approach(pair, soft, seed)) >= _MEETING:
-            found.apart_soft[pair] = gap
-    return found.groups(postures)
-
-
-@dataclass
-class _Found:
-    """Pairs by the reason for which they need no check; distances are closest approaches [m]."""
-
-    neighbours: list[BodyPair] = field(default_factory=list)
-    apart_hard: dict[BodyPair, float] = field(default_factory=dict)
-    apart_soft: dict[BodyPair, float] = field(default_factory=dict)
-    always: list[BodyPair] = field(default_factory=list)
-
-    def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
-        """Return the groups that hold any pair."""
-        apart = (
-            "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
-            "only the room that primitives take beyond them touches"
-        )
-        hard, soft = (
-            apart.format(limits, np.floor(min(pairs.values(), default=0.0) * 1e3))
-            for limits, pairs in (("hard", self.apart_hard), ("soft", self.apart_soft))
-        )
-        neighbours = "neighbours: one joint connects them, and its limits keep them apart"
-        always = (
-            f"primitives overlap in each of {postures} postures: parts of one joint assembly, so a "
-            "check would forbid every posture"
-        )
-        groups = (
-            DisabledGroup(reason=neighbours, pairs=tuple(self.neighbours)),
-            DisabledGroup(reason=hard, pairs=tuple(self.apart_hard)),
-            DisabledGroup(reason=always, pairs=tuple(self.always)),
-            DisabledGroup(reason=soft, limits="soft", pairs=tuple(self.apart_soft)),
-        )
-        return tuple(group for group in groups if group.pairs)
-
-
-class Surfaces:
+class SurfaceDistance:
     """The bodies' original surfaces as points, and how close two of them can come."""
 
     def __init__(
@@ -146,7 +47,7 @@ class Surfaces:
         model: Urdf,
         triangles: Mapping[str, FloatArray],
         scale: float = 1.0,
-        rough: Surfaces | None = None,
+        rough: SurfaceDistance | None = None,
     ) -> None:
         """Take the surfaces; points are spread when a body is first asked for.
 
@@ -196,7 +97,7 @@ class Surfaces:
         found: list[tuple[float, tuple[float, ...]]] = []
         for q in draws:
             found.append((distance(q), tuple(q)))
-            if found[-1][0] < _MEETING:
+            if found[-1][0] < MEETING:
                 return found[-1][0]
         found.sort(key=lambda item: item[0])
         closest = found[0][0]
@@ -257,22 +158,6 @@ class Surfaces:
             corners = np.unique(triangles.reshape(-1, 3), axis=0)
             self._points[body] = np.concatenate([inner, corners])
         return self._points[body]
-
-
-def _carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
-    """Return the surface that each body's primitives stand for, in its frame [m].
-
-    Those of a base stand for all that is welded to it as well: a column, a torso.
-    """
-    carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
-    added = body_triangles(model)
-    return carried | {body.name: added[body.name] for body in robot.bodies}
-
-
-def _moved_by(model: Urdf, joint: str) -> set[str]:
-    """Return every body that a joint moves."""
-    first = model.joints[joint].child
-    return {body for body in model.links if model.chain(first, body) is not None}
 
 
 def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:

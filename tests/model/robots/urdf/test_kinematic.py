@@ -11,9 +11,9 @@ from pydrake.multibody.tree import RevoluteJoint
 from scipy.spatial.transform import Rotation
 
 from tcs.model.robots import kinematic_urdf, robot_urdf
-from tcs.model.robots.pose import pose_in_root
 from tcs.model.robots.robot_file import ExtraFrame
 from tcs.model.robots.self_collision import sample_positions
+from tcs.model.robots.urdf.pose import pose_in_root
 
 
 def parsed(text, robot):

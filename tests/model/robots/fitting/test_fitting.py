@@ -5,11 +5,16 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.boxes import best_candidate, corner_points, enclose, tightest_orientation
-from tcs.model.robots.fit_robot import HAND, fit_robot
-from tcs.model.robots.fitting import Target, fit_triangles
-from tcs.model.robots.geometry import body_triangles
+from tcs.model.robots.fitting.bodies import HAND, fit_robot
+from tcs.model.robots.fitting.bounding import (
+    best_candidate,
+    corner_points,
+    enclose,
+    tightest_orientation,
+)
+from tcs.model.robots.fitting.division import Target, fit_triangles
 from tcs.model.robots.primitives import enclosed
+from tcs.model.robots.urdf.surfaces import body_triangles
 
 
 def triangles_of(*solids):

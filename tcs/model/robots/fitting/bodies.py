@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.boxes import corner_points, enclose, hull_volume
-from tcs.model.robots.fitting import Fit, Target, fit_triangles
-from tcs.model.robots.geometry import (
+from tcs.model.robots.fitting.bounding import corner_points, enclose, hull_volume
+from tcs.model.robots.fitting.division import Fit, Target, fit_triangles
+from tcs.model.robots.primitives import Primitive, union_volume
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.urdf import Urdf
+from tcs.model.robots.urdf.surfaces import (
     body_triangles,
     geometry_triangles,
     place,
     surface_geometries,
     welded_top,
 )
-from tcs.model.robots.primitives import Primitive, union_volume
-from tcs.model.robots.robot_file import RobotFile
-from tcs.model.robots.urdf import Urdf
 
 FloatArray = NDArray[np.float64]
 
@@ -67,8 +67,8 @@ def fit_robot(
     model = robot.model()
     triangles = body_triangles(model)
     groups = _groups(robot, model, triangles)
-    moved = _moved_by(model, robot.arm_joints[0])
-    held = _moved_by(model, robot.arm_joints[-1])
+    moved = model.links_moved_by(robot.arm_joints[0])
+    held = model.links_moved_by(robot.arm_joints[-1])
     targets: dict[object, Target] = {}
     for body in groups:
         target = HAND if body in held else ARM if body in moved else REST
@@ -142,12 +142,6 @@ def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit
         pieces.append(triangles)
     hull = hull_volume(np.concatenate(pieces))
     return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
-
-
-def _moved_by(model: Urdf, joint: str) -> set[str]:
-    """Return every body that a joint moves."""
-    first = model.joints[joint].child
-    return {body for body in model.links if model.chain(first, body) is not None}
 
 
 def _key_frame(model: Urdf, body: str) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,133 @@
+"""Which pairs of a robot's bodies need no collision check, and the evidence for each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
+from tcs.model.robots.robot_file import DisabledGroup, RobotFile
+from tcs.model.robots.self_collision.clearance import (
+    CLEAR,
+    FINER,
+    MEETING,
+    SurfaceDistance,
+    free_joints,
+    joints_between,
+)
+from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
+from tcs.model.robots.self_collision.postures import sample_positions
+from tcs.model.robots.urdf import Urdf
+from tcs.model.robots.urdf.surfaces import body_triangles
+
+FloatArray = NDArray[np.float64]
+
+_MOST_JOINTS = 3
+"""Up to so many joints between two bodies, the closest approach is searched for."""
+
+
+def propose_disabled_pairs(
+    robot: RobotFile, *, postures: int = 2000, seed: int = 0
+) -> tuple[DisabledGroup, ...]:
+    """Return the pairs of bodies that need no check, in groups with their reason.
+
+    Only pairs with a body that the scored arm moves are looked at; others are never checked. A pair
+    whose primitives touch in none of the postures is left enabled, for its check costs little and
+    may yet catch something. Of the others a pair is proposed when
+
+    - one joint of the URDF connects the two: they touch where it turns, and its limits keep them
+      apart (an extra body, such as a tool, was not built that way and gets no such credit);
+    - no more than three joints lie between them, and the original surfaces never come close: what
+      touches then is the room that primitives take beyond them. If that needs the soft limits, the
+      group holds only while they are in force;
+    - its primitives touch in every posture, so that its check would forbid all of them.
+
+    Args:
+        robot: The robot; its present disabled pairs do not matter.
+        postures: Postures drawn uniformly within the hard limits.
+        seed: Seed of the draws.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    both = hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
+    model = model_with_extras(robot)
+    built = robot.model().links.keys()
+    judge = SelfCollision(robot)
+    sampled = sample_positions(hard, postures, seed)
+    counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
+    moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
+    triangles = _carried_triangles(robot, model)
+    surfaces = SurfaceDistance(model, triangles)
+    fine = SurfaceDistance(model, triangles, scale=FINER, rough=surfaces)
+    found = _Found()
+    for pair, count in sorted(counts.items()):
+        if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
+            continue
+        joints = joints_between(model, *pair)
+        few = len(free_joints(model, joints)) <= _MOST_JOINTS
+        if len(joints) == 1 and built >= set(pair):
+            found.neighbours.append(pair)
+            continue
+        near = [surfaces.closest_approach(pair, limits, seed) if few else 0.0 for limits in both]
+        if near[0] >= CLEAR:
+            found.apart_hard[pair] = near[0]
+        elif count == postures:
+            found.always.append(pair)
+        elif near[1] >= CLEAR:
+            found.apart_soft[pair] = near[1]
+        elif set(pair) <= hand:
+            # Never checked either, so a long look would be wasted.
+            continue
+        elif near[0] >= MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= MEETING:
+            found.apart_hard[pair] = gap
+        elif near[1] >= MEETING and (gap := fine.closest_approach(pair, soft, seed)) >= MEETING:
+            found.apart_soft[pair] = gap
+    return found.groups(postures)
+
+
+@dataclass
+class _Found:
+    """Pairs by the reason for which they need no check; distances are closest approaches [m]."""
+
+    neighbours: list[BodyPair] = field(default_factory=list)
+    apart_hard: dict[BodyPair, float] = field(default_factory=dict)
+    apart_soft: dict[BodyPair, float] = field(default_factory=dict)
+    always: list[BodyPair] = field(default_factory=list)
+
+    def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
+        """Return the groups that hold any pair."""
+        apart = (
+            "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
+            "only the room that primitives take beyond them touches"
+        )
+        hard, soft = (
+            apart.format(limits, np.floor(min(pairs.values(), default=0.0) * 1e3))
+            for limits, pairs in (("hard", self.apart_hard), ("soft", self.apart_soft))
+        )
+        neighbours = "neighbours: one joint connects them, and its limits keep them apart"
+        always = (
+            f"primitives overlap in each of {postures} postures: parts of one joint assembly, so a "
+            "check would forbid every posture"
+        )
+        groups = (
+            DisabledGroup(reason=neighbours, pairs=tuple(self.neighbours)),
+            DisabledGroup(reason=hard, pairs=tuple(self.apart_hard)),
+            DisabledGroup(reason=always, pairs=tuple(self.always)),
+            DisabledGroup(reason=soft, limits="soft", pairs=tuple(self.apart_soft)),
+        )
+        return tuple(group for group in groups if group.pairs)
+
+
+def _carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
+    """Return the surface that each body's primitives stand for, in its frame [m].
+
+    Those of a base stand for all that is welded to it as well: a column, a torso.
+    """
+    carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
+    added = body_triangles(model)
+    return carried | {body.name: added[body.name] for body in robot.bodies}

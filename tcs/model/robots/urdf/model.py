@@ -1,0 +1,116 @@
+"""A URDF as values: links with their geometry, and joints with their limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from tcs.errors import UnknownNameError
+
+Vector = tuple[float, float, float]
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+"""Joint types with one degree of freedom; every other joint but `fixed` is refused."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mimic:
+    """A joint that follows another: q = multiplier * q_leader + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """One joint of a URDF [m or rad]."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    xyz: Vector
+    """Origin of the joint in the parent link [m]."""
+    rpy: Vector
+    """Roll, pitch, yaw about the parent's fixed axes [rad]."""
+    axis: Vector
+    hard: tuple[float, float]
+    """The `limit` element; infinite where continuous."""
+    soft: tuple[float, float]
+    """The `safety_controller` element within the hard limits; the hard ones without it."""
+    mimic: Mimic | None
+    velocity: float = math.inf
+    """How fast it may move by the `limit` element [m/s or rad/s]; infinite where that says none."""
+
+    @property
+    def is_movable(self) -> bool:
+        """Whether the joint has a degree of freedom."""
+        return self.type in MOVABLE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Geometry:
+    """One visual or collision geometry of a link."""
+
+    role: Literal["visual", "collision"]
+    shape: Literal["mesh", "box", "cylinder", "sphere"]
+    size: tuple[float, ...]
+    """Mesh: scale (3). Box: full sizes (3) [m]. Cylinder: radius, length [m]. Sphere: radius."""
+    mesh: Path | None
+    xyz: Vector
+    """Origin in the link [m]."""
+    rpy: Vector
+    """Roll, pitch, yaw about the link's fixed axes [rad]."""
+    rgba: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """The tree of a robot: links, joints, geometry."""
+
+    path: Path
+    links: Mapping[str, tuple[Geometry, ...]]
+    joints: Mapping[str, Joint]
+
+    @cached_property
+    def parent_joints(self) -> Mapping[str, Joint]:
+        """The joint above each link, by link name; the root has none."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @property
+    def root(self) -> str:
+        """Name of the link that nothing carries."""
+        return next(link for link in self.links if link not in self.parent_joints)
+
+    def joint(self, name: str, where: str) -> Joint:
+        """Return a joint by name.
+
+        Raises:
+            UnknownNameError: If there is none; `where` begins its message.
+        """
+        try:
+            return self.joints[name]
+        except KeyError:
+            raise UnknownNameError("joint", name, self.joints, where=where) from None
+
+    def links_moved_by(self, joint: str) -> frozenset[str]:
+        """Return every link that a joint moves."""
+        first = self.joints[joint].child
+        return frozenset(link for link in self.links if self.chain(first, link) is not None)
+
+    def chain(self, base: str, tip: str) -> tuple[Joint, ...] | None:
+        """Return the joints from link `base` out to link `tip`, None if `tip` hangs elsewhere."""
+        joints: list[Joint] = []
+        link = tip
+        while link != base:
+            joint = self.parent_joints.get(link)
+            if joint is None:
+                return None
+            joints.append(joint)
+            link = joint.parent
+        return tuple(reversed(joints))
