@@ -129,8 +129,8 @@ def best_of_all(
 ) -> tuple[int, ...]:
     """Return the first best of all kept sets of one and two, going through all of them."""
     sets, weights = tables.sets, UtilityWeights()
-    ways = tables.index.ways[travel.route]
-    legs = legs_from(here, tables.grid, sets.candidates, sets.cell, ways, travel)
+    distances = tables.index.distances[travel.route]
+    legs = legs_from(here, tables.grid, sets.candidates, sets.cell, distances, travel)
     singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)
     singles[~legs.reachable[sets.cell]] = -np.inf
     best, members = singles.max(), (int(np.argmax(singles)),)

@@ -27,10 +27,10 @@ def main() -> None:
         print(f"told {told}, used {choice.match.state}: {choice.members[0].to_json()}")
 
     # The same from a camera: the head's place in the room's frame [m], with the bed low and flat.
-    choice = tcs.select(file, here, seen={"head": (0.294, -0.09, 0.682)})
+    choice = tcs.select(file, here, frames={"head": (0.294, -0.09, 0.682)})
     match = choice.match
     assert match is not None
-    print(f"seen {match.frames_off:.3f} m from where it is at the shift {match.state}")
+    print(f"seen {match.frame_error:.3f} m from where it is at the shift {match.state}")
 
 
 if __name__ == "__main__":

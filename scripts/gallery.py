@@ -23,9 +23,9 @@ from tcs.cli.rows import default_path, score_one
 from tcs.files.writing import make_folder, whole_file
 from tcs.output.draw import as_png
 from tcs.output.draw.floor_plan import described
-from tcs.output.report import check_row
 from tcs.output.report.pictures import Shown, map_figure, member_figure, scene_figure
 from tcs.output.report.states import states_figure
+from tcs.placement.robustness import check_row
 from tcs.placement.scoring import all_rows
 from tcs.placement.store import ScoreFile
 

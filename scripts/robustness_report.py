@@ -19,8 +19,8 @@ from tcs.cli import talk
 from tcs.cli.rows import default_path, score_one
 from tcs.errors import UnknownNameError
 from tcs.files.writing import make_folder
-from tcs.output.report import Plan, check_row, load_paper, study_rows, write_report
-from tcs.placement.robustness import robustify
+from tcs.output.report import draw_rows, load_paper, write_report
+from tcs.placement.robustness import StudyPlan, check_row, robustify, study_rows
 from tcs.placement.robustness.error_model import check_draws
 
 ROBOT = "pr2"
@@ -60,15 +60,17 @@ def run(options: argparse.Namespace) -> int:
         if not path.exists():
             score_one(task, environment, ROBOT, path, jobs=options.jobs)
         estimate(path, (task, environment), options)
-    plan = Plan(samples=options.samples, seed=options.seed)
+    compared = tuple(load_paper().compared_rows())
+    plan = StudyPlan(samples=options.samples, seed=options.seed, compared=compared)
     begun = time.perf_counter()
     with talk.progress_bar("rows tried") as on_progress:
         found = study_rows(
             paths, plan, jobs=options.jobs, on_progress=on_progress, on_compile=compiling
         )
+    pictures = draw_rows(paths, jobs=options.jobs)
     seconds = time.perf_counter() - begun
     command = shlex.join(["python", *sys.argv])
-    for path in write_report(options.out, found, plan, seconds=seconds, command=command):
+    for path in write_report(options.out, found, pictures, plan, seconds=seconds, command=command):
         print(f"wrote {path}: {path.stat().st_size:,} bytes")
     return 0
 

@@ -79,7 +79,7 @@ def test_choosing_loads_neither_simulator_nor_compiler(tmp_path):
 
 def test_select_is_a_plain_function_with_a_signature():
     assert inspect.isfunction(tcs.select)
-    assert next(iter(inspect.signature(tcs.select).parameters)) == "source"
+    assert next(iter(inspect.signature(tcs.select).parameters)) == "scores"
 
 
 def test_docstring_runs():

@@ -208,7 +208,7 @@ def select(
         ),
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
-        seen=frame_places(seen or ()),
+        frames=frame_places(seen or ()),
     )
     result = reports.choice_as_json(choice, loaded.metadata["measure"])
     talk.print_result(result, reports.report_choice, as_json=as_json)

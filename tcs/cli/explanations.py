@@ -23,7 +23,7 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     if result["observed"]:
         state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
         off = "".join(
-            f"; {said_off(name, value)}" for name, value in result["observed_off"].items()
+            f"; {said_off(name, value)}" for name, value in result["observed_error"].items()
         )
         out.print(f"Scored for {state}{off}.")
     if result["explained"] is not None:
@@ -85,9 +85,9 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
 
 def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
     """Print what keeps every configuration from the goal."""
-    if result["cut_off"]:
+    if result["unreachable"]:
         out.print(
-            f"{result['cut_off']:,} configurations reach it, but there is no way around the "
+            f"{result['unreachable']:,} configurations reach it, but there is no way around the "
             "furniture to any of them."
         )
         return

@@ -113,8 +113,7 @@ def choice_as_json(choice: Choice, measure: str) -> dict[str, Any]:
         "manipulability": round(choice.manipulability, 12),
         "cost": choice.cost,
         "utility": choice.utility,
-        "gap": choice.gap,
-        "cut_off": choice.cut_off,
+        "unreachable": choice.unreachable,
         "seconds": choice.seconds,
         **_success_as_json(choice),
         **_match_as_json(choice.match),
@@ -134,8 +133,8 @@ def _match_as_json(match: Match | None) -> dict[str, Any]:
         return {}
     return {
         "observed": shown_state(match.axes, match.state),
-        "observed_off": shown_state(match.axes, match.off),
-        "frames_off": match.frames_off,
+        "observed_error": shown_state(match.axes, match.observed_error),
+        "frame_error": match.frame_error,
     }
 
 
@@ -154,15 +153,15 @@ def report_choice(result: Mapping[str, Any]) -> None:
             f"under error {result['success']:.1%} of the goals (95 % between {low:.1%} and "
             f"{high:.1%})"
         )
-    if result["cut_off"]:
+    if result["unreachable"]:
         out.print(
-            f"left out: {result['cut_off']:,} configurations to which there is no way from here"
+            f"left out: {result['unreachable']:,} configurations to which there is no way from here"
         )
     if "observed" in result:
         state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
-        off = [said_off(name, value) for name, value in result["observed_off"].items()]
-        if result["frames_off"] is not None:
-            off.append(f"what is seen is {result['frames_off']:.3f} m off")
+        off = [said_off(name, value) for name, value in result["observed_error"].items()]
+        if result["frame_error"] is not None:
+            off.append(f"what is seen is {result['frame_error']:.3f} m off")
         out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
 
 

@@ -24,8 +24,8 @@ def test_select_prints_the_choice(tcs_command, small_file):
     assert (ran.code, ran.err) == (0, "")
     result = ran.json
     assert set(result) == {
-        "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds", "gap",
-        "cut_off",
+        "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds",
+        "unreachable",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     # The order of the tour, which is not that of the indices.
@@ -181,9 +181,9 @@ def test_the_observed_shift_is_told(tcs_command, tmp_path):
     tcs.save(path, score_file(tables=3, observed=[SHIFT]))
     ran = tcs_command("select", path, *HERE, "--observed", "person_y=0.04", "--json").json
     assert ran["observed"] == {"person_y": 0.05}
-    assert ran["observed_off"] == {"person_y": -0.01}
+    assert ran["observed_error"] == {"person_y": -0.01}
     seen = tcs_command("select", path, *HERE, "--seen", "head=0.1,0.1,0.12", "--json").json
-    assert seen["frames_off"] == pytest.approx(0.02)
+    assert seen["frame_error"] == pytest.approx(0.02)
     said = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
     assert "scored for person_y 0.05; person_y is -0.01 off" in said.out
     # A zero that comes out negative has no sign.
@@ -239,9 +239,9 @@ def test_travel_around_the_furniture(tcs_command, tmp_path):
     weights = tcs.UtilityWeights(travel=0.5)
     choice = tcs.select(file, state(base_x=-3, base_y=0.5), weights=weights, travel=travel)
     assert (around["cost"], around["utility"]) == (choice.cost, choice.utility)
-    assert (around["gap"], around["cut_off"]) == (0.0, choice.cut_off)
-    assert straight["cut_off"] == 0
-    assert around["cut_off"] == int(np.count_nonzero(sets.cell == 0)) > 0
+    assert around["unreachable"] == choice.unreachable
+    assert straight["unreachable"] == 0
+    assert around["unreachable"] == int(np.count_nonzero(sets.cell == 0)) > 0
     assert around["cost"] != straight["cost"]
     assert "to which there is no way from here" in tcs_command(*words, "--travel", "around").out
 

@@ -9,7 +9,7 @@ from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
 from tcs.output.report.paper import Paper, load_paper
 from tcs.output.report.robustness import robustness_page
-from tcs.output.report.study import Plan, RowStudy, check_row, study_row, study_rows
+from tcs.output.report.row_pictures import RowPictures, draw_row, draw_rows
 from tcs.output.report.write import write_report
 
 __all__ = [
@@ -17,17 +17,15 @@ __all__ = [
     "Check",
     "Page",
     "Paper",
-    "Plan",
-    "RowStudy",
+    "RowPictures",
     "Section",
     "answer_of",
     "answer_page",
     "as_html",
     "as_markdown",
-    "check_row",
+    "draw_row",
+    "draw_rows",
     "load_paper",
     "robustness_page",
-    "study_row",
-    "study_rows",
     "write_report",
 ]

@@ -211,7 +211,7 @@ def success_table(answer: Answer) -> Table | None:
     named += [
         (f"the surest set of {'one' if most == 1 else f'up to {most}'}", found)
         for most in range(1, success.members.shape[1] + 1)
-        if (found := success.surest(sets, max_members=most))
+        if (found := success.most_robust(sets, max_members=most))
     ]
     rows: list[list[Cell | str]] = []
     for name, members in named:

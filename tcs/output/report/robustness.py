@@ -20,7 +20,7 @@ from tcs.output.report.blocks import (
 )
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.paper import Paper
-from tcs.output.report.study import Plan, RowStudy
+from tcs.output.report.row_pictures import RowPictures
 from tcs.output.report.tables import (
     NEAR,
     contrasts_table,
@@ -33,18 +33,26 @@ from tcs.output.report.tables import (
     table_3,
 )
 from tcs.output.report.words import lost_goal, mean_and_std, p_value, percent, signed
+from tcs.placement.robustness import RowStudy, StudyPlan
 
 SERIES = ("best set, by P_R + P_M", "best single configuration", "surest set, by success")
 METHODS = ("with TC-manipulability", "", "without")
 
 
 def robustness_page(
-    rows: Sequence[RowStudy], paper: Paper, plan: Plan, *, seconds: float, command: str
+    rows: Sequence[RowStudy],
+    pictures: Sequence[RowPictures],
+    paper: Paper,
+    plan: StudyPlan,
+    *,
+    seconds: float,
+    command: str,
 ) -> Page:
     """Return the report as a page.
 
     Args:
         rows: What was found, in the order to show it.
+        pictures: Pictures of each row.
         paper: The paper's figures.
         plan: How much was tried.
         seconds: How long it took, wall clock.
@@ -64,7 +72,7 @@ def robustness_page(
     sections += [
         Section("How well P_M predicts success", _prediction(rows)),
         Section("What is lost, and why", _losses(rows, paper)),
-        Section("Chosen configurations", _chosen(rows)),
+        Section("Chosen configurations", _chosen(rows, pictures)),
         Section("How it was made", _made(rows, paper, plan, seconds, command)),
     ]
     robots = ", ".join(sorted({row.titles[2] for row in rows}))
@@ -161,7 +169,7 @@ def _exception(row: RowStudy, members: int) -> str:
     found = find_contrast(row, members)
     if found is None or row.methods is None:
         return ""
-    drawn = row.methods.cells[members, False]
+    drawn = row.methods.paired[members, False]
     places = "one place" if members == 1 else "two places"
     said = (
         f"{row.name}, {places}: with TC-manipulability the mean is "
@@ -192,11 +200,11 @@ def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
         published = paper.published(row.task, row.environment)
         theirs = (published.mean, published.std) if published else None
         boxes = [
-            Box(1, 100.0 * row.single.shares),
-            Box(0, 100.0 * row.best.shares, theirs),
+            Box(1, 100.0 * row.single.fractions),
+            Box(0, 100.0 * row.best.fractions, theirs),
         ]
         if row.gain is not None:
-            boxes.append(Box(2, 100.0 * row.gain.robust.shares))
+            boxes.append(Box(2, 100.0 * row.gain.robust.fractions))
         groups.append(Group(row.name, boxes))
     figure = draw_boxes(groups, SERIES, label="goals reached [%]", reference="paper, Table I")
     return [
@@ -218,9 +226,9 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
     for row in rows:
         for members in (1, 2):
             published = paper.compared(row.task, row.environment, members)
-            cells = row.methods.cells if row.methods else {}
+            cells = row.methods.paired if row.methods else {}
             boxes = [
-                Box(series, 100.0 * cells[members, is_with].shares, theirs)
+                Box(series, 100.0 * cells[members, is_with].fractions, theirs)
                 for series, is_with, theirs in (
                     (2, False, published.without if published else None),
                     (0, True, published.with_ if published else None),
@@ -328,16 +336,16 @@ def _reading(row: RowStudy) -> str:
     return said
 
 
-def _chosen(rows: Sequence[RowStudy]) -> list[Block]:
+def _chosen(rows: Sequence[RowStudy], pictures: Sequence[RowPictures]) -> list[Block]:
     blocks: list[Block] = []
-    for row in rows:
+    for row, drawn in zip(rows, pictures, strict=True):
         words = "; ".join(
             f"stop {i + 1}: " + ", ".join(f"{name} {value:g}" for name, value in member.items())
             for i, member in enumerate(row.best.members)
         )
         blocks += [
             Picture(
-                row.scene,
+                drawn.scene,
                 "png",
                 f"The robot at each place of the best set for {row.name}.",
                 f"{row.titles[0]} – {row.titles[1]}. P_R {row.best.reachability:.2f}, P_M "
@@ -345,14 +353,14 @@ def _chosen(rows: Sequence[RowStudy]) -> list[Block]:
             ),
             Folded(
                 f"{row.name} from above",
-                [Picture(row.map, "png", f"Map of {row.name} with the best set.", row.name)],
+                [Picture(drawn.map, "png", f"Map of {row.name} with the best set.", row.name)],
             ),
         ]
     return blocks
 
 
 def _made(
-    rows: Sequence[RowStudy], paper: Paper, plan: Plan, seconds: float, command: str
+    rows: Sequence[RowStudy], paper: Paper, plan: StudyPlan, seconds: float, command: str
 ) -> list[Block]:
     cpu = sum(row.cpu_seconds for row in rows)
     slowest = max(rows, key=lambda row: row.best.seconds)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from tcs.output.report.blocks import Cell, Column, Table
 from tcs.output.report.paper import Compared, Paper
-from tcs.output.report.study import RowStudy
 from tcs.output.report.words import goes_with, mean_and_std, p_value, percent, signed, stopped_by
-from tcs.placement.robustness import Contrast, Evaluation, Prediction
+from tcs.placement.robustness import Contrast, Evaluation, Prediction, RowStudy
 
 NEAR = 0.05
 """Percentage points within which two printed means are the same: both are rounded to a tenth."""
@@ -236,7 +235,7 @@ def is_short(row: RowStudy, paper: Paper) -> bool:
 
 
 def _methods_row(row: RowStudy, members: int, published: Compared | None) -> list[Cell | str]:
-    cells = row.methods.cells if row.methods is not None else {}
+    cells = row.methods.paired if row.methods is not None else {}
     without, with_ = cells.get((members, False)), cells.get((members, True))
     contrast = find_contrast(row, members)
     ours = [mean_and_std(cell) if cell is not None else "–" for cell in (without, with_)]

@@ -73,11 +73,11 @@ def stopped_by(loss: Loss) -> str:
         for reason, share in loss.reasons.items()
         if share >= 0.05
     )
-    if loss.pair is not None and loss.pair_share >= 0.2:
+    if loss.pair is not None and loss.pair_fraction >= 0.2:
         said += f"; most often {body(loss.pair[0])} and {body(loss.pair[1])}"
     return said
 
 
 def goes_with(loss: Loss) -> str:
     """Return which error losses go with, as a mean in standard deviations."""
-    return f"{loss.joint.replace('_', ' ')} {loss.tilt:+.1f}"
+    return f"{loss.joint.replace('_', ' ')} {loss.standardized_error:+.1f}"

@@ -10,21 +10,29 @@ from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
 from tcs.output.report.paper import load_paper
 from tcs.output.report.robustness import robustness_page
+from tcs.output.report.row_pictures import RowPictures
 from tcs.output.report.samples import samples_csv
-from tcs.output.report.study import Plan, RowStudy
+from tcs.placement.robustness import RowStudy, StudyPlan
 
 NAMES = ("robustness.html", "robustness.md", "samples.csv")
 """What is written into the folder."""
 
 
 def write_report(
-    folder: Path, rows: Sequence[RowStudy], plan: Plan, *, seconds: float, command: str
+    folder: Path,
+    rows: Sequence[RowStudy],
+    pictures: Sequence[RowPictures],
+    plan: StudyPlan,
+    *,
+    seconds: float,
+    command: str,
 ) -> tuple[Path, ...]:
     """Write a robustness report and return its files, each whole or not at all.
 
     Args:
         folder: Where to; made if it is not there.
-        rows: What was found.
+        rows: Results of each row.
+        pictures: Pictures of each row.
         plan: How much was tried.
         seconds: How long it took, wall clock.
         command: How to make it again.
@@ -33,7 +41,7 @@ def write_report(
         OutputError: If something cannot be written there.
     """
     make_folder(folder)
-    page = robustness_page(rows, load_paper(), plan, seconds=seconds, command=command)
+    page = robustness_page(rows, pictures, load_paper(), plan, seconds=seconds, command=command)
     contents = (as_html(page).encode(), as_markdown(page).encode(), samples_csv(rows))
     paths = tuple(folder / name for name in NAMES)
     for path, content in zip(paths, contents, strict=True):

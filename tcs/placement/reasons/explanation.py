@@ -41,7 +41,7 @@ class Explanation:
     """What each kind of change costs."""
     fix: Fix | None
     """The nearest configuration that reaches the goal, None where there is none."""
-    cut_off: int
+    unreachable: int
     """How many configurations reach the goal but cannot be driven to around the furniture."""
 
     @property
@@ -62,7 +62,7 @@ class Explanation:
             "goal": self.goal,
             "body_frame": self.body_frame,
             "observed": shown_state(axes, self.match.state),
-            "observed_off": shown_state(axes, self.match.off),
+            "observed_error": shown_state(axes, self.match.observed_error),
             "explained": None if self.standing is None else self.standing.to_json(),
             "best_set": {
                 "configurations": list(self.best_set),
@@ -76,7 +76,7 @@ class Explanation:
             "farthest": None if farthest is None else farthest.to_json(),
             "blocking_pairs": [pair.to_json() for pair in self.distribution.blocking_pairs],
             "weights": {**asdict(self.weights), "environment": dict(self.weights.environment)},
-            "cut_off": self.cut_off,
+            "unreachable": self.unreachable,
             "nearest_reaching": None if self.fix is None else self.fix.to_json(),
         }
 
@@ -88,7 +88,7 @@ def explain(
     *,
     weights: TravelWeights | None = None,
     observed: Mapping[str, float] | None = None,
-    seen: Mapping[str, Sequence[float]] | None = None,
+    frames: Mapping[str, Sequence[float]] | None = None,
 ) -> Explanation:
     """Return why a goal is not reached from a configuration, and what would reach it.
 
@@ -102,7 +102,7 @@ def explain(
             the best set with the greatest P_R + P_M by itself.
         weights: What each kind of change costs; by default `fix_weights` of the grid.
         observed: How the person is found: values of the file's observed axes [m or rad].
-        seen: The same told by places of body frames in W [m], by name.
+        frames: The same told by places of body frames in W [m], by name.
 
     Returns:
         The reason, the distribution of reasons over the grid, and the nearest configuration that
@@ -115,7 +115,7 @@ def explain(
         UnknownNameError: If an axis has no such name.
     """
     place = configuration if isinstance(configuration, InitialConfiguration) else None
-    match = nearest_table(file, place, observed, seen)
+    match = nearest_table(file, place, observed, frames)
     table = file.tables[match.index]
     goals = table.sets.weights.size
     if isinstance(goal, bool) or not 0 <= goal < goals:
@@ -127,9 +127,9 @@ def explain(
     weights = fix_weights(grid) if weights is None else weights
     asked = _best_member(table.sets) if configuration is None else configuration
     standing = None if asked is None else Standing.of(grid, scores, goal, asked)
-    fix, cut_off = None, 0
+    fix, unreachable = None, 0
     if standing is not None:
-        fix, cut_off = nearest_fix(grid, scores, table.sets.floor, goal, standing, weights)
+        fix, unreachable = nearest_fix(grid, scores, table.sets.floor, goal, standing, weights)
     return Explanation(
         file=file,
         goal=goal,
@@ -140,7 +140,7 @@ def explain(
         distribution=Distribution.of(scores, goal),
         weights=weights,
         fix=fix,
-        cut_off=cut_off,
+        unreachable=unreachable,
     )
 
 

@@ -14,8 +14,8 @@ from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.changes import Change, ahead_and_left, changes_between, sentence
 from tcs.placement.reasons.standing import Standing
 from tcs.placement.selection import TravelWeights
+from tcs.placement.selection.distances import Distances, FloorDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from
-from tcs.placement.selection.ways import StraightWays, Ways, WaysAround
 from tcs.placement.tables import Floor, Reason, ScoreTable, tc_manipulability, tc_reachability
 
 TURN_WEIGHT = 0.3
@@ -165,13 +165,13 @@ def nearest_fix(
         standing.place, grid, rows, np.arange(len(rows), dtype=np.int32), ways, weights
     )
     cost = np.where(legs.reachable, legs.from_here, np.inf)
-    cut_off = int(np.count_nonzero(~legs.reachable))
-    if cut_off == len(rows):
-        return None, cut_off
+    unreachable = int(np.count_nonzero(~legs.reachable))
+    if unreachable == len(rows):
+        return None, unreachable
     near = np.flatnonzero(cost <= cost.min() + TIE)
     manipulability = tc_manipulability(scores.dexterity[rows[near]], scores.weights)
     best = int(near[np.argmax(manipulability)])
-    driving = ways.from_place(standing.place.base_x, standing.place.base_y)[best]
+    driving = ways.from_position(standing.place.base_x, standing.place.base_y)[best]
     index = int(rows[best])
     here, there = scores.reached[standing.index], scores.reached[index]
     fix = Fix(
@@ -187,12 +187,12 @@ def nearest_fix(
         reached=tuple(np.flatnonzero(there).tolist()),
         lost=tuple(np.flatnonzero(here & ~there).tolist()),
     )
-    return fix, cut_off
+    return fix, unreachable
 
 
 def _ways(
     route: str, cell_xy: NDArray[np.float64], floor: Floor, standing: Standing
-) -> tuple[str, Ways]:
+) -> tuple[str, Distances]:
     """Return the route that can be taken from where the robot stands, and the ways to the cells.
 
     From a configuration in which the body touches something nobody drives: lines tell what is
@@ -200,10 +200,10 @@ def _ways(
     """
     place = standing.place
     if route == "around" and (standing.off or standing.reason != Reason.BODY_BLOCKED):
-        around = WaysAround(cell_xy, floor)
+        around = FloorDistances(cell_xy, floor)
         try:
-            around.from_place(place.base_x, place.base_y)
+            around.from_position(place.base_x, place.base_y)
         except SelectionError:
-            return "straight", StraightWays(cell_xy)
+            return "straight", StraightDistances(cell_xy)
         return route, around
-    return "straight", StraightWays(cell_xy)
+    return "straight", StraightDistances(cell_xy)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from tcs.placement.robustness.comparison import (
-    CELLS,
+    METHODS,
     Contrast,
-    MethodTable,
-    cell_name,
+    MethodComparison,
     compare_methods,
+    method_name,
 )
 from tcs.placement.robustness.error_model import ErrorFile, ErrorModel
 from tcs.placement.robustness.estimation import robustify, success_of, success_summary
@@ -15,10 +15,11 @@ from tcs.placement.robustness.evaluation import SELECTIONS, Evaluation, evaluate
 from tcs.placement.robustness.gains import Gain, Prediction, predictions, robust_gains
 from tcs.placement.robustness.losses import Loss, Losses, losses
 from tcs.placement.robustness.statistics import Difference, Mean, mean_of, rank_sum, signed_rank
+from tcs.placement.robustness.study import RowStudy, StudyPlan, check_row, study_row, study_rows
 from tcs.placement.robustness.trials import Trials
 
 __all__ = [
-    "CELLS",
+    "METHODS",
     "SELECTIONS",
     "Contrast",
     "Difference",
@@ -29,19 +30,24 @@ __all__ = [
     "Loss",
     "Losses",
     "Mean",
-    "MethodTable",
+    "MethodComparison",
     "Prediction",
+    "RowStudy",
+    "StudyPlan",
     "Trials",
-    "cell_name",
+    "check_row",
     "compare_methods",
     "evaluate",
     "losses",
     "mean_of",
+    "method_name",
     "predictions",
     "rank_sum",
     "robust_gains",
     "robustify",
     "signed_rank",
+    "study_row",
+    "study_rows",
     "success_of",
     "success_summary",
 ]

@@ -14,7 +14,7 @@ from tcs.placement.store import ScoreFile
 Cell = tuple[int, bool]
 """Members of the set, and whether TC-manipulability decided."""
 
-CELLS: tuple[Cell, ...] = ((1, False), (1, True), (2, False), (2, True))
+METHODS: tuple[Cell, ...] = ((1, False), (1, True), (2, False), (2, True))
 """The methods that are compared."""
 
 CONTRASTS: tuple[tuple[Cell, Cell], ...] = (
@@ -40,18 +40,18 @@ class Contrast:
     def to_json(self) -> dict[str, Any]:
         """Return it as plain containers."""
         return {
-            "first": cell_name(self.first),
-            "second": cell_name(self.second),
+            "first": method_name(self.first),
+            "second": method_name(self.second),
             "independent": self.independent.to_json(),
             "paired": self.paired.to_json(),
         }
 
 
 @dataclass(frozen=True, eq=False)
-class MethodTable:
+class MethodComparison:
     """The four methods on one row; a method that has no set is missing."""
 
-    cells: dict[Cell, Evaluation]
+    paired: dict[Cell, Evaluation]
     """On the same samples for all."""
     independent: dict[Cell, Evaluation]
     """On samples drawn for each by itself."""
@@ -60,15 +60,15 @@ class MethodTable:
     def to_json(self) -> dict[str, Any]:
         """Return it as plain containers."""
         return {
-            "cells": {cell_name(cell): found.to_json() for cell, found in self.cells.items()},
+            "methods": {method_name(cell): found.to_json() for cell, found in self.paired.items()},
             "contrasts": [contrast.to_json() for contrast in self.contrasts],
         }
 
 
-def cell_name(cell: Cell) -> str:
+def method_name(cell: Cell) -> str:
     """Return a method in words.
 
-    >>> cell_name((2, False))
+    >>> method_name((2, False))
     'two without'
     """
     return f"{('one', 'two')[cell[0] - 1]} {'with' if cell[1] else 'without'}"
@@ -83,7 +83,7 @@ def compare_methods(
     jobs: int = 2,
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
-) -> MethodTable:
+) -> MethodComparison:
     """Return a row of Table III, with its tests.
 
     With TC-manipulability: the best single configuration, and the best set of two. Without:
@@ -111,13 +111,13 @@ def compare_methods(
         trials = Trials.of(file, errors=errors, on_compile=on_compile)
     sets = trials.scored.sets
     has_two = len(sets.best) > 1 and sets.kept_pairs > 0
-    shown = [cell for cell in CELLS if cell[0] == 1 or has_two]
+    shown = [cell for cell in METHODS if cell[0] == 1 or has_two]
     paired: dict[Cell, Evaluation] = {}
     alone: dict[Cell, Evaluation] = {}
     for i, (members, with_manipulability) in enumerate(shown):
         best = "best" if members == 2 else "single"
         for j, (found, stream) in enumerate(
-            ((paired, ""), (alone, cell_name((members, with_manipulability))))
+            ((paired, ""), (alone, method_name((members, with_manipulability))))
         ):
             found[members, with_manipulability] = evaluate(
                 trials,
@@ -134,10 +134,10 @@ def compare_methods(
         Contrast(
             first,
             second,
-            rank_sum(alone[first].shares, alone[second].shares),
-            signed_rank(paired[first].shares, paired[second].shares),
+            rank_sum(alone[first].fractions, alone[second].fractions),
+            signed_rank(paired[first].fractions, paired[second].fractions),
         )
         for first, second in CONTRASTS
         if first in paired and second in paired
     )
-    return MethodTable(paired, alone, contrasts)
+    return MethodComparison(paired, alone, contrasts)

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.model.grid import Grid
 from tcs.placement.robustness.error_model import check_draws
-from tcs.placement.robustness.kept import AS_GOOD, Pairs, kept_pairs
-from tcs.placement.robustness.race import Estimates, race, round_sizes
+from tcs.placement.robustness.pairs import AS_GOOD, Pairs, kept_pairs
+from tcs.placement.robustness.successive_halving import Estimates, round_sizes, successive_halving
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, shown_state
 from tcs.placement.tables import SetTable, SuccessTable, tc_reachability
 from tcs.placement.tables.rules import SHARE_TOLERANCE
-from tcs.placement.tables.success import NOBODY
+from tcs.placement.tables.success import NO_MEMBER
 
 IntArray = NDArray[np.int64]
 
@@ -120,7 +120,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
             continue
         best = []
         for size in (1, 2):
-            members = success.surest(scored.sets, max_members=size)
+            members = success.most_robust(scored.sets, max_members=size)
             row = success.row_of(members)
             if row is None or len(members) < size:
                 continue
@@ -168,7 +168,7 @@ def success_of(
     for pool, most in ((_singles(table), -(-sets // 4)), (_pairs(table), sets)):
         raced = _screened(trials, pool, most, seed, jobs)
         step()
-        found.append((raced, race(raced, table.weights, samples, attempt, step)))
+        found.append((raced, successive_halving(raced, table.weights, samples, attempt, step)))
     return _as_table(table, found)
 
 
@@ -178,7 +178,7 @@ def _as_table(table: SetTable, found: list[tuple[IntArray, Estimates]]) -> Succe
     members, columns = [], []
     for rows, estimates in found:
         order = np.lexsort(rows.T[::-1])
-        flat = np.full((len(rows), width), NOBODY, dtype=np.int32)
+        flat = np.full((len(rows), width), NO_MEMBER, dtype=np.int32)
         if len(rows):
             flat[:, : rows.shape[1]] = table.candidates[rows[order]]
         members.append(flat)

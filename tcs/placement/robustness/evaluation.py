@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.placement.robustness.error_model import ErrorModel, Offsets, check_draws
-from tcs.placement.robustness.kept import uniform_sets
+from tcs.placement.robustness.pairs import uniform_sets
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import Scored, ScoreFile, shown_state
@@ -63,14 +63,14 @@ class Evaluation:
     """The configurations of the set as plain numbers; () if "uniform"."""
 
     @cached_property
-    def shares(self) -> NDArray[np.float64]:
+    def fractions(self) -> NDArray[np.float64]:
         """Share of the goals reached in each sample, by weight, shape (samples,)."""
         return tc_reachability(self.reached, self.weights)
 
     @cached_property
     def summary(self) -> Mean:
-        """Mean of the shares, its standard deviation and interval."""
-        return mean_of(self.shares)
+        """Mean of the fractions, its standard deviation and interval."""
+        return mean_of(self.fractions)
 
     @property
     def samples(self) -> int:
@@ -238,6 +238,6 @@ def _chosen(
             "No success under error was estimated for this table. Estimate it first: "
             "tcs robustify FILE."
         )
-    robust = scored.success.surest(sets) if scored.success is not None else ()
+    robust = scored.success.most_robust(sets) if scored.success is not None else ()
     chosen = {"best": sets.best, "single": sets.best_single, "robust": robust}[select]
     return np.array(chosen, dtype=np.int64)[None], 1

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.placement.robustness.error_model import check_draws, named_generator
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
-from tcs.placement.robustness.kept import AS_GOOD, Pairs, kept_pairs
+from tcs.placement.robustness.pairs import AS_GOOD, Pairs, kept_pairs
 from tcs.placement.robustness.statistics import CONFIDENCE, Difference, signed_rank
 from tcs.placement.robustness.trials import Trials
 from tcs.placement.tables import tc_reachability
@@ -99,14 +99,14 @@ def robust_gains(
         raise SelectionError("No success was estimated for this table: see tcs robustify.")
     gains = []
     for members, scored in ((1, sets.best_single), (2, sets.best)):
-        robust = success.surest(sets, max_members=members)
+        robust = success.most_robust(sets, max_members=members)
         if not robust or (members == 2 and not success.of_size(2).size):
             continue
         first, second = (
             evaluate(trials, select=chosen, samples=samples, seed=seed, jobs=jobs)
             for chosen in (robust, scored)
         )
-        gains.append(Gain(members, first, second, signed_rank(first.shares, second.shares)))
+        gains.append(Gain(members, first, second, signed_rank(first.fractions, second.fractions)))
     return tuple(gains)
 
 
@@ -167,11 +167,11 @@ def _stratified(
         return pool
     order = pool[np.argsort(manipulability[pool], kind="stable")]
     parts = np.array_split(order, STRATA)
-    shares = np.diff(np.linspace(0, count, STRATA + 1).round().astype(np.int64))
+    fractions = np.diff(np.linspace(0, count, STRATA + 1).round().astype(np.int64))
     return np.concatenate(
         [
             rng.choice(part, min(n, part.size), replace=False)
-            for part, n in zip(parts, shares, strict=True)
+            for part, n in zip(parts, fractions, strict=True)
         ]
     )
 

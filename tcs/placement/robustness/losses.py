@@ -29,11 +29,11 @@ class Loss:
     """Why that member fails in the other samples: share of each reason, most frequent first."""
     pair: tuple[str, str] | None
     """The two bodies that are most often in each other's way there."""
-    pair_share: float
+    pair_fraction: float
     """In which share of the losses."""
     joint: str
     """The joint whose error tells losses from the rest best."""
-    tilt: float
+    standardized_error: float
     """By how many of its standard deviations that error is off on average in the losses."""
 
     def to_json(self) -> dict[str, Any]:
@@ -45,9 +45,9 @@ class Loss:
             "member": self.member,
             "reasons": {reason.name.lower(): share for reason, share in self.reasons.items()},
             "pair": list(self.pair) if self.pair else None,
-            "pair_share": self.pair_share,
+            "pair_fraction": self.pair_fraction,
             "joint": self.joint,
-            "tilt": self.tilt,
+            "standardized_error": self.standardized_error,
         }
 
 
@@ -104,9 +104,9 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
                 member=member,
                 reasons={Reason(r): n / int(rows.sum()) for r, n in reasons.most_common()},
                 pair=(robot[pair // len(others)], others[pair % len(others)]) if times else None,
-                pair_share=times / int(rows.sum()),
+                pair_fraction=times / int(rows.sum()),
                 joint=joint,
-                tilt=tilts.get(joint, 0.0),
+                standardized_error=tilts.get(joint, 0.0),
             )
         )
     found.sort(key=lambda loss: loss.success)

@@ -117,7 +117,7 @@ class Bounds:
         approach = here[self.index.cells[0]]
         for cells in self.index.cells[1:]:
             approach = np.minimum(approach, here[cells])
-        return np.asarray(approach + self.legs.metre * self.index.path(self.legs.ways))
+        return np.asarray(approach + self.legs.metre * self.index.path(self.legs.distances))
 
     @cached_property
     def _levels(self) -> FloatArray:

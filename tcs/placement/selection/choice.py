@@ -75,10 +75,8 @@ class Choice:
     """Estimated success of the set under error; None where it was not estimated."""
     success_ci95: tuple[float, float] | None
     """Its 95 % interval."""
-    cut_off: int
+    unreachable: int
     """How many candidates were left out because there is no way to them from here."""
-    gap: float
-    """By how much a set of those that are held may be better at most; 0, the search is exact."""
     seconds: float
     """How long choosing took [s]."""
     match: Match | None = None
@@ -86,14 +84,14 @@ class Choice:
 
 
 def select(
-    source: ScoreFile | SelectionTables,
+    scores: ScoreFile | SelectionTables,
     here: InitialConfiguration,
     *,
     weights: UtilityWeights = _DEFAULT_WEIGHTS,
     travel: TravelWeights = _DEFAULT_TRAVEL,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
-    seen: Mapping[str, Sequence[float]] | None = None,
+    frames: Mapping[str, Sequence[float]] | None = None,
 ) -> Choice:
     """Return the stored set with the greatest utility from where the robot is.
 
@@ -103,15 +101,15 @@ def select(
     lexicographic order.
 
     Args:
-        source: A loaded score file; or its tables, which is faster when choosing repeatedly.
+        scores: A loaded score file; or its tables, which is faster when choosing repeatedly.
         here: The current state of robot and environment, h_0, in the environment frame.
         weights: alpha, beta, gamma, delta.
         travel: What each kind of motion costs.
         max_members: 1 to choose a single configuration, 2 to allow a pair, 3 a triple; by default
             whatever is stored.
-        observed: How the person is found: values of the file's observed axes [m or rad]. The
-            table scored for the nearest values is used; what is not told counts as zero.
-        seen: The same told by places of body frames in W [m], by name.
+        observed: Observed state of the person: values of the file's observed axes [m or rad]. The
+            table scored for the nearest values is used; an axis that is not given counts as zero.
+        frames: Positions of body frames in W [m], by name, in place of `observed`.
 
     Raises:
         SelectionError: If no goal is reached from anywhere, the current state is not finite or
@@ -125,16 +123,16 @@ def select(
     """
     start = time.perf_counter()
     match = None
-    if isinstance(source, ScoreFile):
-        match = nearest_table(source, here, observed, seen)
-        tables = SelectionTables.of(source, match.index)
-    elif observed or seen:
+    if isinstance(scores, ScoreFile):
+        match = nearest_table(scores, here, observed, frames)
+        tables = SelectionTables.of(scores, match.index)
+    elif observed or frames:
         raise SelectionError(
             "Observations choose among the tables of a score file, but one table was given. "
             "Give the file."
         )
     else:
-        tables = source
+        tables = scores
     sets = tables.sets
     if max_members is None:
         max_members = sets.max_members
@@ -147,7 +145,7 @@ def select(
             "the reasons in the score table, then change the task, the grid or the environment."
         )
     legs = legs_from(
-        here, tables.grid, sets.candidates, sets.cell, tables.index.ways[travel.route], travel
+        here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
     )
     if not np.any(legs.reachable):
         raise SelectionError(
@@ -215,8 +213,7 @@ def _choice(
         utility=utility(reachability, manipulability, cost, weights, sure),
         success=success,
         success_ci95=interval,
-        cut_off=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
-        gap=0.0,
+        unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
         seconds=time.perf_counter() - start,
         match=match,
     )

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.selection.ways import StraightWays, Ways, WaysAround
+from tcs.placement.selection.distances import Distances, FloorDistances, StraightDistances
 from tcs.placement.tables import SetTable
 from tcs.placement.tables.groups import Groups
 
@@ -32,10 +32,10 @@ class SetIndex:
         return tuple(GroupIndex(self, kind) for kind in kinds)
 
     @cached_property
-    def ways(self) -> dict[str, Ways]:
+    def distances(self) -> dict[str, Distances]:
         """Distances between the cells by each of the routes."""
         xy = self.sets.cell_xy
-        return {"straight": StraightWays(xy), "around": WaysAround(xy, self.sets.floor)}
+        return {"straight": StraightDistances(xy), "around": FloorDistances(xy, self.sets.floor)}
 
     @cached_property
     def start(self) -> IntArray:
@@ -71,7 +71,7 @@ class GroupIndex:
     """The candidates."""
     groups: Groups
     """The groups."""
-    _paths: dict[type[Ways], FloatArray] = field(default_factory=dict, repr=False)
+    _paths: dict[type[Distances], FloatArray] = field(default_factory=dict, repr=False)
     """Shortest paths through the cells of each group that were asked for, by kind of way."""
 
     @property
@@ -112,14 +112,14 @@ class GroupIndex:
         """How many candidates there are in the cells of each group, shape (K,)."""
         return np.asarray(sum(self.all.size[cells] for cells in self.cells))
 
-    def path(self, ways: Ways) -> FloatArray:
+    def path(self, distances: Distances) -> FloatArray:
         """Return the least distance to drive between the cells of each group [m], shape (K,)."""
-        if type(ways) not in self._paths:
+        if type(distances) not in self._paths:
             legs = [
-                ways.between(first, second)
+                distances.between(first, second)
                 for i, first in enumerate(self.cells)
                 for second in self.cells[i + 1 :]
             ]
             # Of three legs a path takes two.
-            self._paths[type(ways)] = np.sort(legs, axis=0)[: self.members - 1].sum(axis=0)
-        return self._paths[type(ways)]
+            self._paths[type(distances)] = np.sort(legs, axis=0)[: self.members - 1].sum(axis=0)
+        return self._paths[type(distances)]

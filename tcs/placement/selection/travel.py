@@ -2,7 +2,7 @@
 
 D is the shortest open tour that starts at the current state h_0 and visits every
 member of the set. A leg is driven straight, or around the furniture: see
-`tcs.placement.selection.ways`.
+`tcs.placement.selection.distances`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.selection.checks import check_coordinate, check_weight
-from tcs.placement.selection.ways import ROUTES, Ways
+from tcs.placement.selection.distances import ROUTES, Distances
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class Legs:
 
     cell: NDArray[np.int32]
     """Base cells of the candidates, shape (C,)."""
-    ways: Ways
+    distances: Distances
     """Distances between the cells."""
     here_to_cell: FloatArray
     """Cost of driving from the current place to each cell, 0 where there is no way, shape (N,)."""
@@ -90,7 +90,7 @@ class Legs:
 
     def between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
         """Return the cost of the leg between candidates a and b, shape (...)."""
-        driving = self.metre * self.ways.between(self.cell[a], self.cell[b])
+        driving = self.metre * self.distances.between(self.cell[a], self.cell[b])
         return self._with_levels(driving, self.levels[a], self.levels[b])
 
     @cached_property
@@ -126,7 +126,7 @@ def legs_from(
     grid: Grid,
     candidates: NDArray[np.int32],
     cell: NDArray[np.int32],
-    ways: Ways,
+    distances: Distances,
     weights: TravelWeights,
 ) -> Legs:
     """Return the legs between the current state and the candidates of a grid.
@@ -136,7 +136,7 @@ def legs_from(
         grid: Grid of the candidates.
         candidates: Flat indices of the candidates, shape (C,).
         cell: Their base cells, shape (C,).
-        ways: Distances between the cells.
+        distances: Distances between the cells.
         weights: What each kind of motion costs.
 
     Raises:
@@ -149,11 +149,11 @@ def legs_from(
     # Columns are read only when they cost something: looking them up takes longer than choosing.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
-    metres = ways.from_place(float(here.base_x), float(here.base_y))
+    metres = distances.from_position(float(here.base_x), float(here.base_y))
     reachable = np.isfinite(metres)
     return Legs(
         cell=cell,
-        ways=ways,
+        distances=distances,
         here_to_cell=float(weights.metre) * np.where(reachable, metres, 0.0),
         reachable=reachable,
         levels=np.stack(levels, axis=1) if names else np.zeros((len(candidates), 0)),

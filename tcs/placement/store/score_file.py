@@ -17,7 +17,7 @@ from tcs.model.grid import Axis, Grid
 from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
 from tcs.placement.tables.rules import candidates_of
 from tcs.placement.tables.sets import DISTANCE_TOLERANCE
-from tcs.placement.tables.success import NOBODY
+from tcs.placement.tables.success import NO_MEMBER
 
 REQUIRED_METADATA: dict[str, type] = {
     "program_version": str,
@@ -196,7 +196,7 @@ def _check_success(success: SuccessTable | None, sets: SetTable) -> None:
     """Refuse estimates of sets that the table cannot hold."""
     if success is None:
         return
-    named = success.members[success.members != NOBODY]
+    named = success.members[success.members != NO_MEMBER]
     if success.members.shape[1] > sets.max_members or not np.all(np.isin(named, sets.candidates)):
         raise StoreError("estimates of success of sets that are not held.")
 

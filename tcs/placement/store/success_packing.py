@@ -9,7 +9,7 @@ import numpy as np
 from tcs.errors import StoreFormatError
 from tcs.files.compression import fold, small, unfolded
 from tcs.placement.tables import SuccessTable
-from tcs.placement.tables.success import NOBODY
+from tcs.placement.tables.success import NO_MEMBER
 
 
 def packed_success(success: SuccessTable | None) -> dict[str, Any] | None:
@@ -17,7 +17,7 @@ def packed_success(success: SuccessTable | None) -> dict[str, Any] | None:
     if success is None:
         return None
     return {
-        "members_plus_one": fold(small(success.members.astype(np.int64) - NOBODY)),
+        "members_plus_one": fold(small(success.members.astype(np.int64) - NO_MEMBER)),
         "success": fold(success.success),
         "low": fold(success.low),
         "high": fold(success.high),
@@ -43,7 +43,7 @@ def unpacked_success(packed: object) -> SuccessTable | None:
         if np.any(numbers >= np.iinfo(np.int32).max):
             raise StoreFormatError("has estimates of success out of range")
     return SuccessTable(
-        members=(members.astype(np.int64) + NOBODY).astype(np.int32),
+        members=(members.astype(np.int64) + NO_MEMBER).astype(np.int32),
         success=unfolded(packed, "success", "f8", rows),
         low=unfolded(packed, "low", "f8", rows),
         high=unfolded(packed, "high", "f8", rows),

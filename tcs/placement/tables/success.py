@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tcs.placement.tables.checks import read_only, require
 from tcs.placement.tables.sets import MOST_MEMBERS, SetTable
 
-NOBODY = -1
+NO_MEMBER = -1
 """Stands where a set has fewer members than others in the table."""
 
 
@@ -27,7 +27,7 @@ class SuccessTable:
     """
 
     members: NDArray[np.int32]
-    """Flat configuration indices, ascending, NOBODY after the last, shape (K, m)."""
+    """Flat configuration indices, ascending, NO_MEMBER after the last, shape (K, m)."""
     success: NDArray[np.float64]
     """Mean over the samples, shape (K,)."""
     low: NDArray[np.float64]
@@ -68,11 +68,11 @@ class SuccessTable:
     def _check_members(self) -> None:
         """Refuse sets that are none, or out of order."""
         members = self.members.astype(np.int64)
-        there = members != NOBODY
+        there = members != NO_MEMBER
         ascending = (members[:, :-1] < members[:, 1:]) | ~there[:, 1:]
         gapless = there[:, :-1] | ~there[:, 1:]
         require(
-            bool(np.all(members >= NOBODY) and np.all(there[:, 0]))
+            bool(np.all(members >= NO_MEMBER) and np.all(there[:, 0]))
             and bool(np.all(ascending) and np.all(gapless)),
             "success table: members of a set must be ascending configuration indices.",
         )
@@ -87,13 +87,13 @@ class SuccessTable:
     @property
     def sizes(self) -> NDArray[np.int64]:
         """How many members each set has, shape (K,)."""
-        return np.asarray(np.count_nonzero(self.members != NOBODY, axis=1), dtype=np.int64)
+        return np.asarray(np.count_nonzero(self.members != NO_MEMBER, axis=1), dtype=np.int64)
 
     def of_size(self, members: int) -> NDArray[np.int64]:
         """Return the rows of the sets with so many members."""
         return np.flatnonzero(self.sizes == members)
 
-    def surest(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
+    def most_robust(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
         """Return the configuration indices of the surest set; () where there is none.
 
         The surest has the greatest lower end of its interval: by its mean alone a lucky set of a
@@ -113,13 +113,13 @@ class SuccessTable:
 
     def set_at(self, row: int) -> tuple[int, ...]:
         """Return the configuration indices of a set."""
-        return tuple(int(h) for h in self.members[row] if h != NOBODY)
+        return tuple(int(h) for h in self.members[row] if h != NO_MEMBER)
 
     def row_of(self, members: tuple[int, ...]) -> int | None:
         """Return the row of a set, given ascending configuration indices; None if it has none."""
         if len(members) > self.members.shape[1]:
             return None
-        wanted = np.full(self.members.shape[1], NOBODY, dtype=np.int32)
+        wanted = np.full(self.members.shape[1], NO_MEMBER, dtype=np.int32)
         wanted[: len(members)] = members
         found = np.flatnonzero(np.all(self.members == wanted, axis=1))
         return int(found[0]) if found.size else None

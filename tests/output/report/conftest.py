@@ -6,13 +6,13 @@ import dataclasses
 
 import pytest
 
-from tcs.output.report import Paper, Plan, load_paper, study_row
-from tcs.placement.robustness import robustify
+from tcs.output.report import Paper, draw_row, load_paper
+from tcs.placement.robustness import StudyPlan, robustify, study_row
 from tcs.placement.scoring import score
 from tcs.placement.store import save_scores
 from tests.rooms import BESIDE, write_room
 
-PLAN = Plan(samples=60, sets=12, set_samples=6)
+PLAN = StudyPlan(samples=60, sets=12, set_samples=6)
 
 
 @pytest.fixture(scope="session")
@@ -45,9 +45,14 @@ def paper():
 @pytest.fixture(scope="session")
 def study(score_path, paper):
     """The study of that file, with the comparison of Table III."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tcs.output.report.study.load_paper", lambda: paper)
-        return study_row(score_path, PLAN)
+    compared = tuple(paper.compared_rows())
+    return study_row(score_path, dataclasses.replace(PLAN, compared=compared))
+
+
+@pytest.fixture(scope="session")
+def pictures(score_path):
+    """The pictures of that file."""
+    return draw_row(score_path)
 
 
 @pytest.fixture(scope="session")

@@ -207,7 +207,7 @@ def test_estimates_of_success_are_those_of_the_file(answer):
     success, table = answer.success, success_table(answer)
     assert success is not None
     for name, most in (("the surest set of one", 1), ("the surest set of up to 2", 2)):
-        row = success.row_of(success.surest(answer.scored.sets, max_members=most))
+        row = success.row_of(success.most_robust(answer.scored.sets, max_members=most))
         said = column(table, "Under error")[column(table, "Set").index(name)]
         assert float(said.removesuffix(" %")) == pytest.approx(
             100 * success.success[row], abs=0.051

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from tcs.errors import OutputError
-from tcs.output.report import as_html, as_markdown, robustness_page, write_report
+from tcs.output.report import as_html, as_markdown, draw_rows, robustness_page, write_report
 from tcs.output.report.tables import is_short, losses_table, table_1, table_3
 from tcs.output.report.words import REASONS, goes_with, lost_goal
 from tests.output.report.test_page import Reader
 
 
 @pytest.fixture(scope="module")
-def page(study, lossless, paper, plan):
-    return robustness_page([study, lossless], paper, plan, seconds=12.0, command="python it.py")
+def page(study, lossless, pictures, paper, plan):
+    return robustness_page(
+        [study, lossless], [pictures] * 2, paper, plan, seconds=12.0, command="python it.py"
+    )
 
 
 def column(table, title):
@@ -31,7 +33,7 @@ def test_table_1_puts_the_papers_figure_and_the_difference_beside_ours(study, lo
     ours = column(table, "Ours")
     assert ours[1] == "100.0 (0.0)"
     mean = float(ours[0].split(" ")[0])
-    assert mean == pytest.approx(100.0 * np.mean(study.best.shares), abs=0.05)
+    assert mean == pytest.approx(100.0 * np.mean(study.best.fractions), abs=0.05)
     assert column(table, "Paper") == ["99.9 (1.6)", "100.0 (0.0)"]
     differences = column(table, "Difference")
     assert float(differences[0]) == pytest.approx(mean - 99.9, abs=0.11)
@@ -49,9 +51,9 @@ def test_table_3_says_na_where_the_paper_does(study, paper):
     assert column(table, "Places") == ["1", "2", "1", "2"]
     assert column(table, "Paper's")[1] == "94.0 (11.6)"
     assert column(table, "Paper's")[3] == "N/A"
-    shares = study.methods.cells[2, True].shares
+    fractions = study.methods.paired[2, True].fractions
     with_two = float(column(table, "With")[1].split(" ")[0])
-    assert with_two == pytest.approx(100.0 * shares.mean(), abs=0.05)
+    assert with_two == pytest.approx(100.0 * fractions.mean(), abs=0.05)
 
 
 def test_a_short_row_is_explained_from_its_losses(page, study):
@@ -93,15 +95,21 @@ def test_inner_names_of_drawings_are_told_apart(page):
     assert len(clips) == len(set(clips)) > 3
 
 
-def test_files_are_written_whole(study, plan, tmp_path):
+def test_files_are_written_whole(study, pictures, plan, tmp_path):
     folder = tmp_path / "a" / "b"
-    paths = write_report(folder, [study], plan, seconds=1.0, command="it")
+    paths = write_report(folder, [study], [pictures], plan, seconds=1.0, command="it")
     assert sorted(folder.iterdir()) == sorted(paths)
     assert paths[0].read_text().startswith("<!doctype html>")
     assert paths[2].read_text().count("\n") == 10 * plan.samples + 1
 
 
-def test_a_place_that_takes_no_folder_is_told(study, plan, tmp_path):
+def test_a_place_that_takes_no_folder_is_told(study, pictures, plan, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be made"):
-        write_report(tmp_path / "file" / "x", [study], plan, seconds=1.0, command="it")
+        write_report(tmp_path / "file" / "x", [study], [pictures], plan, seconds=1.0, command="it")
+
+
+def test_pictures_do_not_depend_on_the_number_of_processes(pictures, score_path):
+    assert draw_rows([score_path], jobs=2) == (pictures,)
+    assert pictures.map.startswith(b"\x89PNG")
+    assert pictures.scene.startswith(b"\x89PNG")

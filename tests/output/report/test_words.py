@@ -9,10 +9,10 @@ from tcs.placement.robustness import Loss
 from tcs.placement.tables import Reason
 
 
-def loss(reasons, pair=None, pair_share=0.0, tilt=-1.26):
+def loss(reasons, pair=None, pair_fraction=0.0, standardized_error=-1.26):
     return Loss(
         goal=3, body_frame="forearm_left", success=0.625, member=0, reasons=reasons, pair=pair,
-        pair_share=pair_share, joint="person_y", tilt=tilt,
+        pair_fraction=pair_fraction, joint="person_y", standardized_error=standardized_error,
     )  # fmt: skip
 
 
@@ -47,7 +47,7 @@ def test_a_lost_goal_is_a_sentence():
 
 @pytest.mark.parametrize(("tilt", "said"), [(-1.26, "person y -1.3"), (0.84, "person y +0.8")])
 def test_an_error_is_told_with_its_side(tilt, said):
-    assert goes_with(loss({Reason.TOO_FAR: 1.0}, tilt=tilt)) == said
+    assert goes_with(loss({Reason.TOO_FAR: 1.0}, standardized_error=tilt)) == said
 
 
 def test_shares_and_points():

@@ -71,8 +71,8 @@ def test_estimates_are_means_of_evaluations(done):
     offsets = trials.errors.draw(128, 0, stream="race")
     for row in (0, int(np.argmax(success.success)), len(success.success) - 1):
         reached = trials.reached(success.set_at(row), offsets).any(axis=0)
-        shares = reached[: success.samples[row]] @ trials.weights
-        assert success.success[row] == pytest.approx(shares.mean(), abs=1e-7)  # float32
+        fractions = reached[: success.samples[row]] @ trials.weights
+        assert success.success[row] == pytest.approx(fractions.mean(), abs=1e-7)  # float32
 
 
 def test_same_numbers_for_any_number_of_jobs(chair_file, done):
@@ -85,7 +85,7 @@ def test_same_numbers_for_any_number_of_jobs(chair_file, done):
 def test_the_chosen_set_does_no_worse_on_samples_it_has_not_seen(done):
     robust = evaluate(done, select="robust", samples=200, seed=7)
     best = evaluate(done, select="best", samples=200, seed=7)
-    off = robust.shares - best.shares
+    off = robust.fractions - best.fractions
     # Four standard errors of the mean paired difference.
     assert off.mean() > -4 * off.std() / np.sqrt(200)
 

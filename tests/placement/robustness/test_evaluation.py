@@ -11,7 +11,7 @@ import tcs
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.model.scene import JointError
 from tcs.placement.robustness import Trials, compare_methods, evaluate, mean_of
-from tcs.placement.robustness.comparison import CELLS
+from tcs.placement.robustness.comparison import METHODS
 from tcs.placement.tables import tc_reachability
 
 NOTHING = {"person_x": JointError(distribution="normal", std=0.0)}
@@ -29,11 +29,11 @@ def test_without_error_the_score_is_the_offline_score(which, request, rng):
     trials = Trials.of(file, errors=NOTHING)
     for select in ("best", "single", *drawn_sets(file, rng, 5)):
         found = evaluate(trials, samples=3, select=select)
-        assert np.all(found.shares == found.reachability)
+        assert np.all(found.fractions == found.reachability)
         members = tuple(map(int, found.sets[0]))
         assert (found.reachability, found.manipulability) == file.nominal.sets.scores_of(members)
     found = evaluate(trials, samples=30, select="uniform", members=1)
-    assert found.shares.tolist() == [
+    assert found.fractions.tolist() == [
         file.nominal.sets.scores_of((int(h),))[0] for (h,) in found.sets
     ]
 
@@ -54,7 +54,7 @@ def test_a_goal_counts_when_any_member_reaches_it(bed_trials):
     assert len(alone) == 2
     either = alone[0].reached | alone[1].reached
     assert np.array_equal(both.reached, either)
-    assert np.array_equal(both.shares, tc_reachability(either, both.weights))
+    assert np.array_equal(both.fractions, tc_reachability(either, both.weights))
     # Each adds something: the law is not tried on an idle second member.
     assert all(np.any(either & ~one.reached) for one in alone)
 
@@ -63,7 +63,7 @@ def test_growing_a_set_never_lowers_it(chair_trials, rng):
     first, second = drawn_sets(chair_trials.file, rng, 1)[0]
     one = evaluate(chair_trials, samples=50, select=[first])
     two = evaluate(chair_trials, samples=50, select=[first, second])
-    assert np.all(two.shares >= one.shares)
+    assert np.all(two.fractions >= one.fractions)
 
 
 def test_the_same_seed_gives_the_same_for_any_number_of_jobs(bed_file):
@@ -101,14 +101,14 @@ def test_figures_are_those_of_the_samples(bed_trials):
     plain = found.to_json()
     assert json.loads(json.dumps(plain)) == plain
     assert {"mean", "std", "ci95", "per_goal", "samples", "seconds", "seed", "errors"} <= set(plain)
-    assert plain["mean"] == pytest.approx(found.shares.mean())
-    assert plain["std"] == pytest.approx(found.shares.std(ddof=1))
-    assert tuple(plain["ci95"]) == mean_of(found.shares).ci95
+    assert plain["mean"] == pytest.approx(found.fractions.mean())
+    assert plain["std"] == pytest.approx(found.fractions.std(ddof=1))
+    assert tuple(plain["ci95"]) == mean_of(found.fractions).ci95
     assert plain["per_goal"] == pytest.approx(found.reached.mean(axis=0))
     assert np.dot(plain["per_goal"], found.weights) == pytest.approx(plain["mean"])
     assert plain["samples"] == 60
     assert plain["errors"]["person_x"] == {"distribution": "normal", "std": 0.05}
-    assert plain["complete"] == pytest.approx(np.mean(found.shares > 1 - 1e-9))
+    assert plain["complete"] == pytest.approx(np.mean(found.fractions > 1 - 1e-9))
     assert [m["bed_height"] for m in plain["members"]]
     with pytest.raises(ValueError, match="read-only"):
         found.reached[0] = True
@@ -125,10 +125,10 @@ def test_the_person_may_be_believed_elsewhere(bed_file):
 
 def test_one_and_two_with_and_without(bed_trials):
     table = compare_methods(bed_trials, samples=60)
-    assert tuple(table.cells) == CELLS
+    assert tuple(table.paired) == METHODS
     assert len(table.contrasts) == 4
     for contrast in table.contrasts:
-        first, second = table.cells[contrast.first], table.cells[contrast.second]
+        first, second = table.paired[contrast.first], table.paired[contrast.second]
         assert contrast.paired.mean == pytest.approx(first.summary.mean - second.summary.mean)
         assert contrast.independent.mean != contrast.paired.mean
     assert json.dumps(table.to_json())

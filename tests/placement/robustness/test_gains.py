@@ -23,13 +23,13 @@ def test_gains_are_paired_and_on_samples_of_their_own(robust):
     assert [gain.members for gain in gains] == [1, 2]
     unseen = robust.errors.draw(100, 0, stream="race")
     for gain in gains:
-        off = gain.robust.shares - gain.scored.shares
+        off = gain.robust.fractions - gain.scored.fractions
         assert gain.paired.mean == pytest.approx(off.mean())
         for name, values in gain.robust.offsets.items():
             assert np.array_equal(values, gain.scored.offsets[name])
             assert not np.intersect1d(values, unseen[name]).size
     success, sets = robust.scored.success, robust.scored.sets
-    assert tuple(gains[1].robust.sets[0]) == success.surest(sets)
+    assert tuple(gains[1].robust.sets[0]) == success.most_robust(sets)
     assert tuple(gains[1].scored.sets[0]) == sets.best
     assert json.dumps([gain.to_json() for gain in gains])
 

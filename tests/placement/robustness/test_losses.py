@@ -43,9 +43,9 @@ def test_reasons_are_those_of_losses_alone(found):
         assert Reason.REACHED not in loss.reasons
         # The base is not checked again.
         assert Reason.BODY_BLOCKED not in loss.reasons
-        assert (loss.pair is None) == (loss.pair_share == 0.0)
+        assert (loss.pair is None) == (loss.pair_fraction == 0.0)
         blocked = (Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED)
-        assert loss.pair_share <= sum(loss.reasons.get(r, 0.0) for r in blocked) + 1e-12
+        assert loss.pair_fraction <= sum(loss.reasons.get(r, 0.0) for r in blocked) + 1e-12
 
 
 def test_the_joint_that_is_told_is_off_in_the_losses(trials, found):
@@ -53,7 +53,7 @@ def test_the_joint_that_is_told_is_off_in_the_losses(trials, found):
     for loss in told:
         rows = ~evaluation.reached[:, loss.goal]
         off = evaluation.offsets[loss.joint]
-        assert loss.tilt == pytest.approx(off[rows].mean() / off.std(), abs=1e-12)
+        assert loss.standardized_error == pytest.approx(off[rows].mean() / off.std(), abs=1e-12)
 
 
 def test_a_person_lifted_away_is_too_far(chair_trials):
@@ -109,8 +109,8 @@ def test_losses_by_hand():
     # Only where the gripper is in the way from both places can no set do better: goal 1, in
     # samples 0 and 2.
     assert found.ceiling == pytest.approx(1.0 - 0.25 * 2 / 4)
-    assert (told[0].pair, told[0].pair_share) == (("hand", "person"), 1.0)
-    assert (told[1].pair, told[1].pair_share) == (("hand", "bed"), 1.0)
+    assert (told[0].pair, told[0].pair_fraction) == (("hand", "person"), 1.0)
+    assert (told[1].pair, told[1].pair_fraction) == (("hand", "bed"), 1.0)
     assert told[2].pair is None
     assert told[0].reasons == {Reason.ARM_BLOCKED: 1.0}
     assert told[1].reasons == {Reason.GRIPPER_BLOCKED: 1.0}
@@ -128,4 +128,4 @@ def test_an_error_to_either_side_may_tell_losses_best(sign):
     }
     (loss,) = (loss for loss in losses(trials, evaluation).goals if loss.goal == 0)
     assert loss.joint == "person_y"
-    assert loss.tilt == pytest.approx(-sign * 3.0 / np.sqrt(3.0))
+    assert loss.standardized_error == pytest.approx(-sign * 3.0 / np.sqrt(3.0))

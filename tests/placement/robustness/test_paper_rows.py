@@ -26,7 +26,7 @@ def test_without_error_every_row_gives_its_offline_score(task, environment, rng)
     sets = file.nominal.sets
     for select in ("best", "single"):
         found = evaluate(trials, samples=2, select=select)
-        assert np.all(found.shares == found.reachability)
+        assert np.all(found.fractions == found.reachability)
     members = rng.choice(sets.candidates, 200, replace=False)
     reached = trials.reached(members, trials.errors.draw(1, 0))[:, 0]
     assert np.array_equal(reached, sets.reached[np.searchsorted(sets.candidates, members)])

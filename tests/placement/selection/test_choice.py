@@ -167,11 +167,11 @@ def test_equals_brute_force_around_the_furniture(
     )
     kept = all_sets(scores, grid, 0.4)
     tables = SelectionTables(sets, grid)
-    ways = tables.index.ways["around"]
+    distances = tables.index.distances["around"]
     here = state(base_x=where[0], base_y=where[1], base_yaw=1.0)
     travel = TravelWeights(metre=metre, turn=turn, route="around")
     try:
-        metres = ways.from_place(*where)
+        metres = distances.from_position(*where)
     except SelectionError:
         with pytest.raises(SelectionError, match="no way around the furniture starts there"):
             select(tables, here, weights=weights, travel=travel)
@@ -186,7 +186,7 @@ def test_equals_brute_force_around_the_furniture(
         for first, *rest in itertools.permutations(members):
             cost = metre * metres[cell[first]] + turn * abs(yaw[first] - 1.0)
             for h in rest:
-                driven = metre * ways.between(np.array(cell[first]), np.array(cell[h]))
+                driven = metre * distances.between(np.array(cell[first]), np.array(cell[h]))
                 cost += driven + turn * abs(yaw[h] - yaw[first])
             costs.append(cost)
         value = weights.reachability * both[0] + weights.manipulability * both[1]
@@ -198,7 +198,7 @@ def test_equals_brute_force_around_the_furniture(
             select(tables, here, weights=weights, travel=travel)
         return
     choice = select(tables, here, weights=weights, travel=travel)
-    assert choice.cut_off == sum(not np.isfinite(metres[c]) for c in cell.values())
+    assert choice.unreachable == sum(not np.isfinite(metres[c]) for c in cell.values())
     assert choice.utility == pytest.approx(best[1], rel=1e-12, abs=1e-12)
     if not turn:
         # Turns go through a modulus there and not here, which may cost a tie its last bit.

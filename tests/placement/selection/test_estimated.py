@@ -10,11 +10,11 @@ import pytest
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.robustness.kept import Pairs, kept_pairs
+from tcs.placement.robustness.pairs import Pairs, kept_pairs
 from tcs.placement.selection import TravelWeights, UtilityWeights, select
 from tcs.placement.store import load_scores, save_scores
 from tcs.placement.tables import SuccessTable
-from tcs.placement.tables.success import NOBODY
+from tcs.placement.tables.success import NO_MEMBER
 from tests.placement.store.example import score_file
 from tests.placement.tables.small import small_grid
 
@@ -27,7 +27,7 @@ def estimated(sets, rng, singles=15, pairs=60):
     kept = Pairs.joined(kept_pairs(sets))
     some = rng.choice(kept.first.size, pairs, replace=False)
     both = sorted(zip(kept.first[some].tolist(), kept.second[some].tolist(), strict=True))
-    members = np.full((singles + pairs, 2), NOBODY, dtype=np.int32)
+    members = np.full((singles + pairs, 2), NO_MEMBER, dtype=np.int32)
     members[:singles, 0] = sets.candidates[alone]
     members[singles:] = sets.candidates[np.array(both)]
     success = rng.integers(0, 9, len(members)) / 8

@@ -50,12 +50,12 @@ def test_the_nearest_shift_is_used(file, person_y, index):
     assert match.index == index
     scored = -0.1 + index * 0.05
     assert match.state["person_y"] == pytest.approx(scored, abs=1e-12)
-    assert match.off["person_y"] == pytest.approx(person_y - scored, abs=1e-12)
+    assert match.observed_error["person_y"] == pytest.approx(person_y - scored, abs=1e-12)
 
 
 def test_what_is_not_told_is_nominal(file):
     match = nearest_table(file)
-    assert (match.index, match.off) == (file.nominal_index, {})
+    assert (match.index, match.observed_error) == (file.nominal_index, {})
     assert nearest_table(score_file(), at()).index == 0
 
 
@@ -68,9 +68,9 @@ def test_a_single_value_does_not_stand_for_everything(step, near, far):
     file = score_file(observed=[alone])
     assert nearest_table(file).index == 0
     for told in near:
-        assert nearest_table(file, at(), {"person_y": told}).off["person_y"] == pytest.approx(
-            told - 0.3, abs=1e-12
-        )
+        assert nearest_table(file, at(), {"person_y": told}).observed_error[
+            "person_y"
+        ] == pytest.approx(told - 0.3, abs=1e-12)
     for told in far:
         with pytest.raises(SelectionError, match=r"scored is only 0\.3 m"):
             nearest_table(file, at(), {"person_y": told})
@@ -93,7 +93,7 @@ def test_the_choice_is_that_of_the_table(file):
 
 
 @pytest.mark.parametrize(
-    ("seen", "here", "index", "off"),
+    ("frames", "here", "index", "error"),
     [
         ({"head": (0.3, 0.06, 0.7)}, at(), 3, 0.01),
         ({"head": (0.3, 0.06, 0.8)}, at(), 3, 0.01),
@@ -102,10 +102,10 @@ def test_the_choice_is_that_of_the_table(file):
         ({"head": (0.3, -0.1, 0.7), "chest": (1.0, 1.0, 1.0)}, at(), 0, 0.0),
     ],
 )
-def test_frames_seen_tell_the_shift(file, seen, here, index, off):
-    match = nearest_table(file, here, seen=seen)
+def test_observed_frames_select_the_shift(file, frames, here, index, error):
+    match = nearest_table(file, here, frames=frames)
     assert match.index == index
-    assert match.frames_off == pytest.approx(off, abs=1e-12)
+    assert match.frame_error == pytest.approx(error, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -114,11 +114,15 @@ def test_frames_seen_tell_the_shift(file, seen, here, index, off):
         ({"observed": {"person_y": 0.13}}, SelectionError, "scored are only -0.1 to 0.1 m, 5 val"),
         ({"observed": {"person_y": np.nan}}, SelectionError, "must be a finite number"),
         ({"observed": {"person_x": 0.0}}, UnknownNameError, "person_y"),
-        ({"seen": {"heat": (0, 0, 0)}}, UnknownNameError, "head"),
-        ({"seen": {"head": (0.3, 0.3, 0.7)}}, SelectionError, "0.20 m from where it was scored"),
-        ({"seen": {"head": (0.3, 0.3)}}, SelectionError, "three finite numbers"),
+        ({"frames": {"heat": (0, 0, 0)}}, UnknownNameError, "head"),
         (
-            {"seen": {"head": (0.3, 0.0, 0.7)}, "observed": {"person_y": 0.0}},
+            {"frames": {"head": (0.3, 0.3, 0.7)}},
+            SelectionError,
+            "are 0.20 m from where",
+        ),
+        ({"frames": {"head": (0.3, 0.3)}}, SelectionError, "three finite numbers"),
+        (
+            {"frames": {"head": (0.3, 0.0, 0.7)}, "observed": {"person_y": 0.0}},
             SelectionError,
             "Give one of them",
         ),

@@ -8,8 +8,8 @@ from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.scoring.sets import base_cells
 from tcs.placement.selection import TravelWeights, shortest_tour
+from tcs.placement.selection.distances import StraightDistances
 from tcs.placement.selection.travel import legs_from
-from tcs.placement.selection.ways import StraightWays
 from tests.placement.tables.small import small_grid
 
 GRID = small_grid(nx=3, ny=1, yaws=4, torsos=2, bed=2)
@@ -18,7 +18,7 @@ GRID = small_grid(nx=3, ny=1, yaws=4, torsos=2, bed=2)
 def legs(here, travel, flat):
     candidates = np.array(flat, dtype=np.int32)
     cell, xy = base_cells(GRID, candidates)
-    return legs_from(here, GRID, candidates, cell, StraightWays(xy), travel)
+    return legs_from(here, GRID, candidates, cell, StraightDistances(xy), travel)
 
 
 def state(yaw_deg=0.0, torso=0.0, bed=0.0):

@@ -38,13 +38,13 @@ def test_the_surest_set_is_not_the_luckiest():
     table = SuccessTable(**{**PARTS, "members": members})
     # (c,) has the greatest mean, of which less is known.
     high, low = PARTS["high"], np.array([0.4, 0.2, 0.6, 0.7])
-    assert table.surest(sets) == (a, d)
-    assert table.surest(sets, max_members=1) == (c,)
+    assert table.most_robust(sets) == (a, d)
+    assert table.most_robust(sets, max_members=1) == (c,)
     equal = SuccessTable(**{**PARTS, "members": members, "low": np.minimum(low, 0.2), "high": high})
     scores = [sum(sets.scores_of(equal.set_at(row))) for row in range(4)]
-    assert equal.surest(sets) == equal.set_at(int(np.argmax(scores)))
+    assert equal.most_robust(sets) == equal.set_at(int(np.argmax(scores)))
     none = SuccessTable(**{name: part[:0] for name, part in PARTS.items()})
-    assert none.surest(sets) == ()
+    assert none.most_robust(sets) == ()
 
 
 @pytest.mark.parametrize(

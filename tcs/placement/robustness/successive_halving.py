@@ -51,7 +51,7 @@ def round_sizes(samples: int) -> tuple[int, ...]:
     return (*sizes, samples)
 
 
-def race(
+def successive_halving(
     sets: IntArray,
     weights: FloatArray,
     samples: int,
@@ -79,28 +79,28 @@ def race(
     sizes = round_sizes(samples)
     count = len(sets)
     # float32 keeps seven digits of a share of some goals.
-    shares = np.zeros((count, samples), dtype=np.float32)
+    fractions = np.zeros((count, samples), dtype=np.float32)
     had = np.zeros(count, dtype=np.int64)
     alive = np.arange(count)
     bound = float(ndtri(1.0 - (1.0 - CONFIDENCE) / max(1, count * len(sizes))))
     done = 0
     for size in sizes:
         if alive.size:
-            _fill(shares, sets, alive, weights, attempt, done, size)
+            _fill(fractions, sets, alive, weights, attempt, done, size)
             had[alive] = size
-            alive = _best_half(alive, shares[alive, :size], bound)
+            alive = _best_half(alive, fractions[alive, :size], bound)
         done = size
         on_round()
     mean, low, high = np.zeros(count), np.zeros(count), np.ones(count)
     for size in sizes:
         rows = np.flatnonzero(had == size)
         if rows.size:
-            mean[rows], low[rows], high[rows] = intervals_of(shares[rows, :size])
+            mean[rows], low[rows], high[rows] = intervals_of(fractions[rows, :size])
     return Estimates(mean, low, high, had, alive)
 
 
 def _fill(
-    shares: NDArray[np.float32],
+    fractions: NDArray[np.float32],
     sets: IntArray,
     rows: IntArray,
     weights: FloatArray,
@@ -108,7 +108,7 @@ def _fill(
     start: int,
     stop: int,
 ) -> None:
-    """Fill the shares of some sets in samples start <= s < stop."""
+    """Fill the fractions of some sets in samples start <= s < stop."""
     members, number = np.unique(sets[rows], return_inverse=True)
     number = number.reshape(rows.size, -1)
     found = attempt(members, start, stop)
@@ -117,13 +117,13 @@ def _fill(
         reached = found[number[part, 0]]
         for column in number[part, 1:].T:
             reached = reached | found[column]
-        shares[rows[part], start:stop] = tc_reachability(reached, weights)
+        fractions[rows[part], start:stop] = tc_reachability(reached, weights)
 
 
-def _best_half(alive: IntArray, shares: NDArray[np.float32], bound: float) -> IntArray:
+def _best_half(alive: IntArray, fractions: NDArray[np.float32], bound: float) -> IntArray:
     """Return the sets that may be the best, half of them at most, in order."""
-    mean = shares.mean(axis=1, dtype=np.float64)
-    off = shares.astype(np.float64) - shares[int(np.argmax(mean))]
+    mean = fractions.mean(axis=1, dtype=np.float64)
+    off = fractions.astype(np.float64) - fractions[int(np.argmax(mean))]
     n = off.shape[1]
     error = off.std(axis=1, ddof=1) / np.sqrt(n) if n > 1 else np.full(len(off), np.inf)
     mean[off.mean(axis=1) + bound * error < 0.0] = -1.0

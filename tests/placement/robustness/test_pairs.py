@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from tcs.errors import SelectionError, TcsError
-from tcs.placement.robustness import kept
-from tcs.placement.robustness.kept import Pairs, kept_pairs, uniform_sets
+from tcs.placement.robustness import pairs as pairs_module
+from tcs.placement.robustness.pairs import Pairs, kept_pairs, uniform_sets
 from tcs.placement.scoring.sets import build_sets
 from tests.placement.tables.small import random_scores, small_grid
 
@@ -40,7 +40,7 @@ def by_hand(sets):
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 @pytest.mark.parametrize("chunk", [1, 10**6])
 def test_all_kept_pairs(options, chunk, monkeypatch):
-    monkeypatch.setattr(kept, "CHUNK", chunk)
+    monkeypatch.setattr(pairs_module, "CHUNK", chunk)
     sets = table(**options)
     found = Pairs.joined(kept_pairs(sets))
     rows = zip(*(found.first, found.second, found.reachability, found.manipulability), strict=True)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from tcs.errors import SelectionError
-from tcs.placement.selection.ways import WaysAround
+from tcs.placement.selection.distances import FloorDistances
 from tcs.placement.tables import Floor
 from tcs.placement.tables.floor import MOVES
 
@@ -30,10 +30,10 @@ def place(floor, i, j):
     return floor.start[0] + i * floor.step[0], floor.start[1] + j * floor.step[1]
 
 
-def ways_over(floor):
-    """Ways whose cells are all places of a floor, row by row."""
+def distances_over(floor):
+    """Distances whose cells are all places of a floor, row by row."""
     xy = np.array([place(floor, i, j) for i, j in np.ndindex(floor.shape)])
-    return WaysAround(xy, floor)
+    return FloorDistances(xy, floor)
 
 
 def shortest(floor, entries):
@@ -61,12 +61,12 @@ def shortest(floor, entries):
 def test_ways_agree_with_plain_loops(seed, blocked):
     free = np.random.default_rng(seed).random((6, 5)) >= blocked
     floor = floor_of(free)
-    ways = ways_over(floor)
+    distances = distances_over(floor)
     for i, j in np.ndindex(free.shape):
         found = shortest(floor, {(i, j): 0.0})
         for p, q in found:
             # Some dozen roundings of numbers below ten.
-            assert ways.between(np.array(5 * i + j), np.array(5 * p + q)) == pytest.approx(
+            assert distances.between(np.array(5 * i + j), np.array(5 * p + q)) == pytest.approx(
                 found[p, q], abs=1e-14
             )
 
@@ -92,7 +92,7 @@ def test_from_outside_one_drives_straight_to_the_border(x, y):
     floor = floor_of(free)
     low, high = place(floor, 0, 0), place(floor, 5, 4)
     outside = not (low[0] <= x <= high[0] and low[1] <= y <= high[1])
-    found = ways_over(floor).from_place(x, y)
+    found = distances_over(floor).from_position(x, y)
     if outside:
         expected = shortest(floor, seen_from(floor, x, y))
     else:
@@ -110,10 +110,10 @@ def test_round_a_bed():
     free[:31, 12:29] = False  # 3 m along x from the wall, 1.6 m wide
     floor = floor_of(free, step=(0.1, 0.1))
     one, other = place(floor, 20, 11), place(floor, 20, 29)
-    ways = WaysAround(np.array([one, other]), floor)
+    distances = FloorDistances(np.array([one, other]), floor)
     # 11 steps to beyond the end, 18 across, 11 back; the corners cannot be cut.
-    assert ways.between(np.array(0), np.array(1)) == pytest.approx(4.0, abs=1e-12)
-    np.testing.assert_allclose(ways.from_place(*one), [0.0, 4.0], atol=1e-12)
+    assert distances.between(np.array(0), np.array(1)) == pytest.approx(4.0, abs=1e-12)
+    np.testing.assert_allclose(distances.from_position(*one), [0.0, 4.0], atol=1e-12)
 
 
 def test_a_place_with_a_wall_round_it_is_out_of_reach():
@@ -121,7 +121,7 @@ def test_a_place_with_a_wall_round_it_is_out_of_reach():
     free[2:5, 2:5] = False
     free[3, 3] = True
     floor = floor_of(free)
-    ways = ways_over(floor)
-    assert ways.from_place(0.0, 0.0)[7 * 3 + 3] == math.inf
+    distances = distances_over(floor)
+    assert distances.from_position(0.0, 0.0)[7 * 3 + 3] == math.inf
     with pytest.raises(SelectionError, match=r"base at \(-0.75, 2.50\) m stands where"):
-        ways.from_place(-0.75, 2.5)
+        distances.from_position(-0.75, 2.5)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tcs.placement.robustness.race import race, round_sizes
 from tcs.placement.robustness.statistics import intervals_of
+from tcs.placement.robustness.successive_halving import round_sizes, successive_halving
 from tcs.placement.tables import tc_reachability
 
 WEIGHTS = np.array([0.5, 0.25, 0.25])
@@ -30,7 +30,7 @@ class Field:
         self.tried[members, start:stop] += 1
         return self.reached[members, start:stop]
 
-    def shares(self, sets, samples=1024):
+    def fractions(self, sets, samples=1024):
         reached = np.logical_or.reduce([self.reached[c, :samples] for c in sets.T], axis=0)
         return tc_reachability(reached, WEIGHTS)
 
@@ -53,17 +53,17 @@ def test_rounds_double_up_to_all_samples():
 
 
 def test_estimates_are_those_of_the_samples_each_set_has_had(field, sets):
-    found = race(sets, WEIGHTS, 1024, field.attempt)
+    found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
     for k in range(len(sets)):
-        shares = field.shares(sets[k : k + 1], found.samples[k])
-        mean, low, high = intervals_of(shares)
+        fractions = field.fractions(sets[k : k + 1], found.samples[k])
+        mean, low, high = intervals_of(fractions)
         assert found.mean[k] == pytest.approx(mean[0], abs=1e-7)  # float32 in between
         assert (found.low[k], found.high[k]) == pytest.approx((low[0], high[0]), abs=1e-6)
 
 
 def test_the_race_is_cheaper_than_trying_everything_and_finds_the_best(field, sets):
-    found = race(sets, WEIGHTS, 1024, field.attempt)
-    truth = field.shares(sets).mean(axis=1)
+    found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
+    truth = field.fractions(sets).mean(axis=1)
     assert found.survivors.size
     assert np.all(found.samples[found.survivors] == 1024)
     # The better half goes on: what survives is at the top, by a hair of luck at most.
@@ -76,7 +76,7 @@ def test_the_race_is_cheaper_than_trying_everything_and_finds_the_best(field, se
 def test_no_set_behind_beyond_doubt_goes_on(rng):
     field = Field(rng, members=3)
     field.reached[0], field.reached[1], field.reached[2] = True, False, True
-    found = race(np.array([[0], [1], [2]]), WEIGHTS, 256, field.attempt)
+    found = successive_halving(np.array([[0], [1], [2]]), WEIGHTS, 256, field.attempt)
     assert found.samples.tolist() == [256, 64, 128]
     assert found.mean.tolist() == [1.0, 0.0, 1.0]
     assert found.survivors.tolist() == [0]
@@ -84,18 +84,18 @@ def test_no_set_behind_beyond_doubt_goes_on(rng):
     assert 0.0 < found.high[1] < 3.7 / 64
 
 
-def raced_by_loops(shares, sizes):
-    """Return how many samples each set has had and who is left, from all shares (sets, samples)."""
-    count = len(shares)
+def halved_by_loops(fractions, sizes):
+    """Return the samples of each set and the survivors, from all fractions (sets, samples)."""
+    count = len(fractions)
     bound = stats.norm.isf(0.05 / (count * len(sizes)))
     alive, had = list(range(count)), [0] * count
     for size in sizes:
-        means = {k: shares[k, :size].mean() for k in alive}
+        means = {k: fractions[k, :size].mean() for k in alive}
         leader = max(alive, key=lambda k: (means[k], -k))
         left = []
         for k in alive:
             had[k] = size
-            off = shares[k, :size] - shares[leader, :size]
+            off = fractions[k, :size] - fractions[leader, :size]
             if off.mean() + bound * off.std(ddof=1) / np.sqrt(size) >= 0.0:
                 left.append(k)
         half = sorted(left, key=lambda k: (-means[k], k))[: (len(alive) + 1) // 2]
@@ -115,8 +115,8 @@ def test_who_is_rejected_when_agrees_with_plain_loops(rng, ahead):
         rng.uniform(size=(1, 1024, 1)), rng.uniform(size=field.reached.shape),
     )  # fmt: skip
     field.reached = luck < field.chance[:, None]
-    found = race(sets, WEIGHTS, 1024, field.attempt)
-    had, alive = raced_by_loops(field.shares(sets), round_sizes(1024))
+    found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
+    had, alive = halved_by_loops(field.fractions(sets), round_sizes(1024))
     assert found.samples.tolist() == had
     assert found.survivors.tolist() == alive
 
@@ -127,7 +127,7 @@ def test_intervals_of_survivors_hold(rng):
     for _ in range(20):
         field = Field(rng, members=20, samples=256)
         sets = np.stack([np.arange(20)], axis=1)
-        found = race(sets, WEIGHTS, 256, field.attempt)
+        found = successive_halving(sets, WEIGHTS, 256, field.attempt)
         truth = field.chance @ WEIGHTS
         held += np.count_nonzero((found.low <= truth) & (truth <= found.high))
         count += len(sets)
@@ -136,5 +136,5 @@ def test_intervals_of_survivors_hold(rng):
 
 
 def test_no_sets_no_estimates(field):
-    found = race(np.empty((0, 2), dtype=np.int64), WEIGHTS, 100, field.attempt)
+    found = successive_halving(np.empty((0, 2), dtype=np.int64), WEIGHTS, 100, field.attempt)
     assert found.mean.size == found.survivors.size == 0

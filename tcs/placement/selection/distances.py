@@ -29,14 +29,14 @@ AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Ways(abc.ABC):
+class Distances(abc.ABC):
     """Distances between the current place and base cells."""
 
     cell_xy: FloatArray
     """Places of the cells in W [m], shape (N, 2)."""
 
     @abc.abstractmethod
-    def from_place(self, x: float, y: float) -> FloatArray:
+    def from_position(self, x: float, y: float) -> FloatArray:
         """Return how far it is from a place to each cell [m], inf where there is no way, (N,)."""
 
     @abc.abstractmethod
@@ -44,10 +44,10 @@ class Ways(abc.ABC):
         """Return how far it is between cells that have a way from one place [m], shape (...)."""
 
 
-class StraightWays(Ways):
+class StraightDistances(Distances):
     """Straight lines, whatever is in the way: the paper's choice."""
 
-    def from_place(self, x: float, y: float) -> FloatArray:
+    def from_position(self, x: float, y: float) -> FloatArray:
         """Return the distance of each cell from a place [m], shape (N,)."""
         return _distance(np.array([x, y]), self.cell_xy)
 
@@ -57,13 +57,13 @@ class StraightWays(Ways):
 
 
 @dataclass(frozen=True, eq=False)
-class WaysAround(Ways):
+class FloorDistances(Distances):
     """Shortest ways over the floor. The first use finds those between all cells, and is slow."""
 
     floor: Floor
     """Where the base can drive."""
 
-    def from_place(self, x: float, y: float) -> FloatArray:
+    def from_position(self, x: float, y: float) -> FloatArray:
         """Return how far it is from a place to each cell [m], inf where there is no way, (N,).
 
         Inside the lattice the robot first drives straight to a corner of the square it is in, if
