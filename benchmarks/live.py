@@ -15,7 +15,7 @@ import time
 import numpy as np
 from table import header, row, spread
 
-from tcs.placement.scoring import LiveScorer, all_rows, score
+from tcs.placement.scoring import LiveScorer, score, task_environment_pairs
 from tcs.placement.selection import nearest_table
 from tcs.placement.store import ScoreFile
 
@@ -32,7 +32,9 @@ def main() -> None:
     )
     options = parser.parse_args()
     header()
-    rows = [one for one in all_rows() if not options.rows or "/".join(one) in options.rows]
+    rows = [
+        one for one in task_environment_pairs() if not options.rows or "/".join(one) in options.rows
+    ]
     for task, room in rows:
         if room == WHEELCHAIR:
             times(task, options.repeats)

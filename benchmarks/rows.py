@@ -76,9 +76,9 @@ def whole_process(folder: Path) -> list[dict[str, object]]:
 
 
 def loads(rows: list[dict[str, object]]) -> None:
-    """Measure how long the largest file takes to load, and all of its scores to unfold."""
+    """Measure how long the largest file takes to load, and all of its scores to decode."""
     path = Path(str(max(rows, key=lambda r: r["file_bytes"])["file"]))
-    loading, unfolding = [], []
+    loading, decoding = [], []
     for _ in range(LOADS):
         begun = time.perf_counter()
         file = tcs.load(path)
@@ -86,10 +86,10 @@ def loads(rows: list[dict[str, object]]) -> None:
         begun = time.perf_counter()
         for table in file.tables:
             _ = table.scores
-        unfolding.append(time.perf_counter() - begun)
+        decoding.append(time.perf_counter() - begun)
     row("largest file", f"{path.name}, {path.stat().st_size / 1e6:.2f} MB")
     row("loaded, ready to choose", spread(loading))
-    row("all its scores unfolded", spread(unfolding))
+    row("all its scores decoded", spread(decoding))
 
 
 def verification(rows: list[dict[str, object]], options: argparse.Namespace) -> bool:

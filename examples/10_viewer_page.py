@@ -9,7 +9,7 @@ from pathlib import Path
 
 import tcs
 from tcs.output.view import Answers, Props, open_meshcat, page
-from tcs.placement.scoring import reopen
+from tcs.placement.scoring import rebuild_scene
 
 
 def main(folder: Path = Path("out/examples")) -> None:
@@ -17,7 +17,7 @@ def main(folder: Path = Path("out/examples")) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     file = tcs.score("feeding")
     # The scene is built anew from the file, which names its models and knows their digest.
-    job, scene, _ = reopen(file)
+    job, scene, _ = rebuild_scene(file)
     # What came of each configuration; table 0 is the only one where nothing is observed.
     answers = Answers.of(file, 0, file.nominal.sets.best)
     props = Props(scene, job.task, answers, meshes=False)

@@ -26,7 +26,7 @@ from tcs.output.draw.floor_plan import described
 from tcs.output.report.pictures import Shown, map_figure, member_figure, scene_figure
 from tcs.output.report.states import states_figure
 from tcs.placement.robustness import check_row
-from tcs.placement.scoring import all_rows
+from tcs.placement.scoring import task_environment_pairs
 from tcs.placement.store import ScoreFile
 
 ROBOT = "pr2"
@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     images = options.out / "images"
     make_folder(images)
     make_folder(options.scores)
-    files = {row: score_file(row, options) for row in all_rows()}
+    files = {row: score_file(row, options) for row in task_environment_pairs()}
     text = INTRODUCTION
     drawn = [from_behind(files), *(scene_of(row, files[row]) for row in LETTERS), *maps(files)]
     sizes = []

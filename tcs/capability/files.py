@@ -18,7 +18,7 @@ from tcs.capability.map import FIXED, ITCM, CapabilityMap
 from tcs.capability.reach import Reach
 from tcs.capability.visibility import CORRECTED, visibility
 from tcs.errors import DataFileError, StoreFormatError, TcsError
-from tcs.files.compression import fold, unfolded
+from tcs.files.compression import compress, decompress
 from tcs.files.plain import plain
 from tcs.files.reader import explained, read_joblib
 from tcs.files.writing import whole_file
@@ -198,10 +198,10 @@ def _packed(capability: CapabilityMap) -> dict[str, Any]:
         "lift": c.lift,
         "manipulability_scale": c.manipulability_scale,
         "metadata": plain("metadata", dict(c.metadata)),
-        "key_step": fold(np.diff(c.keys, prepend=0).astype(np.uint64)),
-        "lifts": fold(np.asarray(c.lifts, np.float64)),
+        "key_step": compress(np.diff(c.keys, prepend=0).astype(np.uint64)),
+        "lifts": compress(np.asarray(c.lifts, np.float64)),
         **{
-            name: fold(getattr(c, name))
+            name: compress(getattr(c, name))
             for name in ("manipulability", "visibility", "free_lifts", "joints")
         },
     }
@@ -223,22 +223,22 @@ def _unpacked(content: object) -> CapabilityMap:
     if not all(isinstance(t, list) and [type(n) for n in t] == [int, int] for t in tilts):
         raise StoreFormatError("lacks sound 'tilts'")
     grid = MapGrid(content["step"], content["turns"], tuple((p, r) for p, r in tilts))
-    step = unfolded(content, "key_step", "u8", (None,))
+    step = decompress(content, "key_step", "u8", (None,))
     count = (step.size,)
     # Summed in floating point first: forged steps must not wrap round to valid ones.
     if step.sum(dtype=np.float64) >= 2.0**62:
         raise StoreFormatError("has cells that do not exist")
-    joints = unfolded(content, "joints", "f4", (None, 7))
+    joints = decompress(content, "joints", "f4", (None, 7))
     try:
         return CapabilityMap(
             kind=content["kind"],
             grid=grid,
             cells=grid.cells_of(np.cumsum(step.astype(np.int64))),
-            manipulability=unfolded(content, "manipulability", "f4", count),
-            visibility=unfolded(content, "visibility", "f4", count),
-            lifts=unfolded(content, "lifts", "f8", (None,)),
+            manipulability=decompress(content, "manipulability", "f4", count),
+            visibility=decompress(content, "visibility", "f4", count),
+            lifts=decompress(content, "lifts", "f8", (None,)),
             lift=content["lift"],
-            free_lifts=unfolded(content, "free_lifts", "u4", count),
+            free_lifts=decompress(content, "free_lifts", "u4", count),
             manipulability_scale=content["manipulability_scale"],
             metadata=content["metadata"],
             joints=joints,

@@ -10,7 +10,7 @@ import pandas as pd
 
 from tcs.files.writing import whole_file
 from tcs.model.grid import Grid
-from tcs.placement.store import Scored, ScoreFile, shown_state
+from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import Reason
 
 
@@ -32,13 +32,13 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
 
 
 def _frame(
-    file: ScoreFile, state: Mapping[str, float], table: Scored, everything: bool
+    file: ScoreFile, state: Mapping[str, float], table: StateTables, everything: bool
 ) -> pd.DataFrame:
     """Return the rows of one table."""
     grid, scores = Grid.from_dict(file.grid), table.scores
     rows = np.arange(grid.size) if everything else table.sets.candidates
     values = grid.values(rows)
-    columns: dict[str, object] = dict(shown_state(file.observed_axes, state))
+    columns: dict[str, object] = dict(state_to_json(file.observed_axes, state))
     columns |= {
         (f"{axis.name}_deg" if axis.unit == "deg" else axis.name): (
             np.degrees(values[axis.name]) if axis.unit == "deg" else values[axis.name]

@@ -13,7 +13,7 @@ from tcs.cli.talk import paper
 if TYPE_CHECKING:
     # Listing what ships has no use for the arrays of a choice.
     from tcs.placement.selection import Choice, Match
-from tcs.placement.store import shown_state
+from tcs.placement.store import state_to_json
 
 REASONS = {
     "reached": "reached",
@@ -132,8 +132,8 @@ def _match_as_json(match: Match | None) -> dict[str, Any]:
     if match is None or not match.state:
         return {}
     return {
-        "observed": shown_state(match.axes, match.state),
-        "observed_error": shown_state(match.axes, match.observed_error),
+        "observed": state_to_json(match.axes, match.state),
+        "observed_error": state_to_json(match.axes, match.observed_error),
         "frame_error": match.frame_error,
     }
 

@@ -9,7 +9,7 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.places import check_writable
 from tcs.files.writing import make_folder
-from tcs.placement.scoring import all_rows
+from tcs.placement.scoring import task_environment_pairs
 
 
 def default_path(task: str, environment: str, robot: str) -> Path:
@@ -76,7 +76,7 @@ def score_all(
         OutputError: If the folder cannot be made or written.
         TcsError: Whatever `tcs.score` raises. What was scored before is kept.
     """
-    rows = all_rows(environment)
+    rows = task_environment_pairs(environment)
     make_folder(folder, advice="Name one with --out.")
     return [
         score_one(task, room, robot, folder / default_path(task, room, robot), jobs=jobs, **sets)

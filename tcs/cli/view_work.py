@@ -18,7 +18,7 @@ from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
 from tcs.output.report.pictures import Shown, title_of
 from tcs.output.view import Answers, Props, Viewer, legend, open_meshcat, page
-from tcs.placement.scoring import reopen
+from tcs.placement.scoring import rebuild_scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def stage(
     """
     file = tcs.load(path)
     shown = Shown.of(file, here, max_members, observed_settings(observed, file.observed_axes))
-    job, scene, _ = reopen(file, meshes=meshes)
+    job, scene, _ = rebuild_scene(file, meshes=meshes)
     for name, value in file.observed_states[shown.table].items():
         scene.set_joint(name, value)
     answers = Answers.of(file, shown.table, shown.indices)

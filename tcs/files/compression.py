@@ -1,4 +1,4 @@
-"""Arrays folded small, one by one, so that each can be unfolded when it is needed."""
+"""Arrays of numbers, each compressed by itself, so that each is decompressed when needed."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from tcs.errors import StoreFormatError
 
 LEVEL = 3
 """Arm joints are as good as random: higher levels and lzma take much longer for a few percent,
-and lzma also to unfold."""
+and lzma also to decompress."""
 
 MAX_BYTES = 2 * 1024**3
-"""Most bytes an array may unfold to: several times the largest, within a common machine."""
+"""Most bytes an array may decompress to: several times the largest, within a common machine."""
 
 _TYPES = ("u1", "u2", "u4", "u8", "f4", "f8")
 
 
-def fold(array: NDArray[Any]) -> dict[str, Any]:
+def compress(array: NDArray[Any]) -> dict[str, Any]:
     """Return an array of numbers as plain containers around its compressed bytes."""
     little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
     size = little.dtype.itemsize
     # Bytes of equal significance together: signs and exponents repeat, mantissas do not.
     planes = little.reshape(-1, 1).view(np.uint8).reshape(-1, size).T
-    folded = zlib.compress(planes.tobytes(), LEVEL)
+    compressed = zlib.compress(planes.tobytes(), LEVEL)
     return {
         "type": f"{array.dtype.kind}{size}",
         "shape": list(array.shape),
-        "bytes": np.frombuffer(folded, dtype=np.uint8),
+        "bytes": np.frombuffer(compressed, dtype=np.uint8),
     }
 
 
-def small(values: NDArray[np.int64]) -> NDArray[Any]:
+def smallest_unsigned(values: NDArray[np.int64]) -> NDArray[Any]:
     """Return whole numbers >= 0 in the smallest unsigned type that holds them all."""
     return values.astype(np.min_scalar_type(int(values.max(initial=0))))
 
 
-def unfolded(
-    packed: dict[str, Any], name: str, kind: str, shape: tuple[int | None, ...]
+def decompress(
+    encoded: dict[str, Any], name: str, kind: str, shape: tuple[int | None, ...]
 ) -> NDArray[Any]:
-    """Return the array that was folded and stored under a name, checked.
+    """Return the array stored under a name, decompressed and checked.
 
     Args:
-        packed: The containers it is stored in.
+        encoded: The containers it is stored in.
         name: Its name there.
         kind: Its element type, or "u" for any unsigned one.
         shape: Shape it must have, None where any length will do.
@@ -54,10 +54,10 @@ def unfolded(
     Raises:
         StoreFormatError: If it is missing, damaged, or of another type or shape.
     """
-    folded = packed.get(name)
-    if not isinstance(folded, dict):
+    compressed = encoded.get(name)
+    if not isinstance(compressed, dict):
         raise StoreFormatError(f"lacks the array '{name}'")
-    found, said, data = folded.get("type"), folded.get("shape"), folded.get("bytes")
+    found, said, data = compressed.get("type"), compressed.get("shape"), compressed.get("bytes")
     if (
         found not in _TYPES
         or not isinstance(said, list)

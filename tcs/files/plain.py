@@ -14,7 +14,7 @@ MAX_DEPTH = 32
 
 MAX_ITEMS = 100_000
 """Most values allowed; our own descriptions need some thousand. A few lists that contain each
-other twice, thirty levels deep, fit into a hundred bytes and unfold to a billion values."""
+other twice, thirty levels deep, fit into a hundred bytes and expand to a billion values."""
 
 
 def plain(what: str, value: object) -> Any:

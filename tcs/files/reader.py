@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from tcs.errors import StoreError, StoreFormatError, TcsError, UnsafeStoreError
 
 MAX_BYTES = 2 * 1024**3
-"""Most bytes a file may unfold to: several times the largest store, within a common machine."""
+"""Most bytes a file may decompress to: several times the largest store, within a common machine."""
 
 ELEMENT_TYPES = ("u1", "u2", "u4", "u8", "i4", "i8", "f4", "f8")
 """Element types of arrays: plain numbers. Objects ("O") would be pickles inside the pickle."""
@@ -204,11 +204,11 @@ def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> objec
 
     Raises:
         StoreError: If it cannot be read.
-        StoreFormatError: If it is truncated, foreign, or unfolds to more than 2 GB.
+        StoreFormatError: If it is truncated, foreign, or decompresses to more than 2 GB.
         UnsafeStoreError: If it names anything outside the allow-list.
     """
     name = f"{what} '{path}'"
-    reader = _Reader(_unfolded(name, _bytes_of(path, name, again), again))
+    reader = _Reader(_decompress(name, _bytes_of(path, name, again), again))
     return explained(path, reader.load, what, again)
 
 
@@ -253,7 +253,7 @@ def _bytes_of(path: Path, name: str, again: str) -> bytes:
         ) from None
 
 
-def _unfolded(name: str, data: bytes, again: str) -> bytes:
+def _decompress(name: str, data: bytes, again: str) -> bytes:
     """Return the decompressed bytes, at most MAX_BYTES of them."""
     if data[:1] == pickle.PROTO:
         return data
@@ -264,18 +264,18 @@ def _unfolded(name: str, data: bytes, again: str) -> bytes:
         )
     decompressor = zlib.decompressobj()
     try:
-        unfolded = decompressor.decompress(data, MAX_BYTES + 1)
+        content = decompressor.decompress(data, MAX_BYTES + 1)
     except (zlib.error, MemoryError) as error:
         raise StoreFormatError(f"{name} is damaged ({error}). {again}") from None
-    if len(unfolded) > MAX_BYTES:
+    if len(content) > MAX_BYTES:
         raise StoreFormatError(
-            f"{name} unfolds to more than {MAX_BYTES} bytes. It is damaged or made to "
+            f"{name} decompresses to more than {MAX_BYTES} bytes. It is damaged or made to "
             f"fill the memory. {again}"
         )
     if not decompressor.eof or decompressor.unused_data:
         what = "goes on after its end" if decompressor.eof else "is truncated"
         raise StoreFormatError(f"{name} {what}. {again}")
-    return unfolded
+    return content
 
 
 def _shown(value: object) -> str:

@@ -83,7 +83,7 @@ def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
     joints[:, 0] += np.float32(0.01)
     scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
     forged = dataclasses.replace(
-        file, tables=(tcs.placement.store.Scored.of(scores, file.nominal.sets),)
+        file, tables=(tcs.placement.store.StateTables.of(scores, file.nominal.sets),)
     )
     path = tmp_path / "forged.tcs"
     tcs.save(path, forged)

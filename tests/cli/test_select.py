@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tcs
-from tcs.placement.store import Scored
+from tcs.placement.store import StateTables
 from tests.placement.store.example import SHIFT, score_file
 
 HERE = ("--here", "0.5", "-1", "90")
@@ -225,11 +225,11 @@ def test_travel_around_the_furniture(tcs_command, tmp_path):
     file = score_file()
     sets = file.nominal.sets
     # A wall round the first base cell.
-    x, y = np.rint((sets.cell_xy[0] - sets.floor.start) / sets.floor.step).astype(int)
-    moves = sets.floor.moves.copy()
+    x, y = np.rint((sets.cell_xy[0] - sets.lattice.start) / sets.lattice.step).astype(int)
+    moves = sets.lattice.moves.copy()
     moves[:, x - 1 : x + 1, y - 1 : y + 2] = False
-    sets = dataclasses.replace(sets, floor=dataclasses.replace(sets.floor, moves=moves))
-    file = dataclasses.replace(file, tables=(Scored.of(file.nominal.scores, sets),))
+    sets = dataclasses.replace(sets, lattice=dataclasses.replace(sets.lattice, moves=moves))
+    file = dataclasses.replace(file, tables=(StateTables.of(file.nominal.scores, sets),))
     path = tmp_path / "walled.tcs"
     tcs.save(path, file)
     words = ("select", path, "--here", -3, 0.5, 0, "--gamma", 0.5)

@@ -12,7 +12,7 @@ from tcs.output.report import Check, answer_of, answer_page
 from tcs.output.view.answers import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import TravelWeights, UtilityWeights
-from tcs.placement.store.packing import pack
+from tcs.placement.store.encoding import encode
 from tcs.placement.tables import Reason
 from tests.placement.store.example import score_file
 from tests.placement.store.test_success import with_estimates
@@ -39,13 +39,13 @@ def names(cells: list[list[str]]) -> list[str]:
 @pytest.mark.parametrize("part", ["sets", "scores", "success"])
 def test_parts_of_a_score_file(part):
     listed = names(rows(page("files"), f"| `{part}` | type"))
-    assert sorted(listed) == sorted(pack(with_estimates())["tables"][0][part])
+    assert sorted(listed) == sorted(encode(with_estimates())["tables"][0][part])
 
 
 def test_top_level_of_a_score_file():
     text = page("files")
     text = text[text.index("Top level:") : text.index("`success` is none")]
-    for key in pack(score_file()):
+    for key in encode(score_file()):
         assert f"`{key}`" in text, key
 
 

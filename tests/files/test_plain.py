@@ -42,7 +42,7 @@ def test_a_value_that_contains_itself_is_refused():
         plain("metadata", loop)
 
 
-def test_a_value_that_unfolds_to_billions_is_refused():
+def test_a_value_that_expands_to_billions_is_refused():
     value = ["x"]
     for _ in range(30):
         value = [value, value]

@@ -12,7 +12,7 @@ import pytest
 from tcs.errors import StoreFormatError, UnsafeStoreError
 from tcs.files import reader
 from tcs.placement.store import load_scores
-from tcs.placement.store.packing import pack
+from tcs.placement.store.encoding import encode
 from tests.placement.store.example import score_file
 
 
@@ -101,7 +101,7 @@ def test_the_name_asked_for_is_told(path, mark):
 
 
 def test_a_sound_file_with_an_attack_inside(path, mark):
-    content = pack(score_file())
+    content = encode(score_file())
     content["environment"] = content["environment"] | {"wall": Call(os.system, f"touch {mark}")}
     joblib.dump(content, path, compress=3)
     with pytest.raises(UnsafeStoreError):
@@ -208,7 +208,7 @@ def test_a_hand_written_wreck_is_refused(path, content):
 def test_a_bomb_is_refused(path, monkeypatch):
     monkeypatch.setattr(reader, "MAX_BYTES", 10**6)
     path.write_bytes(zlib.compress(bytes(10**7)))
-    with pytest.raises(StoreFormatError, match="unfolds to more than 1000000 bytes"):
+    with pytest.raises(StoreFormatError, match="decompresses to more than 1000000 bytes"):
         load_scores(path)
 
 

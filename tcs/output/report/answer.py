@@ -16,7 +16,7 @@ from tcs.output.report.states import has_states, states_figure
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
 from tcs.placement.scoring.verify import DEXTERITY_BAR, Finding, check_pairs
-from tcs.placement.store import Scored, ScoreFile, load_scores
+from tcs.placement.store import ScoreFile, StateTables, load_scores
 from tcs.placement.tables import Reason, SuccessTable
 
 _DPI = 110
@@ -75,7 +75,7 @@ class Answer:
     """How long all of this took, wall clock."""
 
     @property
-    def scored(self) -> Scored:
+    def scored(self) -> StateTables:
         """The table that the set is of."""
         return self.file.tables[self.shown.table]
 

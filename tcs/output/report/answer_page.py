@@ -30,7 +30,7 @@ from tcs.output.report.blocks import (
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.reproduce import commands, estimated, place_words
 from tcs.output.report.words import REASONS, percent
-from tcs.placement.store import shown_state
+from tcs.placement.store import state_to_json
 from tcs.placement.tables import SetTable
 
 LIMITS = (
@@ -94,7 +94,7 @@ def _summary(answer: Answer) -> list[Block]:
         )
     state = answer.file.observed_states[answer.shown.table]
     if state:
-        shown = shown_state(answer.file.observed_axes, state)
+        shown = state_to_json(answer.file.observed_axes, state)
         listed = ", ".join(_found(name, value) for name, value in shown.items())
         tables = len(answer.file.tables)
         said.append(

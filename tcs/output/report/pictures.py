@@ -26,7 +26,7 @@ from tcs.output.draw import (
     primitive_corners,
 )
 from tcs.output.draw.solids import FloatArray, outline
-from tcs.placement.scoring import Job, reopen
+from tcs.placement.scoring import Job, rebuild_scene
 from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.placement.store import ScoreFile
 
@@ -187,7 +187,7 @@ def serves(file: ScoreFile, shown: Shown, number: int) -> tuple[int, ...]:
 
 def stage(file: ScoreFile, shown: Shown) -> Stage:
     """Return what a file was scored from, and its scene; refuse other models than those."""
-    job, scene, _ = reopen(file)
+    job, scene, _ = rebuild_scene(file)
     for name, value in file.observed_states[shown.table].items():
         scene.set_joint(name, value)
     return job, scene

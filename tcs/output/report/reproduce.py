@@ -7,7 +7,7 @@ from typing import Any
 
 from tcs.model.grid import InitialConfiguration
 from tcs.output.report.answer import Answer
-from tcs.placement.store import shown_state
+from tcs.placement.store import state_to_json
 
 PAPER_DISTANCE = 0.40
 """Least distance of two members where nobody asks for another [m], as in the TCS paper."""
@@ -82,5 +82,5 @@ def place_words(here: InitialConfiguration) -> str:
 def _observed(answer: Answer) -> list[str]:
     """Return the options that name the observed state of the table."""
     state = answer.file.observed_states[answer.shown.table]
-    shown = shown_state(answer.file.observed_axes, state)
+    shown = state_to_json(answer.file.observed_axes, state)
     return [word for name, value in shown.items() for word in ("--observed", f"{name}={value:.9g}")]

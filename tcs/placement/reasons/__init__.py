@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tcs.placement.reasons.changes import Change
 from tcs.placement.reasons.distribution import BlockingPair, Check, Distribution
+from tcs.placement.reasons.explained import Standing
 from tcs.placement.reasons.explanation import Explanation, explain
 from tcs.placement.reasons.fix import Fix, fix_weights
-from tcs.placement.reasons.standing import Standing
 
 __all__ = [
     "BlockingPair",

@@ -11,10 +11,10 @@ import numpy as np
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
+from tcs.placement.reasons.explained import Standing
 from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
-from tcs.placement.reasons.standing import Standing
 from tcs.placement.selection import Match, TravelWeights, nearest_table
-from tcs.placement.store import ScoreFile, shown_state
+from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import SetTable
 
 
@@ -61,8 +61,8 @@ class Explanation:
             "environment": self.file.metadata["environment"],
             "goal": self.goal,
             "body_frame": self.body_frame,
-            "observed": shown_state(axes, self.match.state),
-            "observed_error": shown_state(axes, self.match.observed_error),
+            "observed": state_to_json(axes, self.match.state),
+            "observed_error": state_to_json(axes, self.match.observed_error),
             "explained": None if self.standing is None else self.standing.to_json(),
             "best_set": {
                 "configurations": list(self.best_set),
@@ -129,7 +129,7 @@ def explain(
     standing = None if asked is None else Standing.of(grid, scores, goal, asked)
     fix, unreachable = None, 0
     if standing is not None:
-        fix, unreachable = nearest_fix(grid, scores, table.sets.floor, goal, standing, weights)
+        fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, standing, weights)
     return Explanation(
         file=file,
         goal=goal,

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.changes import Change, ahead_and_left, changes_between, sentence
-from tcs.placement.reasons.standing import Standing
+from tcs.placement.reasons.explained import Standing
 from tcs.placement.selection import TravelWeights
 from tcs.placement.selection.distances import Distances, FloorDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from
-from tcs.placement.tables import Floor, Reason, ScoreTable, tc_manipulability, tc_reachability
+from tcs.placement.tables import BaseLattice, Reason, ScoreTable, tc_manipulability, tc_reachability
 
 TURN_WEIGHT = 0.3
 """Cost of a radian of turning: the sides of a base as large as the PR2's move by 0.33 m."""
@@ -132,7 +132,7 @@ def fix_weights(
 def nearest_fix(
     grid: Grid,
     scores: ScoreTable,
-    floor: Floor,
+    lattice: BaseLattice,
     goal: int,
     standing: Standing,
     weights: TravelWeights,
@@ -144,7 +144,7 @@ def nearest_fix(
     Args:
         grid: The grid that was scored.
         scores: Its scores.
-        floor: Where the base can drive.
+        lattice: Where the base can drive.
         goal: Number of the goal.
         standing: Where the robot stands.
         weights: What each kind of change costs.
@@ -159,7 +159,7 @@ def nearest_fix(
     rows = np.flatnonzero(scores.reached[:, goal]).astype(np.int32)
     at = grid.values(rows)
     cell_xy = np.stack([at["base_x"], at["base_y"]], axis=1)
-    route, ways = _ways(weights.route, cell_xy, floor, standing)
+    route, ways = _ways(weights.route, cell_xy, lattice, standing)
     # Every row is a base cell of its own: legs start here and end there, none lead on.
     legs = legs_from(
         standing.place, grid, rows, np.arange(len(rows), dtype=np.int32), ways, weights
@@ -191,7 +191,7 @@ def nearest_fix(
 
 
 def _ways(
-    route: str, cell_xy: NDArray[np.float64], floor: Floor, standing: Standing
+    route: str, cell_xy: NDArray[np.float64], lattice: BaseLattice, standing: Standing
 ) -> tuple[str, Distances]:
     """Return the route that can be taken from where the robot stands, and the ways to the cells.
 
@@ -200,7 +200,7 @@ def _ways(
     """
     place = standing.place
     if route == "around" and (standing.off or standing.reason != Reason.BODY_BLOCKED):
-        around = FloorDistances(cell_xy, floor)
+        around = FloorDistances(cell_xy, lattice)
         try:
             around.from_position(place.base_x, place.base_y)
         except SelectionError:

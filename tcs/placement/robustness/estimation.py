@@ -16,7 +16,7 @@ from tcs.placement.robustness.error_model import check_draws
 from tcs.placement.robustness.pairs import AS_GOOD, Pairs, kept_pairs
 from tcs.placement.robustness.successive_halving import Estimates, round_sizes, successive_halving
 from tcs.placement.robustness.trials import Errors, Progress, Trials
-from tcs.placement.store import ScoreFile, shown_state
+from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import SetTable, SuccessTable, tc_reachability
 from tcs.placement.tables.rules import SHARE_TOLERANCE
 from tcs.placement.tables.success import NO_MEMBER
@@ -133,7 +133,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
                     "sets": int(success.of_size(size).size),
                 }
             )
-        observed = shown_state(file.observed_axes, state)
+        observed = state_to_json(file.observed_axes, state)
         tables.append({"observed": observed, "best": best, "made": made})
     return {"tables": tables}
 

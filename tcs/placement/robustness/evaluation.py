@@ -16,7 +16,7 @@ from tcs.placement.robustness.error_model import ErrorModel, Offsets, check_draw
 from tcs.placement.robustness.pairs import uniform_sets
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
-from tcs.placement.store import Scored, ScoreFile, shown_state
+from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
 SELECTIONS = ("best", "single", "robust", "uniform")
@@ -202,7 +202,7 @@ def evaluate(
         check_base=trials.checks_base,
         seed=seed,
         seconds=time.perf_counter() - begun - compiling,
-        observed=shown_state(trials.file.observed_axes, trials.observed),
+        observed=state_to_json(trials.file.observed_axes, trials.observed),
         about={
             "task": trials.job.task.name,
             "environment": trials.job.spec.environment.name,
@@ -215,7 +215,7 @@ def evaluate(
 
 
 def _chosen(
-    scored: Scored, select: str | Sequence[int], members: int, samples: int, seed: int
+    scored: StateTables, select: str | Sequence[int], members: int, samples: int, seed: int
 ) -> tuple[NDArray[np.int64], int]:
     """Return the sets to evaluate, shape (1, m) or (samples, m), and how many there were."""
     sets = scored.sets

@@ -19,9 +19,9 @@ from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tcs.model.scene import JointError, LoweredScene, Scene, environment_at
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.reopen import reopen
+from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.scoring.sweep import warm_up
-from tcs.placement.store import Scored, ScoreFile
+from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import Reason
 
 AT_ONCE = 1000
@@ -80,7 +80,7 @@ class Trials:
             UnknownNameError: If something is named that is not there.
             SelectionError: If there is no such table.
         """
-        job, scene, lowered = reopen(file)
+        job, scene, lowered = rebuild_scene(file)
         chosen = file.nominal_index if table is None else table
         if not 0 <= chosen < len(file.tables):
             raise SelectionError(
@@ -97,7 +97,7 @@ class Trials:
         return dataclasses.replace(self, table=table)
 
     @property
-    def scored(self) -> Scored:
+    def scored(self) -> StateTables:
         """Scores and sets of the table."""
         return self.file.tables[self.table]
 

@@ -29,7 +29,7 @@ from tcs.model.scene import (
 from tcs.model.tasks import Task, load_task
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.placement.scoring.sweep import ANALYTIC, sweep
-from tcs.placement.store import Scored, ScoreFile, shown_state
+from tcs.placement.store import ScoreFile, StateTables, state_to_json
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,7 +192,7 @@ def score_scene(
     )
     sets_begun = time.perf_counter()
     tables = tuple(
-        Scored.of(scores, build_sets(scores, job.grid, jobs=jobs, **sets))
+        StateTables.of(scores, build_sets(scores, job.grid, jobs=jobs, **sets))
         for scores in swept.tables
     )
     done = time.perf_counter()
@@ -299,7 +299,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "reasons": dict(reasons),
         "tables": [
             {
-                "observed": shown_state(file.observed_axes, state),
+                "observed": state_to_json(file.observed_axes, state),
                 "candidates": len(table.sets.candidates),
                 "sets": table.sets.sets,
             }

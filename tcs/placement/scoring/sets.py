@@ -13,7 +13,7 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.sets import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.model.grid import ROBOT_AXES, Grid
-from tcs.placement.scoring.floor import floor_of
+from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.triples import kept_triples
 from tcs.placement.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
 from tcs.placement.tables.groups import Groups
@@ -126,7 +126,7 @@ def build_sets(
         triples=triples,
         best=best,
         best_single=best_single,
-        floor=floor_of(scores, grid),
+        lattice=lattice_of(scores, grid),
     )
 
 

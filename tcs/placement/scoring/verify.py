@@ -16,9 +16,9 @@ from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.verification.reference import measured
 from tcs.model.scene import Scene, goal_poses
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.reopen import reopen
+from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.scoring.sweep import ik_of
-from tcs.placement.store import Scored, ScoreFile
+from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import Reason
 
 POSITION_BAR = 1e-6
@@ -122,7 +122,7 @@ def verify(
     """
     if pairs < 0 or dense < 0:
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
-    job, scene, lowered = reopen(file)
+    job, scene, lowered = rebuild_scene(file)
     rng = np.random.default_rng(seed)
     reason = np.concatenate([table.scores.reason for table in file.tables])
     reached = _sample(rng, reason == Reason.REACHED, pairs)
@@ -176,7 +176,7 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene, lowered = reopen(file)
+    job, scene, lowered = rebuild_scene(file)
     measure = file.metadata["measure"]
     problem = build_problem(lowered.arrays, lowered.grid, measure)
     check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
@@ -191,7 +191,7 @@ Pairs = list[tuple[int, int]]
 class _Check:
     """The three kinds of checks on the scores of a file."""
 
-    tables: tuple[Scored, ...]
+    tables: tuple[StateTables, ...]
     size: int
     """Configurations in a table."""
     problem: Problem

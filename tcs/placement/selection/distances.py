@@ -1,7 +1,7 @@
 """How far it is to drive: in straight lines, or around the furniture.
 
-Around the furniture means along the lattice of `tcs.placement.tables.Floor`, whose moves go to the
-eight neighbours of a cell. In the open such a path is up to 8 percent longer than a straight line.
+Around the furniture means along `tcs.placement.tables.BaseLattice`, whose moves go to the eight
+neighbours of a cell. In the open such a path is up to 8 percent longer than a straight line.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.placement.tables import Floor
-from tcs.placement.tables.floor import MOVES
+from tcs.placement.tables import BaseLattice
+from tcs.placement.tables.base_lattice import MOVES
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]
@@ -58,16 +58,16 @@ class StraightDistances(Distances):
 
 @dataclass(frozen=True, eq=False)
 class FloorDistances(Distances):
-    """Shortest ways over the floor. The first use finds those between all cells, and is slow."""
+    """Shortest ways over the lattice. The first use finds those between all cells, and is slow."""
 
-    floor: Floor
+    lattice: BaseLattice
     """Where the base can drive."""
 
     def from_position(self, x: float, y: float) -> FloatArray:
         """Return how far it is from a place to each cell [m], inf where there is no way, (N,).
 
         Inside the lattice the robot first drives straight to a corner of the square it is in, if
-        the base can move from there. Outside all floor is free, and it drives straight to any
+        the base can move from there. Everything outside is free, and it drives straight to any
         place of the border that it can see.
 
         Raises:
@@ -98,22 +98,22 @@ class FloorDistances(Distances):
     @cached_property
     def _node(self) -> IntArray:
         """Number of the lattice's place at each cell, shape (N,)."""
-        along = np.rint((self.cell_xy - self.floor.start) / self.floor.step).astype(np.int64)
-        return np.asarray(along[:, 0] * self.floor.shape[1] + along[:, 1])
+        along = np.rint((self.cell_xy - self.lattice.start) / self.lattice.step).astype(np.int64)
+        return np.asarray(along[:, 0] * self.lattice.shape[1] + along[:, 1])
 
     @cached_property
     def _graph(self) -> Any:
         """The moves as a sparse matrix of lengths [m], both ways."""
         from scipy.sparse import csr_matrix
 
-        number = np.arange(self.floor.moves[0].size)
+        number = np.arange(self.lattice.moves[0].size)
         begin, end, length = [], [], []
-        for along, (dx, dy) in zip(self.floor.moves, MOVES, strict=True):
+        for along, (dx, dy) in zip(self.lattice.moves, MOVES, strict=True):
             there = number[along.ravel()]
-            back = there + dx * self.floor.shape[1] + dy
+            back = there + dx * self.lattice.shape[1] + dy
             begin += [there, back]
             end += [back, there]
-            one = np.hypot(dx * self.floor.step[0], dy * self.floor.step[1])
+            one = np.hypot(dx * self.lattice.step[0], dy * self.lattice.step[1])
             length.append(np.full(2 * there.size, one))
         places = (np.concatenate(begin), np.concatenate(end))
         return csr_matrix((np.concatenate(length), places), shape=(number.size, number.size))
@@ -136,11 +136,11 @@ class FloorDistances(Distances):
     def _movable(self) -> NDArray[np.bool_]:
         """Whether the base can move at all from a place, shape (X, Y)."""
         degree = np.diff(self._graph.indptr)
-        return np.asarray(degree > 0).reshape(self.floor.shape)
+        return np.asarray(degree > 0).reshape(self.lattice.shape)
 
     def _entries(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
         """Return the places the robot drives to first, and how far they are [m]."""
-        (nx, ny), start, step = self.floor.shape, np.array(self.floor.start), self.floor.step
+        (nx, ny), start, step = self.lattice.shape, np.array(self.lattice.start), self.lattice.step
         along = (np.array([x, y]) - start) / step
         if np.all((along >= 0.0) & (along <= (nx - 1, ny - 1))):
             i, j = np.minimum(np.floor(along).astype(np.int64), (nx - 2, ny - 2))

@@ -35,7 +35,7 @@ class SetIndex:
     def distances(self) -> dict[str, Distances]:
         """Distances between the cells by each of the routes."""
         xy = self.sets.cell_xy
-        return {"straight": StraightDistances(xy), "around": FloorDistances(xy, self.sets.floor)}
+        return {"straight": StraightDistances(xy), "around": FloorDistances(xy, self.sets.lattice)}
 
     @cached_property
     def start(self) -> IntArray:

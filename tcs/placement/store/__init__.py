@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION
 from tcs.placement.store.files import load_scores, save_scores
-from tcs.placement.store.packing import FORMAT, FORMAT_VERSION
 from tcs.placement.store.score_file import (
     REQUIRED_METADATA,
-    Scored,
     ScoreFile,
+    StateTables,
     check_scene,
-    shown_state,
+    state_to_json,
 )
 
 __all__ = [
@@ -17,9 +17,9 @@ __all__ = [
     "FORMAT_VERSION",
     "REQUIRED_METADATA",
     "ScoreFile",
-    "Scored",
+    "StateTables",
     "check_scene",
     "load_scores",
     "save_scores",
-    "shown_state",
+    "state_to_json",
 ]

@@ -12,7 +12,7 @@ import joblib
 
 from tcs.files.reader import explained, read_joblib
 from tcs.files.writing import whole_file
-from tcs.placement.store.packing import pack, unpack
+from tcs.placement.store.encoding import decode, encode
 from tcs.placement.store.score_file import ScoreFile
 from tcs.placement.tables import ScoreTable
 
@@ -29,7 +29,7 @@ def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
     """
     path = Path(path)
     plain = io.BytesIO()
-    joblib.dump(pack(file), plain)
+    joblib.dump(encode(file), plain)
     # Its large parts are folded already: level 0 adds a checksum over everything, and no more.
     checked = zlib.compress(plain.getbuffer(), 0)
     with whole_file(path, "Score file") as stream:
@@ -54,4 +54,4 @@ def load_scores(path: str | os.PathLike[str]) -> ScoreFile:
     def explain(read: Callable[[], ScoreTable]) -> ScoreTable:
         return explained(path, read)
 
-    return explained(path, lambda: unpack(content, explain))
+    return explained(path, lambda: decode(content, explain))

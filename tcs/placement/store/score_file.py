@@ -40,7 +40,7 @@ MAX_TABLES = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
+class StateTables:
     """Scores and sets for one observed state of the person, e.g. lying 5 cm to the left.
 
     Scores are large and choosing needs the sets alone, so a loaded file unfolds the scores of a
@@ -112,7 +112,7 @@ class ScoreFile:
     body_frames: dict[str, list[float]]
     """Where each body frame is in W [m] when scored: x, y, z for each state of the observed axes
     and, within it, of the environment's axes, one after the other."""
-    tables: tuple[Scored, ...]
+    tables: tuple[StateTables, ...]
     """Scores and sets for each state of the observed axes, in C order; one where there are none."""
 
     def __post_init__(self) -> None:
@@ -181,7 +181,7 @@ class ScoreFile:
         return tuple(dict(zip(names, state, strict=True)) for state in states)
 
     @property
-    def nominal(self) -> Scored:
+    def nominal(self) -> StateTables:
         """The table whose observed state is nearest to zero: the person where they belong."""
         return self.tables[self.nominal_index]
 
@@ -209,10 +209,10 @@ def _are_numbers(values: object, count: int) -> bool:
     )
 
 
-def shown_state(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[str, float]:
+def state_to_json(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[str, float]:
     """Return an observed state as plain numbers, angles in degrees under `..._deg` names.
 
-    >>> shown_state((Axis("person_y", "m", -0.1, 0.05, 5),), {"person_y": 0.05})
+    >>> state_to_json((Axis("person_y", "m", -0.1, 0.05, 5),), {"person_y": 0.05})
     {'person_y': 0.05}
     """
     return {

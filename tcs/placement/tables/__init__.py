@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
-from tcs.placement.tables.floor import Floor
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import SetTable
 from tcs.placement.tables.success import SuccessTable
 
 __all__ = [
-    "Floor",
+    "BaseLattice",
     "Reason",
     "ScoreTable",
     "SetTable",

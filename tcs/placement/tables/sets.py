@@ -15,9 +15,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.checks import read_only, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
-from tcs.placement.tables.floor import Floor
 from tcs.placement.tables.groups import Groups
 from tcs.placement.tables.rules import RULES, PairLimits, pair_limits
 
@@ -89,7 +89,7 @@ class SetTable:
     "code2015"; () without candidates."""
     best_single: tuple[int, ...]
     """The same among sets of one."""
-    floor: Floor
+    lattice: BaseLattice
     """Where the base can drive."""
 
     def __post_init__(self) -> None:
@@ -129,7 +129,7 @@ class SetTable:
         )
         require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
         require(self.state_size > 0, "set table: state_size must be positive.")
-        require(isinstance(self.floor, Floor), "set table: floor must be a Floor.")
+        require(isinstance(self.lattice, BaseLattice), "set table: lattice must be a BaseLattice.")
         self._check_candidates()
         self._check_pairs()
         require(
@@ -151,12 +151,12 @@ class SetTable:
         )
         require(bool(np.all(np.diff(self.cell_start) > 0)), "set table: a cell has no candidate.")
         require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
-        along = (self.cell_xy - self.floor.start) / self.floor.step
-        inside = (np.rint(along) >= 0) & (np.rint(along) < self.floor.shape)
+        along = (self.cell_xy - self.lattice.start) / self.lattice.step
+        inside = (np.rint(along) >= 0) & (np.rint(along) < self.lattice.shape)
         # A millionth of a step: what rounding leaves of some dozen steps, and to spare.
         require(
             bool(np.all(inside & (np.abs(along - np.rint(along)) < 1e-6))),
-            "set table: cell_xy must be places of the floor.",
+            "set table: cell_xy must be places of the lattice.",
         )
         for name, size in (("best", self.max_members), ("best_single", 1)):
             members = getattr(self, name)

@@ -26,7 +26,7 @@ from tcs.output.report.answer_tables import (
 )
 from tcs.output.report.reproduce import robustify_command, score_command
 from tcs.placement.scoring import score
-from tcs.placement.store import Scored, load_scores, save_scores
+from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
 from tests.output.report.test_page import Reader
 from tests.output.report.test_robustness_report import column
@@ -159,7 +159,7 @@ def false_path(score_path, tmp_path_factory):
     path = tmp_path_factory.mktemp("false") / "false.tcs"
     joints = scores.arm_joints + np.float32([0, 0, 0, math.radians(1.0), 0, 0, 0])
     wrong = dataclasses.replace(scores, arm_joints=joints)
-    table = Scored.of(wrong, file.nominal.sets)
+    table = StateTables.of(wrong, file.nominal.sets)
     save_scores(path, dataclasses.replace(file, tables=(table,)))
     return path
 
@@ -183,7 +183,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     joints = scores.arm_joints.copy()
     joints[row, 0] += np.float32(0.01)
     path = tmp_path / "one.tcs"
-    table = Scored.of(dataclasses.replace(scores, arm_joints=joints), file.nominal.sets)
+    table = StateTables.of(dataclasses.replace(scores, arm_joints=joints), file.nominal.sets)
     save_scores(path, dataclasses.replace(file, tables=(table,)))
     # Nothing is drawn at random.
     found = answer_of(path, check=Check(pairs=0, dense=0))
@@ -217,7 +217,7 @@ def test_estimates_of_success_are_those_of_the_file(answer):
             [100 * success.low[row], 100 * success.high[row]], abs=0.051
         )
     file = dataclasses.replace(
-        answer.file, tables=tuple(Scored.of(t.scores, t.sets) for t in answer.file.tables)
+        answer.file, tables=tuple(StateTables.of(t.scores, t.sets) for t in answer.file.tables)
     )
     plain = dataclasses.replace(answer, file=file)
     assert success_table(plain) is None
@@ -282,7 +282,7 @@ def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path
     file = load_scores(score_path)
     scores = file.nominal.scores
     better = np.where(scores.reached, scores.dexterity + np.float32(1e-3), scores.dexterity)
-    table = Scored.of(
+    table = StateTables.of(
         dataclasses.replace(scores, dexterity=better),
         dataclasses.replace(
             file.nominal.sets,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tcs.output.report import load_paper
-from tcs.placement.scoring import all_rows
+from tcs.placement.scoring import task_environment_pairs
 
 
 def test_every_row_that_ships_is_in_table_1_once():
     rows = load_paper().rows()
     assert len(rows) == len(set(rows)) == 13
-    assert set(rows) == set(all_rows())
+    assert set(rows) == set(task_environment_pairs())
 
 
 def test_table_3_has_five_tasks_with_one_and_two_configurations():

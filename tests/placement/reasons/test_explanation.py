@@ -10,7 +10,7 @@ from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons import fix_weights
 from tcs.placement.reasons.distribution import CHECKS
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.store import Scored
+from tcs.placement.store import StateTables
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.store.example import SHIFT, score_file
 from tests.placement.tables.small import small_grid
@@ -133,7 +133,7 @@ def made(grid, outcome):
         arm_joints=np.zeros((int(reached.sum()), 7), np.float32),
         weights=np.ones(1),
     )
-    tables = (Scored.of(scores, build_sets(scores, grid)),)
+    tables = (StateTables.of(scores, build_sets(scores, grid)),)
     return dataclasses.replace(score_file(grid=grid), tables=tables)
 
 

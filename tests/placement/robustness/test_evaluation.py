@@ -178,7 +178,8 @@ def test_nothing_reached_is_nothing_to_evaluate(bed_trials):
         best_single=(),
     )
     file = dataclasses.replace(
-        none.file, tables=(tcs.placement.store.Scored(empty, lambda: None), none.file.tables[1])
+        none.file,
+        tables=(tcs.placement.store.StateTables(empty, lambda: None), none.file.tables[1]),
     )
     with pytest.raises(SelectionError, match="no goal is reached"):
         evaluate(dataclasses.replace(none, file=file), samples=1)

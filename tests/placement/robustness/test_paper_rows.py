@@ -7,7 +7,7 @@ import pytest
 
 from tcs.model.scene import JointError
 from tcs.placement.robustness import Trials, evaluate
-from tcs.placement.scoring import all_rows, score
+from tcs.placement.scoring import score, task_environment_pairs
 
 NOTHING = {
     "bed": {"person_x": JointError(distribution="normal", std=0.0)},
@@ -19,7 +19,7 @@ NOTHING = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("task", "environment"), all_rows())
+@pytest.mark.parametrize(("task", "environment"), task_environment_pairs())
 def test_without_error_every_row_gives_its_offline_score(task, environment, rng):
     file = score(task, environment)
     trials = Trials.of(file, errors=NOTHING[environment.split("-")[0]])

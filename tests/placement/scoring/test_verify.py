@@ -11,7 +11,7 @@ from tcs.errors import StoreMismatchError, TcsError
 from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
 from tcs.placement.scoring.verify import estimated_recall
-from tcs.placement.store import Scored
+from tcs.placement.store import StateTables
 
 
 def test_stored_answers_are_true(small_file):
@@ -52,7 +52,7 @@ def with_joints(file, change):
     joints = file.nominal.scores.arm_joints.copy()
     change(joints)
     scores = dataclasses.replace(file.nominal.scores, arm_joints=joints)
-    return dataclasses.replace(file, tables=(Scored.of(scores, file.nominal.sets),))
+    return dataclasses.replace(file, tables=(StateTables.of(scores, file.nominal.sets),))
 
 
 def test_a_joint_moved_by_a_hundredth_is_found(small_file):
@@ -109,7 +109,7 @@ def test_reached_pairs_taken_away_are_missed(small_file):
         scores, reason=reason, dexterity=dexterity, arm_joints=scores.arm_joints[kept]
     )
     sets = build_sets(stripped, Grid.from_dict(small_file.grid))
-    forged = dataclasses.replace(small_file, tables=(Scored.of(stripped, sets),))
+    forged = dataclasses.replace(small_file, tables=(StateTables.of(stripped, sets),))
     found = verify(forged, pairs=0, dense=60)
     assert found.missed > 0
     assert found.recall < 0.9

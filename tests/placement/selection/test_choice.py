@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.scoring.floor import floor_of
+from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.sets import build_sets
 from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
 from tcs.placement.tables import Reason, ScoreTable
@@ -144,7 +144,7 @@ def floor_with_walls(grid, seed, share):
         arm_joints=np.zeros((0, 7), dtype=np.float32),
         weights=np.ones(1),
     )
-    return floor_of(scores, grid)
+    return lattice_of(scores, grid)
 
 
 @settings(deadline=None, max_examples=60)
@@ -163,7 +163,7 @@ def test_equals_brute_force_around_the_furniture(
     grid = small_grid(nx=6, ny=5, yaws=2, torsos=1)
     scores = random_scores(grid, 3, seed, levels=levels, share=0.3)
     sets = dataclasses.replace(
-        build_sets(scores, grid), floor=floor_with_walls(grid, seed, blocked)
+        build_sets(scores, grid), lattice=floor_with_walls(grid, seed, blocked)
     )
     kept = all_sets(scores, grid, 0.4)
     tables = SelectionTables(sets, grid)

@@ -9,34 +9,34 @@ from hypothesis import given, settings
 
 from tcs.errors import SelectionError
 from tcs.placement.selection.distances import FloorDistances
-from tcs.placement.tables import Floor
-from tcs.placement.tables.floor import MOVES
+from tcs.placement.tables import BaseLattice
+from tcs.placement.tables.base_lattice import MOVES
 
 STEP = (0.1, 0.2)
 
 
-def floor_of(free, step=STEP):
-    """The floor whose places are free or not, in one state of everything."""
+def lattice_of(free, step=STEP):
+    """The lattice whose places are free or not, in one state of everything."""
     moves = np.zeros((4, *free.shape), dtype=bool)
     for kind, i, j in np.ndindex(moves.shape):
         dx, dy = MOVES[kind]
         places = [(i + p, j + q) for p in {0, dx} for q in {0, dy}]
         if all(0 <= p < free.shape[0] and 0 <= q < free.shape[1] for p, q in places):
             moves[kind, i, j] = all(free[place] for place in places)
-    return Floor(start=(-1.0, 2.0), step=step, moves=moves)
+    return BaseLattice(start=(-1.0, 2.0), step=step, moves=moves)
 
 
-def place(floor, i, j):
-    return floor.start[0] + i * floor.step[0], floor.start[1] + j * floor.step[1]
+def place(lattice, i, j):
+    return lattice.start[0] + i * lattice.step[0], lattice.start[1] + j * lattice.step[1]
 
 
-def distances_over(floor):
-    """Distances whose cells are all places of a floor, row by row."""
-    xy = np.array([place(floor, i, j) for i, j in np.ndindex(floor.shape)])
-    return FloorDistances(xy, floor)
+def distances_over(lattice):
+    """Distances whose cells are all places of a lattice, row by row."""
+    xy = np.array([place(lattice, i, j) for i, j in np.ndindex(lattice.shape)])
+    return FloorDistances(xy, lattice)
 
 
-def shortest(floor, entries):
+def shortest(lattice, entries):
     """How far all places are from some, {(i, j): metres}: Dijkstra's search in plain loops."""
     done, queue = {}, [(metres, at) for at, metres in entries.items()]
     heapq.heapify(queue)
@@ -46,12 +46,12 @@ def shortest(floor, entries):
             continue
         done[i, j] = metres
         for kind, (dx, dy) in enumerate(MOVES):
-            length = math.hypot(dx * floor.step[0], dy * floor.step[1])
-            if floor.moves[kind, i, j]:
+            length = math.hypot(dx * lattice.step[0], dy * lattice.step[1])
+            if lattice.moves[kind, i, j]:
                 heapq.heappush(queue, (metres + length, (i + dx, j + dy)))
             back = (i - dx, j - dy)
-            inside = 0 <= back[0] < floor.shape[0] and 0 <= back[1] < floor.shape[1]
-            if inside and floor.moves[kind, *back]:
+            inside = 0 <= back[0] < lattice.shape[0] and 0 <= back[1] < lattice.shape[1]
+            if inside and lattice.moves[kind, *back]:
                 heapq.heappush(queue, (metres + length, back))
     return done
 
@@ -60,10 +60,10 @@ def shortest(floor, entries):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.3, 0.6]))
 def test_ways_agree_with_plain_loops(seed, blocked):
     free = np.random.default_rng(seed).random((6, 5)) >= blocked
-    floor = floor_of(free)
-    distances = distances_over(floor)
+    lattice = lattice_of(free)
+    distances = distances_over(lattice)
     for i, j in np.ndindex(free.shape):
-        found = shortest(floor, {(i, j): 0.0})
+        found = shortest(lattice, {(i, j): 0.0})
         for p, q in found:
             # Some dozen roundings of numbers below ten.
             assert distances.between(np.array(5 * i + j), np.array(5 * p + q)) == pytest.approx(
@@ -71,14 +71,14 @@ def test_ways_agree_with_plain_loops(seed, blocked):
             )
 
 
-def seen_from(floor, x, y):
+def seen_from(lattice, x, y):
     """Border places to which the straight line from (x, y) does not enter the lattice."""
-    (nx, ny), entries = floor.shape, {}
+    (nx, ny), entries = lattice.shape, {}
     for i, j in np.ndindex(nx, ny):
-        p, q = place(floor, i, j)
+        p, q = place(lattice, i, j)
         # Ten points along the way, none of them strictly inside.
         line = [(x + t * (p - x), y + t * (q - y)) for t in np.linspace(0.05, 0.95, 10)]
-        low, high = place(floor, 0, 0), place(floor, nx - 1, ny - 1)
+        low, high = place(lattice, 0, 0), place(lattice, nx - 1, ny - 1)
         if not any(low[0] < a < high[0] and low[1] < b < high[1] for a, b in line):
             entries[i, j] = math.dist((x, y), (p, q))
     return entries
@@ -89,28 +89,28 @@ def seen_from(floor, x, y):
 def test_from_outside_one_drives_straight_to_the_border(x, y):
     free = np.ones((6, 5), dtype=bool)
     free[1:-1, 2] = False
-    floor = floor_of(free)
-    low, high = place(floor, 0, 0), place(floor, 5, 4)
+    lattice = lattice_of(free)
+    low, high = place(lattice, 0, 0), place(lattice, 5, 4)
     outside = not (low[0] <= x <= high[0] and low[1] <= y <= high[1])
-    found = distances_over(floor).from_position(x, y)
+    found = distances_over(lattice).from_position(x, y)
     if outside:
-        expected = shortest(floor, seen_from(floor, x, y))
+        expected = shortest(lattice, seen_from(lattice, x, y))
     else:
         i, j = math.floor((x + 1.0) / 0.1), math.floor((y - 2.0) / 0.2)
         corners = itertools.product((i, i + 1), (j, j + 1))
-        movable = {c: math.dist((x, y), place(floor, *c)) for c in corners if free[c]}
-        expected = shortest(floor, movable)
+        movable = {c: math.dist((x, y), place(lattice, *c)) for c in corners if free[c]}
+        expected = shortest(lattice, movable)
     for i, j in np.ndindex(free.shape):
         assert found[5 * i + j] == pytest.approx(expected.get((i, j), math.inf), abs=1e-14)
 
 
 def test_round_a_bed():
-    """Two places on both sides of a bed: 1.8 m by line, once round its end by floor."""
+    """Two places on both sides of a bed: 1.8 m by line, 1.8 m more around its end."""
     free = np.ones((41, 41), dtype=bool)
     free[:31, 12:29] = False  # 3 m along x from the wall, 1.6 m wide
-    floor = floor_of(free, step=(0.1, 0.1))
-    one, other = place(floor, 20, 11), place(floor, 20, 29)
-    distances = FloorDistances(np.array([one, other]), floor)
+    lattice = lattice_of(free, step=(0.1, 0.1))
+    one, other = place(lattice, 20, 11), place(lattice, 20, 29)
+    distances = FloorDistances(np.array([one, other]), lattice)
     # 11 steps to beyond the end, 18 across, 11 back; the corners cannot be cut.
     assert distances.between(np.array(0), np.array(1)) == pytest.approx(4.0, abs=1e-12)
     np.testing.assert_allclose(distances.from_position(*one), [0.0, 4.0], atol=1e-12)
@@ -120,8 +120,8 @@ def test_a_place_with_a_wall_round_it_is_out_of_reach():
     free = np.ones((7, 7), dtype=bool)
     free[2:5, 2:5] = False
     free[3, 3] = True
-    floor = floor_of(free)
-    distances = distances_over(floor)
+    lattice = lattice_of(free)
+    distances = distances_over(lattice)
     assert distances.from_position(0.0, 0.0)[7 * 3 + 3] == math.inf
     with pytest.raises(SelectionError, match=r"base at \(-0.75, 2.50\) m stands where"):
         distances.from_position(-0.75, 2.5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.store import Scored, ScoreFile
+from tcs.placement.store import ScoreFile, StateTables
 from tests.placement.tables.small import random_scores, small_grid
 
 METADATA = {
@@ -38,7 +38,7 @@ def score_file(*, grid=None, share=0.4, tables=1, options=None, **changes):
         "observed": [],
         "body_frames": {"head": [0.1] * (3 * tables * math.prod(grid.environment_shape))},
         "tables": tuple(
-            Scored.of(scores, build_sets(scores, grid, **(options or {}))) for scores in scored
+            StateTables.of(scores, build_sets(scores, grid, **(options or {}))) for scores in scored
         ),
     }
     return ScoreFile(**(parts | changes))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tcs.errors import OutputError, StoreError, StoreFormatError
-from tcs.files.compression import fold, unfolded
+from tcs.files.compression import compress, decompress
 from tcs.placement.store import FORMAT_VERSION, ScoreFile, load_scores, save_scores
-from tcs.placement.store.packing import pack
+from tcs.placement.store.encoding import encode
 from tests.placement.store.example import SHIFT, score_file
 from tests.placement.tables.small import small_grid
 
@@ -66,7 +66,7 @@ def test_joblib_reads_it_too(path, file):
 
 
 def test_a_compressed_file_is_read_too(path, file):
-    joblib.dump(pack(file), path, compress=3)
+    joblib.dump(encode(file), path, compress=3)
     assert_same(file, load_scores(path))
 
 
@@ -172,7 +172,7 @@ def test_a_truncated_file_is_told(path, file, share):
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
 def test_a_truncated_uncompressed_file_is_told(path, file, share):
-    joblib.dump(pack(file), path)
+    joblib.dump(encode(file), path)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(StoreFormatError):
@@ -190,7 +190,7 @@ def test_a_flipped_bit_is_told(path, file):
 
 def test_flipped_bytes_never_crash(tmp_path, file):
     """Whatever a byte turns into, the answer is a sound file or one of our errors."""
-    joblib.dump(pack(file), tmp_path / "whole")
+    joblib.dump(encode(file), tmp_path / "whole")
     whole = (tmp_path / "whole").read_bytes()
     rng = np.random.default_rng(0)
     told = []
@@ -234,13 +234,13 @@ def test_a_longer_file_is_told(path, file):
 
 
 def test_a_file_from_the_future_is_told(path, file):
-    joblib.dump(pack(file) | {"format_version": FORMAT_VERSION + 1}, path)
+    joblib.dump(encode(file) | {"format_version": FORMAT_VERSION + 1}, path)
     with pytest.raises(StoreFormatError, match="reads version 3: update tcs"):
         load_scores(path)
 
 
 def test_an_older_file_gets_one_line_that_says_what_to_do(path, file):
-    joblib.dump(pack(file) | {"format_version": 2}, path)
+    joblib.dump(encode(file) | {"format_version": 2}, path)
     with pytest.raises(StoreFormatError) as refused:
         load_scores(path)
     assert str(refused.value) == (
@@ -250,7 +250,7 @@ def test_an_older_file_gets_one_line_that_says_what_to_do(path, file):
 
 
 def changed(file, section, name, change):
-    content = pack(file)
+    content = encode(file)
     place = content
     if section in ("scores", "sets"):
         content["tables"] = [dict(content["tables"][0])]
@@ -259,9 +259,9 @@ def changed(file, section, name, change):
     old = place[section][name]
     if isinstance(old, dict) and "bytes" in old:
         kind = old["type"][0] if old["type"][0] == "u" else old["type"]
-        array = unfolded({name: old}, name, kind, (None,) * len(old["shape"]))
+        array = decompress({name: old}, name, kind, (None,) * len(old["shape"]))
         new = change(array)
-        place[section][name] = fold(new) if isinstance(new, np.ndarray) else new
+        place[section][name] = compress(new) if isinstance(new, np.ndarray) else new
     else:
         place[section][name] = change(old)
     return content
@@ -302,11 +302,11 @@ FORGED = {
     "members missing": ("sets", "max_members", lambda members: True),
     "states of another grid": ("sets", "state_size", lambda size: size + 1),
     "environment no yes or no": ("sets", "same_environment", lambda same: 1),
-    "floor missing": ("sets", "floor", lambda floor: None),
-    "floor without a step": ("sets", "floor", lambda floor: floor | {"step": [0.1]}),
-    "floor of another shape": ("sets", "floor", lambda floor: floor | {"shape": [3, 3]}),
-    "floor without places": ("sets", "floor", lambda floor: floor | {"shape": [0, 3]}),
-    "enormous floor": ("sets", "floor", lambda floor: floor | {"shape": [2**40, 2**40]}),
+    "lattice missing": ("sets", "lattice", lambda lattice: None),
+    "lattice without a step": ("sets", "lattice", lambda lattice: lattice | {"step": [0.1]}),
+    "lattice of another shape": ("sets", "lattice", lambda lattice: lattice | {"shape": [3, 3]}),
+    "lattice without places": ("sets", "lattice", lambda lattice: lattice | {"shape": [0, 3]}),
+    "enormous lattice": ("sets", "lattice", lambda lattice: lattice | {"shape": [2**40, 2**40]}),
     "triples where none belong": ("sets", "triples", lambda triples: {"least": 0.5}),
     "triples missing": ("sets", "max_members", lambda members: 3),
     "best no candidate": ("sets", "best", lambda best: [2**30]),
@@ -359,8 +359,8 @@ def test_a_forged_file_is_told_in_one_line(path, file, section, name, change):
 
 
 def test_a_folded_array_may_not_swell(path, file):
-    """What unfolds to more than its shape says is refused before it fills the memory."""
-    content = pack(file)
+    """What decompresses to more than its shape says is refused before it fills the memory."""
+    content = encode(file)
     bomb = np.frombuffer(zlib.compress(bytes(100_000_000)), dtype=np.uint8)
     content["tables"][0]["sets"]["pair_sum"]["bytes"] = bomb
     joblib.dump(content, path)
@@ -370,7 +370,7 @@ def test_a_folded_array_may_not_swell(path, file):
 
 @pytest.mark.parametrize("section", ["metadata", "task", "grid", "observed", "tables"])
 def test_a_missing_section_is_told(path, file, section):
-    content = pack(file)
+    content = encode(file)
     del content[section]
     joblib.dump(content, path)
     with pytest.raises(StoreFormatError, match=f"has no {section}"):
@@ -379,7 +379,7 @@ def test_a_missing_section_is_told(path, file, section):
 
 @pytest.mark.parametrize("section", ["scores", "sets"])
 def test_a_missing_half_of_a_table_is_told(path, file, section):
-    content = pack(file)
+    content = encode(file)
     del content["tables"][0][section]
     joblib.dump(content, path)
     with pytest.raises(StoreFormatError, match=f"has no {section}"):

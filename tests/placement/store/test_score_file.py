@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import GridError, StoreError, StoreMismatchError
-from tcs.placement.store import Scored, check_scene
+from tcs.placement.store import StateTables, check_scene
 from tests.placement.store.example import METADATA, score_file
 from tests.placement.tables.small import random_scores, small_grid
 
@@ -30,10 +30,10 @@ def test_parts_must_belong_together():
         dataclasses.replace(file, grid=small_grid(nx=6, ny=4).to_dict(), body_frames={})
     others = random_scores(small_grid(nx=6, ny=4, bed=2), 5, seed=2)
     with pytest.raises(StoreError, match="sets do not belong to the scores"):
-        Scored.of(others, table.sets)
+        StateTables.of(others, table.sets)
     moved = dataclasses.replace(table.sets, cell_xy=table.sets.cell_xy + np.array([0.0, 0.2]))
     with pytest.raises(StoreError, match="not those of the grid"):
-        dataclasses.replace(file, tables=(Scored.of(table.scores, moved),))
+        dataclasses.replace(file, tables=(StateTables.of(table.scores, moved),))
     with pytest.raises(GridError):
         dataclasses.replace(file, grid={})
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tcs.errors import StoreError, TcsError
-from tcs.files.compression import fold
+from tcs.files.compression import compress
 from tcs.placement.store import load_scores, save_scores
-from tcs.placement.store.packing import pack, unpack
+from tcs.placement.store.encoding import decode, encode
 from tcs.placement.tables import SuccessTable
 from tests.placement.store.example import score_file
 
@@ -41,9 +41,9 @@ def test_what_is_saved_is_loaded(tmp_path):
 
 
 def test_files_without_estimates_load():
-    packed = pack(score_file())
+    packed = encode(score_file())
     del packed["tables"][0]["success"]
-    assert unpack(packed).nominal.success is None
+    assert decode(packed).nominal.success is None
 
 
 def test_estimates_of_sets_that_are_not_held_are_refused():
@@ -55,24 +55,24 @@ def test_estimates_of_sets_that_are_not_held_are_refused():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("members_plus_one", fold(np.array([[2**32 - 1, 0]] * 2, dtype=np.uint32))),
-        ("members_plus_one", fold(np.array([1, 2], dtype=np.uint8))),
+        ("members_plus_one", compress(np.array([[2**32 - 1, 0]] * 2, dtype=np.uint32))),
+        ("members_plus_one", compress(np.array([1, 2], dtype=np.uint8))),
         ("members_plus_one", None),
-        ("samples", fold(np.array([2**31, 1], dtype=np.uint32))),
-        ("samples", fold(np.array([0, 1], dtype=np.uint8))),
-        ("success", fold(np.array([7.0, 0.5]))),
-        ("low", fold(np.array([0.1]))),
-        ("high", fold(np.array([0.1, 0.2], dtype=np.float32))),
+        ("samples", compress(np.array([2**31, 1], dtype=np.uint32))),
+        ("samples", compress(np.array([0, 1], dtype=np.uint8))),
+        ("success", compress(np.array([7.0, 0.5]))),
+        ("low", compress(np.array([0.1]))),
+        ("high", compress(np.array([0.1, 0.2], dtype=np.float32))),
         (None, 3),
         (None, []),
     ],
 )
 def test_forged_estimates_are_refused(name, value):
-    packed = pack(with_estimates())
+    packed = encode(with_estimates())
     table = packed["tables"][0]
     if name is None:
         table["success"] = value
     else:
         table["success"] = {**table["success"], name: value}
     with pytest.raises(TcsError):
-        unpack(packed)
+        decode(packed)

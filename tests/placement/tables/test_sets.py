@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
-from tcs.placement.tables import Floor, SetTable
+from tcs.placement.tables import BaseLattice, SetTable
 
-NO_MOVES = Floor(start=(0.0, 0.0), step=(0.5, 0.5), moves=np.zeros((4, 2, 2), dtype=np.bool_))
+NO_MOVES = BaseLattice(start=(0.0, 0.0), step=(0.5, 0.5), moves=np.zeros((4, 2, 2), dtype=np.bool_))
 
 
 def parts():
@@ -34,7 +34,7 @@ def parts():
         "triples": None,
         "best": (4, 7),
         "best_single": (4,),
-        "floor": NO_MOVES,
+        "lattice": NO_MOVES,
     }
 
 
@@ -70,7 +70,7 @@ WRONG = {
     "distance nan": ({"min_distance": float("nan")}, "min_distance"),
     "members": ({"max_members": 0}, "max_members"),
     "states": ({"state_size": 0}, "state_size"),
-    "floor": ({"floor": None}, "floor must be a Floor"),
+    "lattice": ({"lattice": None}, "lattice must be a BaseLattice"),
     "candidates": ({"candidates": np.array([4, 4, 7], dtype=np.int32)}, "ascending"),
     "negative candidate": ({"candidates": np.array([-4, 4, 7], dtype=np.int32)}, "ascending"),
     "cell": ({"cell": np.array([0, 0, 2], dtype=np.int32)}, r"cell outside 0\.\.1"),

@@ -9,7 +9,7 @@ from tcs.placement.scoring.job import Job, load_job
 from tcs.placement.store import ScoreFile, check_scene
 
 
-def reopen(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene, LoweredScene]:
+def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene, LoweredScene]:
     """Return the job a file was scored from, its live scene, and that scene as arrays.
 
     Args:

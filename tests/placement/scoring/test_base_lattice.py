@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tcs.placement.scoring.floor import BORDER, floor_of
+from tcs.placement.scoring.base_lattice import BORDER, lattice_of
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.tables.small import small_grid
 
@@ -20,7 +20,7 @@ def scores_with(grid, blocked):
     )
 
 
-def plain_moves(scores, grid, floor):
+def plain_moves(scores, grid, lattice):
     """The same moves by plain loops over all places, one state at a time."""
     free = {}
     for h in range(grid.size):
@@ -28,7 +28,7 @@ def plain_moves(scores, grid, floor):
         free[*state, yaw, torso, i, j] = scores.reason[h, 0] != Reason.BODY_BLOCKED
     nx, ny = grid.axis("base_x").count, grid.axis("base_y").count
     border = [round((s - grid.axis(n).start) / -step) for s, step, n in
-              zip(floor.start, floor.step, ("base_x", "base_y"), strict=True)]  # fmt: skip
+              zip(lattice.start, lattice.step, ("base_x", "base_y"), strict=True)]  # fmt: skip
     shape = (nx + 2 * border[0], ny + 2 * border[1])
     states = {key[:-2] for key in free}
 
@@ -53,27 +53,27 @@ def test_moves_agree_with_plain_loops(seed, bed):
     grid = small_grid(nx=5, ny=4, yaws=2, torsos=1, bed=bed)
     rng = np.random.default_rng(seed)
     scores = scores_with(grid, np.flatnonzero(rng.random(grid.size) < 0.75))
-    floor = floor_of(scores, grid)
+    lattice = lattice_of(scores, grid)
     # 0.6 m are three places 0.2 m apart, and one more stands for all beyond.
-    assert floor.start == pytest.approx((-0.7 - 0.8, 0.1 - 0.8), abs=1e-15)
-    np.testing.assert_array_equal(floor.moves, plain_moves(scores, grid, floor))
+    assert lattice.start == pytest.approx((-0.7 - 0.8, 0.1 - 0.8), abs=1e-15)
+    np.testing.assert_array_equal(lattice.moves, plain_moves(scores, grid, lattice))
 
 
 def test_a_heading_has_to_be_free_at_both_ends_of_a_move():
     grid = small_grid(nx=2, ny=1, yaws=2, torsos=1)
     # The first place is free with the first heading only, the second with the second.
-    floor = floor_of(scores_with(grid, [1, 2]), grid)
+    lattice = lattice_of(scores_with(grid, [1, 2]), grid)
     inside = (round(BORDER / 0.2) + 1,) * 2
-    assert not floor.moves[0][inside]
-    assert floor_of(scores_with(grid, [1, 3]), grid).moves[0][inside]
+    assert not lattice.moves[0][inside]
+    assert lattice_of(scores_with(grid, [1, 3]), grid).moves[0][inside]
 
 
 def test_everything_free_allows_every_move():
     grid = small_grid(nx=1, ny=1, yaws=1, torsos=1)
-    floor = floor_of(scores_with(grid, []), grid)
+    lattice = lattice_of(scores_with(grid, []), grid)
     # Neither axis has a step of its own that means anything: 0.1 m.
-    assert floor.step == (0.1, 0.1)
-    x, y = floor.shape
+    assert lattice.step == (0.1, 0.1)
+    x, y = lattice.shape
     assert (x, y) == (15, 15)
-    counts = floor.moves.sum(axis=(1, 2)).tolist()
+    counts = lattice.moves.sum(axis=(1, 2)).tolist()
     assert counts == [(x - 1) * y, x * (y - 1), *[(x - 1) * (y - 1)] * 2]

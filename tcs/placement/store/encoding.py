@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import StoreFormatError
-from tcs.files.compression import fold, small, unfolded
-from tcs.placement.store.score_file import DESCRIPTIONS, Scored, ScoreFile
-from tcs.placement.store.set_packing import packed_sets, unpacked_sets
-from tcs.placement.store.success_packing import packed_success, unpacked_success
+from tcs.files.compression import compress, decompress, smallest_unsigned
+from tcs.placement.store.score_file import DESCRIPTIONS, ScoreFile, StateTables
+from tcs.placement.store.set_encoding import decode_sets, encode_sets
+from tcs.placement.store.success_encoding import decode_success, encode_success
 from tcs.placement.tables import Reason, ScoreTable, SetTable
 
 FORMAT = "tcs scores"
@@ -24,8 +24,8 @@ Explain = Callable[[Callable[[], ScoreTable]], ScoreTable]
 """Calls a function and turns what it raises into one line about the file."""
 
 
-def pack(file: ScoreFile) -> dict[str, Any]:
-    """Return the plain containers that `unpack` takes."""
+def encode(file: ScoreFile) -> dict[str, Any]:
+    """Return the plain containers that `decode` takes."""
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -33,20 +33,20 @@ def pack(file: ScoreFile) -> dict[str, Any]:
         "observed": file.observed,
         "tables": [
             {
-                "sets": packed_sets(table.sets),
+                "sets": encode_sets(table.sets),
                 "scores": _packed_scores(table.scores, table.sets),
-                "success": packed_success(table.success),
+                "success": encode_success(table.success),
             }
             for table in file.tables
         ],
     }
 
 
-def unpack(content: object, explain: Explain = lambda read: read()) -> ScoreFile:
+def decode(content: object, explain: Explain = lambda read: read()) -> ScoreFile:
     """Return the score file that was packed.
 
     Args:
-        content: What `pack` returned.
+        content: What `encode` returned.
         explain: Called around the unfolding of scores, which waits until they are asked for.
 
     Raises:
@@ -78,18 +78,18 @@ def unpack(content: object, explain: Explain = lambda read: read()) -> ScoreFile
     )
 
 
-def _unpacked_table(packed: dict[str, Any], explain: Explain) -> Scored:
+def _unpacked_table(packed: dict[str, Any], explain: Explain) -> StateTables:
     """Return a table whose scores are unfolded when they are first asked for."""
-    sets = unpacked_sets(_dict(packed.get("sets"), "sets"))
+    sets = decode_sets(_dict(packed.get("sets"), "sets"))
     scores = _dict(packed.get("scores"), "scores")
 
     def unfold() -> ScoreTable:
         table = _unpacked_scores(scores, sets)
-        Scored(sets, lambda: table).check(table)
+        StateTables(sets, lambda: table).check(table)
         return table
 
-    success = unpacked_success(packed.get("success"))
-    return Scored(sets, lambda: explain(unfold), success)
+    success = decode_success(packed.get("success"))
+    return StateTables(sets, lambda: explain(unfold), success)
 
 
 def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
@@ -97,25 +97,25 @@ def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
     rest[sets.candidates] = False
     return {
         # The dexterity of the candidates is stored with the sets.
-        "dexterity_rest": fold(scores.dexterity[rest]),
-        "reason": fold(scores.reason),
-        "pair_plus_one": fold(small(scores.pair.astype(np.int64) + 1)),
+        "dexterity_rest": compress(scores.dexterity[rest]),
+        "reason": compress(scores.reason),
+        "pair_plus_one": compress(smallest_unsigned(scores.pair.astype(np.int64) + 1)),
         "pair_names": [list(names) for names in scores.pair_names],
-        "arm_joints": fold(scores.arm_joints),
+        "arm_joints": compress(scores.arm_joints),
     }
 
 
 def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
     goals = sets.weights.size
-    reason = unfolded(packed, "reason", "u1", (None, goals))
+    reason = decompress(packed, "reason", "u1", (None, goals))
     if len(sets.candidates) and sets.candidates[-1] >= len(reason):
         raise StoreFormatError("has sets of more configurations than scores")
     dexterity = np.zeros(reason.shape, dtype=np.float32)
     dexterity[sets.candidates] = sets.dexterity
     rest = reason == Reason.REACHED
     rest[sets.candidates] = False
-    dexterity[rest] = unfolded(packed, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
-    pair = unfolded(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
+    dexterity[rest] = decompress(packed, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
+    pair = decompress(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
     names = packed.get("pair_names")
     if not isinstance(names, list) or not all(
         isinstance(n, list) and len(n) == 2 and all(isinstance(body, str) for body in n)
@@ -129,7 +129,7 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
         reason=reason,
         pair=pair.astype(np.int32),
         pair_names=tuple((first, second) for first, second in names),
-        arm_joints=unfolded(packed, "arm_joints", "f4", (None, 7)),
+        arm_joints=decompress(packed, "arm_joints", "f4", (None, 7)),
         weights=sets.weights,
     )
 

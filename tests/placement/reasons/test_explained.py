@@ -5,7 +5,7 @@ import pytest
 
 from tcs.errors import GridError, SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.reasons.standing import Standing, nearest_configuration
+from tcs.placement.reasons.explained import Standing, nearest_configuration
 from tcs.placement.tables import Reason
 from tests.placement.tables.small import random_scores, small_grid
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from tcs.model.grid import ROBOT_AXES, Grid
-from tcs.placement.tables import Floor, Reason, ScoreTable
-from tcs.placement.tables.floor import MOVES
+from tcs.placement.tables import BaseLattice, Reason, ScoreTable
+from tcs.placement.tables.base_lattice import MOVES
 
 BORDER = 0.6
 """What blocks the base at the border of the grid is taken to go on for so long [m]. The grid says
@@ -19,7 +19,7 @@ STEP = 0.1
 """Distance of neighbours along an axis that the grid holds still [m]."""
 
 
-def floor_of(scores: ScoreTable, grid: Grid) -> Floor:
+def lattice_of(scores: ScoreTable, grid: Grid) -> BaseLattice:
     """Return where the base can drive between the places of a grid, and around it.
 
     The base can move from a place to a neighbour when in some state of the environment, with some
@@ -53,7 +53,7 @@ def floor_of(scores: ScoreTable, grid: Grid) -> Floor:
             for j in columns:
                 possible &= free[:, i : shape[0] - dx + i, low + j : high + j]
         along[: shape[0] - dx, low:high] = possible.any(axis=0)
-    return Floor(
+    return BaseLattice(
         start=(
             axes[0].start - (border[0] + 1) * step[0],
             axes[1].start - (border[1] + 1) * step[1],

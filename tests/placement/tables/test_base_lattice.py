@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
-from tcs.placement.tables import Floor
+from tcs.placement.tables import BaseLattice
 
 
 def parts():
@@ -12,10 +12,10 @@ def parts():
 
 
 def test_knows_its_shape_and_is_read_only():
-    floor = Floor(**parts())
-    assert floor.shape == (2, 3)
+    lattice = BaseLattice(**parts())
+    assert lattice.shape == (2, 3)
     with pytest.raises(ValueError, match="read-only"):
-        floor.moves[0, 0, 0] = True
+        lattice.moves[0, 0, 0] = True
 
 
 def leaving(kind, i, j):
@@ -40,4 +40,4 @@ WRONG = {
 @pytest.mark.parametrize(("changes", "message"), WRONG.values(), ids=WRONG.keys())
 def test_refuses(changes, message):
     with pytest.raises(TcsError, match=message):
-        Floor(**(parts() | changes))
+        BaseLattice(**(parts() | changes))

@@ -1,4 +1,4 @@
-"""The floor round the furniture: a lattice of places, and the moves between neighbours."""
+"""The lattice of base positions around the furniture, and the moves between neighbours."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Floor:
+class BaseLattice:
     """Where the base can drive: X by Y places, and the straight moves between neighbours.
 
-    The lattice reaches beyond the grid of base places. All floor beyond the lattice is free.
+    The lattice reaches beyond the grid of base places. The area beyond the lattice is free.
     """
 
     start: tuple[float, float]
@@ -34,20 +34,20 @@ class Floor:
             TcsError: If a number is not finite, a step not positive, there are fewer than two
                 places along an axis, or a move leads out of the lattice.
         """
-        moves = read_only("floor: moves", self.moves, np.bool_, (len(MOVES), None, None))
+        moves = read_only("base lattice: moves", self.moves, np.bool_, (len(MOVES), None, None))
         object.__setattr__(self, "moves", moves)
         numbers = (*self.start, *self.step)
         require(
             len(self.start) == len(self.step) == 2
             and all(isinstance(value, float) and abs(value) < np.inf for value in numbers)
             and min(self.step) > 0.0,
-            "floor: start and step must be two finite numbers each, the steps positive.",
+            "base lattice: start and step must be two finite numbers each, the steps positive.",
         )
-        require(min(self.shape) >= 2, "floor: needs at least two places along each axis.")
+        require(min(self.shape) >= 2, "base lattice: needs at least two places along each axis.")
         for along, (dx, dy) in zip(moves, MOVES, strict=True):
             leaving = np.ones(self.shape, dtype=np.bool_)
             leaving[: self.shape[0] - dx, max(0, -dy) : self.shape[1] - max(0, dy)] = False
-            require(not np.any(along & leaving), "floor: a move leads out of the lattice.")
+            require(not np.any(along & leaving), "base lattice: a move leads out of the lattice.")
 
     @property
     def shape(self) -> tuple[int, int]:

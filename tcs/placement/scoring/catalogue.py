@@ -7,7 +7,7 @@ from tcs.model.scene import environment_names, load_environment
 from tcs.model.tasks import load_task, task_names
 
 
-def all_rows(environment: str | None = None) -> tuple[tuple[str, str], ...]:
+def task_environment_pairs(environment: str | None = None) -> tuple[tuple[str, str], ...]:
     """Return the names of task and environment of every row that ships with `tcs`.
 
     Args:

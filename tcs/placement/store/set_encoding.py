@@ -1,0 +1,200 @@
+"""Encode a set table as plain containers and compressed arrays, and decode it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import StoreFormatError
+from tcs.files.compression import MAX_BYTES, compress, decompress, smallest_unsigned
+from tcs.placement.tables import BaseLattice, SetTable
+from tcs.placement.tables.base_lattice import MOVES
+from tcs.placement.tables.groups import ARRAYS, Groups
+
+_PLAIN = {
+    "rule": str,
+    "max_members": int,
+    "min_distance": float,
+    "same_environment": bool,
+    "state_size": int,
+}
+"""Fields of a set table that are single values, and the type of each."""
+
+
+def encode_sets(sets: SetTable) -> dict[str, Any]:
+    """Return the plain containers that `decode_sets` takes."""
+    cells = len(sets.cell_xy)
+    numbers = sets.pair_cells[:, 0].astype(np.int64) * cells + sets.pair_cells[:, 1]
+    # There are few different values: one for each subset of the goals at most.
+    values, code = np.unique(sets.pair_reachability, return_inverse=True)
+    return {
+        "rule": sets.rule,
+        "max_members": int(sets.max_members),
+        "min_distance": float(sets.min_distance),
+        "same_environment": bool(sets.same_environment),
+        "state_size": int(sets.state_size),
+        "weights": compress(sets.weights),
+        # Steps from one to the next are mostly small, and compress well.
+        "candidate_step": compress(_steps(sets.candidates.astype(np.int64))),
+        "reached": compress(sets.reached.astype(np.uint8)),
+        "dexterity": compress(sets.dexterity[sets.reached]),
+        "cell": compress(smallest_unsigned(sets.cell.astype(np.int64))),
+        "cell_xy": compress(sets.cell_xy),
+        "pair_step": compress(_steps(numbers)),
+        "pair_count": compress(smallest_unsigned(sets.pair_count)),
+        "reachability_values": compress(values),
+        "reachability_code": compress(smallest_unsigned(code.astype(np.int64))),
+        "pair_manipulability": compress(sets.pair_manipulability),
+        "pair_sum": compress(sets.pair_sum),
+        "member_reachability": compress(sets.member_reachability),
+        "member_manipulability": compress(sets.member_manipulability),
+        "member_sum": compress(sets.member_sum),
+        "triples": None if sets.triples is None else _encode_groups(sets.triples, cells),
+        "best": list(sets.best),
+        "best_single": list(sets.best_single),
+        "lattice": {
+            "start": list(sets.lattice.start),
+            "step": list(sets.lattice.step),
+            "shape": list(sets.lattice.shape),
+            "moves": compress(np.packbits(sets.lattice.moves)),
+        },
+    }
+
+
+def decode_sets(encoded: dict[str, Any]) -> SetTable:
+    """Return the encoded sets.
+
+    Raises:
+        StoreFormatError: If something is missing or out of range.
+        TcsError: If the sets contradict themselves.
+    """
+    for name, kind in _PLAIN.items():
+        if type(encoded.get(name)) is not kind:
+            raise StoreFormatError(f"has sets without '{name}'")
+    weights = decompress(encoded, "weights", "f8", (None,))
+    # A table has at most 20 million configurations: see `tcs.model.grid.MAX_CONFIGURATIONS`.
+    candidates = _ascending(
+        decompress(encoded, "candidate_step", "u", (None,)), 2**31, "candidates"
+    )
+    reached = decompress(encoded, "reached", "u1", (candidates.size, weights.size)) != 0
+    dexterity = np.zeros(reached.shape, dtype=np.float32)
+    dexterity[reached] = decompress(encoded, "dexterity", "f4", (int(np.count_nonzero(reached)),))
+    cell_xy = decompress(encoded, "cell_xy", "f8", (None, 2))
+    values = decompress(encoded, "reachability_values", "f8", (None,))
+    step = decompress(encoded, "pair_step", "u", (None,))
+    kept = (step.size,)
+    numbers = _ascending(step, len(cell_xy) ** 2 + 1, "pairs of cells")
+    code = decompress(encoded, "reachability_code", "u", kept).astype(np.int64)
+    if np.any(code >= values.size):
+        raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
+    pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
+    return SetTable(
+        **{name: encoded[name] for name in _PLAIN},
+        weights=weights,
+        candidates=candidates.astype(np.int32),
+        reached=reached,
+        dexterity=dexterity,
+        cell=_int32(decompress(encoded, "cell", "u", candidates.shape)),
+        cell_xy=cell_xy,
+        pair_cells=pair_cells.astype(np.int32),
+        pair_count=decompress(encoded, "pair_count", "u", kept).astype(np.int64),
+        pair_reachability=values[code],
+        pair_manipulability=decompress(encoded, "pair_manipulability", "f4", kept),
+        pair_sum=decompress(encoded, "pair_sum", "f4", kept),
+        member_reachability=decompress(encoded, "member_reachability", "f8", candidates.shape),
+        member_manipulability=decompress(encoded, "member_manipulability", "f4", candidates.shape),
+        member_sum=decompress(encoded, "member_sum", "f4", candidates.shape),
+        triples=_decode_groups(encoded.get("triples"), len(cell_xy)),
+        best=_indices(encoded, "best"),
+        best_single=_indices(encoded, "best_single"),
+        lattice=_decode_lattice(encoded.get("lattice")),
+    )
+
+
+def _encode_groups(groups: Groups, cells: int) -> dict[str, Any]:
+    """Return the plain containers that `_decode_groups` takes."""
+    number = np.zeros(len(groups.cells), dtype=np.int64)
+    for column in groups.cells.T.astype(np.int64):
+        number = number * cells + column
+    return {
+        "least": float(groups.least),
+        "step": compress(_steps(number)),
+        **{name: compress(getattr(groups, name)) for name in ARRAYS if name != "count"},
+        "count": compress(smallest_unsigned(groups.count)),
+    }
+
+
+def _decode_groups(encoded: object, cells: int) -> Groups | None:
+    """Return the encoded sets of three, checked; None where there are none."""
+    if encoded is None:
+        return None
+    if not isinstance(encoded, dict) or type(encoded.get("least")) is not float:
+        raise StoreFormatError("has sets of three that are none")
+    number = _ascending(decompress(encoded, "step", "u", (None,)), cells**3 + 1, "triples of cells")
+    wide = {"reachability": "f8", "member_reachability": "f8"}
+    return Groups(
+        least=encoded["least"],
+        cells=np.stack(
+            [number // cells**2, number // cells % cells, number % cells]
+            if cells
+            else [number] * 3,
+            axis=1,
+        ).astype(np.int32),
+        count=decompress(encoded, "count", "u", number.shape).astype(np.int64),
+        **{
+            name: decompress(encoded, name, wide.get(name, "f4"), (None,))
+            for name in ARRAYS
+            if name != "count"
+        },
+    )
+
+
+def _decode_lattice(encoded: object) -> BaseLattice:
+    """Return where the base can drive, checked."""
+    if not isinstance(encoded, dict):
+        raise StoreFormatError("has sets without a base lattice")
+    pairs = {}
+    for name, kind in (("start", float), ("step", float), ("shape", int)):
+        values = encoded.get(name)
+        if not isinstance(values, list) or [type(value) for value in values] != [kind] * 2:
+            raise StoreFormatError(f"has a base lattice without '{name}'")
+        pairs[name] = values
+    shape = (len(MOVES), *pairs["shape"])
+    if min(shape) < 1 or math.prod(shape) > MAX_BYTES:
+        raise StoreFormatError(f"has a base lattice of shape {shape}")
+    bits = decompress(encoded, "moves", "u1", (-(-math.prod(shape) // 8),))
+    moves = np.unpackbits(bits, count=math.prod(shape)).astype(np.bool_).reshape(shape)
+    return BaseLattice(
+        start=(pairs["start"][0], pairs["start"][1]),
+        step=(pairs["step"][0], pairs["step"][1]),
+        moves=moves,
+    )
+
+
+def _ascending(step: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
+    """Return the sums of steps, all of them below `end`."""
+    # Summed in floating point first: forged steps must not wrap round to valid ones.
+    if step.sum(dtype=np.float64) >= float(end):
+        raise StoreFormatError(f"has {what} that do not exist")
+    return np.cumsum(step.astype(np.int64))
+
+
+def _indices(encoded: dict[str, Any], name: str) -> tuple[int, ...]:
+    members = encoded.get(name)
+    if not isinstance(members, list) or not all(type(h) is int and 0 <= h < 2**31 for h in members):
+        raise StoreFormatError(f"has a '{name}' that is no list of configurations")
+    return tuple(members)
+
+
+def _int32(values: NDArray[Any]) -> NDArray[np.int32]:
+    if np.any(values > np.iinfo(np.int32).max):
+        raise StoreFormatError("has a number of a cell that is out of range")
+    return values.astype(np.int32)
+
+
+def _steps(ascending: NDArray[np.int64]) -> NDArray[Any]:
+    """Return the differences of ascending numbers, from 0."""
+    return smallest_unsigned(np.asarray(np.diff(ascending, prepend=0), dtype=np.int64))
