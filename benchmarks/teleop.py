@@ -101,7 +101,7 @@ def switches(arm: Arm, settings: Settings, steps: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     largest, count = 0.0, 0
     for joints in 0.9 * arm.random_joints(rng, max(1, steps // 200)):
-        if arm.beyond(joints):
+        if arm.limit_violation(joints):
             continue
         session, before, mode = Teleoperation(arm, joints, settings), np.zeros(7), None
         for _ in range(10):

@@ -22,22 +22,24 @@ from tcs.files.writing import whole_file
 from tcs.model.robots import RobotFile, load_robot
 from tcs.output.view import open_meshcat
 from tcs.output.view.teleop import (
-    Film,
     LivePage,
     Recorder,
     Replay,
-    Stage,
+    RobotDisplay,
+    RunView,
     replay_page,
     start_posture,
 )
-from tcs.output.view.teleop.recorder import begun_at
-from tcs.output.view.teleop.stage import draw_course
+from tcs.output.view.teleop.robot_display import draw_course
 from tcs.teleop import Arm, Mode, Settings, load_arm
-from tcs.teleop.lines import Course, find_course
-from tcs.teleop.metrics import PLANES, Line, completion_time, trajectory_accuracy
-from tcs.teleop.run import Run, check_format, load_run, save_run
-from tcs.teleop.settings import Behaviour
-from tcs.teleop.trial import GOAL_RADIUS
+from tcs.teleop.control.settings import LimitBehaviour
+from tcs.teleop.experiment.course import Course, find_course
+from tcs.teleop.experiment.metrics import PLANES, completion_time, trajectory_accuracy
+from tcs.teleop.experiment.trial import GOAL_RADIUS
+from tcs.teleop.line import Line
+from tcs.teleop.runs.files import check_format, load_run, save_run
+from tcs.teleop.runs.recorder import begun_at
+from tcs.teleop.runs.run import Run
 
 MODES: Mapping[str, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
@@ -57,7 +59,7 @@ class Asked:
     """The live page as the command line gives it."""
 
     robot: str
-    behaviour: Behaviour
+    behaviour: LimitBehaviour
     condition: str
     start_deg: tuple[float, ...] | None
     lift: float | None
@@ -76,10 +78,10 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
         check_format(asked.save)
         check_writable(asked.save)
     robot = load_robot(asked.robot)
-    arm = load_arm(robot, lift=torso_lift(robot, asked.lift))
+    arm = load_arm(robot, torso_height=torso_lift(robot, asked.lift))
     start = None if asked.start_deg is None else _start(arm, asked.start_deg)
     meshcat = open_meshcat(port)
-    stage = Stage(arm, meshes=True)
+    stage = RobotDisplay(arm, meshes=True)
     course = None
     if asked.line:
         talk.say("looking for a line that needs the arm reshaped; that takes some seconds.")
@@ -125,7 +127,7 @@ def drive(asked: Asked, *, port: int | None, browser: bool, duration: float | No
 def _start(arm: Arm, degrees: tuple[float, ...]) -> Any:
     """Return a start posture [rad], shape (7,)."""
     start = arm.checked([math.radians(value) for value in degrees], "start posture")
-    outside = arm.beyond(start)
+    outside = arm.limit_violation(start)
     if outside:
         raise TcsError(f"start posture: {outside}. Give one within them with --start-deg.")
     return start
@@ -136,7 +138,7 @@ def _metadata(asked: Asked, arm: Arm, course: Course | None) -> dict[str, Any]:
     said: dict[str, Any] = {
         "tcs": tcs.__version__,
         "robot": asked.robot,
-        "lift": arm.lift,
+        "lift": arm.torso_height,
         "condition": asked.condition,
         "limits": asked.behaviour,
         "operator_kind": "whoever drove the live page",
@@ -169,7 +171,7 @@ def _followed(run: Run, line: Line) -> str:
     )
 
 
-def _film(path: Path, robot: str | None) -> tuple[Film, RobotFile]:
+def _film(path: Path, robot: str | None) -> tuple[RunView, RobotFile]:
     """Return what a file holds, and its robot.
 
     Raises:
@@ -184,7 +186,7 @@ def _film(path: Path, robot: str | None) -> tuple[Film, RobotFile]:
         raise DataFileError(f"run '{path}': its 'lift' is {lift!r}, but must be a number [m].")
     file = load_robot(named)
     try:
-        return Film(load_arm(file, lift=lift), run), file
+        return RunView(load_arm(file, torso_height=lift), run), file
     except DataFileError as error:
         raise DataFileError(f"run '{path}': {error}") from None
 
@@ -200,7 +202,7 @@ def play(
     """
     film, file = _film(path, robot)
     meshcat = open_meshcat(port)
-    replay = Replay(meshcat, Stage(film.arm, meshes=True), film)
+    replay = Replay(meshcat, RobotDisplay(film.arm, meshes=True), film)
     typer.echo(f"{file.title}: {_summary(film)}")
     talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
     if browser:
@@ -226,7 +228,7 @@ def export(path: Path, robot: str | None, page: Path, *, meshes: bool) -> dict[s
             "This page holds the robot's meshes in another format: every triangle in its place, no "
             f"textures. Its robot file says of them: {file.source}"
         )
-    stage = Stage(film.arm, meshes=meshes)
+    stage = RobotDisplay(film.arm, meshes=meshes)
     text = replay_page(open_meshcat(), stage, film, title=file.title, notes=notes).encode()
     with whole_file(page, "Page") as stream:
         stream.write(text)
@@ -253,7 +255,7 @@ def report_page(result: dict[str, Any]) -> None:
         )
 
 
-def _summary(film: Film) -> str:
+def _summary(film: RunView) -> str:
     """Return what a run is, in one line."""
     said = film.run.metadata
     words = [f"{film.length:.1f} s, {len(film.run)} samples"]

@@ -19,8 +19,8 @@ from tcs.errors import GridError
 
 if TYPE_CHECKING:
     from tcs.model.robots import RobotFile
-    from tcs.teleop.experiment import Experiment
-    from tcs.teleop.maps import DrivenMaps
+    from tcs.teleop.experiment.maps import ControllerMaps
+    from tcs.teleop.experiment.within_subject import Experiment
 
 FILES = ("experiment.html", "experiment.md", "trials.csv", "line.json")
 
@@ -67,13 +67,13 @@ def experiment(
     from tcs.output.report import as_html, as_markdown
     from tcs.output.report.teleop import experiment_page
     from tcs.teleop.arm import load_arm
-    from tcs.teleop.experiment import Plan, run_experiment
-    from tcs.teleop.lines import find_course
-    from tcs.teleop.maps import check_robot, maps_of
-    from tcs.teleop.run import check_format
+    from tcs.teleop.experiment.course import find_course
+    from tcs.teleop.experiment.maps import check_map_robot, controller_maps
+    from tcs.teleop.experiment.within_subject import ExperimentPlan, run_experiment
+    from tcs.teleop.runs.files import check_format
 
     began = time.monotonic()
-    plan = Plan(
+    plan = ExperimentPlan(
         operators=asked.operators, trials=asked.trials, training=asked.training, seed=asked.seed
     )
     runs = None
@@ -81,9 +81,9 @@ def experiment(
         runs = asked.out / "runs"
         check_format(runs / f"run{asked.runs_as}")
     robot = load_robot(asked.robot)
-    arm = load_arm(robot, lift=torso_lift(robot, asked.lift))
+    arm = load_arm(robot, torso_height=torso_lift(robot, asked.lift))
     if asked.maps:
-        check_robot(arm)
+        check_map_robot(arm)
     # Only now: what is refused leaves no empty folder behind.
     make_folder(runs or asked.out)
     for name in FILES:
@@ -93,12 +93,12 @@ def experiment(
         arm, course, plan, runs=runs, runs_as=asked.runs_as or ".csv", jobs=jobs,
         on_progress=on_progress,
     )  # fmt: skip
-    maps = maps_of(done) if asked.maps else None
+    maps = controller_maps(done) if asked.maps else None
     seconds = time.monotonic() - began
     page = experiment_page(done, maps, seconds=seconds, command=asked.command())
     line = {
         "robot": arm.name,
-        "lift": arm.lift,
+        "lift": arm.torso_height,
         "start": course.line.start,
         "end": course.line.end,
         "joints": course.joints.tolist(),
@@ -152,7 +152,7 @@ def torso_lift(robot: RobotFile, asked: float | None) -> float:
 def report(result: dict[str, Any]) -> None:
     """Print medians, tests and what was written."""
     from tcs.output.report.teleop_tables import NAMES, SCALE
-    from tcs.teleop.experiment import SCRIPTED
+    from tcs.teleop.experiment.within_subject import SCRIPTED
 
     out = talk.paper()
     out.print(f"{result['operators']} {SCRIPTED}, robot {result['robot']}, seed {result['seed']}")
@@ -177,8 +177,8 @@ def report(result: dict[str, Any]) -> None:
         out.print(f"runs in {result['runs']}")
 
 
-def _numbers(done: Experiment, maps: DrivenMaps | None) -> dict[str, Any]:
-    from tcs.teleop.trial import MEASURES
+def _numbers(done: Experiment, maps: ControllerMaps | None) -> dict[str, Any]:
+    from tcs.teleop.experiment.trial import MEASURES
 
     return {
         "medians": {
@@ -205,14 +205,14 @@ def _numbers(done: Experiment, maps: DrivenMaps | None) -> dict[str, Any]:
 
 def _trials(done: Experiment) -> bytes:
     """Return every trial as CSV, in SI units."""
-    from tcs.teleop.experiment import samples_rows
-    from tcs.teleop.trial import MEASURES
+    from tcs.teleop.experiment.trial import MEASURES
+    from tcs.teleop.experiment.within_subject import trial_rows
 
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         ["scripted_operator", "controller", "place_in_order", "training", "trial", *MEASURES]
     )
-    for row in samples_rows(done, MEASURES):
+    for row in trial_rows(done, MEASURES):
         writer.writerow([f"{x:.9g}" if isinstance(x, float) else x for x in row])
     return text.getvalue().encode()

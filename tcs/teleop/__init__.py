@@ -1,9 +1,15 @@
-"""Teleoperation of a redundant arm: driving its tool, and reshaping it while the tool stays."""
+"""Teleoperation of a redundant seven-joint arm: tool motion and null-space motion.
+
+In: an arm read off a robot file (`load_arm`) and one `Command` per control period. Out: one `Step`
+per period (joints, tool pose, limits, singularity, reason for a stop), recorded as runs.
+Subpackages: `control` (the control law), `operators` (scripted ones), `runs` (recorded steps and
+their files) and `experiment` (the null-space paper's trials, metrics and statistics).
+"""
 
 from __future__ import annotations
 
 from tcs.teleop.arm import Arm, load_arm
-from tcs.teleop.session import Step, Teleoperation
-from tcs.teleop.settings import Command, Mode, Settings
+from tcs.teleop.control.session import Step, Teleoperation
+from tcs.teleop.control.settings import Command, Mode, Settings
 
 __all__ = ["Arm", "Command", "Mode", "Settings", "Step", "Teleoperation", "load_arm"]

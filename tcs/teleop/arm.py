@@ -15,7 +15,7 @@ from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import NOWHERE, Scene, SceneSpec, arm_chain
 
 JOINTS = 7
-UNSAID_VELOCITY = 1.0
+DEFAULT_VELOCITY = 1.0
 """Velocity limit of a joint whose URDF gives none [rad/s]: slower than any arm that ships."""
 
 
@@ -39,7 +39,7 @@ class Arm:
         lower: Lower limits in force [rad], shape (7,); -inf where a joint turns on and on.
         upper: Upper limits in force [rad], shape (7,); +inf where a joint turns on and on.
         velocity: Greatest joint rates [rad/s], shape (7,).
-        lift: Where the torso stands [m]; 0 for a robot without one.
+        torso_height: Height of the torso joint [m]; 0 for a robot without one.
         frames: What lies between neighbouring link frames, shape (8, 4, 4): X_BL1 at zero, six
             steps X_Li-1,Li at zero, X_L7T. Link i turns about the z axis of Li.
     """
@@ -48,7 +48,7 @@ class Arm:
     lower: FloatArray
     upper: FloatArray
     velocity: FloatArray
-    lift: float
+    torso_height: float
     frames: FloatArray = field(repr=False)
     _parts: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
 
@@ -131,7 +131,7 @@ class Arm:
             )
         return values
 
-    def beyond(self, joints: FloatArray) -> str:
+    def limit_violation(self, joints: FloatArray) -> str:
         """Return which joint breaks its limits and by what, empty if none does.
 
         Args:
@@ -156,23 +156,23 @@ class Arm:
         return rng.uniform(lower, upper, size=(count, JOINTS))
 
 
-def load_arm(robot: RobotFile | str | Path, *, lift: float = 0.0) -> Arm:
+def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm:
     """Return the scored arm of a robot, read off its Drake plant.
 
     Args:
         robot: The robot, its name, or the path of a robot file.
-        lift: How high the torso stands [m]; taken to the nearest height it can have.
+        torso_height: Height of the torso joint [m], clipped to its range.
 
     Raises:
         UnknownNameError: If there is no robot of that name.
         RobotError: If the robot file or its model cannot be used.
-        TcsError: If the lift is not finite.
+        TcsError: If the torso height is not finite.
     """
-    if not math.isfinite(lift):
-        raise TcsError(f"lift of the torso: must be a finite number [m], not {lift}.")
+    if not math.isfinite(torso_height):
+        raise TcsError(f"torso height: must be a finite number [m], not {torso_height}.")
     file = robot if isinstance(robot, RobotFile) else load_robot(robot)
     scene = Scene(SceneSpec(file, NOWHERE))
-    used = scene.set_torso(lift)
+    used = scene.set_torso(torso_height)
     scene.set_arm(np.zeros(JOINTS))
     chain, _ = arm_chain(scene)
     built = scene.built
@@ -186,7 +186,7 @@ def load_arm(robot: RobotFile | str | Path, *, lift: float = 0.0) -> Arm:
         robot=file,
         lower=chain.lower.copy(),
         upper=chain.upper.copy(),
-        velocity=np.where(np.isfinite(fastest), fastest, UNSAID_VELOCITY),
-        lift=used,
+        velocity=np.where(np.isfinite(fastest), fastest, DEFAULT_VELOCITY),
+        torso_height=used,
         frames=frames,
     )

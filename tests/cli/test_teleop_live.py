@@ -14,10 +14,10 @@ import pytest
 
 from tcs.cli.teleop_live_work import _followed
 from tcs.teleop import Command, Teleoperation, load_arm
-from tcs.teleop.lines import find_course
-from tcs.teleop.metrics import Line
-from tcs.teleop.run import load_run, save_run
-from tcs.teleop.trial import run_of
+from tcs.teleop.experiment.course import find_course
+from tcs.teleop.line import Line
+from tcs.teleop.runs.files import load_run, save_run
+from tcs.teleop.runs.recorder import run_from_steps
 
 READY_DEG = (0, 34, 0, -80, 0, 57, 0)
 
@@ -30,7 +30,7 @@ def saved(tmp_path_factory):
     command = Command(linear=(0.1, 0.0, 0.0))
     rows = [(command, session.step(command)) for _ in range(100)]
     path = tmp_path_factory.mktemp("run") / "run.csv"
-    save_run(path, run_of(arm, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"}))
+    save_run(path, run_from_steps(arm, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"}))
     return path
 
 
@@ -231,7 +231,7 @@ def test_how_well_a_line_was_followed_is_told():
     rows = [(one, session.step(one)) for one in asked]
     session.place(np.radians(READY_DEG))
     rows += [(one, session.step(one)) for one in [Command()] * 50 + [command] * 190]
-    told = _followed(run_of(arm, rows, {}), line)
+    told = _followed(run_from_steps(arm, rows, {}), line)
     # 0.18 m to the sphere at 0.1 m/s, and some time to speed up.
     seconds = float(told.split("took ")[1].split(" s")[0])
     assert 1.8 <= seconds <= 1.9

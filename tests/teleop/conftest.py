@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tcs.teleop import load_arm
-from tcs.teleop.lines import find_course
+from tcs.teleop.experiment.course import find_course
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from tcs.errors import TcsError, UnknownNameError
 from tcs.model.robots import load_robot
 from tcs.model.scene import EnvironmentFile, Scene, SceneSpec
 from tcs.teleop import load_arm
-from tcs.teleop.arm import UNSAID_VELOCITY, Arm
+from tcs.teleop.arm import DEFAULT_VELOCITY, Arm
 
 ROBOTS = ("iiwa7", "pr2", "tiago", "panda", "pr2_right")
 NOWHERE = EnvironmentFile(name="nowhere", title="", origin="", source="none", floor=False, grid={})
@@ -16,9 +16,9 @@ NOWHERE = EnvironmentFile(name="nowhere", title="", origin="", source="none", fl
 @pytest.mark.parametrize("lift", [0.0, 0.2])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_tool_and_jacobian_are_those_of_drake(name, lift, rng):
-    arm = load_arm(name, lift=lift)
+    arm = load_arm(name, torso_height=lift)
     scene = Scene(SceneSpec(load_robot(name), NOWHERE))
-    assert scene.set_torso(lift) == arm.lift
+    assert scene.set_torso(lift) == arm.torso_height
     for joints in arm.random_joints(rng, 20):
         scene.set_arm(joints)
         X_BT, ours = scene.tool_pose(), arm.kinematics(joints)
@@ -70,7 +70,7 @@ def test_a_joint_without_a_velocity_limit_moves_slowly(tmp_path):
     (tmp_path / "slow.urdf").write_text(text.replace('velocity="1.745329252"', ""))
     file = tmp_path / "slow.yaml"
     file.write_text(f"based_on: iiwa7\nurdf: {tmp_path / 'slow.urdf'}\n")
-    assert load_arm(file).velocity[2] == UNSAID_VELOCITY
+    assert load_arm(file).velocity[2] == DEFAULT_VELOCITY
 
 
 def test_arrays_cannot_be_written_to():
@@ -92,16 +92,16 @@ def test_joints_that_are_no_seven_numbers_are_refused(joints):
 
 def test_the_joint_beyond_its_limits_is_named():
     arm = load_arm("iiwa7")
-    assert arm.beyond(np.zeros(7)) == ""
-    assert arm.beyond(arm.upper) == ""
-    said = arm.beyond(np.array([0.0, 0, 0, -2.2, 0, 0, 0]))
+    assert arm.limit_violation(np.zeros(7)) == ""
+    assert arm.limit_violation(arm.upper) == ""
+    said = arm.limit_violation(np.array([0.0, 0, 0, -2.2, 0, 0, 0]))
     assert said.startswith("joint 4 ('iiwa_joint_4') is at -2.2000 rad, outside its limits -2.09")
 
 
 def test_random_joints_keep_within_the_limits(rng):
     arm = load_arm("pr2")
     drawn = arm.random_joints(rng, 1000)
-    assert all(arm.beyond(joints) == "" for joints in drawn)
+    assert all(arm.limit_violation(joints) == "" for joints in drawn)
     assert np.abs(drawn[:, ~arm.bounded]).max() <= np.pi
 
 
@@ -118,5 +118,5 @@ def test_an_arm_knows_its_robot():
 
 @pytest.mark.parametrize("lift", [np.nan, np.inf])
 def test_a_lift_that_is_no_number_is_refused(lift):
-    with pytest.raises(TcsError, match="lift of the torso: must be a finite number"):
-        load_arm("tiago", lift=lift)
+    with pytest.raises(TcsError, match="torso height: must be a finite number"):
+        load_arm("tiago", torso_height=lift)

@@ -38,15 +38,15 @@ from tcs.output.report.teleop_tables import (
     trials_table,
 )
 from tcs.output.report.words import p_value
-from tcs.teleop.experiment import HYPOTHESES, SCRIPTED, Experiment, ratio_of_medians
-from tcs.teleop.lines import BLOCKED_AFTER
-from tcs.teleop.maps import DrivenMaps
-from tcs.teleop.operators import Traits
-from tcs.teleop.trial import END_EFFECTOR, NOVEL
+from tcs.teleop.experiment.course import BLOCKED_AFTER
+from tcs.teleop.experiment.maps import ControllerMaps
+from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
+from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment, median_ratio
+from tcs.teleop.operators.scripted import OperatorTraits
 
 
 def experiment_page(
-    experiment: Experiment, maps: DrivenMaps | None = None, *, seconds: float, command: str
+    experiment: Experiment, maps: ControllerMaps | None = None, *, seconds: float, command: str
 ) -> Page:
     """Return the experiment as a page.
 
@@ -86,7 +86,7 @@ def findings(experiment: Experiment) -> list[str]:
         "and nothing about what people feel."
     ]
     for name in HYPOTHESES:
-        test, ratio = tests[name], ratio_of_medians(experiment, name)
+        test, ratio = tests[name], median_ratio(experiment, name)
         theirs = PAPER[name][1] / PAPER[name][0]
         there, here = (median_of(experiment, one, name) for one in (END_EFFECTOR.name, NOVEL.name))
         said.append(
@@ -149,12 +149,12 @@ def _paths(experiment: Experiment) -> list[Block]:
 
 def _operators(experiment: Experiment) -> list[Block]:
     rows = []
-    for field in fields(Traits):
+    for field in fields(OperatorTraits):
         values = [getattr(one, field.name) for one in experiment.traits]
         rows.append(
             [
                 field.name.replace("_", " "),
-                number(getattr(Traits(), field.name)),
+                number(getattr(OperatorTraits(), field.name)),
                 number(values[0])
                 if len({*values}) == 1
                 else f"{number(min(values))} to {number(max(values))}",

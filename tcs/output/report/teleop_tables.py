@@ -8,9 +8,9 @@ import numpy as np
 
 from tcs.output.report.blocks import Block, Column, Table, Text
 from tcs.output.report.words import p_value
-from tcs.teleop.experiment import HYPOTHESES, SCRIPTED, Experiment
-from tcs.teleop.maps import DrivenMaps
-from tcs.teleop.trial import END_EFFECTOR, NOVEL
+from tcs.teleop.experiment.maps import ControllerMaps
+from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
+from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment
 
 PAPER = {"accuracy": (0.0572, 0.0351), "time": (37.09, 36.65), "effort": (0.25e-6, 0.11e-6)}
 """Medians of end-effector control and of the novel controller: null-space paper, Table II, of 26
@@ -175,7 +175,7 @@ def learning_table(experiment: Experiment) -> Table:
     )
 
 
-def maps_blocks(experiment: Experiment, maps: DrivenMaps) -> list[Block]:
+def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:
     """Return how the capability map changes with the controller."""
     rows = []
     for one in maps.maps:

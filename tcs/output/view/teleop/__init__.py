@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from tcs.output.view.teleop.live import LivePage
-from tcs.output.view.teleop.recorder import Recorder
-from tcs.output.view.teleop.replay import Film, Replay, replay_page
-from tcs.output.view.teleop.stage import Stage
+from tcs.output.view.teleop.replay import Replay, RunView, replay_page
+from tcs.output.view.teleop.robot_display import RobotDisplay
 from tcs.output.view.teleop.start import start_posture
+from tcs.teleop.runs.recorder import Recorder
 
-__all__ = ["Film", "LivePage", "Recorder", "Replay", "Stage", "replay_page", "start_posture"]
+__all__ = [
+    "LivePage",
+    "Recorder",
+    "Replay",
+    "RobotDisplay",
+    "RunView",
+    "replay_page",
+    "start_posture",
+]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.output.view.teleop.gamepad import DOWN as PAD_DOWN
-from tcs.output.view.teleop.gamepad import UP, A, Asked, Gamepad, Pad
+from tcs.output.view.teleop.gamepad import UP, A, Asked, Gamepad, GamepadState
 from tcs.teleop import Command, Mode
-from tcs.teleop.settings import RESHAPING
+from tcs.teleop.control.settings import NULL_SPACE_MODES
 
 FloatArray = NDArray[np.float64]
 TAP = 0.15
@@ -91,7 +91,7 @@ class Reading:
     sliders: Mapping[str, float]
     clicks: Mapping[str, int]
     """How often each button has been pressed since it is there."""
-    pad: Pad | None
+    pad: GamepadState | None
     watched: bool
     """Whether a browser looks at the page."""
 
@@ -109,7 +109,7 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class OperatorCommand:
     """What a person wants in one step."""
 
     command: Command
@@ -124,7 +124,7 @@ class Heard:
 
 
 @dataclass
-class Hand:
+class OperatorInput:
     """A person at the controls, over time."""
 
     source: Source
@@ -145,7 +145,7 @@ class Hand:
         """What commands move."""
         return self.modes[self._mode]
 
-    def listen(self, now: float) -> Heard:
+    def listen(self, now: float) -> OperatorCommand:
         """Return what is asked for.
 
         Args:
@@ -169,8 +169,8 @@ class Hand:
                 self.source.zero()
         if lost or back or STOP in pressed:
             command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
-            return Heard(command, lost, back=back, watched=reading.watched)
-        return Heard(self._command(reading, asked, now), hint=self._hint_at(now))
+            return OperatorCommand(command, lost, back=back, watched=reading.watched)
+        return OperatorCommand(self._command(reading, asked, now), hint=self._hint_at(now))
 
     def _pressed(self, reading: Reading, now: float) -> dict[str, int]:
         """Return the buttons pressed since the last look, and how often."""
@@ -185,7 +185,7 @@ class Hand:
 
     def _obey(self, pressed: Mapping[str, int], asked: Asked, now: float) -> None:
         """Change mode, group and clutch."""
-        reshaping = self.mode in RESHAPING
+        reshaping = self.mode in NULL_SPACE_MODES
         for number in range(self.groups):
             if group_button(number) in pressed:
                 self.group = number
@@ -211,7 +211,7 @@ class Hand:
 
     def _command(self, reading: Reading, asked: Asked, now: float) -> Command:
         clutch = self.clutch or asked.clutch
-        if self.mode in RESHAPING:
+        if self.mode in NULL_SPACE_MODES:
             down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
             sign = int(np.sign(int(up) - int(down) + asked.turn))
             group = self.group if self.mode is Mode.NULL_SPACE and sign else None

@@ -21,7 +21,7 @@ UP, DOWN, LEFT, RIGHT = 12, 13, 14, 15
 
 
 @dataclass(frozen=True, slots=True)
-class Pad:
+class GamepadState:
     """What a gamepad is doing, as the browser has told it last; axes in [-1, 1]."""
 
     axes: tuple[float, ...]
@@ -71,12 +71,12 @@ class Gamepad:
 
     def __init__(self) -> None:
         """Begin without one."""
-        self._last: Pad | None = None
+        self._last: GamepadState | None = None
         self._changed = 0.0
         self._heeded = False
         self._lost = ""
 
-    def look(self, pad: Pad | None, now: float) -> Asked:
+    def look(self, pad: GamepadState | None, now: float) -> Asked:
         """Return what is asked for now.
 
         Left stick: ahead and sideways; right stick: up, and turning about the vertical. With the
@@ -135,7 +135,9 @@ class Gamepad:
         self._heeded, self._lost = False, ""
 
 
-def pad_of(index: int | None, axes: Sequence[float], buttons: Sequence[float]) -> Pad | None:
+def gamepad_state(
+    index: int | None, axes: Sequence[float], buttons: Sequence[float]
+) -> GamepadState | None:
     """Return what Meshcat tells of a gamepad; None if it has none.
 
     When a gamepad goes, the browser sends an empty message; Meshcat then keeps the last index and
@@ -143,4 +145,4 @@ def pad_of(index: int | None, axes: Sequence[float], buttons: Sequence[float]) -
     """
     if index is None or not (len(axes) or len(buttons)):
         return None
-    return Pad(tuple(axes), tuple(buttons))
+    return GamepadState(tuple(axes), tuple(buttons))

@@ -12,16 +12,16 @@ from pydrake.geometry import Meshcat
 
 from tcs.output.view.teleop.controls import (
     RATE_SLIDERS,
-    Hand,
-    Heard,
+    OperatorCommand,
+    OperatorInput,
     Reading,
     buttons,
     sliders,
 )
-from tcs.output.view.teleop.gamepad import pad_of
-from tcs.output.view.teleop.pace import Pace, Times
+from tcs.output.view.teleop.gamepad import gamepad_state
 from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
-from tcs.output.view.teleop.stage import TARGET, TOOL, Stage, Trail, pose_of
+from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
+from tcs.output.view.teleop.timing import Durations, StepClock
 from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation
 
 FloatArray = NDArray[np.float64]
@@ -61,7 +61,7 @@ class MeshcatControls:
                 name: meshcat.GetButtonClicks(f"{name} ({key_name(key)})")
                 for name, key in self._buttons.items()
             },
-            pad_of(pad.index, pad.axes, pad.button_values),
+            gamepad_state(pad.index, pad.axes, pad.button_values),
             meshcat.GetNumActiveConnections() > 0,
         )
 
@@ -86,7 +86,7 @@ class LivePage:
     def __init__(
         self,
         meshcat: Meshcat,
-        stage: Stage,
+        stage: RobotDisplay,
         arm: Arm,
         start: FloatArray,
         *,
@@ -112,10 +112,10 @@ class LivePage:
             TcsError: If the start posture is not seven finite numbers.
         """
         self.session = Teleoperation(arm, start, settings, modes[0])
-        self.hand = Hand(
+        self.hand = OperatorInput(
             MeshcatControls(meshcat, len(settings.groups)), modes, len(settings.groups)
         )
-        self.steps, self.pictures, self.worked = Times(), Times(), Times()
+        self.steps, self.pictures, self.worked = Durations(), Durations(), Durations()
         self.dropped = 0
         self._meshcat, self._stage, self._arm = meshcat, stage, arm
         self._start = np.array(start, dtype=np.float64)
@@ -127,7 +127,7 @@ class LivePage:
         stage.set_up(meshcat, arm.kinematics(self._start).p)
         self._panel = Panel(meshcat, arm)
         self._trail = Trail(meshcat)
-        self._heard = Heard(Command())
+        self._heard = OperatorCommand(Command())
         self.last = self.session.step(Command(clutch=True))
         self.show()
 
@@ -175,7 +175,7 @@ class LivePage:
 
     def run(self, duration: float | None = None) -> None:
         """Drive the arm for so long [s], or until interrupted."""
-        pace = Pace(self.session.settings.period)
+        pace = StepClock(self.session.settings.period)
         end = None if duration is None else time.monotonic() + duration
         since = 0
         while end is None or time.monotonic() < end:

@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform
 
 from tcs.output.view.teleop.text import ADVANCE, text_mesh
 from tcs.teleop import Arm
-from tcs.teleop.flags import ShortArray, share_of_range
+from tcs.teleop.control.status import ShortArray, range_fraction
 
 FloatArray = NDArray[np.float64]
 PANEL = "/Cameras/default/rotated/<object>/panel"
@@ -81,7 +81,7 @@ def readout(
     """
     # A joint without limits stands where it has turned to, from half a turn back to half a turn on.
     turned = (np.asarray(joints) + math.pi) % (2.0 * math.pi) / (2.0 * math.pi)
-    shares = np.where(arm.bounded, share_of_range(arm, np.asarray(joints)), turned)
+    shares = np.where(arm.bounded, range_fraction(arm, np.asarray(joints)), turned)
     other = SINGULAR if singular else FREE
     states = tuple(LIMIT if flag else other for flag in limits)
     return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, said)

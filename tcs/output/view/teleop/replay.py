@@ -26,10 +26,10 @@ from tcs.output.view.teleop.panel import (
     readout,
     state_facts,
 )
-from tcs.output.view.teleop.stage import TOOL, Stage, draw_course, draw_path, pose_of
+from tcs.output.view.teleop.robot_display import TOOL, RobotDisplay, draw_course, draw_path, pose_of
 from tcs.teleop import Arm, Mode, Settings
-from tcs.teleop.run import NO_GROUP, Run
-from tcs.teleop.trial import GOAL_RADIUS
+from tcs.teleop.experiment.trial import GOAL_RADIUS
+from tcs.teleop.runs.run import NO_GROUP, Run
 
 FloatArray = NDArray[np.float64]
 PLACE, SPEED = "time [s]", "speed"
@@ -43,7 +43,7 @@ _PICTURE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class RunView:
     """What there is to see of a run."""
 
     arm: Arm
@@ -115,7 +115,7 @@ class Film:
 class Replay:
     """A film in a Meshcat, with a slider for its time."""
 
-    def __init__(self, meshcat: Meshcat, stage: Stage, film: Film) -> None:
+    def __init__(self, meshcat: Meshcat, stage: RobotDisplay, film: RunView) -> None:
         """Show the first sample, and play on from there.
 
         Args:
@@ -178,7 +178,7 @@ class Replay:
 
 
 def replay_page(
-    meshcat: Meshcat, stage: Stage, film: Film, *, title: str, notes: Sequence[str] = ()
+    meshcat: Meshcat, stage: RobotDisplay, film: RunView, *, title: str, notes: Sequence[str] = ()
 ) -> str:
     """Return one page that plays the run without a server.
 

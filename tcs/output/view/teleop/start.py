@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.output.view.teleop.stage import Stage
+from tcs.output.view.teleop.robot_display import RobotDisplay
 from tcs.teleop import Arm, Settings
-from tcs.teleop.control import smallest_singular_value
-from tcs.teleop.flags import share_of_range
+from tcs.teleop.control.resolved_rate import smallest_singular_value
+from tcs.teleop.control.status import range_fraction
 
 FloatArray = NDArray[np.float64]
 _CANDIDATES, _TRIED, _CLIMB = 3000, 20, 500
@@ -19,7 +19,7 @@ _AREA = ((0.4, 0.75), (-0.3, 0.3), (-0.4, 0.4))
 """Where the tool may be from the shoulder: ahead, left, up, in shares of the arm's length."""
 
 
-def start_posture(arm: Arm, stage: Stage) -> FloatArray:
+def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
     """Return a posture from which there is room to move, the same each time [rad], shape (7,).
 
     Of postures within the limits whose tool points ahead, one with much room: the smallest
@@ -62,6 +62,6 @@ def _room(arm: Arm, joints: FloatArray, low: FloatArray, high: FloatArray) -> fl
     at = arm.kinematics(joints)
     if at.R[0, 0] < _AHEAD or (at.p < low).any() or (at.p > high).any():
         return 0.0
-    shares = share_of_range(arm, joints)
+    shares = range_fraction(arm, joints)
     room = float(np.minimum(shares, 1.0 - shares)[arm.bounded].min(initial=0.5))
     return max(room, 0.0) * smallest_singular_value(at.jacobian, Settings().length)

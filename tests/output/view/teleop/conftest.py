@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tcs.output.view import open_meshcat
-from tcs.output.view.teleop import LivePage, Stage
+from tcs.output.view.teleop import LivePage, RobotDisplay
 from tcs.output.view.teleop.controls import Reading, buttons, sliders
 from tcs.teleop import Command, Mode, Settings, Teleoperation, load_arm
-from tcs.teleop.trial import run_of
+from tcs.teleop.runs.recorder import run_from_steps
 
 MODES = (Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.POSE)
 
@@ -21,7 +21,7 @@ def iiwa():
 
 @pytest.fixture(scope="session")
 def iiwa_stage(iiwa):
-    return Stage(iiwa, meshes=False)
+    return RobotDisplay(iiwa, meshes=False)
 
 
 @pytest.fixture
@@ -108,4 +108,4 @@ def driven(iiwa):
     asked += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
     asked += [(Command(mode=Mode.END_EFFECTOR, linear=(0.25, 0.0, 0.1)), 500)]
     rows = [(command, session.step(command)) for command, count in asked for _ in range(count)]
-    return run_of(iiwa, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"})
+    return run_from_steps(iiwa, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.output.view import open_meshcat
-from tcs.output.view.teleop import Film, LivePage, replay_page
+from tcs.output.view.teleop import LivePage, RunView, replay_page
 from tcs.output.view.teleop.panel import COLOURS
 from tcs.teleop import Settings
 from tests.output.view.browser import chromium
@@ -209,7 +209,7 @@ def test_a_closed_browser_stops_the_arm(page, browser):
 
 
 def test_played_run_needs_no_server(browser, iiwa, iiwa_stage, driven, tmp_path):
-    film = Film(iiwa, driven)
+    film = RunView(iiwa, driven)
     path = tmp_path / "run.html"
     meshcat = open_meshcat()
     path.write_text(replay_page(meshcat, iiwa_stage, film, title="A run"))

@@ -17,12 +17,12 @@ from tcs.output.view.teleop.controls import (
     TURN_DOWN,
     TURN_SPEED,
     TURN_UP,
-    Hand,
+    OperatorInput,
     buttons,
     group_button,
     sliders,
 )
-from tcs.output.view.teleop.gamepad import Pad
+from tcs.output.view.teleop.gamepad import GamepadState
 from tcs.teleop import Mode
 from tests.output.view.teleop.conftest import MODES
 
@@ -31,7 +31,7 @@ X = RATE_SLIDERS[0]
 
 @pytest.fixture
 def hand(desk):
-    return Hand(desk, MODES, 4)
+    return OperatorInput(desk, MODES, 4)
 
 
 def twist(heard):
@@ -121,7 +121,7 @@ def test_tool_rates_are_not_sent_while_the_tool_is_held(hand, desk):
 
 
 def test_one_mode_alone_says_so(desk):
-    hand = Hand(desk, (Mode.END_EFFECTOR,), 4)
+    hand = OperatorInput(desk, (Mode.END_EFFECTOR,), 4)
     desk.press(NEXT_MODE)
     heard = hand.listen(0.0)
     assert heard.command.mode is Mode.END_EFFECTOR
@@ -149,7 +149,7 @@ def test_without_a_browser_the_arm_is_held_and_sliders_go_back(hand, desk):
 
 
 def test_what_a_gamepad_said_to_a_browser_that_is_gone_is_forgotten(hand, desk):
-    rest, push = Pad((0.0,) * 4, ()), Pad((0.0, -1.0, 0.0, 0.0), ())
+    rest, push = GamepadState((0.0,) * 4, ()), GamepadState((0.0, -1.0, 0.0, 0.0), ())
     desk.pad = rest
     hand.listen(0.0)
     hand.listen(0.01)
@@ -167,7 +167,7 @@ def test_what_a_gamepad_said_to_a_browser_that_is_gone_is_forgotten(hand, desk):
 
 
 def test_a_lost_gamepad_holds_the_arm_until_space(hand, desk):
-    desk.pad = Pad((0.0,) * 4, ())
+    desk.pad = GamepadState((0.0,) * 4, ())
     hand.listen(0.0)
     hand.listen(0.01)
     desk.sliders[X] = 0.2
@@ -186,7 +186,7 @@ def test_a_lost_gamepad_holds_the_arm_until_space(hand, desk):
 
 def test_gamepad_chooses_mode_and_group(hand, desk):
     def push(*pressed):
-        desk.pad = Pad((0.0,) * 4, tuple(float(i in pressed) for i in range(17)))
+        desk.pad = GamepadState((0.0,) * 4, tuple(float(i in pressed) for i in range(17)))
 
     push()
     hand.listen(0.0)

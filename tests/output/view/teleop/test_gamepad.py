@@ -2,7 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from tcs.output.view.teleop.gamepad import DEAD_ZONE, STUCK_AFTER, Gamepad, Pad, pad_of
+from tcs.output.view.teleop.gamepad import (
+    DEAD_ZONE,
+    STUCK_AFTER,
+    Gamepad,
+    GamepadState,
+    gamepad_state,
+)
 
 NOTHING = (0.0,) * 17
 
@@ -11,7 +17,7 @@ def pushed(*axes, buttons=()):
     values = [0.0] * 17
     for button in buttons:
         values[button] = 1.0
-    return Pad((*axes, *(0.0,) * (4 - len(axes))), tuple(values))
+    return GamepadState((*axes, *(0.0,) * (4 - len(axes))), tuple(values))
 
 
 @pytest.fixture
@@ -24,10 +30,10 @@ def heeded():
 
 
 def test_meshcat_without_a_gamepad_gives_none():
-    assert pad_of(None, (), ()) is None
+    assert gamepad_state(None, (), ()) is None
     # What Meshcat tells after a gamepad has gone.
-    assert pad_of(0, [], []) is None
-    assert pad_of(1, [0.5], [1.0]) == Pad((0.5,), (1.0,))
+    assert gamepad_state(0, [], []) is None
+    assert gamepad_state(1, [0.5], [1.0]) == GamepadState((0.5,), (1.0,))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +118,7 @@ def test_a_hand_that_moves_may_push_for_long(heeded):
 def test_a_gamepad_with_fewer_buttons_or_axes_is_no_error():
     pad = Gamepad()
     for now in (0.0, 0.01, 0.02):
-        asked = pad.look(Pad((0.0,), ()), now)
+        asked = pad.look(GamepadState((0.0,), ()), now)
     assert asked.linear == (0.0, 0.0, 0.0)
 
 

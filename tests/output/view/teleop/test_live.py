@@ -7,7 +7,7 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.output.view import open_meshcat
-from tcs.output.view.teleop import LivePage, Recorder, Stage, start_posture
+from tcs.output.view.teleop import LivePage, Recorder, RobotDisplay, start_posture
 from tcs.output.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
 from tcs.output.view.teleop.live import key_name
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR, readout
@@ -118,9 +118,9 @@ def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, 
 
 
 def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
-    from tcs.output.view.teleop import recorder as module
+    from tcs.teleop.runs import recorder as module
     from tcs.teleop import Command, Teleoperation
-    from tcs.teleop.trial import run_of
+    from tcs.teleop.runs.recorder import run_from_steps
 
     monkeypatch.setattr(module, "_BLOCK", 10)
     session = Teleoperation(iiwa, ready)
@@ -130,7 +130,7 @@ def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
     for row in rows:
         found.add(*row)
     assert len(found) == 33
-    run, whole = found.run({"robot": "iiwa7"}), run_of(iiwa, rows, {})
+    run, whole = found.run({"robot": "iiwa7"}), run_from_steps(iiwa, rows, {})
     assert run.metadata == {"robot": "iiwa7"}
     for name in ("time", "joints", "position", "quaternion", "linear", "group", "mode", "limits"):
         np.testing.assert_array_equal(getattr(run, name), getattr(whole, name), err_msg=name)
@@ -144,10 +144,10 @@ def test_the_page_has_all_its_controls(page, meshcat):
 
 @pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
 def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
-    arm = load_arm(name, lift=0.1)
-    stage = Stage(arm, meshes=False)
+    arm = load_arm(name, torso_height=0.1)
+    stage = RobotDisplay(arm, meshes=False)
     start = start_posture(arm, stage)
-    assert arm.beyond(start) == ""
+    assert arm.limit_violation(start) == ""
     stage.poses(start)
     assert stage.contacts() is None
     np.testing.assert_array_equal(start, start_posture(arm, stage))

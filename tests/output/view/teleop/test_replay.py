@@ -7,17 +7,17 @@ import pytest
 
 from tcs.errors import DataFileError
 from tcs.output.view import open_meshcat
-from tcs.output.view.teleop import Film, Replay, replay_page
+from tcs.output.view.teleop import Replay, RunView, replay_page
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR
 from tcs.output.view.teleop.replay import AGAIN, PLACE, PLAY, SPEED
 from tcs.teleop import Command, Teleoperation, load_arm
-from tcs.teleop.trial import run_of
+from tcs.teleop.runs.recorder import run_from_steps
 from tests.output.view.teleop.conftest import Instead
 
 
 @pytest.fixture
 def film(iiwa, driven):
-    return Film(iiwa, driven)
+    return RunView(iiwa, driven)
 
 
 @pytest.fixture
@@ -52,9 +52,9 @@ def test_the_panel_tells_modes_limits_and_singularities(film):
     stretched = int(np.flatnonzero(run.singular)[-1])
     assert SINGULAR in film.readout(stretched).states
     held = dataclasses.replace(run, clutch=np.ones(len(run), bool))
-    assert Film(film.arm, held).readout(0).mode == "end-effector mode; clutch in"
+    assert RunView(film.arm, held).readout(0).mode == "end-effector mode; clutch in"
     stopped = dataclasses.replace(run, stopped=np.ones(len(run), bool))
-    assert Film(film.arm, stopped).readout(0).said == "stopped"
+    assert RunView(film.arm, stopped).readout(0).said == "stopped"
 
 
 def test_it_plays_by_the_clock_and_ends(replay, film):
@@ -106,7 +106,7 @@ def test_the_arm_stands_where_the_run_has_it(replay, meshcat, iiwa_stage, film, 
 
 def test_another_robots_run_is_refused(driven):
     with pytest.raises(DataFileError, match=r"iiwa_joint_1.*'panda'.*--robot"):
-        Film(load_arm("panda"), driven)
+        RunView(load_arm("panda"), driven)
 
 
 def test_page_is_whole_and_small(iiwa_stage, film):
@@ -122,9 +122,9 @@ def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
     session = Teleoperation(iiwa, ready)
     command = Command(angular=(0.0, 0.0, 0.1))
     rows = [(command, session.step(command)) for _ in range(400)]
-    run = run_of(iiwa, rows, {})
+    run = run_from_steps(iiwa, rows, {})
     # As if a sample had been kept every two seconds, for thirteen minutes.
-    long = Film(iiwa, dataclasses.replace(run, time=200.0 * run.time))
+    long = RunView(iiwa, dataclasses.replace(run, time=200.0 * run.time))
     assert long.length > 790
     text = replay_page(open_meshcat(), iiwa_stage, long, title="long")
     assert len(text.encode()) < 10e6
@@ -132,7 +132,7 @@ def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
 
 def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_stage, meshcat):
     ends = {"line_start": [0.6, 0.2, 0.9], "line_end": [-0.1, 0.2, 0.9]}
-    film = Film(iiwa, dataclasses.replace(driven, metadata=ends))
+    film = RunView(iiwa, dataclasses.replace(driven, metadata=ends))
     np.testing.assert_array_equal(film.course[1], ends["line_end"])
     Replay(meshcat, iiwa_stage, film)
     assert meshcat.HasPath("course/line")
@@ -151,13 +151,13 @@ def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_stage, meshcat):
     ids=["none", "no end", "a word", "flat", "no way", "nowhere"],
 )
 def test_a_run_without_a_line_shows_none(driven, iiwa, ends):
-    assert Film(iiwa, dataclasses.replace(driven, metadata=ends)).course is None
+    assert RunView(iiwa, dataclasses.replace(driven, metadata=ends)).course is None
 
 
 def test_pictures_of_a_long_run_go_to_its_end(iiwa_stage, driven, iiwa):
     seen = []
 
-    class Noting(Film):
+    class Noting(RunView):
         def sample(self, seconds):
             seen.append(seconds)
             return super().sample(seconds)

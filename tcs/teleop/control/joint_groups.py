@@ -1,0 +1,189 @@
+"""Null-space control: turning a group of joints while the tool stays (paper, eqs. 9-14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.teleop.arm import JOINTS
+from tcs.teleop.control.least_squares import bounded_minimum
+
+HELD = 1e-9
+"""A group holds the tool alone when it leaves less than this over of a metre [m per rad of the
+lead]: rounding of a Jacobian is a thousand times smaller, and it is as much as the figures of a
+URDF let axes miss each other by."""
+_WEAK = 0.002
+"""Singular value of the followers [m/rad] below which they are eased: to hold a tool that the lead
+joint moves at 0.5 m/rad, they would have to turn 250 times as fast as it does."""
+_EASED = 0.3
+"""How much a follower's rate counts against an outside joint's where the followers can do
+nothing."""
+
+_HOLDING = 1e6
+"""What a velocity of the tool of 1 m/s costs against a rate of the lead joint that is 1 rad/s off:
+a lead joint kept from turning at 0.4 rad/s pulls at the tool by less than 0.01 mm/s."""
+_RESTING = 1e-3
+"""What a rate of 1 rad/s outside the group costs against the same: the lead joint slows down by a
+thousandth where one of them has to turn as fast."""
+_EASED_WITHIN = 1e-3
+"""What a rate of a follower costs against one outside the group."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroupMotion:
+    """Joint rates that turn a group while the tool stays.
+
+    Attributes:
+        rates: Joint rates [rad/s], shape (7,).
+        exact: Whether only joints of the group move.
+        slip: Velocity of the tool that no joint could make up for [m/s].
+    """
+
+    rates: FloatArray
+    exact: bool
+    slip: float
+
+
+def group_motion(
+    jacobian: FloatArray,
+    group: tuple[int, ...],
+    rate: float,
+    velocity: FloatArray | None = None,
+) -> GroupMotion:
+    """Return the motion of a joint group in the null space: N_Jp xi of eq. (11).
+
+    The paper solves 0 = J_p theta' (eq. 10) for a 7 x 4 basis whose columns turn one joint group
+    each (eq. 12), and does not say how that basis is made. Ours: the lead joint turns at rate k,
+    and of all motions that hold the tool we take the one in which the joints outside the group
+    move least (least squares; among equals, the smallest rates within the group). With L the lead
+    joint, F the others of its group, O the rest, v the velocity asked of the tool,
+
+        w = v - J_L k,  N = 1 - J_F J_F^+,  r_O = (N J_O)^+ N w,  r_F = J_F^+ (w - J_O r_O).
+
+    Where the group alone can hold the tool, N w = 0, and r_O is set to exactly zero. Where J_F
+    loses rank, followers would have to race; there their rates count as well, the more the weaker
+    they are, without a jump at the border.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        group: Joints of the group, counted from 0, its lead joint first.
+        rate: Rate of the lead joint: k times the speed of the group [rad/s].
+        velocity: Velocity that the tool is to have, to undo its drift [m/s], shape (3,).
+
+    Returns:
+        The motion; `slip` says whether the tool is held.
+    """
+    lead, own = group[0], list(group[1:])
+    others = [joint for joint in range(JOINTS) if joint not in group]
+    rates = np.zeros(JOINTS)
+    rates[lead] = rate
+    wanted = -(jacobian @ rates)
+    if velocity is not None:
+        wanted = wanted + velocity
+    left: FloatArray = wanted
+    weight = 0.0
+    if own:
+        U, s, Vt = np.linalg.svd(jacobian[:, own], full_matrices=False)
+        weight = _weight(float(s[-1]))
+        if weight == 0.0:
+            left = wanted - U @ (wanted @ U)
+    if weight == 0.0:
+        scale = abs(rate) + float(np.linalg.norm(wanted))
+        exact = float(np.linalg.norm(left)) <= HELD * scale
+        if not exact and others:
+            rest = jacobian[:, others]
+            if own:
+                rest = rest - U @ (U.T @ rest)
+            rates[others] = _smallest(rest, left)
+            wanted = wanted - jacobian[:, others] @ rates[others]
+        if own:
+            rates[own] = ((wanted @ U) / s) @ Vt
+            wanted = wanted - jacobian[:, own] @ rates[own]
+    else:
+        both = own + others
+        cost = np.where(np.arange(len(both)) < len(own), weight, 1.0)
+        rates[both] = _smallest(jacobian[:, both] / cost, wanted) / cost
+        wanted = wanted - jacobian[:, both] @ rates[both]
+        exact = False
+    return GroupMotion(rates, bool(exact), float(np.linalg.norm(wanted)))
+
+
+def bounded_group_motion(
+    jacobian: FloatArray,
+    group: tuple[int, ...],
+    rate: float,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> tuple[FloatArray, BoolArray]:
+    """Return the motion of a joint group in the null space between bounds of the joint rates.
+
+    As `group_motion`, with weights in place of strict order, because bounds want one minimum:
+    holding the tool (`_HOLDING`), then the lead joint's rate (1), then rest outside the group
+    (`_RESTING`), then within it. Where the tool cannot be held at that rate, the lead joint slows
+    down; the minimum changes steadily with posture and bounds.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        group: Joints of the group, counted from 0, its lead joint first.
+        rate: Rate of the lead joint [rad/s].
+        lower: Lowest rates, at most 0 [rad/s], shape (7,).
+        upper: Highest rates, at least 0 [rad/s], shape (7,).
+
+    Returns:
+        Joint rates [rad/s], shape (7,), and which joints are held at a bound, shape (7,).
+    """
+    weights = np.full(JOINTS, _RESTING)
+    weights[list(group)] = _RESTING * _EASED_WITHIN
+    weights[group[0]] = 1.0
+    hessian = _HOLDING * (jacobian.T @ jacobian)
+    hessian.flat[:: JOINTS + 1] += weights
+    slope = np.zeros(JOINTS)
+    slope[group[0]] = rate
+    return bounded_minimum(hessian, slope, lower, upper)
+
+
+def null_space_basis(jacobian: FloatArray, groups: tuple[tuple[int, ...], ...]) -> FloatArray:
+    """Return N_Jp of eq. (11), one column for each joint group, its lead joint at rate 1.
+
+    Args:
+        jacobian: J_p, shape (3, 7) [m/rad].
+        groups: The joint groups, lead joints first.
+
+    Returns:
+        Shape (7, groups).
+    """
+    return np.stack([group_motion(jacobian, group, 1.0).rates for group in groups], axis=1)
+
+
+def elbow_direction(jacobian: FloatArray) -> FloatArray:
+    """Return the joint motion that holds the tool's whole pose, its fastest joint at rate 1.
+
+    Component i is (-1)^i times the determinant of J without column i: it turns with the posture
+    without ever changing sign by itself, unlike the last vector of a singular value decomposition.
+
+    Args:
+        jacobian: Shape (6, 7).
+
+    Returns:
+        Shape (7,); zero at a singularity, where more than one motion holds the pose.
+    """
+    *_, Vt = np.linalg.svd(jacobian)
+    n = Vt[-1]
+    oriented = np.linalg.det(np.vstack([jacobian, n]))
+    largest = float(np.abs(n).max())
+    return np.asarray(n * (np.sign(oriented) / largest), dtype=np.float64)
+
+
+def _weight(singular_value: float) -> float:
+    """Return how much the followers' rates count, from their smallest singular value."""
+    if singular_value >= _WEAK:
+        return 0.0
+    return _EASED * float(np.sqrt(1.0 - (singular_value / _WEAK) ** 2))
+
+
+def _smallest(rows: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the least squares solution of least norm."""
+    # Singular values this far below the largest are rounding of a projection.
+    return np.asarray(np.linalg.lstsq(rows, wanted, rcond=1e-9)[0], dtype=np.float64)

@@ -1,0 +1,272 @@
+"""Teleoperation: one arm, one person, one step after another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import JOINTS, Arm
+from tcs.teleop.control.bounds import approach, rate_bounds, stops_in_time
+from tcs.teleop.control.modes import rate_command
+from tcs.teleop.control.null_space_modes import elbow_sign
+from tcs.teleop.control.resolved_rate import pose_error, rotated
+from tcs.teleop.control.settings import NULL_SPACE_MODES, Command, Mode, Settings
+from tcs.teleop.control.state import ControlState, RateCommand, commanded_twist, mode_rate_bounds
+from tcs.teleop.control.status import ShortArray, configuration_status
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """The arm after one step, and what the person is told about it.
+
+    Attributes:
+        time: Time since the session began [s].
+        joints: Joint positions [rad], shape (7,), always within the limits.
+        rates: Joint rates during the step [rad/s], shape (7,).
+        R: Orientation of the tool in the robot's base, R_BT, shape (3, 3).
+        p: Position of the tool in the robot's base [m], shape (3,).
+        target_R: Orientation that is held or followed, shape (3, 3).
+        target_p: Position that is held or followed [m], shape (3,).
+        mode: What commands move.
+        limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
+        singular: Whether the task of this mode is singular.
+        singular_value: Smallest singular value of the task's Jacobian [m/rad].
+        worst_joint: The joint closest to a limit, in shares of its range, counted from 0.
+        stopped: Whether the arm does not do what the person asks.
+        reason: Why, in one line; empty while it does.
+    """
+
+    time: float
+    joints: FloatArray
+    rates: FloatArray
+    R: FloatArray
+    p: FloatArray
+    target_R: FloatArray
+    target_p: FloatArray
+    mode: Mode
+    limits: ShortArray
+    singular: bool
+    singular_value: float
+    worst_joint: int
+    stopped: bool
+    reason: str
+
+
+class Teleoperation:
+    """An arm that follows a person's commands, one every `settings.period`."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        joints: ArrayLike,
+        settings: Settings | None = None,
+        mode: Mode = Mode.END_EFFECTOR,
+    ) -> None:
+        """Begin with the arm at rest.
+
+        A posture beyond the limits is no error: the arm holds still there, and every step says
+        why, until `place` puts it elsewhere.
+
+        Args:
+            arm: The arm.
+            joints: Where its joints stand [rad], shape (7,).
+            settings: How commands become motion; None for the defaults.
+            mode: The mode to begin in.
+
+        Raises:
+            TcsError: If the joints are not seven finite numbers.
+        """
+        self.arm = arm
+        self.settings = settings or Settings()
+        self._mode = mode
+        self._time = 0.0
+        self._heard = 0.0
+        self._command = Command()
+        self.place(joints)
+
+    def place(self, joints: ArrayLike) -> None:
+        """Put the arm, at rest, into another posture; time goes on.
+
+        Args:
+            joints: Where its joints stand [rad], shape (7,).
+
+        Raises:
+            TcsError: If they are not seven finite numbers.
+        """
+        self._joints = self.arm.checked(joints, "start posture")
+        self._rates = np.zeros(JOINTS)
+        self._now = self.arm.kinematics(self._joints)
+        self._target_R, self._target_p = self._now.R, self._now.p
+        self._switching = False
+        self._group: int | None = None
+        self._speed = 0.0
+        self._turning: FloatArray | None = None
+        self._way: float | None = None
+        self._beyond = self.arm.limit_violation(self._joints)
+
+    @property
+    def joints(self) -> FloatArray:
+        """Where the joints stand [rad], shape (7,)."""
+        return self._joints.copy()
+
+    @property
+    def mode(self) -> Mode:
+        """What commands move."""
+        return self._mode
+
+    def step(self, command: Command | None = None) -> Step:
+        """Move the arm on by one period.
+
+        Args:
+            command: What the person asks for; None if nothing was heard: the last command goes on
+                until it has been silent for `settings.timeout`.
+        """
+        self._time += self.settings.period
+        why = self._refused(command)
+        held = bool(why) or self._command.clutch
+        asked = self._admitted(self._command, held)
+        rates, reason = np.zeros(JOINTS), why
+        if not held or self._speed:
+            rates, reason, self._speed, self._turning = self._rate_command(asked)
+            reason = why or reason
+        if self._move(rates):
+            self._switching = False
+        self._advance_target(asked, stays=held or self._switching or bool(reason))
+        return self._report(reason)
+
+    def _admitted(self, command: Command, held: bool) -> Command:
+        """Return what of a command may reach the arm now.
+
+        A group that turns comes to rest before anything else begins, and so does the tool before
+        a group turns: each mode ends by its own rules, so nothing jumps and nothing slips.
+        """
+        if not self._speed:
+            self._group = command.group
+            if not held and command.mode is not None and command.mode != self._mode:
+                self._mode = Mode(command.mode)
+                self._switching = True
+                self._target_R, self._target_p = self._now.R, self._now.p
+        other = command.mode not in (None, self._mode)
+        if not (held or other or self._switching):
+            if self._mode is Mode.POSE or command.group == self._group:
+                return command
+        if self._mode in NULL_SPACE_MODES:
+            return Command(group=self._group)
+        return Command() if held else command
+
+    def _refused(self, command: Command | None) -> str:
+        """Take a command over, or say why the arm holds still instead."""
+        settings = self.settings
+        why = ""
+        if command is not None:
+            self._heard = self._time
+            fault = command.fault(len(settings.groups))
+            if fault:
+                why = f"command refused: {fault}. The arm holds still until a sound one comes."
+            else:
+                self._command = command
+        # Half a period, so that counting periods up does not decide by its rounding.
+        elif self._time - self._heard > settings.timeout + 0.5 * settings.period:
+            why = (
+                f"input lost: no command for more than {settings.timeout:g} s. The arm holds still "
+                "until one comes."
+            )
+        if why:
+            # What was asked before must not go on by itself once the reason is gone.
+            self._command = Command()
+        if self._beyond:
+            why = f"start posture: {self._beyond}. The arm holds still; place it within them."
+        return why
+
+    def _rate_command(self, asked: Command) -> RateCommand:
+        """Return what the mode makes of a command."""
+        settings = self.settings
+        # The Jacobian half way through the step follows the tool's curve to second order.
+        middle = self.arm.kinematics(self._joints + 0.5 * settings.period * self._rates)
+        if self._way is None or not (self._speed or asked.sign):
+            # The way of the elbow that turns joint 1 up when it begins to turn.
+            self._way = elbow_sign(middle.jacobian) if self._mode is Mode.POSE else None
+        lower, upper = mode_rate_bounds(self.arm, self._joints, settings)
+        state = ControlState(
+            arm=self.arm,
+            settings=settings,
+            joints=self._joints,
+            jacobian=middle.jacobian,
+            error=pose_error(self._target_R, self._target_p, self._now.R, self._now.p),
+            lower=lower,
+            upper=upper,
+            speed=self._speed,
+            turning=self._turning,
+            way=self._way or 1.0,
+        )
+        return rate_command(self._mode, asked, state)
+
+    def _move(self, wanted: FloatArray) -> bool:
+        """Move on by one period; return whether the rates are those wanted."""
+        settings, arm = self.settings, self.arm
+        if self._beyond:
+            return True
+        period, acceleration = settings.period, settings.acceleration
+        self._rates, arrived = approach(self._rates, wanted, acceleration * period)
+        if not stops_in_time(arm, self._joints, self._rates, period, acceleration):
+            # A joint that has to brake for its limit does so even where the others take longer.
+            bounds = rate_bounds(arm, self._joints, period, acceleration)
+            self._rates = np.clip(self._rates, *bounds)
+        # The bounds end at the limits; rounding may go past them by a hair.
+        joints = self._joints + settings.period * self._rates
+        self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)
+        self._now = arm.kinematics(self._joints)
+        return arrived
+
+    def _advance_target(self, asked: Command, *, stays: bool) -> None:
+        """Let the target go where the person wants it, on its target_lead.
+
+        Args:
+            asked: The command that reached the arm.
+            stays: Whether the target is where the tool is instead: while the tool comes to rest,
+                so that nothing pulls it back, and where its motion ends.
+        """
+        settings, now = self.settings, self._now
+        if self._mode in NULL_SPACE_MODES and not self._switching:
+            if self._mode is Mode.NULL_SPACE:
+                self._target_R = now.R
+            return
+        if stays:
+            self._target_R, self._target_p = now.R, now.p
+            return
+        twist = commanded_twist(asked)
+        self._target_p = self._target_p + twist[3:] * settings.period
+        self._target_R = rotated(self._target_R, twist[:3], settings.period)
+        error = pose_error(self._target_R, self._target_p, now.R, now.p)
+        angle, way = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
+        if way > settings.target_lead:
+            self._target_p = now.p + error[3:] * (settings.target_lead / way)
+        assisted = self._mode is Mode.ASSISTED
+        target_lead = settings.assist_lead_angle if assisted else settings.target_lead_angle
+        if angle > target_lead:
+            self._target_R = rotated(now.R, error[:3], target_lead / angle)
+
+    def _report(self, reason: str) -> Step:
+        flags = configuration_status(
+            self.arm, self._joints, self._now.jacobian, self._mode, self.settings
+        )
+        return Step(
+            time=self._time,
+            joints=self._joints,
+            rates=self._rates,
+            R=self._now.R,
+            p=self._now.p,
+            target_R=self._target_R,
+            target_p=self._target_p,
+            mode=self._mode,
+            limits=flags.limits,
+            singular=flags.singular,
+            singular_value=flags.singular_value,
+            worst_joint=flags.worst_joint,
+            stopped=bool(reason),
+            reason=reason,
+        )

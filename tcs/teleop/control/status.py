@@ -1,0 +1,72 @@
+"""What the operator is told: which joints are at a limit, and how close a singularity is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import Arm
+from tcs.teleop.control.resolved_rate import smallest_singular_value
+from tcs.teleop.control.settings import Mode, Settings
+
+ShortArray = NDArray[np.int8]
+POSITION_MODES = (Mode.NULL_SPACE,)
+"""Modes whose task is the tool's position alone: three rows of the Jacobian, not six."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConfigurationStatus:
+    """Where the joints stand between their limits, and how near a singularity is.
+
+    Attributes:
+        limits: -1 where a joint is at its lower limit, 1 where at its upper one, else 0; shape
+            (7,).
+        singular: Whether the task is singular.
+        singular_value: Smallest singular value of the task's Jacobian [m/rad].
+        worst_joint: The joint closest to a limit, in shares of its range, counted from 0.
+    """
+
+    limits: ShortArray
+    singular: bool
+    singular_value: float
+    worst_joint: int
+
+
+def range_fraction(arm: Arm, joints: FloatArray) -> FloatArray:
+    """Return where joints stand between their limits: 0 lower, 1 upper, 0.5 without limits.
+
+    Args:
+        arm: The arm.
+        joints: Joint positions [rad], shape (..., 7).
+    """
+    bounded = arm.bounded
+    span = np.where(bounded, arm.upper - arm.lower, 1.0)
+    start = np.where(bounded, arm.lower, joints - 0.5)
+    return (joints - start) / span
+
+
+def configuration_status(
+    arm: Arm, joints: FloatArray, jacobian: FloatArray, mode: Mode, settings: Settings
+) -> ConfigurationStatus:
+    """Return the flags of a posture.
+
+    Args:
+        arm: The arm.
+        joints: Joint positions [rad], shape (7,).
+        jacobian: Of the tool, shape (6, 7).
+        mode: What decides the task: the tool's position, or its pose.
+        settings: The thresholds.
+    """
+    below, above = joints - arm.lower, arm.upper - joints
+    limits = np.zeros(len(joints), np.int8)
+    limits[above <= settings.near_limit] = 1
+    limits[below <= settings.near_limit] = -1
+    rows = jacobian[3:] if mode in POSITION_MODES else jacobian
+    value = smallest_singular_value(rows, settings.length)
+    # Infinite room over an infinite range says nothing; such a joint is never the worst.
+    room = np.minimum(below, above)
+    shares = np.where(np.isfinite(room), room / np.where(arm.bounded, above + below, 1.0), 1.0)
+    return ConfigurationStatus(limits, value < settings.singular, value, int(shares.argmin()))

@@ -1,0 +1,218 @@
+"""One trial: a scripted operator follows the line with one controller, and all is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import Arm
+from tcs.teleop.control.session import Teleoperation
+from tcs.teleop.control.settings import Command, Mode, Settings
+from tcs.teleop.experiment.course import Course
+from tcs.teleop.experiment.metrics import (
+    completion_time,
+    effort,
+    resampled,
+    spectral_arc_length,
+    steering_angle,
+    steering_translation,
+    trajectory_accuracy,
+)
+from tcs.teleop.operators.scripted import Experience, OperatorTraits, Recovery, ScriptedOperator
+from tcs.teleop.runs.recorder import run_from_steps
+from tcs.teleop.runs.run import Run
+
+GOAL_RADIUS = 0.02
+"""Of the sphere at the end of the line [m]; the paper draws one and does not say how large."""
+TIME_LIMIT = 120.0
+"""Of a trial [s] (paper, experiment information, part 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A controller, and what an operator can do with it when the arm stops."""
+
+    name: str
+    title: str
+    mode: Mode
+    approach: Recovery
+    settings: Settings
+
+
+END_EFFECTOR = Condition(
+    "end-effector", "end-effector control", Mode.END_EFFECTOR, Recovery.HAND,
+    Settings(limits="paper"),
+)  # fmt: skip
+NOVEL = Condition(
+    "novel", "novel controller", Mode.END_EFFECTOR, Recovery.GROUP, Settings(limits="paper")
+)
+ASSISTED = Condition(
+    "assisted", "automatic assistance", Mode.ASSISTED, Recovery.HAND, Settings(limits="clamped")
+)
+CONDITIONS = (END_EFFECTOR, NOVEL, ASSISTED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialMeasures:
+    """What a trial comes to; the mean of several where it says so."""
+
+    accuracy: float
+    """Greatest distance between barycentre and line [m]."""
+    time: float
+    """Until the end was reached; the time limit where it was not [s]."""
+    effort: float
+    """Mean absolute work on the device from sample to sample [J]."""
+    work: float
+    """The sum of it over the trial [J]: what rests of the hand do not dilute."""
+    steering_angle: float
+    """[rad]."""
+    steering_translation: float
+    """[m]."""
+    arc_length: float
+    """Spectral arc length of the hand's speed."""
+    stops: float
+    """How often the arm came to a stop."""
+    turned: float
+    """How far joint 1 was turned through its group [rad]."""
+    finished: float
+    """1 where the end was reached in time, else 0."""
+    planes_met: float
+    """Of the 30."""
+
+
+MEASURES = tuple(TrialMeasures.__dataclass_fields__)
+
+
+def run_trial(
+    arm: Arm,
+    course: Course,
+    condition: Condition,
+    traits: OperatorTraits,
+    habits: Experience,
+    rng: np.random.Generator,
+    *,
+    time_limit: float = TIME_LIMIT,
+    metadata: Mapping[str, Any] | None = None,
+) -> Run:
+    """Return what an operator and an arm do until the end is reached or the time is over.
+
+    Args:
+        arm: The arm.
+        course: Line and start posture.
+        condition: The controller.
+        traits: What the operator is like.
+        habits: What has helped so far with this controller; kept up to date.
+        rng: Where chance comes from.
+        time_limit: When the trial is ended [s].
+        metadata: What else the run is to say about itself.
+
+    Raises:
+        TcsError: If the start posture is beyond a limit, is not at the line's start, or the line's
+            end is out of reach.
+    """
+    check_course(arm, course)
+    session = Teleoperation(arm, course.joints, condition.settings, condition.mode)
+    operator = ScriptedOperator(
+        traits, habits, course.line, approach=condition.approach, mode=condition.mode,
+        settings=condition.settings, rng=rng,
+    )  # fmt: skip
+    command = Command()
+    step = session.step(command)
+    rows = [(command, step)]
+    end = np.asarray(course.line.end)
+    while step.time < time_limit and np.linalg.norm(step.p - end) > GOAL_RADIUS:
+        command = operator.command(step)
+        step = session.step(command)
+        rows.append((command, step))
+    said = {
+        "robot": arm.name,
+        "lift": arm.torso_height,
+        "condition": condition.name,
+        "operator_kind": "scripted",
+        "line_start": list(course.line.start),
+        "line_end": list(course.line.end),
+    }
+    return run_from_steps(arm, rows, {**said, **(metadata or {})})
+
+
+def check_course(arm: Arm, course: Course) -> None:
+    """Refuse a line that the arm cannot start on, or whose end is farther than it is long.
+
+    Raises:
+        TcsError: As said.
+    """
+    outside = arm.limit_violation(course.joints)
+    if outside:
+        raise TcsError(f"start posture: {outside}. Give one within them.")
+    tool = arm.link_poses(course.joints)[-1, :3, 3]
+    off = float(np.linalg.norm(tool - course.line.start))
+    if off > GOAL_RADIUS:
+        raise TcsError(
+            f"start posture: the tool is {off:.3f} m from the line's start; it must be within "
+            f"{GOAL_RADIUS:g} m. Give a posture that holds the tool there."
+        )
+    shoulder = arm.frames[0, :3, 3]
+    length = float(np.linalg.norm(arm.frames[1:, :3, 3], axis=1).sum())
+    for what, point in (("start", course.line.start), ("end", course.line.end)):
+        away = float(np.linalg.norm(shoulder - point))
+        if away > length:
+            raise TcsError(
+                f"line out of reach: its {what} is {away:.2f} m from the first joint of "
+                f"'{arm.name}', whose arm is {length:.2f} m long. Give a shorter line, or find one "
+                "with `find_course`."
+            )
+
+
+def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> TrialMeasures:
+    """Return what a trial comes to.
+
+    Steering is filtered and resampled as the ITCM thesis does; effort is not, as the null-space
+    paper reads it off the device.
+
+    Args:
+        run: The trial.
+        course: What was to be followed.
+        time_limit: What counts as its time where the end was not reached [s].
+    """
+    line = course.line
+    path = trajectory_accuracy(run.position, line)
+    took = completion_time(run.time, run.position, line, radius=GOAL_RADIUS)
+    hand, angles = run.hand()
+    _, steered = resampled(run.time, np.hstack([hand, np.unwrap(angles, axis=0)]))
+    time, smooth = resampled(run.time, hand)
+    speed = np.linalg.norm(np.diff(smooth, axis=0), axis=1) / np.diff(time)
+    stops = np.flatnonzero(np.diff(run.stopped.astype(int)) == 1)
+    turning = (run.group == 0) & ~run.clutch
+    mean_work = effort(run.time, hand)
+    return TrialMeasures(
+        accuracy=path.worst,
+        time=time_limit if took is None else took,
+        effort=mean_work,
+        work=mean_work * (len(run) - 2),
+        steering_angle=steering_angle(steered[:, 3:]),
+        steering_translation=steering_translation(steered[:, :3]),
+        arc_length=spectral_arc_length(speed, 1.0 / float(time[1] - time[0])),
+        stops=float(len(stops)),
+        turned=float(np.abs(run.rates[turning, 0]).sum() * run.step),
+        finished=0.0 if took is None else 1.0,
+        planes_met=float(path.planes_met),
+    )
+
+
+def mean_measures(trials: list[TrialMeasures]) -> TrialMeasures:
+    """Return the mean of each measure over trials."""
+    means: dict[str, float] = {
+        name: float(np.mean([getattr(trial, name) for trial in trials])) for name in MEASURES
+    }
+    return TrialMeasures(**means)
+
+
+def sampled_path(run: Run, count: int = 200) -> FloatArray:
+    """Return some points of the tool's path at even times, for a picture [m], shape (count, 3)."""
+    rows = np.linspace(0, len(run) - 1, min(count, len(run))).astype(int)
+    return np.asarray(run.position[rows])

@@ -1,0 +1,291 @@
+"""The trajectory-following experiment of the null-space paper, with scripted operators.
+
+Every operator drives with every controller: four training trials, then three that count. The means
+of these three are the samples that the tests compare (paper, section II.C).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.arm import Arm
+from tcs.teleop.experiment.course import Course
+from tcs.teleop.experiment.statistics import (
+    GroupStatistics,
+    RepeatedMeasures,
+    SignedRankTest,
+    Tail,
+    group_statistics,
+    repeated_measures,
+    signed_rank_test,
+)
+from tcs.teleop.experiment.trial import (
+    CONDITIONS,
+    END_EFFECTOR,
+    NOVEL,
+    TIME_LIMIT,
+    Condition,
+    TrialMeasures,
+    mean_measures,
+    measure,
+    run_trial,
+    sampled_path,
+)
+from tcs.teleop.operators.scripted import Experience, OperatorTraits
+from tcs.teleop.runs.files import FORMATS, save_run
+from tcs.teleop.runs.run import Run
+
+OPERATORS = 26
+"""As many as the paper had participants."""
+TRAINING = 4
+TRIALS = 3
+SCRIPTED = "scripted operators, not people"
+"""What every table has to say."""
+HYPOTHESES: dict[str, Tail] = {"accuracy": "greater", "time": "two-sided", "effort": "greater"}
+"""What is asked of end-effector control against the novel controller (paper, section II.C.6)."""
+ANOVA_MEASURES = ("time", "steering_angle", "steering_translation", "arc_length")
+"""Measures of the ITCM thesis, compared over all conditions."""
+
+OnProgress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExperimentPlan:
+    """How much is run.
+
+    Attributes:
+        operators: How many drive.
+        training: Trials that do not count, before those that do.
+        trials: Trials that count.
+        seed: Of everything random.
+        conditions: Controllers that are compared.
+        time_limit: Of a trial [s].
+    """
+
+    operators: int = OPERATORS
+    training: int = TRAINING
+    trials: int = TRIALS
+    seed: int = 0
+    conditions: tuple[Condition, ...] = CONDITIONS
+    time_limit: float = TIME_LIMIT
+
+    def __post_init__(self) -> None:
+        """Refuse a plan that compares nothing.
+
+        Raises:
+            TcsError: If there are fewer than three operators, no trial, or a condition twice.
+        """
+        if self.operators < 3 or self.trials < 1 or self.training < 0:
+            raise TcsError(
+                f"experiment with {self.operators} operators, {self.training} training trials and "
+                f"{self.trials} trials: it takes 3 operators and 1 trial at least."
+            )
+        if not (math.isfinite(self.time_limit) and self.time_limit >= 1.0):
+            raise TcsError(f"experiment: a time limit of {self.time_limit:g} s; 1 s at least.")
+        names = [condition.name for condition in self.conditions]
+        if len({*names}) != len(names) or len(names) < 2:
+            raise TcsError(f"experiment: conditions {names} must be two or more, each once.")
+
+    def order(self, operator: int) -> tuple[Condition, ...]:
+        """Return the order in which an operator, counted from 0, meets the conditions.
+
+        All orders take turns; of two conditions that is the paper's Table I.
+        """
+        orders = list(itertools.permutations(self.conditions))
+        return orders[operator % len(orders)]
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerTrials:
+    """What one operator did with one controller."""
+
+    operator: int
+    condition: str
+    training: tuple[TrialMeasures, ...]
+    trials: tuple[TrialMeasures, ...]
+    paths: tuple[FloatArray, ...]
+    """Of the tool in each trial that counts [m], shapes (k, 3)."""
+    postures: tuple[FloatArray, ...]
+    """Of the arm in each trial that counts, ten a second [rad], shapes (k, 7)."""
+
+    @property
+    def mean(self) -> TrialMeasures:
+        """Mean of each measure over the trials that count."""
+        return mean_measures(list(self.trials))
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """All of it."""
+
+    arm: Arm
+    course: Course
+    plan: ExperimentPlan
+    traits: tuple[OperatorTraits, ...]
+    drives: dict[str, tuple[ControllerTrials, ...]]
+    """By condition, in the order of operators."""
+
+    def sample(self, condition: str, measure: str) -> FloatArray:
+        """Return the means of a measure by operator, shape (operators,)."""
+        return np.array([getattr(drive.mean, measure) for drive in self.drives[condition]])
+
+    def described(self, condition: str, measure: str) -> GroupStatistics:
+        """Return what a sample is like: a row of the paper's Table II."""
+        return group_statistics(self.sample(condition, measure))
+
+    def compared(self, measure: str, first: str, second: str, tail: Tail) -> SignedRankTest:
+        """Return how two conditions differ: a row of the paper's Table III."""
+        return signed_rank_test(
+            self.sample(first, measure), self.sample(second, measure), tail=tail
+        )
+
+    def tested(self) -> dict[str, SignedRankTest]:
+        """Return the paper's tests of end-effector control against the novel controller."""
+        return {
+            name: self.compared(name, END_EFFECTOR.name, NOVEL.name, tail)
+            for name, tail in HYPOTHESES.items()
+        }
+
+    def varied(self) -> dict[str, RepeatedMeasures]:
+        """Return the thesis's analyses of variance over all conditions."""
+        return {
+            name: repeated_measures({c: self.sample(c, name) for c in self.drives})
+            for name in ANOVA_MEASURES
+        }
+
+
+def run_experiment(
+    arm: Arm,
+    course: Course,
+    plan: ExperimentPlan | None = None,
+    *,
+    runs: Path | None = None,
+    runs_as: str = ".csv",
+    jobs: int = 1,
+    on_progress: OnProgress | None = None,
+) -> Experiment:
+    """Return what all operators did with all controllers.
+
+    Args:
+        arm: The arm.
+        course: The line and the start posture.
+        plan: How much is run; None for the paper's.
+        runs: Folder to save each trial that counts to, as `runs_as`; it must be there.
+        runs_as: ".csv" or ".parquet".
+        jobs: Number of processes; the answers do not depend on it.
+        on_progress: Called with operators times conditions done, and in all.
+
+    Raises:
+        TcsError: If the course does not fit the arm.
+        OutputError: If a run cannot be saved.
+    """
+    plan = plan or ExperimentPlan()
+    if runs_as not in FORMATS:
+        raise TcsError(f"runs as '{runs_as}': must be {' or '.join(FORMATS)}.")
+    traits = tuple(
+        OperatorTraits.drawn(_rng(plan.seed, operator)) for operator in range(plan.operators)
+    )
+    work = [
+        (operator, condition)
+        for operator in range(plan.operators)
+        for condition in plan.order(operator)
+    ]
+    calls = (
+        delayed(_drive)(arm, course, plan, operator, condition, traits[operator], runs, runs_as)
+        for operator, condition in work
+    )
+    found: list[ControllerTrials] = []
+    for drive in Parallel(jobs, return_as="generator_unordered")(calls):
+        found.append(drive)
+        if on_progress is not None:
+            on_progress(len(found), len(work))
+    found.sort(key=lambda drive: drive.operator)
+    drives = {
+        condition.name: tuple(drive for drive in found if drive.condition == condition.name)
+        for condition in plan.conditions
+    }
+    return Experiment(arm, course, plan, traits, drives)
+
+
+def _drive(
+    arm: Arm,
+    course: Course,
+    plan: ExperimentPlan,
+    operator: int,
+    condition: Condition,
+    traits: OperatorTraits,
+    runs: Path | None,
+    runs_as: str,
+) -> ControllerTrials:
+    """Return what one operator does with one controller."""
+    habits = Experience()
+    measured, paths, postures = [], [], []
+    number = plan.conditions.index(condition)
+    for trial in range(plan.training + plan.trials):
+        counts = trial >= plan.training
+        run = run_trial(
+            arm, course, condition, traits, habits, _rng(plan.seed, operator, number, trial),
+            time_limit=plan.time_limit,
+            metadata={
+                "operator": operator + 1,
+                "trial": trial - plan.training + 1 if counts else trial + 1,
+                "training": not counts,
+                "seed": plan.seed,
+                "place_in_order": plan.order(operator).index(condition) + 1,
+            },
+        )  # fmt: skip
+        measured.append(measure(run, course, time_limit=plan.time_limit))
+        if counts:
+            paths.append(sampled_path(run))
+            postures.append(run.joints[:: max(1, round(0.1 / run.step))].copy())
+            if runs is not None:
+                save_run(runs / run_name(run, runs_as), run)
+    return ControllerTrials(
+        operator,
+        condition.name,
+        tuple(measured[: plan.training]),
+        tuple(measured[plan.training :]),
+        tuple(paths),
+        tuple(postures),
+    )
+
+
+def run_name(run: Run, runs_as: str = ".csv") -> str:
+    """Return the name of a trial's file, e.g. "novel-operator-03-trial-1.csv"."""
+    said = run.metadata
+    return f"{said['condition']}-operator-{said['operator']:02d}-trial-{said['trial']}{runs_as}"
+
+
+def _rng(seed: int, *place: int) -> np.random.Generator:
+    """Return the chance of one place in the experiment, whoever asks first."""
+    # A path of its own for each length: operator 1 is not trial 1.
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(len(place), *place)))
+
+
+def median_ratio(experiment: Experiment, measure: str) -> float:
+    """Return the novel controller's median of a measure over that of end-effector control."""
+    novel, there = (experiment.sample(one.name, measure) for one in (NOVEL, END_EFFECTOR))
+    return float(np.median(novel) / np.median(there))
+
+
+def trial_rows(experiment: Experiment, names: Sequence[str]) -> list[list[object]]:
+    """Return every trial as rows: operator, condition, place in the order, trial, measures."""
+    rows: list[list[object]] = []
+    for condition, drives in experiment.drives.items():
+        for drive in drives:
+            order = [one.name for one in experiment.plan.order(drive.operator)]
+            place = order.index(condition) + 1
+            for training, trials in ((True, drive.training), (False, drive.trials)):
+                for number, trial in enumerate(trials, start=1):
+                    values = [getattr(trial, name) for name in names]
+                    rows.append([drive.operator + 1, condition, place, training, number, *values])
+    return rows

@@ -1,0 +1,5 @@
+"""Scripted operators: repeatable stand-ins for people who teleoperate an arm.
+
+In: the line to follow, operator traits and the steps of the arm so far. Out: one `Command` per
+control period.
+"""

@@ -1,0 +1,57 @@
+"""Smooth random motion about zero: how a hand trembles, and how an eye misjudges a place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+
+
+class GaussMarkovProcess:
+    """Three independent coordinates that wander about zero, with smooth speed.
+
+    Each is a critically damped second-order system driven by white noise, in the steady state from
+    the first sample on: its spread is the same at all times and for any sampling period.
+    """
+
+    def __init__(
+        self, rng: np.random.Generator, *, std: float, memory: float, period: float
+    ) -> None:
+        """Begin anywhere in the steady state.
+
+        Args:
+            rng: Where the noise comes from.
+            std: Standard deviation of each coordinate.
+            memory: Time after which it has forgotten most of where it was [s].
+            period: From one sample to the next [s].
+        """
+        a = 1.0 / memory
+        fade = math.exp(-a * period)
+        self._rng = rng
+        # The exact solution over one period of x'' = -2 a x' - a^2 x + noise.
+        self._transition = fade * np.array(
+            [[1.0 + a * period, period], [-a * a * period, 1.0 - a * period]]
+        )
+        steady = std * std * np.diag([1.0, a * a])
+        noise = steady - self._transition @ steady @ self._transition.T
+        # Rounding may leave an eigenvalue a hair below zero where periods are short.
+        values, vectors = np.linalg.eigh(noise)
+        self._spread = vectors * np.sqrt(np.maximum(values, 0.0))
+        self._state = std * np.array([[1.0], [a]]) * rng.standard_normal((2, 3))
+
+    @property
+    def value(self) -> FloatArray:
+        """Where it is, shape (3,)."""
+        return np.array(self._state[0])
+
+    @property
+    def rate(self) -> FloatArray:
+        """How fast it moves [1/s], shape (3,)."""
+        return np.array(self._state[1])
+
+    def advance(self) -> None:
+        """Go on by one period."""
+        drive = self._spread @ self._rng.standard_normal((2, 3))
+        self._state = self._transition @ self._state + drive

@@ -1,0 +1,309 @@
+"""Scripted operators: stand-ins for people in the trajectory-following experiment.
+
+They are no people, and what they do proves nothing about people. They let the experiment be run
+again, by anyone, and show what a controller does to one and the same way of driving.
+
+An operator has one way of driving, whatever the controller: pursue the line, notice late, tremble,
+think when the arm stops, and try something; if that does not help, try something else, further. The
+controller decides only what there is to try (`Recovery`):
+
+- end-effector control: hand motions, a random direction with a random turn;
+- the novel controller: joint group 1, one way or the other.
+
+What helped is remembered and tried first the next time. Nothing else is learnt, and at the outset
+nobody knows what helps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.control.resolved_rate import pose_error
+from tcs.teleop.control.session import Step
+from tcs.teleop.control.settings import Command, Mode, Settings
+from tcs.teleop.line import Line
+from tcs.teleop.operators.gauss_markov import GaussMarkovProcess
+
+
+class Recovery(StrEnum):
+    """What an operator does when the arm stops."""
+
+    HAND = "hand"
+    """Moves and turns the hand."""
+    GROUP = "group"
+    """Turns joint group 1, counted from 1, with the tool held."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OperatorTraits:
+    """What one operator is like; the same with every controller.
+
+    The values are ours, set before the first run to what is usual for adults at slow and careful
+    work, and never fitted to an outcome. `drawn` spreads them over operators.
+
+    Attributes:
+        speed: Of the hand on its way [m/s]: 1 m in 17 s, as "as accurately as possible" asks for.
+        reaction: From an event to the hand's answer [s]; simple reactions take 0.2 to 0.3 s.
+        thinking: From noticing that the arm has stopped to the next try [s].
+        pointing: To take the other device, point at the joint on the interface and press [s].
+        regrip: To take the first device again [s].
+        muscle: Time constant of the hand's speed [s].
+        lookahead: How far ahead on the line the operator aims [m].
+        misjudging: How far off the tool is seen, each coordinate, standard deviation [m].
+        misjudging_memory: For how long a misjudgement lasts [s].
+        tremor: Spread of the hand's speed as a share of the speed itself: noise that grows with
+            the signal (Harris and Wolpert, Nature 394, 1998).
+        tremor_rest: Speed that is added to the hand's before that share is taken [m/s]: a hand at
+            rest is not still.
+        tremor_memory: For how long tremor lasts [s].
+        first_try: How far the hand goes in a first try [m].
+        turn_per_metre: How far it turns on its way in a try [rad/m].
+        first_turn: How far group 1 is turned in a first try [rad].
+        growth: How much further each next try goes.
+    """
+
+    speed: float = 0.06
+    reaction: float = 0.25
+    thinking: float = 1.0
+    pointing: float = 1.5
+    regrip: float = 0.5
+    muscle: float = 0.15
+    lookahead: float = 0.1
+    misjudging: float = 0.008
+    misjudging_memory: float = 2.0
+    tremor: float = 0.1
+    tremor_rest: float = 0.01
+    tremor_memory: float = 0.2
+    first_try: float = 0.05
+    turn_per_metre: float = 5.0
+    first_turn: float = 0.35
+    growth: float = 1.3
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> OperatorTraits:
+        """Return an operator: what people differ in, spread by a fifth (log-normal)."""
+        usual = cls()
+        varied = (
+            "speed", "reaction", "thinking", "pointing", "regrip", "misjudging", "tremor",
+            "first_try", "first_turn",
+        )  # fmt: skip
+        spread = np.exp(0.2 * rng.standard_normal(len(varied)))
+        changes = {
+            name: float(getattr(usual, name) * factor)
+            for name, factor in zip(varied, spread, strict=True)
+        }
+        return replace(usual, **changes)
+
+
+@dataclass(slots=True)
+class Experience:
+    """What has helped so far with one controller, by the number of the obstacle on the way."""
+
+    motions: dict[int, FloatArray] = field(default_factory=dict)
+    """The tool's turn and way from where the arm stopped [rad; m], shape (6,)."""
+    turns: dict[int, float] = field(default_factory=dict)
+    """How far group 1 was turned [rad]."""
+
+
+class _Phase(StrEnum):
+    READY = "ready"
+    FOLLOW = "follow"
+    THINK = "think"
+    TRY = "try"
+    TO_GROUP = "to group"
+    TURN = "turn"
+    TO_TOOL = "to tool"
+
+
+_PAST = 0.05
+"""An obstacle is behind when the tool is this share of the line beyond it."""
+_FARTHEST_TRY = 0.3
+"""Tries grow no further than this [m]: a third of the arm's reach."""
+_FARTHEST_TURN = 1.6
+"""Nor does a turn of the group: a right angle [rad]."""
+
+
+class ScriptedOperator:
+    """One operator in one trial: sees steps, gives commands."""
+
+    def __init__(
+        self,
+        traits: OperatorTraits,
+        habits: Experience,
+        line: Line,
+        *,
+        approach: Recovery,
+        mode: Mode,
+        settings: Settings,
+        rng: np.random.Generator,
+    ) -> None:
+        """Take the device.
+
+        Args:
+            traits: What the operator is like.
+            habits: What has helped so far; kept up to date.
+            line: What to follow.
+            approach: What to do when the arm stops.
+            mode: The mode in which the hand drives the tool.
+            settings: Of the arm that is driven.
+            rng: Where chance comes from.
+        """
+        self._traits, self._habits, self._line = traits, habits, line
+        self._approach, self._mode, self._settings = approach, mode, settings
+        self._rng = rng
+        period = settings.period
+        self._seen: deque[Step] = deque(maxlen=1 + round(traits.reaction / period))
+        self._misjudged = GaussMarkovProcess(
+            rng, std=traits.misjudging, memory=traits.misjudging_memory, period=period
+        )
+        self._trembling = GaussMarkovProcess(
+            rng, std=1.0, memory=traits.tremor_memory, period=period
+        )
+        self._velocity, self._spin = np.zeros(3), np.zeros(3)
+        self._time = 0.0
+        # Whoever is told to begin reacts before the hand moves.
+        self._begin(_Phase.READY, traits.reaction)
+        self._obstacle, self._tries, self._farthest = -1, 0, -np.inf
+        self._where: Step | None = None
+        """The arm where it stopped at this obstacle."""
+        self._motion, self._moved = np.zeros(6), np.zeros(6)
+        self._turn, self._turned = 0.0, 0.0
+
+    def command(self, step: Step) -> Command:
+        """Return what the operator commands, having seen one more step."""
+        self._time = step.time
+        self._seen.append(step)
+        self._misjudged.advance()
+        self._trembling.advance()
+        seen = self._seen[0]
+        # What was seen before this phase began has been dealt with.
+        stopped = seen.stopped and seen.time > self._began
+        over = self._time - self._began >= self._lasts - 0.5 * self._settings.period
+        aim, spin = np.zeros(3), np.zeros(3)
+        if self._phase is _Phase.FOLLOW:
+            place = seen.p + self._misjudged.value
+            share = float(self._line.fraction_at(place))
+            if stopped:
+                self._stop(seen, share)
+            else:
+                self._learn(share)
+                aim = self._pursue(place, share)
+        elif self._phase is _Phase.TRY:
+            spin, aim = self._motion[:3] / self._lasts, self._motion[3:] / self._lasts
+            if over or stopped:
+                self._end_try(step, stopped=stopped)
+        elif self._phase is _Phase.TURN:
+            if over or stopped:
+                self._end_turn(stopped=stopped)
+        elif over:
+            self._go_on()
+        return self._commanded(aim, spin)
+
+    def _commanded(self, aim: FloatArray, spin: FloatArray) -> Command:
+        """Return the command: muscle and tremor make of what is wanted what the hand does."""
+        traits = self._traits
+        share = self._settings.period / (traits.muscle + self._settings.period)
+        self._velocity = self._velocity + share * (aim - self._velocity)
+        self._spin = self._spin + share * (spin - self._spin)
+        if self._phase in (_Phase.TO_GROUP, _Phase.TO_TOOL):
+            return Command(clutch=True)
+        if self._phase is _Phase.TURN:
+            return Command(group=0, sign=int(np.sign(self._turn)), mode=Mode.NULL_SPACE)
+        strength = traits.tremor * (float(np.linalg.norm(self._velocity)) + traits.tremor_rest)
+        linear = self._velocity + strength * self._trembling.value
+        return Command(linear=linear, angular=self._spin, mode=self._mode)
+
+    def _begin(self, phase: _Phase, lasts: float = math.inf) -> None:
+        self._phase, self._began, self._lasts = phase, self._time, lasts
+
+    def _pursue(self, place: FloatArray, share: float) -> FloatArray:
+        """Return the velocity towards a point a little ahead on the line [m/s]."""
+        traits, line = self._traits, self._line
+        ahead = line.at(min(1.0, max(0.0, share) + traits.lookahead / line.length)) - place
+        distance = float(np.linalg.norm(ahead))
+        # The hand slows down where the end is less than a second away at distance per second.
+        return np.asarray(ahead * (min(traits.speed, distance) / max(distance, 1e-9)))
+
+    def _stop(self, seen: Step, share: float) -> None:
+        """Note that the arm has stopped: at the same obstacle as before, or beyond."""
+        if share > self._farthest + _PAST:
+            self._obstacle += 1
+            self._tries = 0
+            self._where = seen
+            self._turn, self._turned = 0.0, 0.0
+        self._farthest = max(self._farthest, share)
+        self._begin(_Phase.THINK, self._traits.thinking)
+
+    def _learn(self, share: float) -> None:
+        """Keep what has helped, once the obstacle is behind."""
+        if self._tries and share > self._farthest + _PAST:
+            if self._approach is Recovery.GROUP:
+                self._habits.turns[self._obstacle] = self._turned
+            else:
+                self._habits.motions[self._obstacle] = self._moved
+            self._tries = 0
+
+    def _go_on(self) -> None:
+        """Begin what comes after a phase that has lasted its time."""
+        if self._phase is _Phase.THINK:
+            self._tries += 1
+            if self._approach is Recovery.GROUP:
+                self._turn = self._next_turn()
+                self._begin(_Phase.TO_GROUP, self._traits.pointing)
+            else:
+                self._motion = self._next_motion()
+                turn, way = (float(np.linalg.norm(part)) for part in np.split(self._motion, 2))
+                pace = self._traits.speed
+                lasts = max(way / pace, turn / (pace * self._traits.turn_per_metre))
+                # What helped may have been next to nothing: it takes a moment all the same.
+                self._begin(_Phase.TRY, max(lasts, self._traits.muscle))
+        elif self._phase is _Phase.TO_GROUP:
+            self._begin(_Phase.TURN, abs(self._turn) / self._settings.group_rate)
+        else:
+            self._begin(_Phase.FOLLOW)
+
+    def _next_motion(self) -> FloatArray:
+        """Return the turn and way of the hand that comes to mind [rad; m], shape (6,)."""
+        if self._tries == 1 and self._obstacle in self._habits.motions:
+            return self._habits.motions[self._obstacle]
+        traits = self._traits
+        way = min(_FARTHEST_TRY, traits.first_try * traits.growth ** (self._tries - 1))
+        directions = self._rng.standard_normal((2, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.concatenate([way * traits.turn_per_metre * directions[0], way * directions[1]])
+
+    def _next_turn(self) -> float:
+        """Return how far group 1 is to be turned [rad]."""
+        if self._tries == 1 and self._obstacle in self._habits.turns:
+            return self._habits.turns[self._obstacle]
+        traits = self._traits
+        more = min(_FARTHEST_TURN, traits.first_turn * traits.growth ** (self._tries - 1))
+        if self._turn and abs(self._turned) + more <= math.pi:
+            return math.copysign(more, self._turn)
+        # Nothing tried yet, or that way is closed, or half a turn has not helped: then back, and on
+        # to the other side.
+        way = -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
+        return float(way * (abs(self._turned) + more))
+
+    def _end_try(self, now: Step, *, stopped: bool) -> None:
+        """Look whether the arm goes on from here; think again where the try itself was stopped."""
+        assert self._where is not None
+        self._moved = pose_error(now.R, now.p, self._where.R, self._where.p)
+        if stopped:
+            self._begin(_Phase.THINK, self._traits.thinking)
+        else:
+            self._begin(_Phase.FOLLOW)
+
+    def _end_turn(self, *, stopped: bool) -> None:
+        """Take the tool again; a way that is closed is not tried on."""
+        turned = (self._time - self._began) * self._settings.group_rate
+        self._turned += math.copysign(turned, self._turn)
+        if stopped:
+            self._turn = 0.0
+        self._begin(_Phase.TO_TOOL, self._traits.regrip)

@@ -1,0 +1,113 @@
+"""What is driven, kept in little room: an hour at 100 Hz in some 120 MB."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tcs.teleop import Arm, Command, Step
+from tcs.teleop.runs.run import NO_GROUP, Run
+
+_BLOCK = 6000
+"""Steps after which single ones become arrays: a minute's."""
+_LEAST = 2
+"""Samples that a run must have."""
+_PUT_BACK = 1e-4
+"""Joints that are farther from where their rates take them than this [rad] were put there."""
+
+
+class Recorder:
+    """Commands and steps on their way to a run."""
+
+    def __init__(self, arm: Arm) -> None:
+        """Begin with nothing.
+
+        Args:
+            arm: The arm that is driven.
+        """
+        self._arm = arm
+        self._blocks: list[Run] = []
+        self._rows: list[tuple[Command, Step]] = []
+
+    def __len__(self) -> int:
+        return sum(len(block) for block in self._blocks) + len(self._rows)
+
+    def add(self, command: Command, step: Step) -> None:
+        """Keep a step, and the command that it followed."""
+        self._rows.append((command, step))
+        if len(self._rows) >= _BLOCK + _LEAST:
+            self._blocks.append(run_from_steps(self._arm, self._rows[:_BLOCK], {}))
+            self._rows = self._rows[_BLOCK:]
+
+    def run(self, metadata: Mapping[str, Any]) -> Run | None:
+        """Return all of it as a run; None if it is too short for one.
+
+        Args:
+            metadata: What the run is to say about itself.
+        """
+        if len(self) < _LEAST:
+            return None
+        blocks = [*self._blocks, run_from_steps(self._arm, self._rows, {})]
+        arrays = {
+            one.name: np.concatenate([getattr(block, one.name) for block in blocks])
+            for one in dataclasses.fields(Run)
+            if one.name not in ("joint_names", "metadata")
+        }
+        return Run(self._arm.joints, **arrays, metadata=metadata)
+
+
+def begun_at(run: Run) -> int:
+    """Return the sample with which the last try of a person at a line begins.
+
+    That is the first command after the arm was last put back to where it began; the last sample if
+    none came.
+    """
+    steps = np.diff(run.joints, axis=0) - run.rates[1:] * np.diff(run.time)[:, None]
+    # A step is its rate times its time, but for the digits of a file; being put back is not.
+    put_back = np.flatnonzero(np.abs(steps).max(axis=1) > _PUT_BACK)
+    first = int(put_back[-1]) + 1 if len(put_back) else 0
+    asked = run.linear.any(axis=1) | run.angular.any(axis=1) | (run.sign != 0)
+    after = np.flatnonzero(asked[first:])
+    return first + int(after[0]) if len(after) else len(run) - 1
+
+
+def run_from_steps(arm: Arm, rows: list[tuple[Command, Step]], metadata: Mapping[str, Any]) -> Run:
+    """Return commands, and the steps they led to, as a run.
+
+    Args:
+        arm: The arm.
+        rows: Each command with the step after it; two at least.
+        metadata: What the run is to say about itself.
+    """
+    from scipy.spatial.transform import Rotation
+
+    commands, steps = [row[0] for row in rows], [row[1] for row in rows]
+
+    def column(values: list[Any], kind: Any = np.float64) -> Any:
+        return np.array(values, dtype=kind)
+
+    return Run(
+        joint_names=tuple(arm.joints),
+        time=column([step.time for step in steps]),
+        joints=column([step.joints for step in steps]),
+        rates=column([step.rates for step in steps]),
+        position=column([step.p for step in steps]),
+        quaternion=Rotation.from_matrix([step.R for step in steps]).as_quat(scalar_first=True),
+        linear=column([command.linear for command in commands]),
+        angular=column([command.angular for command in commands]),
+        group=column([_group(command) for command in commands], np.int64),
+        sign=column([command.sign for command in commands], np.int64),
+        clutch=column([command.clutch for command in commands], np.bool_),
+        mode=np.array([step.mode.value for step in steps]),
+        limits=column([step.limits for step in steps], np.int64),
+        singular=column([step.singular for step in steps], np.bool_),
+        stopped=column([step.stopped for step in steps], np.bool_),
+        metadata=metadata,
+    )
+
+
+def _group(command: Command) -> int:
+    return NO_GROUP if command.group is None else command.group

@@ -1,0 +1,147 @@
+"""Runs and their files: what is saved comes back, feeds a capability map, or is refused."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tcs.capability import read_csv
+from tcs.errors import DataFileError, OutputError
+from tcs.model.robots import load_robot
+from tcs.teleop.runs.files import load_run, save_run
+from tcs.teleop.runs.run import NO_GROUP, Run
+
+ROBOT = load_robot("tiago")
+ARRAYS = [
+    "time", "joints", "rates", "position", "quaternion", "linear", "angular", "group", "sign",
+    "clutch", "mode", "limits", "singular", "stopped",
+]  # fmt: skip
+
+
+def made(n=40, seed=0, **changes):
+    rng = np.random.default_rng(seed)
+    limits = np.array([ROBOT.joint_limits()[name] for name in ROBOT.arm_joints])
+    quaternion = rng.standard_normal((n, 4))
+    arrays = {
+        "time": np.arange(n) * 0.01,
+        "joints": rng.uniform(limits[:, 0], limits[:, 1], size=(n, 7)),
+        "rates": rng.standard_normal((n, 7)),
+        "position": rng.standard_normal((n, 3)),
+        "quaternion": quaternion / np.linalg.norm(quaternion, axis=1)[:, None],
+        "linear": rng.standard_normal((n, 3)),
+        "angular": rng.standard_normal((n, 3)),
+        "group": rng.integers(NO_GROUP, 4, n),
+        "sign": rng.integers(-1, 2, n),
+        "clutch": rng.random(n) < 0.5,
+        "mode": np.where(rng.random(n) < 0.5, "pose", "end-effector"),
+        "limits": rng.integers(-1, 2, (n, 7)),
+        "singular": rng.random(n) < 0.5,
+        "stopped": rng.random(n) < 0.5,
+    }
+    return Run(ROBOT.arm_joints, **{**arrays, **changes}, metadata={"robot": "tiago", "seed": seed})
+
+
+@pytest.mark.parametrize(("ending", "places"), [("csv", 1e-9), ("parquet", 0.0)])
+def test_what_is_saved_comes_back(tmp_path, ending, places):
+    run, path = made(), tmp_path / f"run.{ending}"
+    save_run(path, run)
+    back = load_run(path)
+    assert back.joint_names == run.joint_names
+    assert back.metadata == run.metadata
+    for name in ARRAYS:
+        found, saved = getattr(back, name), getattr(run, name)
+        assert found.dtype.kind == saved.dtype.kind
+        if found.dtype.kind == "f":
+            np.testing.assert_allclose(found, saved, rtol=places, atol=places)
+        else:
+            np.testing.assert_array_equal(found, saved)
+
+
+def test_a_capability_map_reads_a_saved_run_as_it_is(tmp_path):
+    run = made()
+    save_run(tmp_path / "run.csv", run)
+    recording = read_csv(tmp_path / "run.csv", ROBOT)
+    np.testing.assert_allclose(recording.joints, run.joints, atol=1e-9)
+    assert recording.lift is None
+
+
+def test_nothing_is_left_where_a_run_cannot_be_written(tmp_path):
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_run(tmp_path / "nowhere" / "run.csv", made())
+    with pytest.raises(OutputError, match=r"\.csv or \.parquet"):
+        save_run(tmp_path / "run.xlsx", made())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_its_library_parquet_says_what_to_install(tmp_path, monkeypatch):
+    save_run(tmp_path / "run.parquet", made())
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(OutputError, match=r"pip install 'tcs\[parquet\]'"):
+        save_run(tmp_path / "other.parquet", made())
+    with pytest.raises(DataFileError, match=r"pip install 'tcs\[parquet\]'"):
+        load_run(tmp_path / "run.parquet")
+    save_run(tmp_path / "run.csv", made())
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rates": np.zeros((40, 6))}, "'rates' has shape"),
+        ({"time": np.zeros(40)}, "sample 1: the time 0 s does not rise"),
+        ({"position": np.full((40, 3), np.nan)}, "sample 0: 'position' is not finite"),
+        ({"quaternion": np.ones((40, 4))}, "must have length 1"),
+        ({"mode": np.full(40, "xyz")}, "sample 0: mode 'xyz' is none of end-effector, null-space"),
+        ({"joints": np.full((40, 7), 1e9)}, r"sample 0: a joint at 1e\+09 rad; must be within"),
+    ],
+)
+def test_arrays_that_do_not_belong_together_are_refused(changes, said):
+    with pytest.raises(DataFileError, match=said):
+        made(**changes)
+
+
+def test_files_that_hold_no_run_are_refused(tmp_path):
+    with pytest.raises(DataFileError, match="cannot be read: No such file"):
+        load_run(tmp_path / "none.csv")
+    with pytest.raises(DataFileError, match=r"must be \.csv or \.parquet"):
+        load_run(tmp_path / "run.txt")
+    (tmp_path / "empty.csv").write_text("")
+    with pytest.raises(DataFileError, match="is no table"):
+        load_run(tmp_path / "empty.csv")
+    (tmp_path / "broken.parquet").write_bytes(b"PAR1 no more")
+    with pytest.raises(DataFileError, match="is no table"):
+        load_run(tmp_path / "broken.parquet")
+    save_run(tmp_path / "run.csv", made())
+    frame = pd.read_csv(tmp_path / "run.csv", keep_default_na=False)
+    frame.drop(columns="qw").to_csv(tmp_path / "less.csv", index=False)
+    with pytest.raises(DataFileError, match="column qw is missing"):
+        load_run(tmp_path / "less.csv")
+    frame.astype({"x": object}).assign(x="here").to_csv(tmp_path / "words.csv", index=False)
+    with pytest.raises(DataFileError, match="'position' holds something that is no number"):
+        load_run(tmp_path / "words.csv")
+    frame.assign(metadata="{").to_csv(tmp_path / "metadata.csv", index=False)
+    with pytest.raises(DataFileError, match="no JSON object"):
+        load_run(tmp_path / "metadata.csv")
+
+
+def test_arrays_are_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        made().joints[0, 0] = 1.0
+
+
+def test_the_hand_goes_where_the_commands_say_while_it_is_coupled():
+    n = 201
+    steady = {"linear": np.tile([0.1, 0.0, -0.2], (n, 1)), "angular": np.tile([0.3, 0, 0], (n, 1))}
+    time, none, never = np.arange(n) * 0.01, np.full(n, NO_GROUP), np.zeros(n, dtype=bool)
+    position, angles = made(n, time=time, group=none, clutch=never, **steady).hand()
+    np.testing.assert_allclose(position[-1], [0.2, 0.0, -0.4], atol=1e-12)
+    np.testing.assert_allclose(angles[-1], [0.6, 0.0, 0.0], atol=1e-12)
+    half = np.arange(n) > 100
+    position, angles = made(n, time=time, group=none, clutch=half, **steady).hand()
+    np.testing.assert_allclose(position[-1], [0.1, 0.0, -0.2], atol=1e-12)
+    np.testing.assert_allclose(angles[-1], [0.3, 0.0, 0.0], atol=1e-12)
+    position, angles = made(n, time=time, group=np.zeros(n, int), clutch=never, **steady).hand()
+    assert not position.any()
+    assert not angles.any()
