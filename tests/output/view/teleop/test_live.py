@@ -118,8 +118,8 @@ def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, 
 
 
 def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
-    from tcs.teleop.runs import recorder as module
     from tcs.teleop import Command, Teleoperation
+    from tcs.teleop.runs import recorder as module
     from tcs.teleop.runs.recorder import run_from_steps
 
     monkeypatch.setattr(module, "_BLOCK", 10)
