@@ -23,7 +23,6 @@ from tcs.capability import (
     GraspTask,
     MapGrid,
     MapVolume,
-    Operator,
     Reach,
     TaskMap,
     check_map,
@@ -31,13 +30,13 @@ from tcs.capability import (
     map_from_recording,
     merge,
     pick_and_place_task,
-    simulate,
 )
 from tcs.capability.surroundings import Surroundings
 from tcs.model.robots import load_robot
 from tcs.model.scene import EnvironmentFile
 from tcs.output.draw import save_figure
 from tcs.output.draw.capability_maps import task_figure
+from tcs.teleop.recordings import HandMotion, simulate_recording
 
 LIFT = 0.1725
 """Brings TIAGo's shoulder to 0.91 m."""
@@ -70,7 +69,7 @@ def compile_first(reach: Reach) -> None:
     """Run everything compiled once, for no time below is to hold compiling."""
     reach.free_lifts(np.zeros((1, 7)))
     reach.manipulability(np.zeros((1, 7)))
-    simulate(reach, Operator(seconds=1.0))
+    simulate_recording(reach, HandMotion(seconds=1.0))
 
 
 def timed(run: Callable[[], object]) -> tuple[float, float]:
@@ -162,7 +161,7 @@ def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | 
     """Compare the thesis's pick-and-place task with its published base poses."""
     maps = []
     for seed in range(seeds):
-        simulated = simulate(reach, Operator(height=HEIGHT), seed=seed)
+        simulated = simulate_recording(reach, HandMotion(height=HEIGHT), seed=seed)
         grid = MapGrid.of(grasps="side")
         recorded = map_from_recording(reach, grid, simulated.recording, height=HEIGHT)
         maps.append((f"ITCM, seed {seed}", recorded.capability))

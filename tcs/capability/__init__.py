@@ -16,7 +16,6 @@ from tcs.capability.merge import BasePose, TaskMap, merge
 from tcs.capability.reach import Reach
 from tcs.capability.recording import Recording, read_csv, recording_of, write_csv
 from tcs.capability.sequence import Stop, split
-from tcs.capability.simulate import Operator, simulate
 from tcs.capability.tasks import (
     Grasp,
     GraspPosition,
@@ -37,7 +36,6 @@ __all__ = [
     "MapCheck",
     "MapGrid",
     "MapVolume",
-    "Operator",
     "Reach",
     "Recorded",
     "Recording",
@@ -57,7 +55,6 @@ __all__ = [
     "read_csv",
     "recording_of",
     "save_map",
-    "simulate",
     "split",
     "visibility",
     "write_csv",

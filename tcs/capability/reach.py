@@ -14,7 +14,6 @@ from tcs.errors import GridError
 from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.contacts import new_workspace
-from tcs.kernel.follow import Control, Hand, follow
 from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
@@ -180,29 +179,6 @@ class Reach:
         for level in range(len(self.lifts)):
             bits |= self.free(joints, level).astype(np.uint32) << np.uint32(level)
         return bits
-
-    def follow(
-        self, start: FloatArray, hand: Hand, control: Control, samples: int
-    ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Return what an arm does that follows a hand.
-
-        Args:
-            start: Arm joints before the first sample [rad], shape (7,).
-            hand: What the hand does.
-            control: How the arm follows.
-            samples: How many periods.
-
-        Returns:
-            Arm joints [rad], shape (n, 7); commands x, y [m] and heading [rad] in B, shape (n, 3);
-            whether something was in the way, shape (n,).
-        """
-        problem = _with_goals(self._at(self.level), np.eye(3)[None], np.zeros((1, 3)))
-        joints, commands = np.empty((samples, 7)), np.empty((samples, 3))
-        held = np.zeros(samples, np.bool_)
-        # Rounded joints may lie past a limit by the last digit of single precision.
-        begin = np.clip(start, *self.limits)
-        follow(problem, new_workspace(problem), control, hand, begin, joints, commands, held)
-        return joints, commands, held
 
     def _at(self, level: int) -> Problem:
         """Return the problem with one torso level."""

@@ -139,9 +139,11 @@ def record(
     """
     robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
     hand = work.SimulatedHand(seconds, scale, centre, seed, save_csv)
-    result = work.record(
-        robot_setup, out, text, csv, hand, height=height, view=view, drop_bad=drop_bad
-    )
+    with talk.progress_bar("samples") as on_progress:
+        result = work.record(
+            robot_setup, out, text, csv, hand, height=height, view=view, drop_bad=drop_bad,
+            on_progress=on_progress,
+        )  # fmt: skip
     talk.print_result(result, reports.report_map, as_json=as_json)
 
 

@@ -124,9 +124,11 @@ def record(
     height: float | None,
     view: str,
     drop_bad: bool,
+    on_progress: Callable[[int, int], None],
 ) -> dict[str, Any]:
     """Make a map of a CSV file or of a simulated recording, and write it."""
-    from tcs.capability import Operator, read_csv, simulate, write_csv
+    from tcs.capability import read_csv, write_csv
+    from tcs.teleop.recordings import HandMotion, simulate_recording
 
     _check_outputs(out, text, hand.save_csv)
     grid, reach = setup.grid(), setup.reach()
@@ -134,12 +136,12 @@ def record(
         recording = read_csv(csv, reach.robot, drop_bad=drop_bad)
         return _of_recording(reach, grid, recording, out, text, height, view)
     height = 0.41 if height is None else height
-    operator = Operator(height=height, seconds=hand.seconds, scale=hand.scale, centre=hand.centre)
-    simulated = simulate(reach, operator, seed=hand.seed)
+    motion = HandMotion(height=height, seconds=hand.seconds, scale=hand.scale, centre=hand.centre)
+    simulated = simulate_recording(reach, motion, seed=hand.seed, on_progress=on_progress)
     if hand.save_csv is not None:
         write_csv(hand.save_csv, reach.robot, simulated.recording)
     result = _of_recording(reach, grid, simulated.recording, out, text, height, view)
-    return {**result, "seed": hand.seed, "held": float(simulated.held.mean())}
+    return {**result, "seed": hand.seed, "stopped": float(simulated.stopped.mean())}
 
 
 def from_bags(

@@ -1,0 +1,259 @@
+"""Simulated recordings: a random hand at the master drives the teleoperated arm.
+
+The joint states become a capability map (ITCM) where no operator is at hand. The hand heads for
+random poses in the box of a master device; the arm follows in end-effector control and stops
+before it touches the robot or the floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tcs.capability import Reach, Recording
+from tcs.errors import DataFileError
+from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.teleop.arm import JOINTS, load_arm
+from tcs.teleop.control import pose_error
+from tcs.teleop.session import Step, Teleoperation
+from tcs.teleop.settings import Command, Mode, Settings
+
+MASTER_BOX = (0.070, 0.160, 0.120)
+"""Depth, width and height of the workspace of a Geomagic Touch [m]: forward, left, up."""
+PERIOD = 0.02
+"""Between samples [s]: joint states come at 50 Hz, ITCM thesis, Appendix C.1."""
+LONGEST = 86_400.0
+"""Longest recording [s]: a day, 27 times the thesis's recording, fits into memory."""
+_GAIN = 4.0
+"""Commanded tool speed per distance to the hand [1/s]."""
+_FASTEST = (1.5, 0.4)
+"""Greatest commanded velocities, angular and linear [rad/s; m/s]."""
+_LEAD = 0.10
+"""Distance by which the hand leads the tool before it waits [m]."""
+_PATIENCE = 1.0
+"""Time that the hand waits for the tool or for a stopped arm [s]."""
+_STRETCH = 25
+"""Samples between two collision checks, which are done at once: half a second."""
+_SETTINGS = Settings(period=PERIOD, length=0.2)
+"""Where joint limits leave the tool too few joints, `length` divides the error between position and
+orientation; chosen for a pitch error of the recorded grasps near that of the thesis (Table 3)."""
+
+_RECOVERY = Mode.ASSISTED
+"""Mode after the arm was stopped or lost the hand: it leads the joints away from their limits."""
+
+OnProgress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandMotion:
+    """Motion of the operator's hand, scaled to the arm.
+
+    The defaults are those of the recording in the ITCM thesis as far as it states them: height,
+    roll and pitch fixed, an hour. It does not state scale, centre, yaw and speed of the hand.
+
+    Attributes:
+        height: Height of the tool above the floor [m].
+        seconds: Length of the recording [s]: 53 min and 17 s, as in Appendix C.1.
+        scale: Metres at the arm per metre at the master: 0.16 m become the 1.2 m of the thesis.
+        centre: Centre of the box, x and y in B [m].
+        yaw: Lowest and highest yaw of the tool [rad].
+        pitch: Pitch of the tool [rad]; pi / 2 for top grasps.
+        speed: Speed of the hand, scaled to the arm [m/s].
+        angular_speed: Angular speed of the hand [rad/s].
+    """
+
+    height: float = 0.41
+    seconds: float = 3200.0
+    scale: float = 7.5
+    centre: tuple[float, float] = (0.65, 0.0)
+    yaw: tuple[float, float] = (-math.pi / 2, math.pi / 2)
+    pitch: float = 0.0
+    speed: float = 0.15
+    angular_speed: float = 0.5
+
+    @property
+    def middle(self) -> FloatArray:
+        """Middle of the box and of the yaw range: x, y [m] and yaw [rad], shape (3,)."""
+        return np.array([*self.centre, np.mean(self.yaw)])
+
+    @property
+    def extent(self) -> FloatArray:
+        """Depth and width of the box [m] and the yaw range [rad], shape (3,)."""
+        depth, width = (self.scale * side for side in MASTER_BOX[:2])
+        return np.array([depth, width, self.yaw[1] - self.yaw[0]])
+
+    def tool_poses(self, hand: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return commanded tool poses in B: rotations (n, 3, 3) and positions [m] (n, 3).
+
+        Args:
+            hand: x, y [m] and yaw [rad] of the hand, shape (n, 3).
+        """
+        cp, sp = math.cos(self.pitch), math.sin(self.pitch)
+        c, s = np.cos(hand[:, 2]), np.sin(hand[:, 2])
+        R = np.zeros((len(hand), 3, 3))
+        R[:, 0, 0], R[:, 0, 1], R[:, 0, 2] = c * cp, -s, c * sp
+        R[:, 1, 0], R[:, 1, 1], R[:, 1, 2] = s * cp, c, s * sp
+        R[:, 2, 0], R[:, 2, 2] = -sp, cp
+        return R, np.column_stack([hand[:, :2], np.full(len(hand), self.height)])
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRecording:
+    """Joint states of the driven arm, and how well it followed the hand."""
+
+    recording: Recording
+    position_error: FloatArray
+    """Distance from the commanded to the actual tool position [m], shape (n,)."""
+    orientation_error: FloatArray
+    """Angle from the commanded to the actual tool orientation [rad], shape (n,)."""
+    stopped: BoolArray
+    """Whether the arm stood still to avoid a contact, shape (n,)."""
+
+
+def simulate_recording(
+    reach: Reach,
+    motion: HandMotion | None = None,
+    *,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+) -> SimulatedRecording:
+    """Return the joint states of an arm that follows a random hand.
+
+    Args:
+        reach: The robot, at the torso height to record at.
+        motion: Motion of the hand; None for the defaults.
+        seed: Seed of the hand's targets.
+        on_progress: Called with samples done and in all.
+
+    Raises:
+        DataFileError: If a number is not finite, the length is out of range, or the arm reaches no
+            pose in the box to start from.
+
+    Source:
+        The "complete simulation" that the ITCM thesis names as future work, Appendix C.4: scaling
+        between master and slave, joint limits, self-collision. The controller of its slave is not
+        published; here it is `Mode.END_EFFECTOR` of `tcs.teleop`.
+    """
+    motion = motion or HandMotion()
+    count = _sample_count(motion)
+    start = _start_posture(reach, motion)
+    session = Teleoperation(load_arm(reach.robot, lift=float(reach.lift)), start, _SETTINGS)
+    step = session.step(Command(mode=Mode.END_EFFECTOR))
+    hand = _Hand(motion, np.random.default_rng(seed), step)
+    joints, poses = np.empty((count, JOINTS)), np.empty((count, 3))
+    stopped = np.zeros(count, np.bool_)
+    done, free = 0, start
+    while done < count:
+        end = min(done + _STRETCH, count)
+        for i in range(done, end):
+            step = session.step(hand.command(step))
+            joints[i], poses[i] = step.joints, hand.pose
+        blocked = np.flatnonzero(~reach.free(joints[done:end], reach.level))
+        if blocked.size:
+            # The arm stops at its last posture without contact, until the hand gives up.
+            end, done = done + int(blocked[0]), done + int(blocked[0])
+            free = joints[end - 1].copy() if end else start
+            end = min(end + round(_PATIENCE / PERIOD), count)
+            joints[done:end], poses[done:end], stopped[done:end] = free, poses[done], True
+            session.place(free)
+            step = session.step(Command())
+            hand.give_up(step)
+        done = end
+        if on_progress is not None:
+            on_progress(done, count)
+    R_BC, p_BC = motion.tool_poses(poses)
+    R_AT, p_AT = reach.tool_poses(joints)
+    chord = np.linalg.norm(R_BC - reach.R_BA @ R_AT, axis=(1, 2)) / math.sqrt(8.0)
+    return SimulatedRecording(
+        Recording(joints, np.full(count, float(reach.lift))),
+        np.linalg.norm(p_BC - (p_AT @ reach.R_BA.T + reach.p_BA), axis=1),
+        2.0 * np.arcsin(np.minimum(chord, 1.0)),
+        stopped,
+    )
+
+
+class _Hand:
+    """Hand that heads for random poses in its box and waits for a tool that lags behind."""
+
+    def __init__(self, motion: HandMotion, rng: np.random.Generator, step: Step) -> None:
+        """Start where the tool is, at the middle yaw."""
+        self.pose = np.array([step.p[0], step.p[1], motion.middle[2]])
+        """x, y [m] and yaw [rad] in B, shape (3,)."""
+        self._motion, self._rng = motion, rng
+        self._mode = Mode.END_EFFECTOR
+        self._target = self._draw()
+        self._waited = 0.0
+
+    def command(self, step: Step) -> Command:
+        """Return the command of the next period, after the arm's last step."""
+        behind = math.hypot(self.pose[0] - step.p[0], self.pose[1] - step.p[1])
+        self._waited = self._waited + PERIOD if behind > _LEAD else 0.0
+        if self._waited > _PATIENCE:
+            self.give_up(step)
+        if self._waited == 0.0:
+            self._move()
+        R, p = self._motion.tool_poses(self.pose[None])
+        twist = _GAIN * pose_error(R[0], p[0], step.R, step.p)
+        for part, fastest in zip((twist[:3], twist[3:]), _FASTEST, strict=True):
+            part *= min(1.0, fastest / max(math.sqrt(part @ part), 1e-12))
+        return Command(angular=twist[:3], linear=twist[3:], mode=self._mode)
+
+    def give_up(self, step: Step) -> None:
+        """Return to the tool and head for another pose, with assistance until it is reached."""
+        self.pose[:2] = step.p[:2]
+        self._target, self._waited, self._mode = self._draw(), 0.0, _RECOVERY
+
+    def _move(self) -> None:
+        """Move towards the target for one period, at the hand's speed."""
+        way = self._target - self.pose
+        motion = self._motion
+        seconds = max(math.hypot(way[0], way[1]) / motion.speed, abs(way[2]) / motion.angular_speed)
+        if seconds <= PERIOD:
+            self.pose[:] = self._target
+            self._target, self._mode = self._draw(), Mode.END_EFFECTOR
+        else:
+            self.pose += (PERIOD / seconds) * way
+
+    def _draw(self) -> FloatArray:
+        motion = self._motion
+        return motion.middle + motion.extent * self._rng.uniform(-0.5, 0.5, 3)
+
+
+def _sample_count(motion: HandMotion) -> int:
+    """Return the number of samples.
+
+    Raises:
+        DataFileError: If a number is not finite, or the length is out of range.
+    """
+    numbers = (motion.seconds, motion.height, motion.scale, *motion.centre)
+    if not (np.all(np.isfinite(numbers)) and PERIOD <= motion.seconds <= LONGEST):
+        raise DataFileError(
+            f"simulated recording of {motion.seconds:g} s at a height of {motion.height:g} m: "
+            f"numbers must be finite, and the time from {PERIOD:g} to {LONGEST:,.0f} s."
+        )
+    return round(motion.seconds / PERIOD)
+
+
+def _start_posture(reach: Reach, motion: HandMotion) -> FloatArray:
+    """Return the best posture at the reachable pose of the box that is nearest to its middle.
+
+    Raises:
+        DataFileError: If no pose of the box is reached.
+    """
+    line = np.linspace(-0.5, 0.5, 9)
+    grid = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
+    order = np.argsort((grid**2).sum(axis=1), kind="stable")
+    solved = reach.solve(*motion.tool_poses(motion.middle + motion.extent * grid[order]))
+    if not solved.reached.any():
+        depth, width = motion.extent[:2]
+        raise DataFileError(
+            f"simulated recording: the arm cannot start, as it reaches no pose in the box of "
+            f"{depth:.2f} x {width:.2f} m about x {motion.centre[0]:g}, y {motion.centre[1]:g} m "
+            f"at a height of {motion.height:g} m with the torso at {reach.lift:g} m. Move the box."
+        )
+    # Joints rounded to single precision may lie past a limit by their last digit.
+    joints = np.asarray(solved.joints[int(np.argmax(solved.reached))], dtype=np.float64)
+    return np.asarray(np.clip(joints, *reach.limits))
