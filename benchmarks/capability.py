@@ -36,7 +36,7 @@ from tcs.model.robots import load_robot
 from tcs.model.scene import EnvironmentFile
 from tcs.output.draw import save_figure
 from tcs.output.draw.capability_maps import task_figure
-from tcs.teleop.recordings import HandMotion, simulate_recording
+from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
 LIFT = 0.1725
 """Brings TIAGo's shoulder to 0.91 m."""

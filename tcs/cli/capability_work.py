@@ -128,7 +128,7 @@ def record(
 ) -> dict[str, Any]:
     """Make a map of a CSV file or of a simulated recording, and write it."""
     from tcs.capability import read_csv, write_csv
-    from tcs.teleop.recordings import HandMotion, simulate_recording
+    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
     _check_outputs(out, text, hand.save_csv)
     grid, reach = setup.grid(), setup.reach()

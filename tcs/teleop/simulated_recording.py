@@ -17,9 +17,9 @@ from tcs.capability import Reach, Recording
 from tcs.errors import DataFileError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.arm import JOINTS, load_arm
-from tcs.teleop.control import pose_error
-from tcs.teleop.session import Step, Teleoperation
-from tcs.teleop.settings import Command, Mode, Settings
+from tcs.teleop.control.resolved_rate import pose_error
+from tcs.teleop.control.session import Step, Teleoperation
+from tcs.teleop.control.settings import Command, Mode, Settings
 
 MASTER_BOX = (0.070, 0.160, 0.120)
 """Depth, width and height of the workspace of a Geomagic Touch [m]: forward, left, up."""
@@ -37,7 +37,7 @@ _PATIENCE = 1.0
 """Time that the hand waits for the tool or for a stopped arm [s]."""
 _STRETCH = 25
 """Samples between two collision checks, which are done at once: half a second."""
-_SETTINGS = Settings(period=PERIOD, length=0.2)
+_SETTINGS = Settings(period=PERIOD, length=0.3)
 """Where joint limits leave the tool too few joints, `length` divides the error between position and
 orientation; chosen for a pitch error of the recorded grasps near that of the thesis (Table 3)."""
 
@@ -140,7 +140,7 @@ def simulate_recording(
     motion = motion or HandMotion()
     count = _sample_count(motion)
     start = _start_posture(reach, motion)
-    session = Teleoperation(load_arm(reach.robot, lift=float(reach.lift)), start, _SETTINGS)
+    session = Teleoperation(load_arm(reach.robot, torso_height=float(reach.lift)), start, _SETTINGS)
     step = session.step(Command(mode=Mode.END_EFFECTOR))
     hand = _Hand(motion, np.random.default_rng(seed), step)
     joints, poses = np.empty((count, JOINTS)), np.empty((count, 3))

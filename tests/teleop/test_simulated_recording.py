@@ -9,7 +9,7 @@ from tcs.capability import MapGrid, Reach, map_from_recording
 from tcs.errors import DataFileError
 from tcs.model.robots import load_robot
 from tcs.teleop import load_arm
-from tcs.teleop.recordings import PERIOD, HandMotion, simulate_recording
+from tcs.teleop.simulated_recording import PERIOD, HandMotion, simulate_recording
 
 MINUTE = HandMotion(seconds=60.0, height=0.6)
 
