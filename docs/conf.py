@@ -23,6 +23,7 @@ extensions = [
     "code_links",
     "docstrings",
     "mathml",
+    "package_pages",
 ]
 exclude_patterns = ["_ext", "_static"]
 # Single backticks in docstrings are code, as in Markdown.

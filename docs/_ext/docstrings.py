@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from sphinx.application import Sphinx
@@ -10,13 +11,17 @@ from sphinx.application import Sphinx
 def make_ready(
     app: Sphinx, what: str, name: str, value: Any, options: Any, lines: list[str]
 ) -> None:
-    """Keep colons in the descriptions of attributes, and bars, from being taken for markup.
+    """Keep colons of attributes, bars and asterisks from being taken for markup.
 
-    Napoleon takes what stands before the first colon of an attribute's first line for its type.
-    Ours have their types in annotations, and colons in their sentences: an empty comment goes
-    first. A bar opens a substitution for Sphinx; ours stand for absolute values.
+    Napoleon takes the text before the first colon of an attribute's first line for its type.
+    Attributes here have their types in annotations, and colons in their sentences: an empty comment
+    goes first. A bar opens a substitution for Sphinx, an asterisk an emphasis; in these docstrings
+    they are absolute values and products or file patterns.
     """
-    lines[:] = [line if "`" in line else line.replace("|", r"\|") for line in lines]
+    lines[:] = [
+        line if "`" in line or ">>>" in line else re.sub(r"\||\*(?=\S)", r"\\\g<0>", line)
+        for line in lines
+    ]
     if what in ("attribute", "data", "property") and lines:
         lines[:0] = ["..", ""]
 

@@ -8,10 +8,15 @@ from types import FunctionType
 import pytest
 
 import tcs
+from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.pairs import score_pair
+from tcs.kernel.measure import isotropy_at, limit_penalty
+from tcs.placement.selection import select, shortest_tour, utility
+from tcs.placement.tables import tc_manipulability, tc_reachability
 from tests.docs.building import CHECKOUT, DOCS, build
 
-# No room of their own that others import from: the command line, and single modules.
-WITHOUT_PAGE = {"cli"}
+# The command line has pages of its own, and no names that others import.
+WITHOUT_PAGE = {("cli",), ("__main__",)}
 
 
 def pages(site: Path) -> list[Path]:
@@ -44,24 +49,26 @@ def test_equations_are_set(site):
     assert [equation for equation in equations if "\\" in equation or "&#x0005C;" in equation] == []
 
 
-@pytest.mark.parametrize(
-    "target",
-    [
-        "tables.html#tcs.placement.tables.tc_reachability",
-        "kernel.html#tcs.kernel.measure.isotropy_at",
-        "kernel.html#tcs.kernel.analytic.lanes.solve_lanes",
-        "kernel.html#tcs.kernel.analytic.pairs.score_pair",
-        "tables.html#tcs.placement.tables.tc_manipulability",
-        "select.html#tcs.placement.selection.utility",
-        "select.html#tcs.placement.selection.shortest_tour",
-        "select.html#tcs.placement.selection.select",
-        "kernel.html#tcs.kernel.measure.limit_penalty",
-    ],
-)
-def test_equation_leads_to_its_function(site, target):
-    assert f'href="api/{target}"' in (site / "method.html").read_text(encoding="utf-8")
-    page, anchor = target.split("#")
-    assert f'id="{anchor}"' in (site / "api" / page).read_text(encoding="utf-8")
+EQUATIONS = [
+    isotropy_at,
+    limit_penalty,
+    score_pair,
+    select,
+    shortest_tour,
+    solve_lanes,
+    tc_manipulability,
+    tc_reachability,
+    utility,
+]
+
+
+@pytest.mark.parametrize("function", EQUATIONS, ids=lambda function: function.__name__)
+def test_equation_leads_to_its_function(site, function):
+    text = (site / "method.html").read_text(encoding="utf-8")
+    links = re.findall(rf'href="(api/[^"#]+)#(tcs[.\w]*\.{function.__name__})"', text)
+    assert links
+    for page, anchor in links:
+        assert f'id="{anchor}"' in (site / page).read_text(encoding="utf-8")
 
 
 def test_every_promised_name_leads_to_its_description(site):
@@ -74,19 +81,42 @@ def test_every_promised_name_leads_to_its_description(site):
         ), name
 
 
-def rooms() -> list[str]:
-    found = {path.parent.name for path in (CHECKOUT / "tcs").glob("*/__init__.py")}
-    return sorted(found - WITHOUT_PAGE)
+def modules() -> list[str]:
+    """Return the modules and packages whose description belongs in the API."""
+    paths = [path.relative_to(CHECKOUT) for path in (CHECKOUT / "tcs").rglob("*.py")]
+    names = [path.parent if path.stem == "__init__" else path.with_suffix("") for path in paths]
+    return sorted(".".join(name.parts) for name in names if name.parts[1:2] not in WITHOUT_PAGE)
 
 
-@pytest.mark.parametrize("room", rooms())
-def test_every_name_of_a_room_is_described(site, room):
-    text = (site / "api" / f"{room}.html").read_text(encoding="utf-8")
-    there = vars(importlib.import_module(f"tcs.{room}"))
-    # Constants and names of types have no home of their own that Sphinx could find.
-    kinds = (type, FunctionType)
-    names = [name for name in there.get("__all__", []) if isinstance(there[name], kinds)]
-    assert [name for name in names if f'id="tcs.{room}.{name}"' not in text] == []
+def test_every_module_is_described(site):
+    text = "".join(path.read_text(encoding="utf-8") for path in (site / "api").rglob("*.html"))
+    described = set(re.findall(r'id="module-(tcs[.\w]*)"', text))
+    # A function that a package exports hides the module it is named after.
+    functions = set(re.findall(r'id="(tcs[.\w]+)"', text))
+    assert [name for name in modules() if name not in described | functions] == []
+
+
+def test_every_exported_name_is_described(site):
+    text = "".join(path.read_text(encoding="utf-8") for path in (site / "api").rglob("*.html"))
+    described = set(re.findall(r'id="(tcs[.\w]+)"', text))
+    missing = []
+    for module in set(modules()) - {"tcs"}:
+        if not (CHECKOUT / module.replace(".", "/") / "__init__.py").is_file():
+            continue
+        there = vars(importlib.import_module(module))
+        # Constants and names of types have no home of their own that Sphinx could find.
+        names = [n for n in there.get("__all__", []) if isinstance(there[n], (type, FunctionType))]
+        missing += [f"{module}.{n}" for n in names if f"{module}.{n}" not in described]
+    assert missing == []
+
+
+def test_page_of_a_package_that_does_not_exist_fails_the_build(tmp_path):
+    (tmp_path / "docs").mkdir()
+    page = "# A page\n\n```{package} tcs.nothing\n```\n"
+    (tmp_path / "docs" / "index.md").write_text(page, encoding="utf-8")
+    done = build(tmp_path / "docs", tmp_path / "out")
+    assert done.returncode != 0
+    assert "index: there is no package tcs.nothing; rename the page" in done.stderr
 
 
 def test_links_that_lead_nowhere_fail_the_build(tmp_path):
