@@ -50,11 +50,11 @@ def test_unknown_name():
 
 
 @pytest.mark.parametrize(
-    ("name", "room", "there"),
+    ("name", "package", "there"),
     [("load", "tcs.placement.store", "load_scores"), ("score", "tcs.placement.scoring", "score")],
 )
-def test_names_are_those_of_the_rooms(name, room, there):
-    assert getattr(tcs, name) is getattr(importlib.import_module(room), there)
+def test_names_are_those_of_the_packages(name, package, there):
+    assert getattr(tcs, name) is getattr(importlib.import_module(package), there)
 
 
 def test_import_loads_nothing_heavy():

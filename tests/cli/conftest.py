@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 import tcs
 from tcs.cli.app import app
 from tcs.placement.store import save_scores
+from tests.environments import CORNER, write_environment
 from tests.placement.store.example import METADATA, score_file
-from tests.rooms import CORNER, write_room
 
 TIMINGS = dict.fromkeys(
     ("compile_seconds", "scoring_seconds", "sets_seconds", "total_seconds"), 0.5
@@ -82,7 +82,7 @@ def small_file(tmp_path) -> Path:
 @pytest.fixture(scope="session")
 def corner(tmp_path_factory) -> Path:
     """An environment file of the user's own, with 36 configurations."""
-    return write_room(tmp_path_factory.mktemp("corner"), "corner", CORNER)
+    return write_environment(tmp_path_factory.mktemp("corner"), "corner", CORNER)
 
 
 @pytest.fixture

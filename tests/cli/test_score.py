@@ -11,7 +11,7 @@ import pytest
 
 import tcs
 from tcs.files.paths import data_folder
-from tests.rooms import CORNER, write_room
+from tests.environments import CORNER, write_environment
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +167,7 @@ def test_unknown_names(tcs_command, tmp_path, words, said):
     ],
 )
 def test_impossible_grids(tcs_command, tmp_path, count, said):
-    room = write_room(tmp_path, "corner", CORNER | {"base_x": (0.95, 0.1, count)})
+    room = write_environment(tmp_path, "corner", CORNER | {"base_x": (0.95, 0.1, count)})
     ran = tcs_command("score", "shaving", "--environment", room, "--out", tmp_path / "o.tcs")
     assert ran.code == 1
     assert ran.err.count("\n") == 1

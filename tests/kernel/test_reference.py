@@ -69,7 +69,7 @@ def test_distances_of_the_real_shapes_are_drakes_or_less(scene, lowered, full_gr
     close = 0
     for _ in range(150):
         first, ours = [(Group.ARM, arm), (Group.BODY, body)][rng.integers(2)]
-        second, theirs = [(Group.ROOM, room), (Group.BODY, body)][rng.integers(2)]
+        second, theirs = [(Group.ENVIRONMENT, room), (Group.BODY, body)][rng.integers(2)]
         i, j = int(rng.integers(len(ours))), int(rng.integers(len(theirs)))
         if (first, i) == (second, j):
             continue

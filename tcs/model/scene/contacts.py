@@ -30,7 +30,7 @@ class Group(Enum):
     """The scored arm and what it carries."""
     BODY = "body"
     """The rest of the robot."""
-    ROOM = "room"
+    ENVIRONMENT = "environment"
     """Furniture, person, obstacles, floor."""
 
 
@@ -42,7 +42,8 @@ class Part:
     body: BodyIndex
     group: Group
     carrier: int
-    """Arm: 1..7, the link that carries it. Body: 1 if it rides on the torso, else 0. Room: 0."""
+    """The arm: 1..7, the link that carries the shape. The rest of the robot: 1 if mounted on the
+    torso, 0 if fixed to the base. The environment: 0."""
     name: str
     """What a blocked configuration is blamed on, e.g. "person::head_center"."""
     pad: float
@@ -53,13 +54,13 @@ class Part:
 class ContactRule:
     """Which pairs of shapes count as collision.
 
-    Checked: the arm against itself, the rest of the robot and the room; the rest of the robot
-    against the room, except the floor it stands on. The rest of the robot keeps its posture, and
-    the room stands still, so neither is checked against itself.
+    Checked: the arm against itself, the rest of the robot and the environment; the rest of the
+    robot against the environment, except the floor it stands on. The rest of the robot keeps its
+    posture and the environment is static, so neither is checked against itself.
 
     Attributes:
         disabled_pairs: Pairs of robot bodies never checked (the robot file's).
-        allowed_contacts: Pairs of a robot body and a room body that may touch (the task's).
+        allowed_contacts: Pairs of a robot body and an environment body that may touch (the task's).
     """
 
     disabled_pairs: frozenset[frozenset[str]]
@@ -79,22 +80,24 @@ class ContactRule:
         Args:
             parts: Every part of the scene, to know which names there are.
             disabled_pairs: Pairs of robot bodies that are never checked.
-            allowed_contacts: Pairs (robot body, room body) that may touch.
+            allowed_contacts: Pairs (robot body, environment body) that may touch.
             where: Where the allowed contacts stand, for the message.
 
         Raises:
             UnknownNameError: If an allowed contact names a body that has no shape in the scene.
         """
-        robot_names, room_names = set[str](), set[str]()
+        robot_names, environment_names = set[str](), set[str]()
         for part in parts:
-            (room_names if part.group is Group.ROOM else robot_names).add(part.name)
+            (environment_names if part.group is Group.ENVIRONMENT else robot_names).add(part.name)
         allowed = []
-        for robot_body, room_body in allowed_contacts:
+        for robot_body, environment_body in allowed_contacts:
             if robot_body not in robot_names:
                 raise UnknownNameError("robot body", robot_body, robot_names, where=where)
-            if room_body not in room_names:
-                raise UnknownNameError("room body", room_body, room_names, where=where)
-            allowed.append(frozenset((robot_body, room_body)))
+            if environment_body not in environment_names:
+                raise UnknownNameError(
+                    "environment body", environment_body, environment_names, where=where
+                )
+            allowed.append(frozenset((robot_body, environment_body)))
         return cls(
             disabled_pairs=frozenset(frozenset(pair) for pair in disabled_pairs),
             allowed_contacts=frozenset(allowed),
@@ -104,12 +107,12 @@ class ContactRule:
         """Return whether contact between two parts counts, in either order."""
         groups = {first.group, second.group}
         names = frozenset((first.name, second.name))
-        if groups in ({Group.ROOM}, {Group.BODY}):
+        if groups in ({Group.ENVIRONMENT}, {Group.BODY}):
             return False
-        if Group.ROOM not in groups:
+        if Group.ENVIRONMENT not in groups:
             moves = groups == {Group.ARM, Group.BODY} or first.carrier != second.carrier
             return moves and names not in self.disabled_pairs
-        if groups == {Group.BODY, Group.ROOM} and FLOOR in names:
+        if groups == {Group.BODY, Group.ENVIRONMENT} and FLOOR in names:
             return False
         return names not in self.allowed_contacts
 

@@ -19,7 +19,7 @@ in a model file are rounded."""
 
 
 @dataclass(frozen=True, slots=True)
-class RoomJoints:
+class EnvironmentJoints:
     """Every joint of the environment that moves.
 
     Attributes:

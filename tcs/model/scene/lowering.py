@@ -101,7 +101,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     )
     arm = [part for part in built.parts if part.group is Group.ARM]
     body = [part for part in built.parts if part.group is Group.BODY]
-    room = [part for part in built.parts if part.group is Group.ROOM]
+    room = [part for part in built.parts if part.group is Group.ENVIRONMENT]
     robot_bodies = _names([*arm, *body])
     room_bodies = _names(room)
 
@@ -111,7 +111,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     chain, X_AL = arm_chain(scene)
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
     for axis in grid.environment_axes:
-        built.room_joints.check_axis(axis, where=where)
+        built.environment_joints.check_axis(axis, where=where)
     room_poses, poses_of_goals = _environment_states(scene, room, task, _states_of(grid))
 
     arrays = SceneArrays(
@@ -219,7 +219,7 @@ def environment_at(
         TcsError: If a joint follows another one, or does not go that far.
     """
     before = scene.positions()
-    room = [part for part in scene.built.parts if part.group is Group.ROOM]
+    room = [part for part in scene.built.parts if part.group is Group.ENVIRONMENT]
     try:
         room_poses, poses_of_goals = _environment_states(scene, room, task, states)
     finally:

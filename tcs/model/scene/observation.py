@@ -112,7 +112,7 @@ def _set_as_seen(scene: Scene, observation: Observation, chosen: tuple[str, ...]
     setting = observation.setting
     for name in setting:
         if name not in chosen:
-            raise UnknownNameError("axis of the room", name, chosen, where="observation, setting")
+            raise UnknownNameError("environment axis", name, chosen, where="observation, setting")
     untold = [name for name in chosen if name not in setting]
     if untold:
         raise SelectionError(
@@ -127,7 +127,9 @@ def _fitted(scene: Scene, observation: Observation) -> Found:
     """Return the joints at which the frames are nearest to where they are seen."""
     spread = _free_joints(scene, observation.joints)
     seen = [(_frame(scene, name), *_pose(name, at)) for name, at in observation.frames.items()]
-    limits = np.array([scene.built.room_joints.limits(name) for name in spread]).reshape(-1, 2)
+    limits = np.array([scene.built.environment_joints.limits(name) for name in spread]).reshape(
+        -1, 2
+    )
     scale = np.array(list(spread.values()))
 
     def offsets(z: FloatArray) -> FloatArray:

@@ -34,8 +34,8 @@ from tcs.errors import RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
-from tcs.model.scene.joints import RoomJoints
-from tcs.model.scene.room import add_room, room_parts
+from tcs.model.scene.environment_plant import add_environment, environment_parts
+from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.spec import SceneSpec
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
@@ -59,9 +59,9 @@ class ScenePlant:
         base_frame: B, the robot's base.
         arm_base_frame: A, the link that carries joint 1.
         tool_frame: T.
-        room_joints: Joints of the environment.
+        environment_joints: Joints of the environment.
         body_frames: Frames that goals may name.
-        parts: Every collision shape: arm, body, room.
+        parts: Every collision shape: arm, body, environment.
         rule: Which pairs of them are checked.
     """
 
@@ -77,7 +77,7 @@ class ScenePlant:
     base_frame: Frame
     arm_base_frame: Frame
     tool_frame: Frame
-    room_joints: RoomJoints
+    environment_joints: EnvironmentJoints
     body_frames: dict[str, Frame]
     parts: tuple[Part, ...]
     rule: ContactRule
@@ -93,7 +93,7 @@ def build_plant(
 
     Args:
         spec: Robot and environment.
-        allowed_contacts: Pairs (robot body, room body) that may touch.
+        allowed_contacts: Pairs (robot body, environment body) that may touch.
         meshes: Whether to load the robot's visual meshes.
 
     Raises:
@@ -110,7 +110,7 @@ def build_plant(
     instance = _add_robot(plant, robot, meshes)
     base_joints = _add_base(plant, plant.GetBodyByName(robot.root_body, instance))
     primitives = _add_primitives(plant, robot, instance)
-    room = add_room(plant, environment)
+    added = add_environment(plant, environment)
     for name, value in robot.joint_positions().items():
         plant.GetJointByName(name, instance).set_default_positions([value])
     plant.Finalize()
@@ -120,7 +120,7 @@ def build_plant(
     inspector = scene_graph.model_inspector()
     parts = (
         *_robot_parts(plant, inspector, primitives, arm_joints, torso),
-        *room_parts(plant, inspector, room, environment),
+        *environment_parts(plant, inspector, added, environment),
     )
     for part in parts:
         shape_of(inspector, part)
@@ -141,9 +141,9 @@ def build_plant(
         base_frame=plant.GetFrameByName(robot.root_body, instance),
         arm_base_frame=plant.GetFrameByName(robot.arm_base, instance),
         tool_frame=plant.GetFrameByName(robot.tool_frame, instance),
-        room_joints=room.joints,
+        environment_joints=added.joints,
         body_frames={
-            name: room.links[link].body_frame() for name, link in environment.body_frames.items()
+            name: added.links[link].body_frame() for name, link in environment.body_frames.items()
         },
         parts=parts,
         rule=rule,

@@ -24,8 +24,9 @@ Contact = tuple[str, str, float]
 class Scene:
     """One robot in one environment, as a Drake plant with one state.
 
-    It starts with the base at the origin, the torso at its lowest, the arm at zero and the room
-    as its file says. Drake plants do not pickle: pass the spec on and build another scene.
+    It starts with the base at the origin, the torso at its lowest, the arm at zero and the
+    environment as its file says. Drake plants do not pickle: pass the spec on and build another
+    scene.
     """
 
     def __init__(
@@ -39,7 +40,7 @@ class Scene:
 
         Args:
             spec: Robot and environment.
-            allowed_contacts: Pairs (robot body, room body) that may touch.
+            allowed_contacts: Pairs (robot body, environment body) that may touch.
             meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
 
         Raises:
@@ -115,7 +116,7 @@ class Scene:
             TcsError: If the joint follows another one, or does not go that far.
         """
         where = f"environment '{self.spec.environment.name}'"
-        for joint, position in self.built.room_joints.positions(name, value, where=where):
+        for joint, position in self.built.environment_joints.positions(name, value, where=where):
             self._set(joint.position_start(), position)
 
     def positions(self) -> FloatArray:
@@ -182,10 +183,10 @@ class Scene:
 
         Returns:
             For each pair of bodies the least signed distance over their shapes, negative where
-            they overlap. Arm before body before room.
+            they overlap. Arm before body before environment.
         """
         part_of = {part.geometry: part for part in self.built.parts}
-        order = (Group.ARM, Group.BODY, Group.ROOM)
+        order = (Group.ARM, Group.BODY, Group.ENVIRONMENT)
         least: dict[tuple[str, str], float] = {}
         for pair in self.query_object().ComputeSignedDistancePairwiseClosestPoints(max_distance):
             both = sorted(

@@ -261,7 +261,7 @@ def room_parts(scene: Scene) -> list[tuple[Part, Kind]]:
     plant = scene.built.plant
     found = []
     for part in scene.built.parts:
-        if part.group is Group.ROOM and part.name != FLOOR:
+        if part.group is Group.ENVIRONMENT and part.name != FLOOR:
             instance = plant.get_body(part.body).model_instance()
             is_person = plant.GetModelInstanceName(instance) in people
             found.append((part, Kind.PERSON if is_person else Kind.FURNITURE))

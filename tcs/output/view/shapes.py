@@ -50,7 +50,7 @@ def robot_shapes(scene: Scene, meshes: bool) -> list[Drawn]:
     """
     inspector = scene.built.scene_graph.model_inspector()
     plant = scene.built.plant
-    parts = [part for part in scene.built.parts if part.group is not Group.ROOM]
+    parts = [part for part in scene.built.parts if part.group is not Group.ENVIRONMENT]
     instances = {plant.get_body(part.body).model_instance() for part in parts}
     shapes = []
     for geometry in inspector.GetAllGeometryIds(Role.kIllustration) if meshes else ():

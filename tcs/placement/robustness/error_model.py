@@ -68,7 +68,7 @@ class ErrorModel:
             read = checked(content, ErrorFile, where, DataFileError)
             source, errors = read.source or str(errors), read.errors
         for name, error in errors.items():
-            scene.built.room_joints.check_error(name, error, where=where)
+            scene.built.environment_joints.check_error(name, error, where=where)
         return cls(dict(errors), source)
 
     def draw(self, samples: int, seed: int, *, stream: str = "") -> Offsets:

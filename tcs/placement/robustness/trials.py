@@ -260,7 +260,7 @@ class Trials:
         stopped = np.zeros(samples, dtype=np.bool_)
         for name, off in offsets.items():
             nominal = believed.get(name, self.job.spec.environment.joints.get(name, 0.0))
-            lower, upper = self.scene.built.room_joints.limits(name)
+            lower, upper = self.scene.built.environment_joints.limits(name)
             # A grid's last step may be a rounding beyond the limit; there it is to stay.
             meant = nominal + np.asarray(off, dtype=np.float64)
             positions[name] = np.clip(meant, min(lower, nominal), max(upper, nominal))

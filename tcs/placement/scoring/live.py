@@ -117,7 +117,7 @@ class LiveScorer:
         untold = {axis.name: 0.0 for axis in self._job.observed}
         axes = []
         for name, value in {**untold, **joints}.items():
-            turns = self._scene.built.room_joints.turns(name)
+            turns = self._scene.built.environment_joints.turns(name)
             start = math.degrees(value) if turns else value
             axes.append(Axis(name, "deg" if turns else "m", start, 0.0, 1))
         return dataclasses.replace(self._job, observed=tuple(axes))

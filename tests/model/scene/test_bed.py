@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tcs.errors import TcsError
 from tcs.model.grid import Grid
 from tcs.model.scene.environment import load_environment
-from tests.model.scene.rooms import RoomAlone, numbers, rows
+from tests.model.scene.environments import EnvironmentAlone, numbers, rows
 
 HEAD_RESTS = (0, 35, 70)
 HINGE = np.array([0.755, 0.0, 0.541])
@@ -20,12 +20,12 @@ OUR_NAME = {"head_link": "head_center"}
 
 @pytest.fixture(scope="module")
 def bed():
-    return RoomAlone("bed")
+    return EnvironmentAlone("bed")
 
 
 @pytest.fixture
-def room(bed):
-    """The bed room as its file says, before and after each test."""
+def environment(bed):
+    """The bed environment as its file says, before and after each test."""
     bed.set()
     yield bed
     bed.set()
@@ -54,34 +54,34 @@ def published_poses(head_rest_deg, bed_height):
 
 @pytest.mark.parametrize("bed_height", [0.0, 0.2])
 @pytest.mark.parametrize("head_rest_deg", HEAD_RESTS)
-def test_body_frames_lie_where_the_original_had_them(room, head_rest_deg, bed_height):
-    room.set(bed_height=bed_height, head_rest=np.radians(head_rest_deg))
+def test_body_frames_lie_where_the_original_had_them(environment, head_rest_deg, bed_height):
+    environment.set(bed_height=bed_height, head_rest=np.radians(head_rest_deg))
     published = published_poses(head_rest_deg, bed_height)
     judged = set()
     for link, (R_WL, p_WL) in published.items():
         ours = f"person::{OUR_NAME.get(link, link)}"
-        if ours not in room.room.links or link == "base_link":
+        if ours not in environment.added.links or link == "base_link":
             continue
         judged.add(ours)
-        X_WL = room.room.links[ours].EvalPoseInWorld(room.state)
+        X_WL = environment.added.links[ours].EvalPoseInWorld(environment.state)
         # Joint frames carry seven digits of a quaternion, over a body 1.7 m long; a wrong figure
         # would be off by more than a millimetre or a tenth of a degree.
         np.testing.assert_allclose(X_WL.translation(), p_WL, atol=1e-6, err_msg=link)
         turned = R_WL.inv() * Rotation.from_matrix(X_WL.rotation().matrix())
         assert turned.magnitude() < 1e-6, link
-    assert judged >= set(room.environment.body_frames.values())
-    assert len(room.environment.body_frames) == 17
+    assert judged >= set(environment.file.body_frames.values())
+    assert len(environment.file.body_frames) == 17
     # The frame of our head rest lies on its hinge, as there.
-    hinge = room.room.links["bed::head_rest_link"].EvalPoseInWorld(room.state)
+    hinge = environment.added.links["bed::head_rest_link"].EvalPoseInWorld(environment.state)
     np.testing.assert_allclose(hinge.translation(), published["head_rest_link"][1], atol=1e-6)
 
 
-def test_raising_the_bed_lifts_all_but_feet_posts_and_wall(room):
+def test_raising_the_bed_lifts_all_but_feet_posts_and_wall(environment):
     still, raised = {}, {}
     for height, found in ((0.0, still), (0.3, raised)):
-        room.set(bed_height=height, head_rest=0.5)
-        for part in room.parts:
-            found[part] = room.query().GetPoseInWorld(part.geometry).GetAsMatrix34().copy()
+        environment.set(bed_height=height, head_rest=0.5)
+        for part in environment.parts:
+            found[part] = environment.query().GetPoseInWorld(part.geometry).GetAsMatrix34().copy()
     for part, before in still.items():
         stays = part.name in ("wall", "floor") or " post " in part.name or " disc " in part.name
         lifted = before + (0.0 if stays else 0.3) * np.eye(3, 4, 3)[[1, 2, 0]]
@@ -89,7 +89,9 @@ def test_raising_the_bed_lifts_all_but_feet_posts_and_wall(room):
 
 
 @pytest.mark.parametrize("head_rest_deg", [0, 20, 35, 70, 80])
-def test_the_person_shifts_along_the_room_whatever_the_head_rest_does(room, head_rest_deg):
+def test_the_person_shifts_along_the_axes_of_w_whatever_the_head_rest_does(
+    environment, head_rest_deg
+):
     at = np.radians(head_rest_deg)
     slope = np.array([np.cos(at), 0.0, -np.sin(at)])
     for joint, direction in (
@@ -98,29 +100,29 @@ def test_the_person_shifts_along_the_room_whatever_the_head_rest_does(room, head
         # The original's own x: along the surface of the head rest, down.
         ("person_slide", slope),
     ):
-        for link in room.environment.body_frames.values():
-            X_WL = room.pose(link, head_rest=at)
-            shifted = room.pose(link, head_rest=at, **{joint: 0.07})
+        for link in environment.file.body_frames.values():
+            X_WL = environment.pose(link, head_rest=at)
+            shifted = environment.pose(link, head_rest=at, **{joint: 0.07})
             moved = shifted.translation() - X_WL.translation()
             np.testing.assert_allclose(moved, 0.07 * direction, atol=1e-12)
             np.testing.assert_allclose(
                 shifted.rotation().matrix(), X_WL.rotation().matrix(), atol=1e-12
             )
-        still = room.pose("bed::head_rest_link", head_rest=at, **{joint: 0.07})
+        still = environment.pose("bed::head_rest_link", head_rest=at, **{joint: 0.07})
         np.testing.assert_allclose(still.translation(), HINGE, atol=1e-12)
 
 
-def test_the_head_tilts_up_about_its_own_centre(room):
-    nominal = room.pose("person::head_center", head_rest=0.6)
-    tilted = room.pose("person::head_center", head_rest=0.6, head_tilt=0.3)
+def test_the_head_tilts_up_about_its_own_centre(environment):
+    nominal = environment.pose("person::head_center", head_rest=0.6)
+    tilted = environment.pose("person::head_center", head_rest=0.6, head_tilt=0.3)
     np.testing.assert_allclose(tilted.translation(), nominal.translation(), atol=1e-12)
     turned = nominal.rotation().inverse() @ tilted.rotation()
     face = turned.matrix()[:, 0]
     np.testing.assert_allclose(face, [np.cos(0.3), 0.0, np.sin(0.3)], atol=1e-12)
     for link in ("person::neck_link", "person::hand_left_link"):
         np.testing.assert_array_equal(
-            room.pose(link, head_rest=0.6, head_tilt=0.3).GetAsMatrix34(),
-            room.pose(link, head_rest=0.6).GetAsMatrix34(),
+            environment.pose(link, head_rest=0.6, head_tilt=0.3).GetAsMatrix34(),
+            environment.pose(link, head_rest=0.6).GetAsMatrix34(),
         )
 
 
@@ -138,8 +140,8 @@ FURNITURE = [row for row in rows("furniture_bed.csv") if row["kind"] == "primiti
 
 
 @pytest.mark.parametrize("row", FURNITURE, ids=lambda row: row["item"])
-def test_furniture_stands_where_the_mesh_has_it(room, row):
-    lowest, highest = room.reach(our_name(row["item"]))
+def test_furniture_stands_where_the_mesh_has_it(environment, row):
+    lowest, highest = environment.reach(our_name(row["item"]))
     if row["shape"] == "cylinder":
         centre, radius = numbers(row, "cx", "cy", "cz"), float(row["dim_a"])
         half = np.array([radius, radius, float(row["dim_b"]) / 2])
@@ -156,8 +158,8 @@ def test_furniture_stands_where_the_mesh_has_it(room, row):
     np.testing.assert_allclose(highest, upper, atol=1e-5)
 
 
-def test_nothing_of_the_bed_is_left_out_or_added(room):
-    ours = {part.name for part in room.parts if not part.name.startswith("person::")}
+def test_nothing_of_the_bed_is_left_out_or_added(environment):
+    ours = {part.name for part in environment.parts if not part.name.startswith("person::")}
     # The plates that brace beam and legs are ours: the published boxes leave them out.
     plates = {name for name in ours if " plate" in name}
     assert ours - plates == {our_name(row["item"]) for row in FURNITURE} | {"floor"}
@@ -165,11 +167,11 @@ def test_nothing_of_the_bed_is_left_out_or_added(room):
 
 
 @pytest.mark.parametrize("head_rest_deg", HEAD_RESTS)
-def test_the_head_section_rises_with_the_head_rest(room, head_rest_deg):
+def test_the_head_section_rises_with_the_head_rest(environment, head_rest_deg):
     where = f" at {head_rest_deg} deg" if head_rest_deg else ""
     (row,) = [r for r in rows("furniture_bed.csv") if r["item"] == f"head_rest_link{where}"]
-    room.set(head_rest=np.radians(head_rest_deg))
-    lowest, highest = room.reach("bed::mattress head section", "bed::pillow")
+    environment.set(head_rest=np.radians(head_rest_deg))
+    lowest, highest = environment.reach("bed::mattress head section", "bed::pillow")
     lower, upper = (numbers(row, *(f"{end}_{k}" for k in "xyz")) for end in ("min", "max"))
     # The pillow is a rounded bump in the mesh and its box has corners: 5 cm high, a third of it
     # flat, so 4 cm at most once it is tilted. The mattress itself agrees.
@@ -179,7 +181,7 @@ def test_the_head_section_rises_with_the_head_rest(room, head_rest_deg):
     np.testing.assert_allclose(highest, upper, atol=0.04)
 
 
-def test_the_lying_person_has_the_shapes_of_the_seated_one(room):
+def test_the_lying_person_has_the_shapes_of_the_seated_one(environment):
     def shapes(alone):
         return [
             (part.name, repr(shape := alone.inspector.GetShape(part.geometry)), type(shape))
@@ -194,25 +196,27 @@ def test_the_lying_person_has_the_shapes_of_the_seated_one(room):
             if part.name.startswith("person::")
         ]
 
-    seated = RoomAlone("wheelchair")
-    assert sorted(shapes(room), key=str) == sorted(shapes(seated), key=str)
-    for link in room.environment.body_frames.values():
-        ours, theirs = ([X for name, X in poses(alone) if name == link] for alone in (room, seated))
+    seated = EnvironmentAlone("wheelchair")
+    assert sorted(shapes(environment), key=str) == sorted(shapes(seated), key=str)
+    for link in environment.file.body_frames.values():
+        ours, theirs = (
+            [X for name, X in poses(alone) if name == link] for alone in (environment, seated)
+        )
         # Quaternions of seven digits.
         np.testing.assert_allclose(ours, theirs, atol=1e-6)
-    person = {name: pad for name, pad in seated.environment.padding.items() if "person" in name}
-    assert person.items() <= room.environment.padding.items()
+    person = {name: pad for name, pad in seated.file.padding.items() if "person" in name}
+    assert person.items() <= environment.file.padding.items()
 
 
 @pytest.mark.parametrize("head_rest_deg", HEAD_RESTS)
-def test_padding_covers_the_skin(room, head_rest_deg):
-    room.set(head_rest=np.radians(head_rest_deg))
-    padding = room.environment.padding
-    skin = room.exposed_skin()
+def test_padding_covers_the_skin(environment, head_rest_deg):
+    environment.set(head_rest=np.radians(head_rest_deg))
+    padding = environment.file.padding
+    skin = environment.exposed_skin()
     # Otherwise the rest would pass by leaving everything out.
     assert len(skin) > 3000
     assert len({link for link, _ in skin}) == 17
-    inward = dict.fromkeys(room.environment.body_frames.values(), -np.inf)
+    inward = dict.fromkeys(environment.file.body_frames.values(), -np.inf)
     for link, distances in skin:
         inward[link] = max(inward[link], min(distances.values()))
     assert {link: d for link, d in inward.items() if d > padding[link]} == {}
@@ -241,46 +245,44 @@ def test_the_bed_has_the_grid_shifts_and_errors_of_the_paper():
     assert deviations == {"person_x": 0.05, "person_y": 0.05}
 
 
-def test_the_bed_without_wall_differs_by_the_wall_alone(room):
-    free = RoomAlone("bed-no-wall")
-    names = [part.name for part in room.parts]
+def test_the_bed_without_wall_differs_by_the_wall_alone(environment):
+    free = EnvironmentAlone("bed-no-wall")
+    names = [part.name for part in environment.parts]
     names.remove("wall")
     assert [part.name for part in free.parts] == names
     changed = {"name", "title", "obstacles"}
-    assert free.environment.model_dump(exclude=changed) == room.environment.model_dump(
-        exclude=changed
-    )
-    lowest, highest = room.reach("wall")
+    assert free.file.model_dump(exclude=changed) == environment.file.model_dump(exclude=changed)
+    lowest, highest = environment.reach("wall")
     np.testing.assert_allclose([lowest, highest], [[-0.08, -1.5, 0], [-0.07, 1.5, 2]], atol=1e-12)
 
 
-def test_joints_go_as_far_as_the_bed_does(room):
-    joints = room.room.joints
+def test_joints_go_as_far_as_the_bed_does(environment):
+    joints = environment.added.joints
     assert joints.limits("bed_height") == pytest.approx((0.0, 0.3))
     assert np.degrees(joints.limits("head_rest")) == pytest.approx((0.0, 80.0))
     with pytest.raises(TcsError, match=r"joint 'head_rest': 105 deg is beyond .* 0 to 80 deg"):
-        room.set(head_rest=np.radians(105))
+        environment.set(head_rest=np.radians(105))
 
 
 def test_models_load_without_a_word_from_drake(caplog):
-    RoomAlone("bed")
+    EnvironmentAlone("bed")
     assert caplog.records == []
 
 
-def test_pictures_show_what_is_checked(room):
-    for link, body in room.room.links.items():
-        frame = room.plant.GetBodyFrameIdOrThrow(body.index())
+def test_pictures_show_what_is_checked(environment):
+    for link, body in environment.added.links.items():
+        frame = environment.plant.GetBodyFrameIdOrThrow(body.index())
         checked, shown = (
             {
                 (
-                    repr(room.inspector.GetShape(g)),
-                    tuple(room.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
+                    repr(environment.inspector.GetShape(g)),
+                    tuple(environment.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
                 )
                 for g in geometries
             }
             for geometries in (
-                room.plant.GetCollisionGeometriesForBody(body),
-                room.inspector.GetGeometries(frame, Role.kIllustration),
+                environment.plant.GetCollisionGeometriesForBody(body),
+                environment.inspector.GetGeometries(frame, Role.kIllustration),
             )
         )
         assert shown == checked, link

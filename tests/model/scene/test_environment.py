@@ -16,8 +16,8 @@ from tcs.model.grid import Axis, Grid
 from tcs.model.scene import Scene, SceneSpec, load_environment
 
 MINIMAL = {
-    "name": "room",
-    "title": "A room",
+    "name": "own",
+    "title": "An environment",
     "origin": "in the corner",
     "source": "made up",
     "grid": {
@@ -32,7 +32,7 @@ FOLLOWED_BY_B = {"knots": [0, 1], "joints": {"b": [0, 1]}}
 
 
 def written(tmp_path: Path, **changes: object) -> Path:
-    path = tmp_path / "room.yaml"
+    path = tmp_path / "own.yaml"
     path.write_text(yaml.safe_dump({**MINIMAL, **changes}, sort_keys=False), encoding="utf-8")
     return path
 
@@ -169,7 +169,7 @@ def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path, c
 
 def test_a_bad_grid_names_the_file(tmp_path):
     grid = {**MINIMAL["grid"], "torso": {"unit": "m", "start": 0.0, "step": 0.1, "count": 0}}
-    with pytest.raises(GridError, match=r"room\.yaml', field 'grid'.*torso.*empty"):
+    with pytest.raises(GridError, match=r"own\.yaml', field 'grid'.*torso.*empty"):
         load_environment(written(tmp_path, grid=grid))
 
 
@@ -185,7 +185,7 @@ def test_a_bad_grid_names_the_file(tmp_path):
     ids=["empty", "unit", "missing", "key", "both"],
 )
 def test_a_bad_observed_axis_names_the_file(tmp_path, axes, error, said):
-    with pytest.raises(error, match=rf"room\.yaml', field 'observed': {said}"):
+    with pytest.raises(error, match=rf"own\.yaml', field 'observed': {said}"):
         load_environment(written(tmp_path, observed=axes))
 
 
@@ -200,20 +200,20 @@ def test_observed_axes_are_axes_in_the_order_of_the_file(tmp_path):
 
 
 def test_posture_and_observed_are_taken_over_from_the_base(tmp_path):
-    room = tmp_path / "room.yaml"
-    room.write_text("{name: room, based_on: bed}")
-    ours, bed = load_environment(room), load_environment("bed")
+    own = tmp_path / "own.yaml"
+    own.write_text("{name: own, based_on: bed}")
+    ours, bed = load_environment(own), load_environment("bed")
     assert ours.posture == bed.posture
     assert ours.observed_axes == bed.observed_axes
-    room.write_text("{name: room, based_on: bed, observed: {}}")
-    assert load_environment(room).observed_axes == ()
+    own.write_text("{name: own, based_on: bed, observed: {}}")
+    assert load_environment(own).observed_axes == ()
 
 
 @pytest.mark.parametrize("text", ["[1, 2]", "a: [", "\x00"], ids=["list", "torn", "binary"])
 def test_what_is_no_mapping_is_refused(tmp_path, text):
-    path = tmp_path / "room.yaml"
+    path = tmp_path / "own.yaml"
     path.write_text(text)
-    with pytest.raises(EnvironmentFileError, match=r"room\.yaml"):
+    with pytest.raises(EnvironmentFileError, match=r"own\.yaml"):
         load_environment(path)
 
 
@@ -230,10 +230,10 @@ def test_a_missing_file_is_refused(tmp_path):
 
 
 def test_a_file_says_only_what_differs_from_the_one_it_is_based_on(tmp_path):
-    room = tmp_path / "room.yaml"
-    room.write_text("{name: room, title: t, based_on: wheelchair, contact_margin: 0.004}")
+    own = tmp_path / "own.yaml"
+    own.write_text("{name: own, title: t, based_on: wheelchair, contact_margin: 0.004}")
     corner = tmp_path / "corner.yaml"
-    corner.write_text("{name: corner, based_on: room.yaml, obstacles: [{name: a, box: [1, 1, 1]}]}")
+    corner.write_text("{name: corner, based_on: own.yaml, obstacles: [{name: a, box: [1, 1, 1]}]}")
     environment, base = load_environment(corner), load_environment("wheelchair")
     assert (environment.name, environment.title) == ("corner", "t")
     assert environment.contact_margin == 0.004
@@ -243,12 +243,12 @@ def test_a_file_says_only_what_differs_from_the_one_it_is_based_on(tmp_path):
 
 
 def test_a_base_that_is_none_is_refused(tmp_path):
-    path = tmp_path / "room.yaml"
-    path.write_text("{name: room, based_on: wheelchir}")
-    with pytest.raises(UnknownNameError, match=r"room\.yaml', field 'based_on'.*'wheelchair'"):
+    path = tmp_path / "own.yaml"
+    path.write_text("{name: own, based_on: wheelchir}")
+    with pytest.raises(UnknownNameError, match=r"own\.yaml', field 'based_on'.*'wheelchair'"):
         load_environment(path)
-    path.write_text("{name: room, based_on: other.yaml}")
-    (tmp_path / "other.yaml").write_text("{name: other, based_on: ./room.yaml}")
+    path.write_text("{name: own, based_on: other.yaml}")
+    (tmp_path / "other.yaml").write_text("{name: other, based_on: ./own.yaml}")
     with pytest.raises(EnvironmentFileError, match=r"other\.yaml', field 'based_on'.*in turn"):
         load_environment(path)
 
@@ -256,9 +256,9 @@ def test_a_base_that_is_none_is_refused(tmp_path):
 def test_the_example_of_the_documentation_works(tmp_path, pr2):
     text = (Path(__file__).parents[3] / "docs" / "scene.md").read_text(encoding="utf-8")
     blocks = dict(re.findall(r"```(yaml|xml)\n(.*?)```", text, flags=re.DOTALL))
-    (tmp_path / "dining_room.yaml").write_text(blocks["yaml"], encoding="utf-8")
+    (tmp_path / "dining.yaml").write_text(blocks["yaml"], encoding="utf-8")
     (tmp_path / "lamp.sdf").write_text(blocks["xml"], encoding="utf-8")
-    scene = Scene(SceneSpec(pr2, load_environment(tmp_path / "dining_room.yaml")))
+    scene = Scene(SceneSpec(pr2, load_environment(tmp_path / "dining.yaml")))
     names = [part.name for part in scene.built.parts]
     assert {"table", "lamp::pole", "lamp::shade", "person::head_center"} <= set(names)
     lamp = scene.built.parts[names.index("lamp::shade")]

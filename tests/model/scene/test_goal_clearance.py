@@ -15,9 +15,9 @@ from pydrake.systems.framework import DiagramBuilder
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.model.grid import Grid
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
-from tcs.model.scene.room import add_room, room_parts
+from tcs.model.scene.environment_plant import add_environment, environment_parts
 from tcs.model.tasks import load_task
-from tests.model.scene.rooms import rows
+from tests.model.scene.environments import rows
 
 ROWS = {
     "wheelchair": rows("goal_clearance_chair.csv"),
@@ -46,18 +46,18 @@ class FloatingGripper:
                     self.tool, X_TL7 @ X_LG, drake_shape(arm, i), f"{i}", ProximityProperties()
                 )
             )
-        self.room = add_room(self.plant, environment)
+        self.added = add_environment(self.plant, environment)
         self.plant.Finalize()
         inspector = graph.model_inspector()
-        self.parts = room_parts(self.plant, inspector, self.room, environment)
+        self.parts = environment_parts(self.plant, inspector, self.added, environment)
         self.margin = environment.contact_margin
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self.state = self.plant.GetMyContextFromRoot(self.context)
 
-    def set_room(self, joint, position):
+    def set_joint(self, joint, position):
         q = self.plant.GetPositions(self.state).copy()
-        for moved, at in self.room.joints.positions(joint, position, where="the test"):
+        for moved, at in self.added.joints.positions(joint, position, where="the test"):
             q[moved.position_start()] = at
         self.plant.SetPositions(self.state, q)
 
@@ -102,7 +102,7 @@ class Comparison:
         for state, name in enumerate(states):
             if name:
                 # The grid's first states are those of the lowest bed, one for each head rest.
-                self.gripper.set_room("head_rest", np.radians(float(name.removeprefix("bed"))))
+                self.gripper.set_joint("head_rest", np.radians(float(name.removeprefix("bed"))))
             for task, lowered in self.lowered.items():
                 arrays = lowered.arrays
                 for i in range(len(lowered.goals)):
@@ -121,7 +121,7 @@ class Comparison:
 
 @pytest.fixture(
     scope="module",
-    params=[(room, finger) for room in ROWS for finger in ("open", "closed")],
+    params=[(row, finger) for row in ROWS for finger in ("open", "closed")],
     ids=" ".join,
 )
 def compared(request, pr2):

@@ -10,7 +10,7 @@ from tcs.errors import EnvironmentFileError, GridError, TcsError, UnknownNameErr
 from tcs.model.grid import Axis, Grid
 from tcs.model.scene import Scene, SceneSpec, load_environment, lower
 from tcs.model.tasks import load_task
-from tests.model.scene.rooms import RoomAlone
+from tests.model.scene.environments import EnvironmentAlone
 
 LIFT = """\
 <sdf version="1.9">
@@ -43,7 +43,7 @@ FLAP_FOLLOWS = {"height": {"knots": [0, 1], "joints": {"flap": [0.2, 1.2]}}}
 
 @pytest.fixture
 def lift(tmp_path):
-    """Make a room with a lift, given what else its file says."""
+    """Make an environment with a lift, given what else its file says."""
     (tmp_path / "lift.sdf").write_text(LIFT, encoding="utf-8")
 
     def make(**changes):
@@ -58,7 +58,7 @@ def lift(tmp_path):
         }
         path = tmp_path / "hall.yaml"
         path.write_text(yaml.safe_dump(content), encoding="utf-8")
-        return RoomAlone(path)
+        return EnvironmentAlone(path)
 
     return make
 
@@ -69,21 +69,21 @@ def angle(X):
 
 
 def test_followers_stand_right_from_the_start(lift):
-    room = lift(posture=FLAP_FOLLOWS)
-    assert angle(room.pose("lift::flap_link")) == pytest.approx(0.2, abs=1e-12)
-    room = lift(posture=FLAP_FOLLOWS, joints={"height": 0.5})
-    assert angle(room.pose("lift::flap_link")) == pytest.approx(0.7, abs=1e-12)
+    environment = lift(posture=FLAP_FOLLOWS)
+    assert angle(environment.pose("lift::flap_link")) == pytest.approx(0.2, abs=1e-12)
+    environment = lift(posture=FLAP_FOLLOWS, joints={"height": 0.5})
+    assert angle(environment.pose("lift::flap_link")) == pytest.approx(0.7, abs=1e-12)
 
 
 def test_a_leader_goes_no_farther_than_its_knots(lift):
-    assert lift().room.joints.limits("height") == (-1.0, 2.0)
-    room = lift(posture=FLAP_FOLLOWS)
-    assert room.room.joints.limits("height") == (0.0, 1.0)
+    assert lift().added.joints.limits("height") == (-1.0, 2.0)
+    environment = lift(posture=FLAP_FOLLOWS)
+    assert environment.added.joints.limits("height") == (0.0, 1.0)
     for beyond in (-0.01, 1.01, np.nan):
         with pytest.raises(TcsError, match=r"joint 'height': .* m is beyond .* 0 to 1 m"):
-            room.set(height=beyond)
+            environment.set(height=beyond)
     # A hair of rounding is no excess.
-    room.set(height=0.1 * 3 + 0.7 + 1e-12)
+    environment.set(height=0.1 * 3 + 0.7 + 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +148,9 @@ def test_what_a_joint_cannot_do_is_refused_with_its_place(lift, changes, error, 
 
 
 def test_a_follower_cannot_be_set(lift):
-    room = lift(posture=FLAP_FOLLOWS)
+    environment = lift(posture=FLAP_FOLLOWS)
     with pytest.raises(TcsError, match=r"'flap' follows 'height' .*Set 'height'"):
-        room.set(flap=0.1)
+        environment.set(flap=0.1)
 
 
 @pytest.fixture(scope="module")

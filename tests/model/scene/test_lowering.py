@@ -71,7 +71,7 @@ def test_arrays_put_every_shape_and_the_tool_where_drake_does(scene, lowered, fu
         R_WG = R_WB @ arrays.body.R[level, i]
         p_WG = p_WB + R_WB @ arrays.body.p[level, i]
         assert_same_pose(R_WG, p_WG, query.GetPoseInWorld(part.geometry))
-    for i, part in enumerate(of_group(scene, Group.ROOM)):
+    for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
         X_WG = query.GetPoseInWorld(part.geometry)
         assert_same_pose(arrays.room.R[0, i], arrays.room.p[0, i], X_WG)
 
@@ -113,7 +113,7 @@ def test_shapes_are_drakes_own(scene, lowered):
     for group, shapes in (
         (Group.ARM, lowered.arrays.arm),
         (Group.BODY, lowered.arrays.body),
-        (Group.ROOM, lowered.arrays.room),
+        (Group.ENVIRONMENT, lowered.arrays.room),
     ):
         parts = of_group(scene, group)
         assert len(parts) == len(shapes.kind)
@@ -135,7 +135,7 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
     for shapes, names, group in (
         (arrays.arm, lowered.robot_bodies, Group.ARM),
         (arrays.body, lowered.robot_bodies, Group.BODY),
-        (arrays.room, lowered.room_bodies, Group.ROOM),
+        (arrays.room, lowered.room_bodies, Group.ENVIRONMENT),
     ):
         assert [names[i] for i in shapes.body] == [part.name for part in of_group(scene, group)]
     assert len(set(lowered.robot_bodies)) == len(lowered.robot_bodies)
@@ -160,8 +160,8 @@ def test_the_pairs_are_those_that_drake_checks(scene, lowered):
     for first, second, matrix in (
         (Group.ARM, Group.ARM, arrays.arm_vs_arm),
         (Group.ARM, Group.BODY, arrays.arm_vs_body),
-        (Group.ARM, Group.ROOM, arrays.arm_vs_room),
-        (Group.BODY, Group.ROOM, arrays.body_vs_room),
+        (Group.ARM, Group.ENVIRONMENT, arrays.arm_vs_room),
+        (Group.BODY, Group.ENVIRONMENT, arrays.body_vs_room),
     ):
         assert matrix.shape == (len(groups[first]), len(groups[second]))
         assert matrix.any()
@@ -212,7 +212,7 @@ def test_an_axis_of_the_environment_moves_its_joint(scene, shaving, wheelchair):
         scene.set_joint("head_tilt", tilt)
         scene.set_joint("wheelchair_y", shift)
         query = scene.query_object()
-        for i, part in enumerate(of_group(scene, Group.ROOM)):
+        for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
             X_WG = query.GetPoseInWorld(part.geometry)
             assert_same_pose(arrays.room.R[state, i], arrays.room.p[state, i], X_WG)
         for i, X_WG in enumerate(goal_poses(scene, shaving)):
@@ -229,7 +229,7 @@ def test_lowering_leaves_the_scene_as_it_was(scene, shaving, full_grid, rng):
     before = scene.positions()
     moved = lower(scene, shaving, full_grid)
     np.testing.assert_array_equal(scene.positions(), before)
-    # What the scene's room has been set to is what is lowered: live mode depends on it.
+    # Lowering reads the environment's joints as they are set: live mode depends on it.
     assert moved.arrays.goal_p[0, 0, 0] == pytest.approx(
         goal_poses(scene, shaving)[0].translation()[0], abs=EXACT
     )

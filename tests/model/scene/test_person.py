@@ -8,17 +8,17 @@ from pydrake.geometry import Role
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from tests.model.scene.rooms import RoomAlone, numbers, rows
+from tests.model.scene.environments import EnvironmentAlone, numbers, rows
 
 
 @pytest.fixture(scope="module")
-def room():
-    return RoomAlone("wheelchair")
+def environment():
+    return EnvironmentAlone("wheelchair")
 
 
 @pytest.mark.parametrize("row", rows("human_frames_chair.csv"), ids=lambda row: row["link"])
-def test_body_frames_lie_where_the_original_had_them(room, row):
-    X_WL = room.pose(f"person::{row['link']}")
+def test_body_frames_lie_where_the_original_had_them(environment, row):
+    X_WL = environment.pose(f"person::{row['link']}")
     p_WL = numbers(row, "w_x", "w_y", "w_z")
     R_WL = Rotation.from_quat(numbers(row, "w_qx", "w_qy", "w_qz", "w_qw"))
     # The rows are rounded to a micrometre and seven digits of a quaternion; a wrong figure would
@@ -27,7 +27,7 @@ def test_body_frames_lie_where_the_original_had_them(room, row):
     turned = R_WL.inv() * Rotation.from_matrix(X_WL.rotation().matrix())
     assert turned.magnitude() < 1e-6
     if row["jo_x"]:
-        X_WP = room.pose(f"person::{row['parent']}")
+        X_WP = environment.pose(f"person::{row['parent']}")
         X_PL = RigidTransform(
             RotationMatrix(
                 Rotation.from_quat(numbers(row, "jo_qx", "jo_qy", "jo_qz", "jo_qw")).as_matrix()
@@ -37,8 +37,8 @@ def test_body_frames_lie_where_the_original_had_them(room, row):
         np.testing.assert_allclose((X_WP @ X_PL).GetAsMatrix34(), X_WL.GetAsMatrix34(), atol=1e-12)
 
 
-def test_every_body_part_can_be_named_by_a_goal(room):
-    frames = room.environment.body_frames
+def test_every_body_part_can_be_named_by_a_goal(environment):
+    frames = environment.file.body_frames
     parts = {f"person::{row['link']}" for row in rows("human_frames_chair.csv")}
     not_parts = {f"person::{n}_link" for n in ("body_th_move", "body_x_move", "body_y_move")}
     assert set(frames.values()) == parts - not_parts - {"person::base_link"}
@@ -60,30 +60,32 @@ def test_every_body_part_can_be_named_by_a_goal(room):
         ("foot plate left", (1.04076, 0.02995, 0.03976), (1.28824, 0.27745, 0.28724)),
     ],
 )
-def test_furniture_stands_where_the_mesh_has_it(room, item, lower, upper):
-    lowest, highest = room.reach(f"wheelchair::{item}")
+def test_furniture_stands_where_the_mesh_has_it(environment, item, lower, upper):
+    lowest, highest = environment.reach(f"wheelchair::{item}")
     # The figures have five digits.
     np.testing.assert_allclose(lowest, lower, atol=1e-5)
     np.testing.assert_allclose(highest, upper, atol=1e-5)
 
 
-def test_the_chair_is_as_large_as_its_mesh(room):
-    chair = {part.name for part in room.parts if part.name.startswith("wheelchair::")}
+def test_the_chair_is_as_large_as_its_mesh(environment):
+    chair = {part.name for part in environment.parts if part.name.startswith("wheelchair::")}
     assert len(chair) == 22
-    lowest, highest = room.reach(*chair)
+    lowest, highest = environment.reach(*chair)
     # Box of the whole mesh; our own parts follow it to within 3 mm.
     np.testing.assert_allclose(lowest, [0.0, -0.3325, 0.0], atol=0.003)
     np.testing.assert_allclose(highest, [1.2884, 0.3325, 0.89], atol=0.003)
 
 
-def test_the_chair_turns_and_shifts_about_its_own_origin(room):
-    X_WC = room.pose("wheelchair::base_link", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1)
+def test_the_chair_turns_and_shifts_about_its_own_origin(environment):
+    X_WC = environment.pose(
+        "wheelchair::base_link", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1
+    )
     np.testing.assert_allclose(X_WC.translation(), [0.1, -0.2, 0.0], atol=1e-15)
     np.testing.assert_allclose(
         X_WC.rotation().matrix(), Rotation.from_euler("z", 1).as_matrix(), atol=1e-15
     )
-    nominal = room.pose("person::head_center")
-    carried = room.pose(
+    nominal = environment.pose("person::head_center")
+    carried = environment.pose(
         "person::head_center", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1
     )
     np.testing.assert_allclose(
@@ -91,9 +93,9 @@ def test_the_chair_turns_and_shifts_about_its_own_origin(room):
     )
 
 
-def test_the_person_shifts_along_their_own_axes_after_the_turn(room):
+def test_the_person_shifts_along_their_own_axes_after_the_turn(environment):
     seat = np.array([0.403, 0.0, 0.47])
-    offset = room.pose("person::head_center").translation() - seat
+    offset = environment.pose("person::head_center").translation() - seat
     for joints, shift in (
         # Axes of the original: positive x backward, positive y to the right.
         ({"person_x": 0.05}, [-0.05, 0, 0]),
@@ -103,25 +105,25 @@ def test_the_person_shifts_along_their_own_axes_after_the_turn(room):
         for turn in (0.0, 0.4):
             # Positive yaw turns to the person's right.
             R = Rotation.from_euler("z", -turn).as_matrix()
-            got = room.pose("person::head_center", person_yaw=turn, **joints).translation()
+            got = environment.pose("person::head_center", person_yaw=turn, **joints).translation()
             np.testing.assert_allclose(got, seat + R @ (offset + shift), atol=1e-12)
 
 
-def test_the_head_tilts_up_about_its_own_centre(room):
-    nominal = room.pose("person::head_center")
-    tilted = room.pose("person::head_center", head_tilt=0.3)
+def test_the_head_tilts_up_about_its_own_centre(environment):
+    nominal = environment.pose("person::head_center")
+    tilted = environment.pose("person::head_center", head_tilt=0.3)
     np.testing.assert_allclose(tilted.translation(), nominal.translation(), atol=1e-15)
     face = tilted.rotation().matrix()[:, 0]
     np.testing.assert_allclose(face, [np.cos(0.3), 0, np.sin(0.3)], atol=1e-12)
     np.testing.assert_array_equal(
-        room.pose("person::neck_link", head_tilt=0.3).GetAsMatrix34(),
-        room.pose("person::neck_link").GetAsMatrix34(),
+        environment.pose("person::neck_link", head_tilt=0.3).GetAsMatrix34(),
+        environment.pose("person::neck_link").GetAsMatrix34(),
     )
 
 
 @pytest.fixture(scope="module")
-def skin(room):
-    return room.exposed_skin()
+def skin(environment):
+    return environment.exposed_skin()
 
 
 def test_most_of_the_skin_is_judged(skin):
@@ -130,18 +132,18 @@ def test_most_of_the_skin_is_judged(skin):
     assert len({link for link, _ in skin}) == 17
 
 
-def test_padding_covers_the_inward_error_of_every_part(room, skin):
-    inward = dict.fromkeys(room.environment.body_frames.values(), -np.inf)
+def test_padding_covers_the_inward_error_of_every_part(environment, skin):
+    inward = dict.fromkeys(environment.file.body_frames.values(), -np.inf)
     for link, distances in skin:
         inward[link] = max(inward[link], min(distances.values()))
-    padding = room.environment.padding
+    padding = environment.file.padding
     assert {link: d for link, d in inward.items() if d > padding[link]} == {}
     # It is a fit, not an enclosure: skin does stand out, or these points judge nothing.
     assert max(inward.values()) > 0.01
 
 
-def test_padded_shapes_enclose_the_exposed_skin(room, skin):
-    padding = room.environment.padding
+def test_padded_shapes_enclose_the_exposed_skin(environment, skin):
+    padding = environment.file.padding
     outside = [
         (link, worst)
         for link, distances in skin
@@ -151,25 +153,25 @@ def test_padded_shapes_enclose_the_exposed_skin(room, skin):
 
 
 def test_models_load_without_a_word_from_drake(caplog):
-    RoomAlone("wheelchair")
+    EnvironmentAlone("wheelchair")
     assert caplog.records == []
 
 
-def test_pictures_show_what_is_checked(room):
-    for link, body in room.room.links.items():
+def test_pictures_show_what_is_checked(environment):
+    for link, body in environment.added.links.items():
         checked = {
             (
-                repr(room.inspector.GetShape(g)),
-                tuple(room.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
+                repr(environment.inspector.GetShape(g)),
+                tuple(environment.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
             )
-            for g in room.plant.GetCollisionGeometriesForBody(body)
+            for g in environment.plant.GetCollisionGeometriesForBody(body)
         }
-        frame = room.plant.GetBodyFrameIdOrThrow(body.index())
+        frame = environment.plant.GetBodyFrameIdOrThrow(body.index())
         shown = {
             (
-                repr(room.inspector.GetShape(g)),
-                tuple(room.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
+                repr(environment.inspector.GetShape(g)),
+                tuple(environment.inspector.GetPoseInFrame(g).GetAsMatrix34().ravel()),
             )
-            for g in room.inspector.GetGeometries(frame, Role.kIllustration)
+            for g in environment.inspector.GetGeometries(frame, Role.kIllustration)
         }
         assert shown == checked, link

@@ -104,11 +104,11 @@ def test_what_is_checked(scene, pr2):
     disabled = {frozenset(pair) for pair in pr2.disabled_pairs}
     for a, b in itertools.combinations(scene.built.parts, 2):
         groups = {a.group, b.group}
-        if groups == {Group.ROOM} or groups == {Group.BODY}:
+        if groups == {Group.ENVIRONMENT} or groups == {Group.BODY}:
             expected = False
-        elif groups == {Group.BODY, Group.ROOM}:
+        elif groups == {Group.BODY, Group.ENVIRONMENT}:
             expected = "floor" not in (a.name, b.name)
-        elif groups == {Group.ARM, Group.ROOM}:
+        elif groups == {Group.ARM, Group.ENVIRONMENT}:
             expected = True
         elif groups == {Group.ARM}:
             expected = a.carrier != b.carrier and frozenset((a.name, b.name)) not in disabled
@@ -168,7 +168,7 @@ def test_violations_start_at_the_required_clearance(scene):
     assert min(closest) < 0 < max(closest)
 
 
-def test_joints_of_the_room_move_the_person(scene):
+def test_joints_of_the_environment_move_the_person(scene):
     head = scene.body_frame_pose("head").translation()
     np.testing.assert_allclose(head, [0.451, 0.0, 1.232], atol=1e-12)
     scene.set_joint("wheelchair_x", 0.02)
@@ -316,13 +316,13 @@ def test_allowed_contacts_are_not_checked(spec):
     plain.restore(scene.positions())
     checked = {(a, b) for a, b, _ in plain.violations()}
     assert ("base_link", "wheelchair::foot plate left") in checked
-    with pytest.raises(UnknownNameError, match="room body 'person::hand'"):
+    with pytest.raises(UnknownNameError, match="environment body 'person::hand'"):
         Scene(spec, allowed_contacts=[("base_link", "person::hand")])
     with pytest.raises(UnknownNameError, match="robot body 'person::neck_link'"):
         Scene(spec, allowed_contacts=[("person::neck_link", "base_link")])
 
 
-def test_a_room_with_nothing_in_it(pr2, wheelchair):
+def test_an_empty_environment(pr2, wheelchair):
     empty = EnvironmentFile(
         name="empty", title="", origin="", source="", grid=wheelchair.grid, floor=False
     )

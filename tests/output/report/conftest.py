@@ -10,7 +10,7 @@ from tcs.output.report import Paper, draw_row, load_paper
 from tcs.placement.robustness import StudyPlan, robustify, study_row
 from tcs.placement.scoring import score
 from tcs.placement.store import save_scores
-from tests.rooms import BESIDE, write_room
+from tests.environments import BESIDE, write_environment
 
 PLAN = StudyPlan(samples=60, sets=12, set_samples=6)
 
@@ -24,8 +24,8 @@ def plan():
 def score_path(tmp_path_factory):
     """A score file."""
     folder = tmp_path_factory.mktemp("study")
-    room = write_room(folder, "small-room", BESIDE)
-    path = folder / "shaving-small-room-pr2.tcs"
+    room = write_environment(folder, "small-wheelchair", BESIDE)
+    path = folder / "shaving-small-wheelchair-pr2.tcs"
     file = score("shaving", room)
     save_scores(path, robustify(file, sets=12, samples=32))
     return path
@@ -38,7 +38,7 @@ def paper():
     for table in ("table_1", "table_3"):
         for row in plain[table]:
             if row["environment"] == "wheelchair":
-                row["environment"] = "small-room"
+                row["environment"] = "small-wheelchair"
     return Paper.model_validate(plain)
 
 

@@ -28,9 +28,9 @@ from tcs.output.report.reproduce import robustify_command, score_command
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
+from tests.environments import write_environment
 from tests.output.report.test_page import Reader
 from tests.output.report.test_robustness_report import column
-from tests.rooms import write_room
 
 FAR = {
     "base_x": (5, 0.1, 3),
@@ -226,7 +226,7 @@ def test_estimates_of_success_are_those_of_the_file(answer):
 
 def test_commands_make_the_same_again(answer, score_path):
     words = shlex.split(score_command(answer))
-    room = str(score_path.parent / "small-room.yaml")
+    room = str(score_path.parent / "small-wheelchair.yaml")
     assert words[:7] == ["tcs", "score", "shaving", "--environment", room, "--robot", "pr2"]
     options = dict(zip(words[7::2], words[8::2], strict=True))
     assert options == {
@@ -259,7 +259,7 @@ def test_on_the_command_line(score_path, tmp_path):
 
 def test_nothing_in_reach_is_a_page_too(tmp_path):
     path = tmp_path / "far.tcs"
-    save_scores(path, score("shaving", write_room(tmp_path, "far", FAR)))
+    save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR)))
     found = answer_of(path, check=CHECK)
     assert found.is_sound
     said = as_markdown(answer_page(found, command="c"))

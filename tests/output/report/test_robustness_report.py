@@ -59,14 +59,14 @@ def test_table_3_says_na_where_the_paper_does(study, paper):
 def test_a_short_row_is_explained_from_its_losses(page, study):
     text = as_markdown(page)
     worst = study.losses.goals[0]
-    assert "Below the paper: shaving, small-room. Of all that is lost, " in text
+    assert "Below the paper: shaving, small-wheelchair. Of all that is lost, " in text
     assert f"Goal {worst.goal} (head) is reached in {100.0 * worst.success:.1f} %" in text
     table = losses_table(study)
     assert column(table, "Goal") == [str(loss.goal) for loss in study.losses.goals]
     assert [float(cell) / 100.0 for cell in column(table, "Reached")] == pytest.approx(
         [loss.success for loss in study.losses.goals], abs=0.0005001
     )
-    assert "Nothing is lost in any sample: brushing, small-room." in text
+    assert "Nothing is lost in any sample: brushing, small-wheelchair." in text
 
 
 def test_a_loss_is_told_with_its_reasons(study):

@@ -9,10 +9,10 @@ from tcs.errors import SelectionError
 from tcs.output.report.pictures import Shown
 from tcs.output.report.states import has_states, states_figure
 from tcs.placement.scoring import score
+from tests.environments import write_environment
 from tests.output.draw.test_map import words
 from tests.placement.store.example import score_file
 from tests.placement.tables.small import small_grid
-from tests.rooms import write_room
 
 SMALL_BED = {
     "bed_height": (0, 0.1, 3),
@@ -27,7 +27,7 @@ SMALL_BED = {
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bed")
-    room = write_room(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
+    room = write_environment(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
     return score("scratching_chest", room)
 
 

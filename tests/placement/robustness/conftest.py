@@ -6,7 +6,7 @@ import pytest
 
 from tcs.placement.robustness import Trials
 from tcs.placement.scoring import score
-from tests.rooms import BESIDE, write_room
+from tests.environments import BESIDE, write_environment
 
 BED = {
     "bed_height": (0, 0.2, 2),
@@ -22,10 +22,10 @@ FOUND = {"person_y": (0, 0.05, 2)}
 @pytest.fixture(scope="session")
 def rooms(tmp_path_factory):
     """Paths of two environment files of the user's own, by name."""
-    folder = tmp_path_factory.mktemp("rooms")
+    folder = tmp_path_factory.mktemp("environments")
     return {
-        "chair": write_room(folder, "small-chair", BESIDE),
-        "bed": write_room(folder, "small-bed", BED, based_on="bed", observed=FOUND),
+        "chair": write_environment(folder, "small-chair", BESIDE),
+        "bed": write_environment(folder, "small-bed", BED, based_on="bed", observed=FOUND),
     }
 
 

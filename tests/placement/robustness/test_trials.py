@@ -206,7 +206,7 @@ def test_a_joint_a_rounding_beyond_its_limit_stays_where_it_is(bed_trials):
     believed = bed_trials._positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
     limits = (believed + 1e-12, believed + 1.0)
     joints = SimpleNamespace(limits=lambda name: limits)
-    scene = SimpleNamespace(built=SimpleNamespace(room_joints=joints))
+    scene = SimpleNamespace(built=SimpleNamespace(environment_joints=joints))
     found = dataclasses.replace(bed_trials, scene=scene)
     positions, stopped = found._positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
     assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]

@@ -5,22 +5,22 @@ from __future__ import annotations
 import pytest
 
 from tcs.placement.scoring import load_job, score
-from tests.rooms import BESIDE, write_room
+from tests.environments import BESIDE, write_environment
 
 
 @pytest.fixture(scope="session")
-def small_room(tmp_path_factory):
+def small_environment(tmp_path_factory):
     """Path of an environment file of the user's own."""
-    return write_room(tmp_path_factory.mktemp("rooms"), "small-room", BESIDE)
+    return write_environment(tmp_path_factory.mktemp("environments"), "small-wheelchair", BESIDE)
 
 
 @pytest.fixture(scope="session")
-def small_file(small_room):
+def small_file(small_environment):
     """Shaving, scored in the small room."""
-    return score("shaving", small_room)
+    return score("shaving", small_environment)
 
 
 @pytest.fixture(scope="session")
-def small_job(small_room):
+def small_job(small_environment):
     """The job behind `small_file`."""
-    return load_job("shaving", small_room, "pr2")
+    return load_job("shaving", small_environment, "pr2")

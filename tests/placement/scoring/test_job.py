@@ -13,7 +13,7 @@ from tcs.placement.scoring import load_job, score, summary, sweep
 from tcs.placement.store import load_scores, save_scores
 
 
-def test_a_small_room_is_reached_and_summed_up(small_file):
+def test_a_small_environment_is_reached_and_summed_up(small_file):
     figures = summary(small_file)
     assert figures["configurations"] == 8 * 2 * 4 * 2
     assert figures["pairs"] == figures["configurations"] * 8
@@ -72,10 +72,10 @@ def test_file_survives_the_disk(small_file, tmp_path):
     )
 
 
-def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_room, tmp_path):
+def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_environment, tmp_path):
     path = tmp_path / "room.yaml"
     path.write_text(
-        f"based_on: {small_room}\nname: cluttered\n"
+        f"based_on: {small_environment}\nname: cluttered\n"
         "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [0.9, -0.55, 0.45]}\n"
     )
     cluttered = score("shaving", path).nominal.scores
@@ -105,11 +105,11 @@ def test_unknown_names_come_with_the_nearest(names, kind, near):
         load_job(*names)
 
 
-def test_an_unknown_body_frame_names_task_and_goal(tmp_path, small_room):
+def test_an_unknown_body_frame_names_task_and_goal(tmp_path, small_environment):
     path = tmp_path / "odd.yaml"
     path.write_text(
         "name: odd\ntitle: odd\nsource: made up\nenvironments: [wheelchair]\ntool: any\ngoals:\n"
         "  - {body_frame: haed, position: [0.2, 0, 0], quaternion_wxyz: [1, 0, 0, 0], weight: 1}\n"
     )
     with pytest.raises(UnknownNameError, match=r"goal 0.*haed.*Did you mean 'head'"):
-        score(path, small_room)
+        score(path, small_environment)

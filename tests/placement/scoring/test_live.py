@@ -31,15 +31,15 @@ TABLES = ("reason", "dexterity", "arm_joints")
 
 
 @pytest.fixture(scope="module")
-def scorer(small_room):
+def scorer(small_environment):
     """Shaving in the small room, ready to be scored."""
-    return LiveScorer("shaving", environment=small_room)
+    return LiveScorer("shaving", environment=small_environment)
 
 
 @pytest.fixture(scope="module")
 def bedside(tmp_path_factory):
     """Path of a bed with a small grid and the paper's five shifts."""
-    path = tmp_path_factory.mktemp("rooms") / "beside-the-bed.yaml"
+    path = tmp_path_factory.mktemp("environments") / "beside-the-bed.yaml"
     path.write_text(BESIDE_THE_BED)
     return path
 
@@ -117,10 +117,10 @@ def test_moving_chair_and_robot_together_changes_nothing_that_is_reached(scorer,
     np.testing.assert_allclose(there, here, atol=1e-6)
 
 
-def test_drake_confirms_what_was_scored_live(small_room, tmp_path):
+def test_drake_confirms_what_was_scored_live(small_environment, tmp_path):
     observation = {"person_x": 0.03, "person_yaw": 0.08, "wheelchair_y": -0.01, "head_tilt": 0.06}
     path = tmp_path / "live.tcs"
-    save_scores(path, score_observed("shaving", "pr2", observation, environment=small_room))
+    save_scores(path, score_observed("shaving", "pr2", observation, environment=small_environment))
     file = load_scores(path)
     assert file.observed_states[0] == pytest.approx(observation, abs=1e-15)
     found = verify(file, pairs=60, dense=6)
@@ -211,7 +211,7 @@ def test_what_cannot_be_is_refused(scorer, observation, error, message):
                 frames={"head": (0.3, 0, 0.9)},
                 setting={"bed_height": 0.2, "head_rest": 0.0, "person_y": 0.1},
             ),
-            "unknown axis of the room 'person_y'",
+            "unknown environment axis 'person_y'",
         ),
         ({"neck_body": 0.1}, "follows 'head_rest'"),
     ],

@@ -34,7 +34,7 @@ CAPSULES = {
 }
 ROOM = """
 based_on: wheelchair
-name: small-room
+name: small-wheelchair
 title: The wheelchair, seen from a few places
 grid:
   base_x: {unit: m, start: -1.0, step: 0.2, count: 11}

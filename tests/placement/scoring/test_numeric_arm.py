@@ -20,7 +20,7 @@ from tcs.placement.tables import Reason
 BENDS = {'xyz="0 0 0.2155"': 'xyz="0.02 0 0.2155"', 'xyz="0 0.0805 0"': 'xyz="0 0.0805 0.01"'}
 ROOM = """
 based_on: wheelchair
-name: small-room
+name: small-wheelchair
 title: The wheelchair, seen from a few places
 grid:
   base_x: {unit: m, start: -1.0, step: 0.25, count: 9}

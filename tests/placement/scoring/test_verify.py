@@ -26,8 +26,8 @@ def test_stored_answers_are_true(small_file):
 
 
 @pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited"])
-def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_room, measure):
-    file = score("shaving", small_room, measure=measure)
+def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_environment, measure):
+    file = score("shaving", small_environment, measure=measure)
     assert file.metadata["measure"] == summary(file)["measure"] == measure
     found = verify(file, pairs=40, dense=10)
     assert found.is_sound
@@ -74,10 +74,10 @@ def test_a_joint_beyond_its_limit_is_found(small_file):
     assert not found.is_sound
 
 
-def test_an_arm_too_close_to_the_person_is_found(small_file, small_room):
+def test_an_arm_too_close_to_the_person_is_found(small_file, small_environment):
     # The same answers in a room that asks for 25 cm of distance: only contact differs.
-    text = small_room.read_text().replace("name: small-room", "name: tight-room")
-    tight = small_room.parent / "tight-room.yaml"
+    text = small_environment.read_text().replace("name: small-wheelchair", "name: tight-wheelchair")
+    tight = small_environment.parent / "tight-wheelchair.yaml"
     tight.write_text(text + "contact_margin: 0.25\n")
     job = load_job("shaving", tight, "pr2")
     metadata = {

@@ -1,4 +1,4 @@
-"""Rooms without any robot, and where a person's skin is exposed in them."""
+"""Environments without any robot, and where a person's skin is exposed in them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from tcs.model.scene.environment import load_environment
-from tcs.model.scene.room import add_room, room_parts
+from tcs.model.scene.environment_plant import add_environment, environment_parts
 
 DATA = Path(__file__).parents[2] / "data"
 BALL_RADIUS = 0.015
@@ -27,17 +27,17 @@ def numbers(row, *columns):
     return np.array([float(row[column]) for column in columns])
 
 
-class RoomAlone:
+class EnvironmentAlone:
     """An environment without any robot."""
 
     def __init__(self, environment):
-        self.environment = load_environment(environment)
+        self.file = load_environment(environment)
         builder = DiagramBuilder()
         self.plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-        self.room = add_room(self.plant, self.environment)
+        self.added = add_environment(self.plant, self.file)
         self.plant.Finalize()
         self.inspector = graph.model_inspector()
-        self.parts = room_parts(self.plant, self.inspector, self.room, self.environment)
+        self.parts = environment_parts(self.plant, self.inspector, self.added, self.file)
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self.state = self.plant.GetMyContextFromRoot(self.context)
@@ -47,14 +47,14 @@ class RoomAlone:
         """Set these joints and what follows them, and all others as the file says."""
         q = self.default.copy()
         for name, value in joints.items():
-            for joint, at in self.room.joints.positions(name, value, where="the test"):
+            for joint, at in self.added.joints.positions(name, value, where="the test"):
                 q[joint.position_start()] = at
         self.plant.SetPositions(self.state, q)
 
     def pose(self, link, **joints):
         """Pose of "model::link" in W with these joints set."""
         self.set(**joints)
-        X_WL = self.room.links[link].EvalPoseInWorld(self.state)
+        X_WL = self.added.links[link].EvalPoseInWorld(self.state)
         self.set()
         return X_WL
 
@@ -90,7 +90,7 @@ class RoomAlone:
         exposed = []
         for row in rows("person_surface.csv"):
             link = f"person::{row['link']}"
-            X_WL = self.room.links[link].EvalPoseInWorld(self.state)
+            X_WL = self.added.links[link].EvalPoseInWorld(self.state)
             point = X_WL @ numbers(row, "x", "y", "z")
             normal = X_WL.rotation() @ numbers(row, "nx", "ny", "nz")
             # The meshes reach into one another with slots and sockets that nothing ever meets.

@@ -1,4 +1,4 @@
-"""Environment files of a user's own: the rooms that come along, seen from a few places."""
+"""Environment files of a user's own: the shipped ones on a small grid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CORNER = {
 """Where the PR2 has goals of shaving in reach: 36 configurations."""
 
 
-def write_room(
+def write_environment(
     folder: Path,
     name: str,
     grid: dict[str, tuple[float, float, int]],

@@ -21,16 +21,16 @@ from pydrake.multibody.tree import (
 from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
-from tcs.model.scene.joints import RoomJoints
+from tcs.model.scene.joints import EnvironmentJoints
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
-"""Wider than any room, so that the arm finds a floor wherever the robot stands; thick enough that
-nothing lies below it [m]."""
+"""Wider than any environment, so that there is a floor at every base pose; thick enough that nothing
+lies below it [m]."""
 _CALM = np.array([0.70, 0.66, 0.58, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class EnvironmentPlant:
     """The environment inside a plant.
 
     Attributes:
@@ -41,12 +41,12 @@ class Room:
     """
 
     links: dict[str, RigidBody]
-    joints: RoomJoints
+    joints: EnvironmentJoints
     named_by_link: frozenset[str]
     floor: bool
 
 
-def add_room(plant: MultibodyPlant, environment: EnvironmentFile) -> Room:
+def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> EnvironmentPlant:
     """Add everything the environment file names to a plant that is not finalized.
 
     Raises:
@@ -82,32 +82,32 @@ def add_room(plant: MultibodyPlant, environment: EnvironmentFile) -> Room:
         plant.RegisterCollisionGeometry(
             plant.world_body(), top, Box(*_FLOOR_SIZE), FLOOR, ProximityProperties()
         )
-    joints = RoomJoints(by_name, environment.posture)
+    joints = EnvironmentJoints(by_name, environment.posture)
     _check_names(environment, links, joints, where)
     joints.set_defaults(environment.joints, where=f"{where}, field 'joints'")
     by_link = {m.name for m in environment.models if m.named_by == "link"}
     by_link |= {o.name for o in environment.obstacles if o.box is not None}
-    return Room(links, joints, frozenset(by_link), environment.floor)
+    return EnvironmentPlant(links, joints, frozenset(by_link), environment.floor)
 
 
-def room_parts(
+def environment_parts(
     plant: MultibodyPlant,
     inspector: SceneGraphInspector,
-    room: Room,
+    added: EnvironmentPlant,
     environment: EnvironmentFile,
 ) -> tuple[Part, ...]:
-    """Return every collision shape of the room, in the order of the environment file."""
+    """Return every collision shape of the environment, in the order of the environment file."""
     parts = []
-    for link, body in room.links.items():
+    for link, body in added.links.items():
         model = link.split("::", maxsplit=1)[0]
         for geometry in plant.GetCollisionGeometriesForBody(body):
-            name = link if model in room.named_by_link else inspector.GetName(geometry)
+            name = link if model in added.named_by_link else inspector.GetName(geometry)
             pad = float(environment.padding.get(link, 0.0))
-            parts.append(Part(geometry, body.index(), Group.ROOM, 0, name, pad))
-    if room.floor:
+            parts.append(Part(geometry, body.index(), Group.ENVIRONMENT, 0, name, pad))
+    if added.floor:
         world = plant.world_body()
         (floor,) = plant.GetCollisionGeometriesForBody(world)
-        parts.append(Part(floor, world.index(), Group.ROOM, 0, FLOOR, 0.0))
+        parts.append(Part(floor, world.index(), Group.ENVIRONMENT, 0, FLOOR, 0.0))
     return tuple(parts)
 
 
@@ -200,7 +200,7 @@ def _fix(
 
 
 def _check_names(
-    environment: EnvironmentFile, links: Iterable[str], joints: RoomJoints, where: str
+    environment: EnvironmentFile, links: Iterable[str], joints: EnvironmentJoints, where: str
 ) -> None:
     """Refuse names in the environment file that its models do not have."""
     for link in environment.padding:
