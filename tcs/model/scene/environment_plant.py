@@ -24,8 +24,8 @@ from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntr
 from tcs.model.scene.joints import EnvironmentJoints
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
-"""Wider than any environment, so that there is a floor at every base pose; thick enough that nothing
-lies below it [m]."""
+"""Wider than any environment, so that there is a floor at every base pose; thick enough that
+nothing lies below it [m]."""
 _CALM = np.array([0.70, 0.66, 0.58, 1.0])
 
 
