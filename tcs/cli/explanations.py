@@ -7,8 +7,23 @@ from typing import Any
 
 from rich.console import Console
 
-from tcs.cli.reports import REASONS, members_table, new_table, said_off
+from tcs.cli.reports import members_table, new_table
 from tcs.cli.talk import paper
+from tcs.output.words import (
+    REASON_NAMES,
+    REASON_TEXTS,
+    axis_name,
+    axis_unit,
+    body_name,
+    deviation_text,
+    frame_name,
+    goal_list,
+    goals_text,
+    pair_text,
+    reason_of,
+    settings_text,
+)
+from tcs.placement.tables import Reason
 
 MOST_PAIRS = 4
 """Pairs of bodies that are printed for each reason; `--json` has them all. The base is blocked a
@@ -21,11 +36,10 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     frame = f", on {result['body_frame']}" if result["body_frame"] else ""
     out.print(f"Goal {result['goal']} of {result['task']} in {result['environment']}{frame}")
     if result["observed"]:
-        state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
         off = "".join(
-            f"; {said_off(name, value)}" for name, value in result["observed_error"].items()
+            f"; {deviation_text(name, value)}" for name, value in result["observed_error"].items()
         )
-        out.print(f"Scored for {state}{off}.")
+        out.print(f"Scored for {settings_text(result['observed'])}{off}.")
     if result["explained"] is not None:
         _print_explained(out, result)
     _print_fix(out, result)
@@ -46,8 +60,10 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
     pair = ""
     if explained["pair"] is not None:
         best = "the best one: " if explained["reason"] == "arm_blocked" else ""
-        pair = f" ({best}{_against(explained['pair'])})"
-    out.print(f"It is not reached from {name}: {REASONS[explained['reason']]}{pair}.")
+        pair = f" ({best}{pair_text(explained['pair'])})"
+    out.print(
+        f"It is not reached from {name}: {REASON_TEXTS[reason_of(explained['reason'])]}{pair}."
+    )
     reaching = result["best_set"]["reaching"]
     if reaching:
         members = " and ".join(str(h) for h in reaching)
@@ -70,10 +86,9 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
         )
     )
     lost = fix["lost_goals"]
-    loses = f", and no longer {', '.join(map(str, lost))}" if lost else ""
-    goals = ", ".join(map(str, fix["reached_goals"]))
+    loses = f", and no longer {goal_list(lost)}" if lost else ""
     out.print(
-        f"It reaches {'goals' if len(fix['reached_goals']) > 1 else 'goal'} {goals}{loses}; "
+        f"It reaches {goals_text(fix['reached_goals'])}{loses}; "
         f"manipulability {fix['manipulability']:.3f}, at this goal {fix['dexterity']:.3f}."
     )
     out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")
@@ -93,10 +108,10 @@ def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
         return
     farthest = result["farthest"]
     pairs = [pair for pair in result["blocking_pairs"] if pair["reason"] == farthest["reason"]]
-    often = f", most often {_against(pairs[0]['pair'])}" if pairs else ""
+    often = f", most often {pair_text(pairs[0]['pair'])}" if pairs else ""
     out.print(
         "No configuration of the grid reaches it. Nearest to it came "
-        f"{farthest['stopped']:,}: {REASONS[farthest['reason']]}{often}."
+        f"{farthest['stopped']:,}: {REASON_TEXTS[reason_of(farthest['reason'])]}{often}."
     )
 
 
@@ -107,13 +122,13 @@ def _print_reasons(out: Console, result: Mapping[str, Any]) -> None:
     for check in result["checks"]:
         share = f"{check['stopped'] / check['of']:.1%}" if check["of"] else "-"
         table.add_row(
-            REASONS[check["reason"]],
+            REASON_TEXTS[reason_of(check["reason"])],
             f"{check['stopped']:,}",
             f"{check['stopped'] / total:.1%}",
             share,
         )
     reached = result["reasons"]["reached"]
-    table.add_row(REASONS["reached"], f"{reached:,}", f"{reached / total:.1%}", "")
+    table.add_row(REASON_TEXTS[Reason.REACHED], f"{reached:,}", f"{reached / total:.1%}", "")
     out.print(table)
 
 
@@ -122,12 +137,12 @@ def _print_pairs(out: Console, result: Mapping[str, Any]) -> None:
     pairs = result["blocking_pairs"]
     if not pairs:
         return
-    table = new_table("blocked", "part", "against", ">configurations")
+    table = new_table("reason", "part", "against", ">configurations")
     for check in result["checks"]:
         blocking = [pair for pair in pairs if pair["reason"] == check["reason"]]
-        what = check["reason"].removesuffix("_blocked")
+        what = REASON_NAMES[reason_of(check["reason"])]
         for pair in blocking[:MOST_PAIRS]:
-            table.add_row(what, *pair["pair"], f"{pair['count']:,}")
+            table.add_row(what, *map(body_name, pair["pair"]), f"{pair['count']:,}")
         rest = blocking[MOST_PAIRS:]
         if rest:
             count = sum(pair["count"] for pair in rest)
@@ -145,16 +160,10 @@ def _weights(weights: Mapping[str, Any], fix: Mapping[str, Any]) -> str:
     ]
     for name, cost in weights["environment"].items():
         unit = "metre" if name in fix["members"][0] else "radian"
-        parts.append(f"{cost:g} per {unit} of {name.replace('_', ' ')}")
+        parts.append(f"{cost:g} per {unit} of {frame_name(name)}")
     return ", ".join(parts)
-
-
-def _against(pair: list[str]) -> str:
-    return f"{pair[0]} against {pair[1]}"
 
 
 def _with_unit(axis: str, value: float) -> str:
     """Return the value of an axis with its name and unit."""
-    name = axis.removesuffix("_deg")
-    shown = "heading" if name == "base_yaw" else name.replace("_", " ")
-    return f"{shown} {value:+g} {'m' if name == axis else 'deg'}"
+    return f"{axis_name(axis)} {value:+g} {axis_unit(axis)}"

@@ -14,6 +14,7 @@ from tcs.cli.rows import default_path, saved_summary
 from tcs.cli.talk import paper
 from tcs.model.grid import Axis
 from tcs.model.scene import EnvironmentFile, load_environment
+from tcs.output.words import settings_text
 
 
 def live_path(task: str, environment: str, robot: str) -> Path:
@@ -84,12 +85,8 @@ def report_found(result: dict[str, Any]) -> None:
     """Print the summary of what was scored, and how the room was taken to be."""
     told = result["observation"]
     state = result["tables"][0]["observed"]
-    said = ", ".join(
-        f"{name.removesuffix('_deg')} {value:.4g} {'deg' if name.endswith('_deg') else 'm'}"
-        for name, value in state.items()
-        if value
-    )
-    paper().print(f"scored as found: {said or 'everything in its place'}")
+    moved = {key: float(f"{value:.4g}") for key, value in state.items() if value}
+    paper().print(f"scored as found: {settings_text(moved) or 'everything in its place'}")
     if told["frames_off"] is not None:
         turned = told["frames_turned"]
         angle = "" if turned is None else f" and {math.degrees(turned):.1f} deg"

@@ -9,20 +9,22 @@ from rich import box
 from rich.table import Table
 
 from tcs.cli.talk import paper
+from tcs.output.words import (
+    REASON_TEXTS,
+    axis_title,
+    axis_value,
+    deviation_text,
+    percentage,
+    reason_of,
+    scores_text,
+    settings_text,
+)
+from tcs.placement.store import state_to_json
 
 if TYPE_CHECKING:
     # Listing what ships has no use for the arrays of a choice.
     from tcs.placement.selection import Choice, Match
-from tcs.placement.store import state_to_json
 
-REASONS = {
-    "reached": "reached",
-    "too_far": "too far for the arm",
-    "joint_limits": "joint limits",
-    "body_blocked": "robot's body would touch something",
-    "gripper_blocked": "gripper would touch something at the goal",
-    "arm_blocked": "every arm posture would touch something",
-}
 _DENSE = {"analytic": "11,520 angles each", "numeric": "400 starts each"}
 NUMERIC_NOTE = (
     "Numeric inverse kinematics: no closed form solves this arm. That takes longer, and a few "
@@ -30,7 +32,6 @@ NUMERIC_NOTE = (
 )
 _ROWS_WIDTH = 170
 """Columns that the table of all rows needs."""
-_UNITS = {"base_x": "m", "base_y": "m", "torso": "m"}
 
 
 def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
@@ -60,19 +61,18 @@ def report_scores(result: Mapping[str, Any]) -> None:
     )
     if result["ik"] == "numeric":
         out.print(NUMERIC_NOTE)
-    reasons = new_table("configuration and goal", ">pairs", ">share")
+    reasons = new_table("configuration and goal", ">pairs", ">of all")
     for name, count in result["reasons"].items():
-        reasons.add_row(REASONS[name], f"{count:,}", f"{count / result['pairs']:.1%}")
+        fraction = percentage(count / result["pairs"])
+        reasons.add_row(REASON_TEXTS[reason_of(name)], f"{count:,}", fraction)
     out.print(reasons)
     for key, what in (("best_single", "best place to stand"), ("best", "best set")):
         best = result[key]
         if best is None:
             out.print(f"{what}: none, no goal is reached from anywhere.")
             continue
-        out.print(
-            f"{what}: {best['reachability']:.1%} of the goals, "
-            f"manipulability {best['manipulability']:.3f} ({result['measure']})"
-        )
+        scores = scores_text(best["reachability"], best["manipulability"], result["measure"])
+        out.print(f"{what}: {scores}")
         out.print(members_table(best["members"]))
     out.print(f"wrote {result['file']}")
 
@@ -142,10 +142,10 @@ def report_choice(result: Mapping[str, Any]) -> None:
     """Print a choice."""
     out = paper()
     out.print(members_table(result["members"]))
+    scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
     out.print(
-        f"{result['reachability']:.1%} of the goals, manipulability "
-        f"{result['manipulability']:.3f} ({result['measure']}), travel cost {result['cost']:.2f}, "
-        f"utility {result['utility']:.3f} (chosen in {1e3 * result['seconds']:.1f} ms)"
+        f"{scores}, travel cost {result['cost']:.2f}, utility {result['utility']:.3f} "
+        f"(chosen in {1e3 * result['seconds']:.1f} ms)"
     )
     if "success" in result:
         low, high = result["success_ci95"]
@@ -158,20 +158,11 @@ def report_choice(result: Mapping[str, Any]) -> None:
             f"left out: {result['unreachable']:,} configurations to which there is no way from here"
         )
     if "observed" in result:
-        state = ", ".join(f"{name} {value:g}" for name, value in result["observed"].items())
-        off = [said_off(name, value) for name, value in result["observed_error"].items()]
+        off = [deviation_text(name, value) for name, value in result["observed_error"].items()]
         if result["frame_error"] is not None:
-            off.append(f"what is seen is {result['frame_error']:.3f} m off")
+            off.append(f"observed frames differ by {result['frame_error']:.3f} m")
+        state = settings_text(result["observed"])
         out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
-
-
-def said_off(name: str, value: float) -> str:
-    """Return how far what is observed is from what was scored; a zero has no sign.
-
-    >>> said_off("person_y", -0.02), said_off("person_y", -0.0)
-    ('person_y is -0.02 off', 'person_y is as observed')
-    """
-    return f"{name} is {value:+g} off" if value else f"{name} is as observed"
 
 
 def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
@@ -207,21 +198,11 @@ def members_table(
     members: Sequence[Mapping[str, float]], heading: str = "stop", names: Sequence[str] = ()
 ) -> Table:
     """Return configurations as a table, by name if they have names, else numbered."""
-    table = new_table(heading, *(f">{_heading(name)}" for name in members[0]))
+    table = new_table(heading, *(f">{axis_title(key)}" for key in members[0]))
     for number, member in enumerate(members):
-        cells = (
-            f"{v % 360.0:.0f}" if n == "base_yaw_deg" else f"{v:.2f}" for n, v in member.items()
-        )
+        cells = (axis_value(key, value) for key, value in member.items())
         table.add_row(names[number] if names else str(number + 1), *cells)
     return table
-
-
-def _heading(name: str) -> str:
-    """Return a column's heading with its unit."""
-    if name == "base_yaw_deg":
-        return "heading [deg]"
-    unit = "deg" if name.endswith("_deg") else _UNITS.get(name, "m")
-    return f"{name.removesuffix('_deg').replace('_', ' ')} [{unit}]"
 
 
 def new_table(*headings: str) -> Table:

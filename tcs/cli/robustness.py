@@ -11,6 +11,8 @@ import typer
 
 from tcs.cli import options, reports, talk
 from tcs.cli.places import observed_settings
+from tcs.output.words import member_text, settings_text
+from tcs.output.words.robustness import error_width
 
 _Errors = Annotated[
     Path | None,
@@ -132,7 +134,7 @@ def report_robustified(result: Mapping[str, Any]) -> None:
     out = talk.paper()
     table = reports.new_table("observed", "set", ">success", ">95 % between", ">sets", "members")
     for row in result["tables"]:
-        state = ", ".join(f"{name} {value:g}" for name, value in row["observed"].items()) or "-"
+        state = settings_text(row["observed"]) or "-"
         for best in row["best"]:
             low, high = best["ci95"]
             table.add_row(
@@ -141,15 +143,11 @@ def report_robustified(result: Mapping[str, Any]) -> None:
                 f"{best['success']:.1%}",
                 f"{low:.1%} {high:.1%}",
                 f"{best['sets']:,}",
-                "; ".join(_place(member) for member in best["members"]),
+                "; ".join(member_text(member) for member in best["members"]),
             )
     out.print(table)
     out.print(f"wrote {result['file']}. To weigh it, where X Y YAW_DEG is where the robot is now:")
     typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")
-
-
-def _place(member: Mapping[str, float]) -> str:
-    return f"({member['base_x']:.2f}, {member['base_y']:.2f}, {member['base_yaw_deg']:.0f} deg)"
 
 
 def _table(loaded: Any, observed: list[str] | None) -> int | None:
@@ -181,16 +179,9 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
     )
     goals = ", ".join(f"{i}: {share:.1%}" for i, share in enumerate(result["per_goal"]))
     out.print(f"by goal  {goals}")
-    widths = ", ".join(f"{joint} {_width(error)}" for joint, error in result["errors"].items())
+    widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     base = "" if result["check_base"] else "; the base is not checked, as in the paper"
     out.print(f"errors  {widths}{base}")
     if result["clipped"]:
         out.print(f"in {result['clipped']:,} samples a joint was stopped at its limit")
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")
-
-
-def _width(error: Mapping[str, Any]) -> str:
-    """Return an error in words, e.g. "normal 0.05 m"."""
-    (key, width) = next((k, v) for k, v in error.items() if k != "distribution")
-    sign = "sd" if error["distribution"] == "normal" else "uniform ±"
-    return f"{sign} {width:g} {'deg' if key.endswith('_deg') else 'm'}"

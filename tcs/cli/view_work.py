@@ -17,7 +17,8 @@ from tcs.cli.places import observed_settings
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
 from tcs.output.report.pictures import Shown, title_of
-from tcs.output.view import Answers, Props, Viewer, legend, open_meshcat, page
+from tcs.output.view import Answers, Props, Viewer, open_meshcat, page
+from tcs.output.words import colour_legend
 from tcs.placement.scoring import rebuild_scene
 
 
@@ -123,7 +124,7 @@ def show_live(staged: Staged, *, port: int | None, browser: bool, duration: floa
     begun = time.perf_counter()
     meshcat = open_meshcat(port)
     typer.echo(f"{staged.title}; {staged.subtitle}")
-    typer.echo(f"arrows: {legend()}")
+    typer.echo(f"arrows: {colour_legend()}")
     viewer = Viewer(meshcat, staged.props, staged.answers, typer.echo)
     talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
     if browser:

@@ -1,6 +1,7 @@
 import pytest
 
 import tcs
+from tcs.output.words import pair_text
 from tcs.placement.reasons import fix_weights
 from tcs.placement.tables import Reason
 from tests.placement.store.example import SHIFT, score_file
@@ -66,11 +67,8 @@ def test_observed_state(tcs_command, tmp_path):
     tcs.save(path, score_file(tables=3, observed=[SHIFT], share=0.1))
     words = ("explain", path, "--goal", 1, "--observed", "person_y=0.04")
     result = tcs_command(*words, "--json").json
-    assert (result["observed"], result["observed_error"]) == (
-        {"person_y": 0.05},
-        {"person_y": -0.01},
-    )
-    assert "person_y 0.05; person_y is -0.01 off" in tcs_command(*words).out
+    assert (result["observed"], result["observed_error"]) == ({"person_y": 0.05}, {"person_y": -0.01})
+    assert "person y 0.05 m; observed person y differs by -0.01 m" in tcs_command(*words).out
     ran = tcs_command("explain", path, "--goal", 1, "--observed", "person_y=0.2")
     assert ran.code == 1
     assert "person_y" in ran.err
@@ -84,8 +82,7 @@ def test_report(tcs_command, stored):
     out = tcs_command("explain", stored, "--goal", 2, "--configuration", h).out
     explained = tcs.explain(file, 2, h)
     assert explained.fix.sentence in " ".join(out.split())
-    first, second = explained.standing.pair
-    assert f"the best one: {first} against {second}" in " ".join(out.split())
+    assert f"the best one: {pair_text(explained.standing.pair)}" in " ".join(out.split())
     for words in ("nearest reaching", "of those that came so far", "per metre of bed height"):
         assert words in " ".join(out.split())
 

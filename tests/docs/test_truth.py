@@ -9,7 +9,7 @@ import tcs
 from tcs.kernel.dexterity import MEASURES
 from tcs.model.grid import Grid
 from tcs.output.report import Check, answer_of, answer_page
-from tcs.output.view.answers import COLOUR_NAMES
+from tcs.output.words.reasons import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import TravelWeights, UtilityWeights
 from tcs.placement.store.encoding import encode

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tcs.model.grid import InitialConfiguration
 from tcs.output.draw.colours import BLOCKED, CASING, EMPTY, HERE, MEMBER, SCALE
 from tcs.output.draw.solids import Kind, Solid
+from tcs.output.words import member_text
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
 ARROW = 0.45
@@ -192,25 +193,11 @@ def stops(members: Sequence[Stand], here: Stand | None) -> list[Artist]:
     """Return where robot and members stand in numbers, for a legend."""
     handles: list[Artist] = []
     if here is not None:
-        said = described(here.configuration)
+        said = member_text(here.configuration.to_json())
         handles.append(Patch(facecolor="none", edgecolor=HERE, ls="--", label=f"now: {said}"))
     for number, stand in enumerate(members, start=1):
-        said = described(stand.configuration)
+        said = member_text(stand.configuration.to_json())
         handles.append(
             Line2D([], [], ls="none", color=MEMBER, marker="o", label=f"{number}: {said}")
         )
     return handles
-
-
-def described(configuration: InitialConfiguration) -> str:
-    """Return a configuration in a few words."""
-    at = configuration.to_json()
-    text = (
-        f"x {at['base_x']:.2f} m, y {at['base_y']:.2f} m, heading "
-        f"{at['base_yaw_deg'] % 360.0:.0f}°, torso {at['torso']:.2f} m"
-    )
-    for name, value in configuration.environment:
-        text += f", {name.replace('_', ' ')} " + (
-            f"{at[f'{name}_deg']:.0f}°" if f"{name}_deg" in at else f"{value:.2f} m"
-        )
-    return text

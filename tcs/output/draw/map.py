@@ -15,6 +15,7 @@ from tcs.output.draw import floor_plan
 from tcs.output.draw.colours import HERE
 from tcs.output.draw.floor_plan import Stand
 from tcs.output.draw.solids import Solid
+from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
 _TITLE_WIDTH = 115
@@ -50,8 +51,8 @@ def draw_map(
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     top = float(places.manipulability.max(initial=0.0))
     panels = (
-        (left, 100.0 * places.reachability, 100.0, "goals reached, P_R [%]"),
-        (right, places.manipulability, top or 1.0, f"manipulability, P_M ({measure}) [0 to 1]"),
+        (left, 100.0 * places.reachability, 100.0, REACHABILITY_LABEL),
+        (right, places.manipulability, top or 1.0, manipulability_label(measure)),
     )
     shown = [stand.polygon for stand in (*members, here) if stand is not None]
     floor_plan.frame(left, [_grid_and_room(places, room), *shown])
@@ -64,8 +65,8 @@ def draw_map(
         _draw_tour(axes, members, here)
         floor_plan.draw_scale_bar(axes)
         axes.set_aspect("equal")
-        axes.set_xlabel("base x [m]")
-    left.set_ylabel("base y [m]")
+        axes.set_xlabel(axis_title("base_x"))
+    left.set_ylabel(axis_title("base_y"))
     lines = [*textwrap.wrap(title, _TITLE_WIDTH), *textwrap.wrap(subtitle, _TITLE_WIDTH)]
     figure.suptitle("\n".join(lines), fontsize=13)
     handles = floor_plan.what_is_what(room, robot=bool(members))

@@ -15,6 +15,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.output.draw import floor_plan
 from tcs.output.draw.floor_plan import Stand
 from tcs.output.draw.solids import Kind, Solid
+from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
 Score = Literal["reachability", "manipulability"]
@@ -86,16 +87,14 @@ def draw_states(
                     columns[j], (0.5, 1.0), (0, 22), xycoords="axes fraction",
                     textcoords="offset points", ha="center", fontsize=11, weight="bold",
                 )  # fmt: skip
-        grid[i, 0].set_ylabel(f"{rows[i]}\nbase y [m]" if rows[i] else "base y [m]", fontsize=9)
+        y_label = axis_title("base_y")
+        grid[i, 0].set_ylabel(f"{rows[i]}\n{y_label}" if rows[i] else y_label, fontsize=9)
     for axes in grid[-1]:
-        axes.set_xlabel("base x [m]", fontsize=9)
+        axes.set_xlabel(axis_title("base_x"), fontsize=9)
     floor_plan.draw_scale_bar(grid[-1, 0], size=_LINES + 0.15)
     if mesh is not None:
-        label = (
-            "goals reached, P_R [%]"
-            if score == "reachability"
-            else f"manipulability, P_M ({measure}) [0 to 1]"
-        )
+        is_reachability = score == "reachability"
+        label = REACHABILITY_LABEL if is_reachability else manipulability_label(measure)
         figure.colorbar(mesh, ax=list(grid.ravel()), label=label, shrink=0.6, aspect=30)
     width = int(9.5 * figure.get_figwidth())
     lines = [*textwrap.wrap(title, width), *textwrap.wrap(subtitle, width)]

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from tcs.model.grid import InitialConfiguration
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import Shown, map_figure, member_figure, serves, stage
+from tcs.output.report.pictures import Shown, map_figure, member_figure, stage
 from tcs.output.report.states import has_states, states_figure
+from tcs.output.words import assign_goals
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
 from tcs.placement.scoring.verify import DEXTERITY_BAR, Finding, check_pairs
@@ -128,9 +129,9 @@ class Answer:
         return finding.is_true and finding.dexterity_error <= DEXTERITY_BAR
 
     @cached_property
-    def server(self) -> tuple[int | None, ...]:
-        """Number of the member that serves each goal, from 0; None where none reaches it."""
-        return servers(self.file, self.shown)
+    def assignment(self) -> tuple[int | None, ...]:
+        """Number of the member that serves each goal, from 0; None where no member reaches it."""
+        return assign_goals(self.scored.scores, self.shown.indices)
 
     @cached_property
     def distributions(self) -> tuple[Distribution, ...]:
@@ -140,22 +141,13 @@ class Answer:
     @property
     def unreached(self) -> tuple[int, ...]:
         """The goals that no member reaches."""
-        return tuple(goal for goal, number in enumerate(self.server) if number is None)
+        return tuple(goal for goal, number in enumerate(self.assignment) if number is None)
 
     def explanation(self, goal: int) -> Explanation:
         """Return what would have to change for the set to reach a goal."""
         from_where = self.shown.indices[0] if self.shown.indices else None
         observed = self.file.observed_states[self.shown.table]
         return explain(self.file, goal, from_where, observed=observed or None)
-
-
-def servers(file: ScoreFile, shown: Shown) -> tuple[int | None, ...]:
-    """Return the number of the member that serves each goal; None where none reaches it."""
-    found: list[int | None] = [None] * file.tables[shown.table].scores.goals
-    for number in range(len(shown.indices)):
-        for goal in serves(file, shown, number):
-            found[goal] = number
-    return tuple(found)
 
 
 def answer_of(
@@ -187,7 +179,7 @@ def answer_of(
     staged = stage(file, shown)
     served = {
         goal: shown.indices[number]
-        for goal, number in enumerate(servers(file, shown))
+        for goal, number in enumerate(assign_goals(file.tables[shown.table].scores, shown.indices))
         if number is not None
     }
     findings = check_pairs(file, shown.table, [(h, goal) for goal, h in served.items()])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from typing import Any
 
 from tcs.output.report.answer import Answer
 from tcs.output.report.answer_tables import (
@@ -28,8 +27,18 @@ from tcs.output.report.blocks import (
     Text,
 )
 from tcs.output.report.machine import machine, today, versions
-from tcs.output.report.reproduce import commands, estimated, place_words
-from tcs.output.report.words import REASONS, percent
+from tcs.output.report.reproduce import commands, estimated
+from tcs.output.words import (
+    REASON_TEXTS,
+    assigned_goals,
+    base_pose_text,
+    frame_name,
+    goal_list,
+    goals_text,
+    percent,
+    settings_text,
+)
+from tcs.output.words.robustness import error_width
 from tcs.placement.store import state_to_json
 from tcs.placement.tables import SetTable
 
@@ -81,10 +90,12 @@ def _summary(answer: Answer) -> list[Block]:
         f"{percent(reachability)} %); P_M is {manipulability:.3f} ({answer.measure})."
     ]
     if answer.unreached:
-        listed = ", ".join(str(goal) for goal in answer.unreached)
-        said.append(f"Not reached: {listed}. Why, and what would help: see Goal by goal.")
+        said.append(
+            f"Not reached: {goal_list(answer.unreached)}. "
+            "Goal by goal says why, and what would help."
+        )
     if answer.shown.here is not None:
-        here = place_words(answer.shown.here)
+        here = base_pose_text(answer.shown.here.to_json())
         said.append(f"At the default weights it is the set to choose for a robot at {here}.")
     else:
         of_all = "" if answer.max_members is None else f" of at most {answer.max_members}"
@@ -95,10 +106,9 @@ def _summary(answer: Answer) -> list[Block]:
     state = answer.file.observed_states[answer.shown.table]
     if state:
         shown = state_to_json(answer.file.observed_axes, state)
-        listed = ", ".join(_found(name, value) for name, value in shown.items())
         tables = len(answer.file.tables)
         said.append(
-            f"It holds where this is found: {listed}"
+            f"It holds where this is found: {settings_text(shown)}"
             + (f"; the file answers for {tables} such states." if tables > 1 else ".")
         )
     said += _success_in_short(answer)
@@ -110,21 +120,12 @@ def _hopeless(answer: Answer) -> list[str]:
     found: dict[str, list[int]] = {}
     for goal, spread in enumerate(answer.distributions):
         if spread.reached == 0 and spread.farthest is not None:
-            found.setdefault(REASONS[spread.farthest.reason], []).append(goal)
+            found.setdefault(REASON_TEXTS[spread.farthest.reason], []).append(goal)
     return [
-        f"{_numbered(goals)}: reached from nowhere on the grid; what came nearest was stopped by "
-        f"this: {why}."
+        f"{goals_text(goals).capitalize()}: reached from nowhere on the grid; what came nearest "
+        f"was stopped by this: {why}."
         for why, goals in found.items()
     ]
-
-
-def _numbered(goals: Sequence[int]) -> str:
-    """Return goals by their numbers.
-
-    >>> _numbered([2]), _numbered([0, 3])
-    ('Goal 2', 'Goals 0, 3')
-    """
-    return f"Goal{'s' if len(goals) > 1 else ''} {', '.join(map(str, goals))}"
 
 
 def _soundness(answer: Answer) -> str:
@@ -165,16 +166,6 @@ def _success_in_short(answer: Answer) -> list[str]:
     ]
 
 
-def _found(name: str, value: float) -> str:
-    """Return a value of an observed axis in words.
-
-    >>> _found("head_tilt_deg", 5.0)
-    'head tilt 5 deg'
-    """
-    unit = "deg" if name.endswith("_deg") else "m"
-    return f"{name.removesuffix('_deg').replace('_', ' ')} {value:g} {unit}"
-
-
 def _map(answer: Answer) -> list[Block]:
     return [
         Picture(
@@ -203,14 +194,14 @@ def _states(answer: Answer) -> list[Block]:
 def _views(answer: Answer) -> list[Block]:
     blocks: list[Block] = []
     for number, view in enumerate(answer.views, start=1):
-        goals = [str(goal) for goal, at in enumerate(answer.server) if at == number - 1]
-        listed = ", ".join(goals) or "none"
+        goals = assigned_goals(answer.assignment, number - 1)
+        served = goals_text(goals) if goals else "no goal"
         blocks.append(
             Picture(
                 view,
                 "png",
                 f"The robot at stop {number} with its arm at a goal, and the tool there, nearer.",
-                f"Stop {number}, best for goals {listed}. The robot is drawn as the shapes that "
+                f"Stop {number}, serves {served}. The robot is drawn as the shapes that "
                 "contacts are checked with; they enclose it. Arrows end where the tool has to be.",
             )
         )
@@ -265,7 +256,9 @@ def _success(answer: Answer) -> list[Block]:
             Text("Nothing is estimated in this file. This estimates it, for the best sets:"),
             Code(shlex.join(["tcs", "robustify", str(answer.path)])),
         ]
-    widths = "; ".join(_error(joint, error) for joint, error in made["errors"].items())
+    widths = "; ".join(
+        f"{frame_name(joint)} ({error_width(error)})" for joint, error in made["errors"].items()
+    )
     base = "the base must stay free" if made["check_base"] else "the base is not checked again"
     blocks: list[Block] = [
         Text(
@@ -284,13 +277,6 @@ def _success(answer: Answer) -> list[Block]:
                 )
             )
     return blocks
-
-
-def _error(joint: str, error: dict[str, Any]) -> str:
-    (key, width) = next((k, v) for k, v in error.items() if k != "distribution")
-    unit = "deg" if key.endswith("_deg") else "m"
-    sign = "standard deviation" if error["distribution"] == "normal" else "uniform ±"
-    return f"{joint.replace('_', ' ')} ({sign} {width:g} {unit})"
 
 
 def _kept(sets: SetTable) -> str:

@@ -7,20 +7,24 @@ from collections import Counter
 
 from tcs.output.report.answer import Answer, Verdict
 from tcs.output.report.blocks import Cell, Column, Table, Tone
-from tcs.output.report.words import REASONS, body, percent
+from tcs.output.words import (
+    REASON_NAMES,
+    REASON_TEXTS,
+    assigned_goals,
+    axis_title,
+    axis_value,
+    body_name,
+    frame_name,
+    goal_list,
+    member_text,
+    pair_text,
+    percent,
+)
 from tcs.placement.reasons.distribution import CHECKS
 from tcs.placement.tables import Reason
 
 MOST_PAIRS = 4
 """Pairs of bodies that are told for each reason."""
-SHORT = {
-    Reason.REACHED: "reached",
-    Reason.BODY_BLOCKED: "body blocked",
-    Reason.GRIPPER_BLOCKED: "gripper blocked",
-    Reason.TOO_FAR: "too far",
-    Reason.JOINT_LIMITS: "joint limits",
-    Reason.ARM_BLOCKED: "arm blocked",
-}
 
 
 def stops_table(answer: Answer) -> Table:
@@ -28,13 +32,17 @@ def stops_table(answer: Answer) -> Table:
     members = [member.to_json() for member in answer.shown.members]
     names = list(members[0])
     rows = [
-        [str(number), *(_value(name, member[name]) for name in names), _listed(answer, number - 1)]
+        [
+            str(number),
+            *(axis_value(name, member[name]) for name in names),
+            _listed(answer, number - 1),
+        ]
         for number, member in enumerate(members, start=1)
     ]
     return Table(
         "Where to stand, in the order of the tour. x, y and heading are those of the robot's base "
         f"in the frame of the environment: {answer.job.spec.environment.origin}",
-        [Column("Stop"), *(Column(_heading(name)) for name in names), Column("Best at goals")],
+        [Column("Stop"), *(Column(axis_title(name)) for name in names), Column("Best at goals")],
         rows,
     )
 
@@ -56,13 +64,13 @@ def goals_table(answer: Answer) -> Table:
     weights = answer.scored.scores.weights
     rows: list[list[Cell | str]] = []
     for g, goal in enumerate(goals):
-        number = answer.server[g]
+        number = answer.assignment[g]
         where = Cell("nowhere", "bad") if number is None else Cell(f"stop {number + 1}", "good")
         spread = answer.distributions[g]
         rows.append(
             [
                 str(g),
-                goal.body_frame.replace("_", " "),
+                frame_name(goal.body_frame),
                 *([f"{weights[g]:.3f}"] if weighted else []),
                 where,
                 *(_verdict(answer.verdicts[stop][g], is_used=number == stop) for stop in stops),
@@ -83,7 +91,7 @@ def joints_table(answer: Answer) -> Table:
     """Return the stored arm posture for each goal that is reached."""
     names = answer.job.spec.robot.arm_joints
     rows = []
-    for goal, number in enumerate(answer.server):
+    for goal, number in enumerate(answer.assignment):
         joints = (
             answer.scored.scores.joints_of(answer.shown.indices[number], goal)
             if number is not None
@@ -113,7 +121,7 @@ def reasons_table(answer: Answer) -> Table:
         rows.append(
             [
                 str(goal),
-                answer.job.task.goals[goal].body_frame.replace("_", " "),
+                frame_name(answer.job.task.goals[goal].body_frame),
                 *(percent(share, 2) if share else "0" for share in shares),
             ]
         )
@@ -124,7 +132,7 @@ def reasons_table(answer: Answer) -> Table:
         [
             Column("Goal"),
             Column("On the", is_number=False),
-            *(Column(SHORT[kind]) for kind in kinds),
+            *(Column(REASON_NAMES[kind]) for kind in kinds),
         ],
         rows,
     )
@@ -142,12 +150,14 @@ def pairs_table(answer: Answer) -> Table:
         total = sum(n for _, n in found)
         for pair, n in found[:MOST_PAIRS]:
             share = f"{percent(n / total)} %"
-            rows.append([SHORT[reason], body(pair[0]), body(pair[1]), f"{n:,}", share])
+            rows.append(
+                [REASON_NAMES[reason], body_name(pair[0]), body_name(pair[1]), f"{n:,}", share]
+            )
         rest = found[MOST_PAIRS:]
         if rest:
             n = sum(times for _, times in rest)
             share = f"{percent(n / total)} %"
-            rows.append([SHORT[reason], f"{len(rest)} other pairs", "", f"{n:,}", share])
+            rows.append([REASON_NAMES[reason], f"{len(rest)} other pairs", "", f"{n:,}", share])
     return Table(
         "What touches what, most often first, over all goals and configurations: the first contact "
         "that is found; for the arm, that of its best posture.",
@@ -220,7 +230,10 @@ def success_table(answer: Answer) -> Table | None:
         rows.append(
             [
                 name,
-                " and ".join(_place(answer, h) for h in members) or "none",
+                " and ".join(
+                    member_text(answer.job.grid.configuration(h).to_json()) for h in members
+                )
+                or "none",
                 f"{percent(reachability)} %",
                 f"{manipulability:.3f}",
                 "no estimate" if row is None else f"{percent(float(success.success[row]))} %",
@@ -249,9 +262,9 @@ def _verdict(verdict: Verdict, *, is_used: bool) -> Cell:
     """Return what came of a goal at a stop."""
     if verdict.reason == Reason.REACHED:
         return Cell(f"{verdict.measure:.3f}", "good" if is_used else "plain")
-    said = REASONS[verdict.reason]
+    said = REASON_TEXTS[verdict.reason]
     if verdict.pair is not None:
-        said += f" ({body(verdict.pair[0])}, {body(verdict.pair[1])})"
+        said += f" ({pair_text(verdict.pair)})"
     return Cell(said, "quiet")
 
 
@@ -263,28 +276,7 @@ def _confirmed(answer: Answer, goal: int) -> Cell:
 
 
 def _listed(answer: Answer, stop: int) -> str:
-    goals = [str(goal) for goal, number in enumerate(answer.server) if number == stop]
-    return " ".join(goals) or "none"
-
-
-def _place(answer: Answer, h: int) -> str:
-    at = answer.job.grid.configuration(h).to_json()
-    return ", ".join(f"{_name(name)} {_value(name, value)}" for name, value in at.items())
-
-
-def _name(name: str) -> str:
-    short = name.removesuffix("_deg").removeprefix("base_")
-    return {"yaw": "heading"}.get(short, short).replace("_", " ")
-
-
-def _heading(name: str) -> str:
-    return f"{_name(name)} [{'deg' if name.endswith('_deg') else 'm'}]"
-
-
-def _value(name: str, value: float) -> str:
-    if name == "base_yaw_deg":
-        return f"{value % 360.0:.0f}"
-    return f"{value:.0f}" if name.endswith("_deg") else f"{value:.2f}"
+    return goal_list(assigned_goals(answer.assignment, stop)) or "none"
 
 
 def _tone(is_good: bool) -> Tone:

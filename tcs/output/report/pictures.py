@@ -26,6 +26,7 @@ from tcs.output.draw import (
     primitive_corners,
 )
 from tcs.output.draw.solids import FloatArray, outline
+from tcs.output.words import assign_goals, assigned_goals, base_pose_text, goals_text, scores_text
 from tcs.placement.scoring import Job, rebuild_scene
 from tcs.placement.selection import SelectionTables, UtilityWeights, nearest_table, select
 from tcs.placement.store import ScoreFile
@@ -74,7 +75,7 @@ class Shown:
             members = tuple(choice.members[i] for i in choice.order)
             indices = tuple(choice.indices[i] for i in choice.order)
             what = (
-                f"chosen from x {here.base_x:.2f} m, y {here.base_y:.2f} m, "
+                f"chosen for a robot at {base_pose_text(here.to_json())}, "
                 f"travel cost {choice.cost:.2f}"
             )
         else:
@@ -84,10 +85,8 @@ class Shown:
             what = "best set"
         if not members:
             return cls(None, (), (), table, "no goal is reached from anywhere")
-        reachability, manipulability = sets.scores_of(tuple(sorted(indices)))
-        said = f"reaches {reachability:.0%} of the goals, manipulability {manipulability:.3f}"
-        said += f" ({file.metadata['measure']})"
-        return cls(here, members, indices, table, f"{what}: {said}")
+        scores = scores_text(*sets.scores_of(tuple(sorted(indices))), file.metadata["measure"])
+        return cls(here, members, indices, table, f"{what}: {scores}")
 
 
 def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int, ...]:
@@ -172,19 +171,6 @@ def member_figure(
     return draw_scene(views, title="")
 
 
-def serves(file: ScoreFile, shown: Shown, number: int) -> tuple[int, ...]:
-    """Return the goals at which one member of the set is better than the others, ascending.
-
-    Args:
-        file: A score file.
-        shown: The set.
-        number: Number of the member, from 0.
-    """
-    dexterity = file.tables[shown.table].scores.dexterity[list(shown.indices)]
-    mine = (dexterity.argmax(axis=0) == number) & (dexterity[number] > 0.0)
-    return tuple(np.flatnonzero(mine).tolist())
-
-
 def stage(file: ScoreFile, shown: Shown) -> Stage:
     """Return what a file was scored from, and its scene; refuse other models than those."""
     job, scene, _ = rebuild_scene(file)
@@ -210,7 +196,7 @@ def _view(
     """Return the view of one member: of robot and person, or of the tool at its goal alone."""
     member, h = shown.members[number], shown.indices[number]
     scores = file.tables[shown.table].scores
-    served = serves(file, shown, number)
+    served = assigned_goals(assign_goals(scores, shown.indices), number)
     _set_room(scene, (member,))
     scene.place_base(member.base_x, member.base_y, member.base_yaw)
     scene.set_torso(member.torso)
@@ -226,8 +212,9 @@ def _view(
     base = np.array([member.base_x, member.base_y, 0.0])
     # Across the line from robot to person, from both sides: neither stands before the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
-    listed = ", ".join(str(g) for g in served) or "none"
-    caption = f"stop {number + 1}, best for goals {listed}; arm at goal {current}"
+    caption = f"stop {number + 1}, serves {goals_text(served) if served else 'no goal'}"
+    if current is not None:
+        caption += f"; arm at goal {current}"
     if is_close and current is not None:
         subject, turns = goals[current] + _AROUND_A_GOAL, [60.0, -60.0, 120.0, -120.0]
         caption = f"the tool at goal {current}"

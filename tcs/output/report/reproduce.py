@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from typing import Any
 
-from tcs.model.grid import InitialConfiguration
 from tcs.output.report.answer import Answer
 from tcs.placement.store import state_to_json
 
@@ -67,16 +66,6 @@ def estimated(answer: Answer) -> dict[str, Any] | None:
         return None
     record = records[answer.shown.table]
     return record if isinstance(record, dict) else None
-
-
-def place_words(here: InitialConfiguration) -> str:
-    """Return where the robot is now, in words.
-
-    >>> place_words(InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=0.0, torso=0.0))
-    'x 1.4 m, y -1.2 m, heading 0 deg'
-    """
-    at = here.to_json()
-    return f"x {at['base_x']:g} m, y {at['base_y']:g} m, heading {at['base_yaw_deg']:g} deg"
 
 
 def _observed(answer: Answer) -> list[str]:

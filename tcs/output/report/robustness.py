@@ -32,7 +32,8 @@ from tcs.output.report.tables import (
     table_1,
     table_3,
 )
-from tcs.output.report.words import lost_goal, mean_and_std, p_value, percent, signed
+from tcs.output.words import p_value, percent, signed
+from tcs.output.words.robustness import lost_goal, mean_and_std
 from tcs.placement.robustness import RowStudy, StudyPlan
 
 SERIES = ("best set, by P_R + P_M", "best single configuration", "surest set, by success")

@@ -12,6 +12,7 @@ from tcs.model.grid import Axis, Grid
 from tcs.output.draw import PlaceMap, Stand, StatePanel, draw_states
 from tcs.output.draw.states import Score
 from tcs.output.report.pictures import Shown, Stage, base_outline, room_solids, stage, title_of
+from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
 
 MOST_PANELS = 60
@@ -77,11 +78,13 @@ def states_figure(
         [panel(state) for state in numbers[first : first + columns.count]]
         for first in reversed(numbers[:: columns.count])
     ]
-    above = itertools.product(*([_said(axis, i) for i in range(axis.count)] for axis in axes[:-1]))
+    above = itertools.product(
+        *([_setting(axis, i) for i in range(axis.count)] for axis in axes[:-1])
+    )
     return draw_states(
         rows,
-        [", ".join(said) for said in above][::-1],
-        [_said(columns, i) for i in range(columns.count)],
+        [", ".join(setting) for setting in above][::-1],
+        [_setting(columns, i) for i in range(columns.count)],
         members=stands,
         title=title_of(job),
         subtitle=shown.subtitle,
@@ -90,8 +93,7 @@ def states_figure(
     )
 
 
-def _said(axis: Axis, index: int) -> str:
-    """Return a value of an axis in words."""
-    value = axis.start + index * axis.step
-    number = f"{value:.0f}°" if axis.unit == "deg" else f"{value:.2f} m"
-    return f"{axis.name.replace('_', ' ')} {number}"
+def _setting(axis: Axis, index: int) -> str:
+    """Return the name and a value of an axis."""
+    key = f"{axis.name}_deg" if axis.unit == "deg" else axis.name
+    return f"{axis_name(key)} {quantity(key, axis.start + index * axis.step)}"

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from tcs.output.report.blocks import Cell, Column, Table
 from tcs.output.report.paper import Compared, Paper
-from tcs.output.report.words import goes_with, mean_and_std, p_value, percent, signed, stopped_by
+from tcs.output.words import p_value, percent, signed
+from tcs.output.words.robustness import goes_with, mean_and_std, stopped_by
 from tcs.placement.robustness import Contrast, Evaluation, Prediction, RowStudy
 
 NEAR = 0.05

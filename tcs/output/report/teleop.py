@@ -37,7 +37,7 @@ from tcs.output.report.teleop_tables import (
     title_of,
     trials_table,
 )
-from tcs.output.report.words import p_value
+from tcs.output.words import p_value
 from tcs.teleop.experiment.course import BLOCKED_AFTER
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tcs.output.report.blocks import Block, Column, Table, Text
-from tcs.output.report.words import p_value
+from tcs.output.words import p_value
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tcs.output.view.answers import Answers, Verdict, legend
+from tcs.output.view.answers import Answers, Verdict
 from tcs.output.view.controls import Controls, Slider, State
 from tcs.output.view.export import Step, page, script
 from tcs.output.view.floor import Floor, floor_of
@@ -20,7 +20,6 @@ __all__ = [
     "Verdict",
     "Viewer",
     "floor_of",
-    "legend",
     "open_meshcat",
     "page",
     "script",

@@ -3,36 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.output.words import (
+    REASON_NAMES,
+    REASON_TEXTS,
+    assign_goals,
+    assigned_goals,
+    goal_list,
+    goals_by_reason,
+    pair_text,
+)
 from tcs.placement.store import ScoreFile
 from tcs.placement.tables import Reason, ScoreTable, SuccessTable
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
-
-COLOURS = {
-    Reason.REACHED: "#009e73",
-    Reason.TOO_FAR: "#56b4e9",
-    Reason.JOINT_LIMITS: "#f0e442",
-    Reason.BODY_BLOCKED: "#4d4d4d",
-    Reason.GRIPPER_BLOCKED: "#e69f00",
-    Reason.ARM_BLOCKED: "#d55e00",
-}
-"""Colours of Okabe and Ito, told apart by who is colour-blind, and a dark grey."""
-
-COLOUR_NAMES = {
-    Reason.REACHED: "green",
-    Reason.TOO_FAR: "light blue",
-    Reason.JOINT_LIMITS: "yellow",
-    Reason.BODY_BLOCKED: "grey",
-    Reason.GRIPPER_BLOCKED: "light orange",
-    Reason.ARM_BLOCKED: "dark orange",
-}
-"""How to call them on a terminal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +52,7 @@ class Verdict:
         Args:
             goal: The goal that is shown: it is told first.
         """
-        return f"goal {goal} {self._said(goal)}; {self.summary}"
+        return f"goal {goal} {self._goal_text(goal)}; {self.summary}"
 
     @property
     def summary(self) -> str:
@@ -72,23 +61,16 @@ class Verdict:
             f"{len(self.reached)} of {len(self.reasons)} goals, "
             f"P_R {self.reachability:.0%}, P_M {self.manipulability:.3f}"
         )
-        rest = self._missed()
-        return f"{scores}{'; ' if rest else ''}{rest}"
+        missed = goals_by_reason(self.reasons).items()
+        rest = [f"{REASON_NAMES[reason]}: {goal_list(goals)}" for reason, goals in missed]
+        return "; ".join([scores, *rest])
 
-    def _said(self, goal: int) -> str:
+    def _goal_text(self, goal: int) -> str:
         reason, pair = self.reasons[goal], self.pairs[goal]
         if reason == Reason.REACHED:
             return "reached"
-        touching = f" ({pair[0]} at {pair[1]})" if pair is not None else ""
-        return f"not reached: {_words(reason)}{touching}"
-
-    def _missed(self) -> str:
-        """Return the other reasons, each with its goals."""
-        found: dict[Reason, list[int]] = {}
-        for g, reason in enumerate(self.reasons):
-            if reason != Reason.REACHED:
-                found.setdefault(reason, []).append(g)
-        return "; ".join(f"{_words(reason)}: {listed(found[reason])}" for reason in sorted(found))
+        contact = f" ({pair_text(pair)})" if pair is not None else ""
+        return f"not reached: {REASON_TEXTS[reason]}{contact}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,21 +135,9 @@ class Answers:
             The goals it reaches with the greatest measure of all members, ascending; a goal that
             several serve alike counts for the first of them.
         """
-        rows = list(self.members)
-        measure = np.where(self.scores.reached[rows], self.scores.dexterity[rows], -1.0)
-        mine = (measure.argmax(axis=0) == number) & self.scores.reached[rows[number]]
-        return tuple(np.flatnonzero(mine).tolist())
+        return assigned_goals(self.assignment, number)
 
-
-def legend() -> str:
-    """Return what the colours of the arrows mean, as a line of text."""
-    return ", ".join(f"{COLOUR_NAMES[reason]}: {_words(reason)}" for reason in Reason)
-
-
-def _words(reason: Reason) -> str:
-    return reason.name.lower().replace("_", " ")
-
-
-def listed(goals: Iterable[int]) -> str:
-    """Return numbers of goals, one after the other."""
-    return " ".join(str(goal) for goal in goals)
+    @cached_property
+    def assignment(self) -> tuple[int | None, ...]:
+        """Number of the member that serves each goal, from 0; None where no member reaches it."""
+        return assign_goals(self.scores, self.members)

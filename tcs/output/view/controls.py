@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from tcs.model.grid import Axis
 from tcs.output.view.answers import Answers
 from tcs.output.view.floor import kinds
+from tcs.output.words import axis_title
 
 MEMBER, GOAL, COLOUR = "set member", "goal", "floor colour"
 NEXT_MEMBER, NEXT_GOAL = "next set member", "next goal"
@@ -22,12 +23,6 @@ KEYS: Mapping[str, str] = {
 """Buttons, and the key of each in the browser."""
 _PARTS = 1_000_000
 """Of a metre or degree: finer than anybody writes a grid."""
-_STAND = {
-    "base_x": "stand at x",
-    "base_y": "stand at y",
-    "base_yaw": "heading",
-    "torso": "torso",
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +52,7 @@ class Slider:
     def tick(self) -> float:
         """The step that Meshcat is given: it rounds to multiples of it, whatever the lowest value.
 
-        >>> Slider("stand at x [m]", 0.1, 0.5, 0.2).tick
+        >>> Slider("base x [m]", 0.1, 0.5, 0.2).tick
         0.1
         """
         low, step = (round(abs(value) * _PARTS) for value in (self.low, self.step))
@@ -184,5 +179,4 @@ def label_of(axis: Axis) -> str:
     >>> label_of(Axis("head_rest", "deg", 0.0, 40.0, 3))
     'head rest [deg]'
     """
-    name = _STAND.get(axis.name, axis.name.replace("_", " "))
-    return f"{name} [{axis.unit}]"
+    return axis_title(f"{axis.name}_deg" if axis.unit == "deg" else axis.name)

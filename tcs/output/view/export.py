@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pydrake.geometry import Meshcat, MeshcatAnimation
 from pydrake.math import RigidTransform
 
-from tcs.output.view.answers import COLOURS, Answers, listed
+from tcs.output.view.answers import Answers
 from tcs.output.view.floor import REACHABILITY, floor_of
 from tcs.output.view.props import FLOOR, SHOWN, Props, Snapshot, arrow_path, draw_floor
+from tcs.output.words import REASON_COLOURS, REASON_NAMES, goals_text
 from tcs.placement.tables import Reason
 
 _RATE = 10
@@ -116,7 +117,7 @@ def _captions(answers: Answers, steps: tuple[Step, ...]) -> list[str]:
         if times:
             until = times[-1] + _HOLD / _RATE
             line = answers.verdict(index).summary
-            shown = f"member {number + 1} at goals {listed(goals)}"
+            shown = f"member {number + 1} at {goals_text(goals)}"
             lines.append(f"{times[0]:g} to {until:g} s: {shown}. It reaches {line}.")
     return lines or ["No goal is reached from anywhere."]
 
@@ -124,8 +125,8 @@ def _captions(answers: Answers, steps: tuple[Step, ...]) -> list[str]:
 def _panel(title: str, lines: list[str]) -> str:
     """Return title, lines and the legend of the arrows, to lie over the picture."""
     colours = "".join(
-        f'<span style="white-space:nowrap;margin-right:1em"><span style="color:{COLOURS[one]}">'
-        f"&#9632;</span> {one.name.lower().replace('_', ' ')}</span>"
+        '<span style="white-space:nowrap;margin-right:1em">'
+        f'<span style="color:{REASON_COLOURS[one]}">&#9632;</span> {REASON_NAMES[one]}</span>'
         for one in Reason
     )
     return overlay(title, lines, f"<p>{colours}</p>")

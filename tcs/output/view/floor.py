@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import matplotlib
@@ -10,10 +9,12 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from tcs.output.view.answers import COLOURS, Answers
+from tcs.output.draw.colours import SCALE
+from tcs.output.view.answers import Answers
+from tcs.output.words import REASON_COLOURS
 from tcs.placement.reasons.distribution import CHECKS
 from tcs.placement.tables import Reason
-from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.place_map import PlaceMap, best_per_place, rows_of_state
 
 FloatArray = NDArray[np.float64]
 
@@ -24,8 +25,6 @@ REACHABILITY, MANIPULABILITY, REASON, SUCCESS = (
     "success",
 )
 """What the floor may be coloured by."""
-_SCALE = "viridis"
-"""As on the map that `tcs map` draws."""
 _NEAREST = (*CHECKS, Reason.REACHED)
 """Reasons, the one that came nearest to reaching the goal last."""
 
@@ -62,33 +61,31 @@ def floor_of(answers: Answers, state: int, goal: int, kind: str) -> Floor:
         to reaching the goal, over all headings and torso heights at each place. P_R and P_M are
         coloured up to the best place of this state.
     """
-    x, y = answers.grid.axis("base_x"), answers.grid.axis("base_y")
-    size = answers.grid.size // math.prod(answers.grid.environment_shape)
-    rows = slice(state * size, (state + 1) * size)
-    shape = (x.count, y.count, -1)
+    grid, scores = answers.grid, answers.scores
+    places = PlaceMap.of_state(scores, grid, state)
     if kind == REASON:
         rank = np.argsort([int(reason) for reason in _NEAREST])
-        best = rank[answers.scores.reason[rows, goal]].reshape(shape).max(axis=2)
-        table = np.array([to_rgb(COLOURS[reason]) for reason in _NEAREST])
+        codes = scores.reason[rows_of_state(grid, state), goal]
+        best = best_per_place(grid, rank[codes], state)
+        table = np.array([to_rgb(REASON_COLOURS[reason]) for reason in _NEAREST])
         colours, shown = table[best], np.ones(best.shape, dtype=np.bool_)
     else:
-        values = _values(answers, rows, kind).reshape(shape).max(axis=2)
+        values = _values(answers, places, state, kind)
         shown = values > 0.0
         top = 1.0 if kind == SUCCESS else float(values.max(initial=0.0)) or 1.0
-        colours = matplotlib.colormaps[_SCALE](values / top)[..., :3]
-    grid = np.stack(np.meshgrid(x.values, y.values, indexing="ij"), axis=-1)
-    return Floor(
-        places=grid[shown], half=(x.step / 2.0, y.step / 2.0), colours=np.asarray(colours[shown])
-    )
+        colours = matplotlib.colormaps[SCALE](values / top)[..., :3]
+    middles = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
+    half = (grid.axis("base_x").step / 2.0, grid.axis("base_y").step / 2.0)
+    return Floor(places=middles[shown], half=half, colours=np.asarray(colours[shown]))
 
 
-def _values(answers: Answers, rows: slice, kind: str) -> FloatArray:
-    """Return what configurations are worth, shape (n,)."""
-    scores = answers.scores
+def _values(answers: Answers, places: PlaceMap, state: int, kind: str) -> FloatArray:
+    """Return the best P_R, P_M or success of one configuration at each place, shape (X, Y)."""
     if kind == REACHABILITY:
-        return np.asarray(tc_reachability(scores.reached[rows], scores.weights))
+        return places.reachability
     if kind == MANIPULABILITY:
-        return np.asarray(tc_manipulability(scores.dexterity[rows], scores.weights))
+        return places.manipulability
+    rows = rows_of_state(answers.grid, state)
     values = np.zeros(rows.stop - rows.start)
     success = answers.success
     if success is not None:
@@ -96,4 +93,4 @@ def _values(answers: Answers, rows: slice, kind: str) -> FloatArray:
         at = success.members[single, 0] - rows.start
         here = (at >= 0) & (at < values.size)
         values[at[here]] = success.success[single][here]
-    return values
+    return np.asarray(best_per_place(answers.grid, values, state))

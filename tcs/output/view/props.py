@@ -14,9 +14,10 @@ from tcs.model.scene import Scene, goal_poses
 from tcs.model.tasks import Task
 from tcs.output.draw import Kind, Stand
 from tcs.output.report.pictures import base_outline, room_parts
-from tcs.output.view.answers import COLOURS, Answers
+from tcs.output.view.answers import Answers
 from tcs.output.view.floor import Floor
 from tcs.output.view.shapes import Drawn, draw_ground, draw_shapes, rgba, robot_shapes
+from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason
 
 FloatArray = NDArray[np.float64]
@@ -112,7 +113,7 @@ class Props:
         corners, faces = _arrow()
         for goal, reason in arrows:
             path = arrow_path((goal, reason))
-            meshcat.SetTriangleMesh(path, corners, faces, rgba(COLOURS[reason]))
+            meshcat.SetTriangleMesh(path, corners, faces, rgba(REASON_COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
         meshcat.SetObject(SHOWN, Sphere(_BALL), rgba(Kind.CURRENT_GOAL.colour))
         self._draw_members(meshcat)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +53,7 @@ class PlaceMap:
             scores: Scores of every configuration of the grid.
             grid: The grid.
         """
-        return cls._of_rows(scores, grid, slice(None), grid.axes)
+        return cls._of_rows(scores, grid, None)
 
     @classmethod
     def of_state(cls, scores: ScoreTable, grid: Grid, state: int) -> PlaceMap:
@@ -68,33 +67,58 @@ class PlaceMap:
         Raises:
             GridError: If there is no state of that number.
         """
-        states = math.prod(grid.environment_shape)
-        if not 0 <= state < states:
-            raise GridError(f"no state {state} of the environment: it has {states}, from 0.")
-        size = grid.size // states
-        own = grid.axes[len(grid.environment_axes) :]
-        return cls._of_rows(scores, grid, slice(state * size, (state + 1) * size), own)
+        return cls._of_rows(scores, grid, state)
 
     @classmethod
-    def _of_rows(
-        cls, scores: ScoreTable, grid: Grid, rows: slice, axes: Sequence[Axis]
-    ) -> PlaceMap:
-        """Return the map of some rows, which are in C order over some axes."""
-        shape = tuple(axis.count for axis in axes)
-        others = tuple(i for i, axis in enumerate(axes) if axis.name not in _PLACE)
-
-        def per_place(values: NDArray[Any]) -> NDArray[Any]:
-            return np.asarray(values.reshape(shape).max(axis=others))
-
+    def _of_rows(cls, scores: ScoreTable, grid: Grid, state: int | None) -> PlaceMap:
+        """Return the map of one state, or of all for None."""
+        rows = rows_of_state(grid, state)
         reached, dexterity = scores.reached[rows], scores.dexterity[rows]
         # The body is in the way, or not, whatever the goal.
         blocked = (scores.reason[rows] == Reason.BODY_BLOCKED).any(axis=1)
+        axes = _axes(grid, state)
         return cls(
             x=grid.axis("base_x").values,
             y=grid.axis("base_y").values,
-            reachability=per_place(tc_reachability(reached, scores.weights)),
-            manipulability=per_place(tc_manipulability(dexterity, scores.weights)),
-            free=per_place(~blocked),
+            reachability=best_per_place(grid, tc_reachability(reached, scores.weights), state),
+            manipulability=best_per_place(
+                grid, tc_manipulability(dexterity, scores.weights), state
+            ),
+            free=best_per_place(grid, ~blocked, state),
             # An axis of one value leaves nothing to choose from. Headings and heights first.
             over=tuple(a.name for a in reversed(axes) if a.count > 1 and a.name not in _PLACE),
         )
+
+
+def best_per_place(grid: Grid, values: NDArray[Any], state: int | None = None) -> NDArray[Any]:
+    """Return the greatest value at each base place, shape (X, Y).
+
+    Args:
+        grid: The grid.
+        values: A value for each configuration of the state, or of the grid where it is None, in
+            their order.
+        state: Number of the environment's state, in C order over its axes; None for all states.
+    """
+    axes = _axes(grid, state)
+    others = tuple(i for i, axis in enumerate(axes) if axis.name not in _PLACE)
+    return np.asarray(values.reshape([axis.count for axis in axes]).max(axis=others))
+
+
+def rows_of_state(grid: Grid, state: int | None = None) -> slice:
+    """Return the configurations of one state of the environment; all of them for None.
+
+    Raises:
+        GridError: If there is no state of that number.
+    """
+    if state is None:
+        return slice(0, grid.size)
+    states = math.prod(grid.environment_shape)
+    if not 0 <= state < states:
+        raise GridError(f"no state {state} of the environment: it has {states}, from 0.")
+    size = grid.size // states
+    return slice(state * size, (state + 1) * size)
+
+
+def _axes(grid: Grid, state: int | None) -> tuple[Axis, ...]:
+    """Return the axes along which the configurations of a state, or of the grid, are ordered."""
+    return grid.axes if state is None else grid.axes[len(grid.environment_axes) :]

@@ -30,7 +30,7 @@ def panels():
 
 def draw(panels, **more):
     members = [stand(x=0.1, y=0.5), stand(x=-0.5, y=0.3)]
-    heads = ("head rest 0°", "head rest 35°", "head rest 70°")
+    heads = ("head rest 0°", "head rest 35 deg", "head rest 70°")
     return draw_states(panels, ("high", "low"), heads, members=members, title="t", **more)
 
 
@@ -65,7 +65,7 @@ def test_panels_show_the_same_part_of_the_floor_with_a_scale(panels):
     limits = {(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes[:6]}
     assert len(limits) == 1
     said = words(figure)
-    for word in ("head rest 35°", "high", "0.5 m", "base x [m]", "2: x -0.50 m", "best place"):
+    for word in ("head rest 35 deg", "high", "0.5 m", "base x [m]", "2: x -0.50 m", "best place"):
         assert word in said
 
 

@@ -11,7 +11,8 @@ import pytest
 from tcs.errors import OutputError
 from tcs.output.report import as_html, as_markdown, draw_rows, robustness_page, write_report
 from tcs.output.report.tables import is_short, losses_table, table_1, table_3
-from tcs.output.report.words import REASONS, goes_with, lost_goal
+from tcs.output.words import REASON_TEXTS
+from tcs.output.words.robustness import goes_with, lost_goal
 from tests.output.report.test_page import Reader
 
 
@@ -72,7 +73,7 @@ def test_a_short_row_is_explained_from_its_losses(page, study):
 def test_a_loss_is_told_with_its_reasons(study):
     loss = study.losses.goals[0]
     reason, share = next(iter(loss.reasons.items()))
-    assert f"{REASONS[reason]} ({100.0 * share:.0f} %)" in lost_goal(loss)
+    assert f"{REASON_TEXTS[reason]} ({100.0 * share:.0f} %)" in lost_goal(loss)
     assert goes_with(loss).startswith(loss.joint.replace("_", " "))
 
 

@@ -71,9 +71,9 @@ def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_answ
 
     live.driver.execute_script("viewer.gui.open()")
     names = live.driver.execute_script("return Object.keys(viewer.gui_controllers)")
-    assert {"set member", "goal", "stand at x [m]", "heading [deg]"} <= set(names)
+    assert {"set member", "goal", "base x [m]", "heading [deg]"} <= set(names)
     before = live.arrows()
-    slider = controller(live, "stand at x [m]")
+    slider = controller(live, "base x [m]")
     live.driver.execute_script("arguments[0].scrollIntoView()", slider)
     right = slider.size["width"] // 2 - 3
     ActionChains(live.driver).move_to_element_with_offset(slider, right, 0).click().perform()

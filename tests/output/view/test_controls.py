@@ -22,7 +22,7 @@ def test_there_is_a_slider_for_whatever_can_move(bed):
     names = [slider.name for slider in Controls(bed).sliders]
     assert names == [
         "set member", "goal", "floor colour", "bed height [m]", "head rest [deg]",
-        "stand at x [m]", "stand at y [m]", "heading [deg]",
+        "base x [m]", "base y [m]", "heading [deg]",
         "torso [m]",
     ]  # fmt: skip
 
@@ -30,7 +30,7 @@ def test_there_is_a_slider_for_whatever_can_move(bed):
 def test_what_has_one_value_has_no_slider():
     alone = made(small_grid(2, 2, 1, 1), 1, (1,))
     names = [slider.name for slider in Controls(alone).sliders]
-    assert names == ["floor colour", "stand at x [m]", "stand at y [m]"]
+    assert names == ["floor colour", "base x [m]", "base y [m]"]
 
 
 def test_every_slider_goes_through_all_its_values(bed):
@@ -45,7 +45,7 @@ def test_every_slider_goes_through_all_its_values(bed):
 def test_standing_elsewhere_moves_that_axis_alone(bed):
     controls = Controls(bed)
     before = controls.first()
-    after = controls.moved(before, "stand at x [m]", -0.3 + 0.04)
+    after = controls.moved(before, "base x [m]", -0.3 + 0.04)
     here, there = (bed.grid.configuration(controls.index(s)) for s in (before, after))
     assert there.base_x == pytest.approx(-0.3)
     assert dataclasses.replace(there, base_x=here.base_x) == here

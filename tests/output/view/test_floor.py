@@ -9,8 +9,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tcs.output.view import floor_of
-from tcs.output.view.answers import COLOURS
 from tcs.output.view.floor import kinds
+from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason, SuccessTable
 
 # Worst first: blocked where it stands, then the checks in the order in which they are made.
@@ -38,7 +38,7 @@ def test_reason_is_the_one_that_came_nearest(bed, state):
     assert len(floor.places) == nx * ny
     for k, (x, y) in enumerate(itertools.product(range(nx), range(ny))):
         found = [Reason(bed.scores.reason[h, 2]) for h in configurations_at(bed, state, x, y)]
-        assert to_hex(floor.colours[k]) == COLOURS[max(found, key=ORDER.index)]
+        assert to_hex(floor.colours[k]) == REASON_COLOURS[max(found, key=ORDER.index)]
 
 
 @pytest.mark.parametrize("kind", ["reachability", "manipulability"])

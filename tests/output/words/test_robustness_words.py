@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tcs.output.report.words import goes_with, lost_goal, p_value, percent, signed, stopped_by
+from tcs.output.words import p_value, percent, signed
+from tcs.output.words.robustness import goes_with, lost_goal, stopped_by
 from tcs.placement.robustness import Loss
 from tcs.placement.tables import Reason
 

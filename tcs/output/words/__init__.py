@@ -1,0 +1,65 @@
+"""Words for results: the texts, number formats and colours that every surface shares.
+
+In: reasons, configurations, score tables, losses and verifications. Out: plain strings and tuples
+for the command line, reports, the viewer and pictures. Nothing here draws, simulates or compiles.
+"""
+
+from __future__ import annotations
+
+from tcs.output.words.assignment import assign_goals, assigned_goals
+from tcs.output.words.bodies import body_name, frame_name, pair_text
+from tcs.output.words.configurations import (
+    axis_name,
+    axis_title,
+    axis_unit,
+    axis_value,
+    base_pose_text,
+    deviation_text,
+    member_text,
+    quantity,
+    setting_text,
+    settings_text,
+)
+from tcs.output.words.goals import goal_list, goals_by_reason, goals_text
+from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
+from tcs.output.words.numbers import p_value, percent, percentage, signed
+from tcs.output.words.reasons import (
+    REASON_COLOURS,
+    REASON_NAMES,
+    REASON_TEXTS,
+    colour_legend,
+    reason_of,
+)
+
+__all__ = [
+    "REACHABILITY_LABEL",
+    "REASON_COLOURS",
+    "REASON_NAMES",
+    "REASON_TEXTS",
+    "assign_goals",
+    "assigned_goals",
+    "axis_name",
+    "axis_title",
+    "axis_unit",
+    "axis_value",
+    "base_pose_text",
+    "body_name",
+    "colour_legend",
+    "deviation_text",
+    "frame_name",
+    "goal_list",
+    "goals_by_reason",
+    "goals_text",
+    "manipulability_label",
+    "member_text",
+    "p_value",
+    "pair_text",
+    "percent",
+    "percentage",
+    "quantity",
+    "reason_of",
+    "scores_text",
+    "setting_text",
+    "settings_text",
+    "signed",
+]

@@ -1,0 +1,42 @@
+"""Formats of numbers."""
+
+from __future__ import annotations
+
+
+def percent(fraction: float, digits: int = 1) -> str:
+    """Return a fraction as a percentage without its sign.
+
+    >>> percent(0.98407)
+    '98.4'
+    """
+    return f"{100.0 * fraction:.{digits}f}"
+
+
+def percentage(fraction: float, digits: int = 1) -> str:
+    """Return a fraction as a percentage.
+
+    >>> percentage(0.98407)
+    '98.4%'
+    """
+    return f"{percent(fraction, digits)}%"
+
+
+def signed(points: float) -> str:
+    """Return percentage points with their sign.
+
+    >>> signed(0.04), signed(-1.25), signed(-0.01)
+    ('0.0', '-1.2', '0.0')
+    """
+    text = f"{points:+.1f}"
+    return "0.0" if float(text) == 0.0 else text
+
+
+def p_value(p: float) -> str:
+    """Return a p-value.
+
+    >>> p_value(3e-7), p_value(0.0312), p_value(1.0)
+    ('< 0.0001', '0.031', '1')
+    """
+    if p < 1e-4:
+        return "< 0.0001"
+    return f"{p:.2g}"

@@ -1,0 +1,56 @@
+"""Why a goal is or is not reached: the sentence, the short name and the colour of each reason."""
+
+from __future__ import annotations
+
+from tcs.placement.tables import Reason
+
+REASON_TEXTS = {
+    Reason.REACHED: "reached",
+    Reason.TOO_FAR: "too far for the arm",
+    Reason.JOINT_LIMITS: "no arm posture within the joint limits",
+    Reason.BODY_BLOCKED: "the robot's body would touch something",
+    Reason.GRIPPER_BLOCKED: "the gripper would touch something at the goal",
+    Reason.ARM_BLOCKED: "every arm posture would touch something",
+}
+"""Each reason as part of a sentence."""
+REASON_NAMES = {
+    Reason.REACHED: "reached",
+    Reason.TOO_FAR: "too far",
+    Reason.JOINT_LIMITS: "joint limits",
+    Reason.BODY_BLOCKED: "body blocked",
+    Reason.GRIPPER_BLOCKED: "gripper blocked",
+    Reason.ARM_BLOCKED: "arm blocked",
+}
+"""Each reason as the title of a column or in a legend."""
+REASON_COLOURS = {
+    Reason.REACHED: "#009e73",
+    Reason.TOO_FAR: "#56b4e9",
+    Reason.JOINT_LIMITS: "#f0e442",
+    Reason.BODY_BLOCKED: "#4d4d4d",
+    Reason.GRIPPER_BLOCKED: "#e69f00",
+    Reason.ARM_BLOCKED: "#d55e00",
+}
+"""The palette of Okabe and Ito, distinct under colour vision deficiency, and a dark grey."""
+COLOUR_NAMES = {
+    Reason.REACHED: "green",
+    Reason.TOO_FAR: "light blue",
+    Reason.JOINT_LIMITS: "yellow",
+    Reason.BODY_BLOCKED: "grey",
+    Reason.GRIPPER_BLOCKED: "light orange",
+    Reason.ARM_BLOCKED: "dark orange",
+}
+"""Names of the colours, for text without colour."""
+
+
+def reason_of(name: str) -> Reason:
+    """Return the reason that JSON calls by this name.
+
+    >>> reason_of("too_far")
+    <Reason.TOO_FAR: 1>
+    """
+    return Reason[name.upper()]
+
+
+def colour_legend() -> str:
+    """Return the meaning of each colour in one line."""
+    return ", ".join(f"{COLOUR_NAMES[reason]}: {REASON_NAMES[reason]}" for reason in Reason)
