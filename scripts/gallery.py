@@ -22,9 +22,9 @@ from tcs.cli.places import place
 from tcs.cli.rows import default_path, score_one
 from tcs.files.writing import make_folder, whole_file
 from tcs.output.draw import as_png
-from tcs.output.draw.floor_plan import described
 from tcs.output.report.pictures import Shown, map_figure, member_figure, scene_figure
 from tcs.output.report.states import states_figure
+from tcs.output.words import member_text
 from tcs.placement.robustness import check_row
 from tcs.placement.scoring import task_environment_pairs
 from tcs.placement.store import ScoreFile
@@ -148,10 +148,11 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
     at = shown.members[0]
     where = "behind the head end of the bed" if at.base_x < 0.0 else "beside the bed"
     rest = "flat" if abs(dict(at.environment)["head_rest"]) < 1e-9 else "raised"
+    where_exactly = member_text(at.to_json())
     text = (
         'The paper: "when trying to shave a user in a configurable bed, the robot can reach '
         'shaving poses well from behind the bed with the head rest lying flat". Here, without a '
-        f"wall, the best single place is {where}, with the head rest {rest} ({described(at)}); "
+        f"wall, the best single place is {where}, with the head rest {rest} ({where_exactly}); "
         f"from it {alone[0]:.0%} of the goals are reached, P_M {alone[1]:.3f}. With the wall that "
         f"place is lost, and the best single place reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
     )
@@ -171,7 +172,9 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
     sets = file.nominal.sets
     reachability, manipulability = sets.scores_of(tuple(sorted(shown.indices)))
     title = row[0].replace("_", " ").capitalize()
-    stops = "; ".join(f"stop {i}: {described(at)}" for i, at in enumerate(shown.members, start=1))
+    stops = "; ".join(
+        f"stop {i}: {member_text(at.to_json())}" for i, at in enumerate(shown.members, start=1)
+    )
     single = sets.scores_of(sets.best_single)
     beside = (
         f" The best single place reaches {single[0]:.0%}, P_M {single[1]:.3f}."

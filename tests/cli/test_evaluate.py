@@ -59,7 +59,7 @@ def test_a_person_reads_the_mean_and_the_errors(tcs_command, stored):
     ran = tcs_command("evaluate", stored, "--samples", 40)
     found = tcs.evaluate(tcs.load(stored), samples=40)
     assert f"under error {found.summary.mean:.1%} of the goals" in ran.out
-    assert "person_yaw sd 5 deg" in ran.out
+    assert "person_yaw standard deviation 5 deg" in ran.out
     assert "the base is not checked, as in the paper" in ran.out
 
 

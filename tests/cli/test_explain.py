@@ -67,7 +67,10 @@ def test_observed_state(tcs_command, tmp_path):
     tcs.save(path, score_file(tables=3, observed=[SHIFT], share=0.1))
     words = ("explain", path, "--goal", 1, "--observed", "person_y=0.04")
     result = tcs_command(*words, "--json").json
-    assert (result["observed"], result["observed_error"]) == ({"person_y": 0.05}, {"person_y": -0.01})
+    assert (result["observed"], result["observed_error"]) == (
+        {"person_y": 0.05},
+        {"person_y": -0.01},
+    )
     assert "person y 0.05 m; observed person y differs by -0.01 m" in tcs_command(*words).out
     ran = tcs_command("explain", path, "--goal", 1, "--observed", "person_y=0.2")
     assert ran.code == 1

@@ -185,7 +185,7 @@ def test_the_observed_shift_is_told(tcs_command, tmp_path):
     seen = tcs_command("select", path, *HERE, "--seen", "head=0.1,0.1,0.12", "--json").json
     assert seen["frame_error"] == pytest.approx(0.02)
     said = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
-    assert "scored for person_y 0.05; person_y is -0.01 off" in said.out
+    assert "scored for person y 0.05 m; observed person y differs by -0.01 m" in said.out
     # A zero that comes out negative has no sign.
     exact = tcs_command("select", path, *HERE, "--observed", "person_y=-0.0")
     assert "scored for person_y 0; person_y is as observed" in exact.out

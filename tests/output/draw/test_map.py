@@ -47,7 +47,7 @@ def test_map_says_what_it_shows(places, chair):
     said = words(figure)
     for word in ("Shaving", "base x [m]", "base y [m]", "furniture", "[%]", "P_M", "now: x 1.00 m"):
         assert word in said
-    assert "1: x 1.00 m, y 2.00 m, heading 0°, torso 0.15 m" in said
+    assert "1: x 1.00 m, y 2.00 m, heading 0 deg, torso 0.15 m" in said
     assert "2: x -1.00 m" in said
     assert "person" not in said
 
@@ -77,7 +77,7 @@ def test_members_outside_the_grid_are_in_the_picture(places):
 def test_axes_of_the_environment_are_told(places):
     bed = {"environment": (("head_rest", 0.5), ("bed_height", 0.2))}
     figure = draw_map(places, [], [stand(**bed, environment_units=("rad", "m"))], title="t")
-    assert "head rest 29°, bed height 0.20 m" in words(figure)
+    assert "head rest 28.6 deg, bed height 0.20 m" in words(figure)
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
