@@ -13,7 +13,7 @@ SHARED := --numprocesses=$(PROCESSES) --dist=loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint docs format figures benchmark benchmark-robots benchmark-peers clean
+.PHONY: help demo test test-all lint wheel docs format figures benchmark benchmark-robots benchmark-peers clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -35,6 +35,10 @@ lint: $(STAMP)  ## Format, lint, types and import rules
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+wheel: $(STAMP)  ## Build the wheel, install it in a clean environment and run the examples with it
+	@mkdir -p $(OUT)
+	$(BIN)/python scripts/check_wheel.py --out $(OUT)/wheel
 
 docs: $(STAMP)  ## Build the site into out/docs, every warning an error; needs no internet
 	@mkdir -p $(OUT)
