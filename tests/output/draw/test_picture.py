@@ -8,7 +8,7 @@ from tcs.output.draw import Kind, Solid, View, draw_scene, primitive_corners
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch):
-    monkeypatch.setattr("tcs.output.draw.picture._SIZE", (240, 200))
+    monkeypatch.setattr("tcs.output.draw.camera.SIZE", (240, 200))
 
 
 def ball(kind, at, radius=0.3):
@@ -129,3 +129,49 @@ def test_one_panel_for_each_view_and_a_legend():
 def test_what_is_behind_the_camera_is_left_out():
     image = picture(draw_scene([view(ball(Kind.ARM, [18.0, 0.0, 7.0]))], title=""))
     assert share(image, Kind.ARM) == 0.0
+
+
+WALL = primitive_corners(BOX, (0.05, 2.0, 1.2))
+
+
+def walls(*angles, distance=1.5, height=1.2):
+    """Walls around the origin, each at an angle [rad]."""
+    for angle in angles:
+        c, s = np.cos(angle), np.sin(angle)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        yield Solid.placed(Kind.FURNITURE, WALL, R, [distance * c, distance * s, height])
+
+
+@pytest.mark.parametrize("azimuths", [(0.0,), (0.5, -2.2), (0.8, 2.4, -0.8, -2.4)])
+def test_the_walls_of_a_room_do_not_hide_what_is_inside(azimuths):
+    inside = (ball(Kind.PERSON, [0.0, -0.4, 1.0]), ball(Kind.ARM, [0.0, 0.4, 1.0]))
+    around = walls(0.0, np.pi / 2, np.pi, -np.pi / 2)
+    open_figure = draw_scene([view(*inside, azimuths=azimuths)], title="")
+    figure = draw_scene([view(*inside, *around, azimuths=azimuths)], title="")
+    for kind in (Kind.PERSON, Kind.ARM):
+        expected = share(picture(open_figure), kind)
+        assert expected > 0.01
+        assert share(picture(figure), kind) == pytest.approx(expected, rel=0.1)
+    assert "left out" in figure.axes[0].get_title()
+    assert "left out" not in open_figure.axes[0].get_title()
+
+
+def test_the_wall_behind_stays():
+    person = ball(Kind.PERSON, [0.0, 0.0, 1.0])
+    image = picture(draw_scene([view(person, *walls(0.0, np.pi))], title=""))
+    assert share(image, Kind.FURNITURE) > 0.1
+
+
+def test_a_side_without_a_wall_is_preferred():
+    inside = (ball(Kind.PERSON, [0.0, 0.0, 1.0]), ball(Kind.GOAL, [0.25, 0.0, 1.0], 0.15))
+    # The goal is on the side of the wall.
+    figure = draw_scene([view(*inside, *walls(0.0), azimuths=(0.0, np.pi / 2))], title="")
+    assert share(picture(figure), Kind.PERSON) > 0.01
+    assert "left out" not in figure.axes[0].get_title()
+
+
+def test_low_furniture_is_never_left_out():
+    low = Solid.placed(Kind.FURNITURE, WALL * [1.0, 1.0, 0.6], np.eye(3), [0.6, 0.0, 0.72])
+    figure = draw_scene([view(ball(Kind.PERSON, [0.0, 0.0, 0.5]), low)], title="")
+    assert share(picture(figure), Kind.FURNITURE) > 0.1
+    assert "left out" not in figure.axes[0].get_title()

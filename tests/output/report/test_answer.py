@@ -46,7 +46,7 @@ CHECK = Check(pairs=12, dense=6, seed=3)
 def _small_pictures():
     """Pictures that take a tenth of the time; what is on them is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tcs.output.draw.picture._SIZE", (300, 260))
+        patch.setattr("tcs.output.draw.camera.SIZE", (300, 260))
         patch.setattr("tcs.output.report.answer._DPI", 30)
         yield
 
