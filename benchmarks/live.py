@@ -68,7 +68,7 @@ def times(task: str, repeats: int) -> None:
 def gains(task: str, room: str, between: float) -> None:
     """Print what the set chosen live has over the one of the nearest stored shift."""
     stored = score(task, room)
-    scorer = LiveScorer(task, environment=room)
+    scorer = LiveScorer(task, room)
     steps = stored.observed_axes[0].values
     places = [float(y) + between for y in steps[:-1]]
     differences = []

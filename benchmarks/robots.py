@@ -15,7 +15,7 @@ import itertools
 import sys
 import time
 
-from table import cell, header, parser, row, save, spread
+from table import cell, header, parser, recall_text, row, save, spread, verification_text
 
 from tcs.model.robots import robot_names
 from tcs.placement.scoring import load_job, score, sweep, verify
@@ -81,22 +81,14 @@ def verification(task: str, robot: str, options: argparse.Namespace) -> bool:
         dense=options.dense,
         seed=options.seed,
     )
-    low, high = found.recall_ci95
-    row(
-        f"verify {task}, {robot}",
-        f"checked {found.checked}, false {found.false_reached}, "
-        f"position {found.max_position_error:.1e} m, rotation {found.max_rotation_error:.1e}, "
-        f"measure {found.max_isotropy_error:.1e}, missed {found.missed} of {found.dense_checked}, "
-        f"recall {found.recall:.5f} ({low:.4f} .. {high:.4f}), "
-        f"shortfall {found.mean_shortfall:.1e}, {time.perf_counter() - begun:.0f} s",
-    )
+    row(f"verify {task}, {robot}", verification_text(found, time.perf_counter() - begun))
     line = f"{robot}, {task}"
     cell(
         "robots", line, "false, of those re-checked", f"{found.false_reached} of {found.checked:,}"
     )
     cell("robots", line, "missed, of those scanned", f"{found.missed} of {found.dense_checked:,}")
-    cell("robots", line, "recall (95 % interval)", f"{found.recall:.4f} ({low:.4f} .. {high:.4f})")
-    if found.recall < RECALL:
+    cell("robots", line, "recall (95 % interval)", recall_text(found, 4))
+    if found.recall is not None and found.recall < RECALL:
         row("", f"recall is below {RECALL}")
     return found.is_sound
 

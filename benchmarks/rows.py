@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from table import header, row, spread
+from table import header, row, spread, verification_text
 
 import tcs
 from tcs.placement.scoring import load_job, sweep
@@ -100,15 +100,8 @@ def verification(rows: list[dict[str, object]], options: argparse.Namespace) -> 
         found = tcs.verify(
             tcs.load(str(r["file"])), pairs=options.pairs, dense=options.dense, seed=options.seed
         )
-        low, high = found.recall_ci95
-        row(
-            f"verify {r['task']}, {r['environment']}",
-            f"checked {found.checked}, false {found.false_reached}, "
-            f"position {found.max_position_error:.1e} m, "
-            f"isotropy {found.max_isotropy_error:.1e}, missed {found.missed} of "
-            f"{found.dense_checked}, recall {found.recall:.5f} ({low:.4f} .. {high:.4f}), "
-            f"shortfall {found.mean_shortfall:.1e}, {time.perf_counter() - begun:.0f} s",
-        )
+        text = verification_text(found, time.perf_counter() - begun)
+        row(f"verify {r['task']}, {r['environment']}", text)
         sound &= found.is_sound
     return sound
 

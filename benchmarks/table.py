@@ -16,8 +16,12 @@ import sys
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tcs.files.writing import whole_file
+
+if TYPE_CHECKING:
+    from tcs.placement.scoring import Verification
 
 FIGURES = Path(__file__).resolve().parent / "figures"
 PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
@@ -107,3 +111,27 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "absent"
+
+
+def recall_text(found: Verification, decimals: int = 5) -> str:
+    """Return the recall with its interval, or why it is not estimated."""
+    if found.recall is None or found.recall_ci95 is None:
+        return found.recall_note or ""
+    low, high = found.recall_ci95
+    return f"{found.recall:.{decimals}f} ({low:.4f} .. {high:.4f})"
+
+
+def verification_text(found: Verification, seconds: float) -> str:
+    """Return the result of re-checking a score file on one line."""
+    values = {
+        "position error [m]": found.max_position_error,
+        "rotation error [rad]": found.max_rotation_error,
+        f"{found.measure} error": found.max_isotropy_error,
+        "mean shortfall": found.mean_shortfall,
+    }
+    errors = (f"{name} {value:.1e}" for name, value in values.items() if value is not None)
+    return (
+        f"checked {found.checked}, false {found.false_reached}, {', '.join(errors)}, "
+        f"missed {found.missed} of {found.dense_checked}, recall {recall_text(found)}, "
+        f"{seconds:.0f} s"
+    )

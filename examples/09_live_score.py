@@ -14,7 +14,7 @@ import tcs
 
 def main() -> None:
     """Score feeding for two observations of the room."""
-    scorer = tcs.LiveScorer("feeding", environment="wheelchair")
+    scorer = tcs.LiveScorer("feeding", "wheelchair")
     here = tcs.InitialConfiguration(base_x=2.0, base_y=-1.0, base_yaw=math.pi, torso=0.0)
     observations: dict[str, tcs.Observation | dict[str, float]] = {
         # The person sits 4 cm further forward than expected: person_x counts backward [m].

@@ -298,11 +298,7 @@ def verify(
     loaded = tcs.load(file)
     with talk.progress_bar("pairs") as on_progress:
         found = tcs.verify(loaded, pairs=pairs, dense=dense, seed=seed, on_progress=on_progress)
-    talk.print_result(
-        found.to_json(),
-        lambda result: reports.report_verification(result, sound=found.is_sound),
-        as_json=as_json,
-    )
+    talk.print_result(found.to_json(), reports.report_verification, as_json=as_json)
     if not found.is_sound:
         talk.say(f"some answers in '{file}' are false; do not use them.")
         raise typer.Exit(1)

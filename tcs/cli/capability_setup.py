@@ -33,10 +33,10 @@ class Setup:
         """
         from tcs.capability import Reach
         from tcs.model.robots import load_robot
-        from tcs.placement.scoring import reference
+        from tcs.placement.scoring import data_reference
 
         robot = load_robot(self.robot)
-        found_as = reference(self.robot, robot.name)
+        found_as = data_reference(self.robot, robot.name)
         if self.tool is not None:
             known = {
                 *robot.model().links,

@@ -61,8 +61,8 @@ def score_found(
     )
     scorer = tcs.LiveScorer(
         task,
+        environment,
         robot,
-        environment=environment,
         jobs=jobs,
         **sets,
         on_compile=talk.say_compiling,
@@ -87,8 +87,8 @@ def report_found(result: dict[str, Any]) -> None:
     state = result["tables"][0]["observed"]
     moved = {key: float(f"{value:.4g}") for key, value in state.items() if value}
     paper().print(f"scored as found: {settings_text(moved) or 'everything in its place'}")
-    if told["frames_off"] is not None:
-        turned = told["frames_turned"]
+    if told["frame_position_error"] is not None:
+        turned = told["frame_rotation_error"]
         angle = "" if turned is None else f" and {math.degrees(turned):.1f} deg"
-        paper().print(f"frames seen fit to {told['frames_off']:.4f} m{angle}")
+        paper().print(f"frames seen fit to {told['frame_position_error']:.4f} m{angle}")
     reports.report_scores(result)

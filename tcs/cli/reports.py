@@ -165,28 +165,32 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
 
 
-def report_verification(found: Mapping[str, Any], *, sound: bool) -> None:
+def report_verification(found: Mapping[str, Any]) -> None:
     """Print what re-checking found."""
-    low, high = found["recall_ci95"]
-    recall = f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"
-    if not found["dense_checked"]:
-        recall = "not estimated: no unreached pair was scanned"
-    left = f"{found['mean_shortfall']:.1e}"
-    if not found["shortfall_checked"]:
-        left = "not estimated: no reached pair was scanned"
+    recall = found["recall_note"]
+    if recall is None:
+        low, high = found["recall_ci95"]
+        recall = f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"
+    left = "not estimated: no reached pair was scanned"
+    if found["mean_shortfall"] is not None:
+        left = f"{found['mean_shortfall']:.1e}"
+
+    def greatest(key: str, unit: str = "") -> str:
+        return "none checked" if found[key] is None else f"{found[key]:.1e}{unit}"
+
     rows = (
         ("reached pairs re-checked with Drake", f"{found['checked']:,}"),
         ("  of them false", f"{found['false_reached']:,}"),
         ("  joints beyond their limits", f"{found['limit_violations']:,}"),
-        ("  tool off its goal, at most", f"{found['max_position_error']:.1e} m"),
-        ("  tool turned off its goal, at most", f"{found['max_rotation_error']:.1e} rad"),
-        (f"  {found['measure']} off, at most", f"{found['max_isotropy_error']:.1e}"),
+        ("  tool off its goal, at most", greatest("max_position_error", " m")),
+        ("  tool turned off its goal, at most", greatest("max_rotation_error", " rad")),
+        (f"  {found['measure']} off, at most", greatest("max_isotropy_error")),
         (f"unreached pairs scanned densely ({_DENSE[found['ik']]})", f"{found['dense_checked']:,}"),
         ("  of them reachable after all", f"{found['missed']:,}"),
         ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
         ("recall", recall),
         (f"mean {found['measure']} left behind", left),
-        ("verdict", "every answer holds" if sound else "SOME ANSWERS ARE FALSE"),
+        ("verdict", found["verdict"]),
     )
     table = new_table("check", ">found")
     for name, value in rows:

@@ -175,29 +175,31 @@ def pairs_table(answer: Answer) -> Table:
 def verification_table(answer: Answer) -> Table:
     """Return what re-checking found."""
     found = answer.verification
-    low, high = found.recall_ci95
     samples = {"analytic": "11,520 arm angles", "numeric": "400 starts"}[found.ik]
-    recall = (
-        f"{percent(found.recall, 2)} % (95 % between {percent(low, 2)} and {percent(high, 2)})"
-        if found.dense_checked
-        else "not estimated"
-    )
-    left = f"{found.mean_shortfall:.1e}" if found.shortfall_checked else "not estimated"
+    recall = found.recall_note or ""
+    if found.recall is not None and found.recall_ci95 is not None:
+        low, high = (percent(end, 2) for end in found.recall_ci95)
+        recall = f"{percent(found.recall, 2)} % (95 % between {low} and {high})"
+    left = "not estimated" if found.mean_shortfall is None else f"{found.mean_shortfall:.1e}"
+
+    def greatest(error: float | None, unit: str = "") -> str:
+        return "none checked" if error is None else f"{error:.1e}{unit}"
+
     wrong = found.false_reached + found.unconfirmed_hits
     rows: list[list[Cell | str]] = [
         ["Stored answers re-checked with Drake, drawn at random", f"{found.checked:,}"],
         ["of them false", Cell(str(found.false_reached), _tone(found.false_reached == 0))],
         ["joints beyond their limits", str(found.limit_violations)],
-        ["tool off its goal, at most", f"{found.max_position_error:.1e} m"],
-        ["tool turned off its goal, at most", f"{found.max_rotation_error:.1e} rad"],
-        [f"stored {found.measure} off, at most", f"{found.max_isotropy_error:.1e}"],
+        ["tool off its goal, at most", greatest(found.max_position_error, " m")],
+        ["tool turned off its goal, at most", greatest(found.max_rotation_error, " rad")],
+        [f"stored {found.measure} off, at most", greatest(found.max_isotropy_error)],
         [f"Unreached pairs scanned densely ({samples} each)", f"{found.dense_checked:,}"],
         ["of them reachable after all", f"{found.missed:,}"],
         ["solutions of the scan that Drake refuses", str(found.unconfirmed_hits)],
         ["Share of what can be reached that is stored as reached", recall],
         [f"mean {found.measure} left behind", left],
     ]
-    verdict = "every answer holds"
+    verdict = found.verdict
     if not found.is_sound:
         verdict = f"SOME ANSWERS ARE FALSE ({wrong})"
     elif not answer.is_sound:

@@ -1,11 +1,17 @@
-"""Scoring: the offline job, its sets, and the re-check of what it stored."""
+"""Scoring: offline, live, and the re-check of score files with Drake.
+
+In: a task, an environment and a robot, by name, path or object; for live scoring an observation.
+Out: a score file, and its verification.
+"""
 
 from __future__ import annotations
 
 from tcs.placement.scoring.catalogue import task_environment_pairs
-from tcs.placement.scoring.job import Job, load_job, reference, score, summary
+from tcs.placement.scoring.job import Job, data_reference, load_job
 from tcs.placement.scoring.live import LiveScorer, score_observed
+from tcs.placement.scoring.offline import score
 from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.score_summary import summary
 from tcs.placement.scoring.sets import SetOptions, build_sets
 from tcs.placement.scoring.sweep import Sweep, sweep, warm_up
 from tcs.placement.scoring.verify import Verification, verify
@@ -17,9 +23,9 @@ __all__ = [
     "Sweep",
     "Verification",
     "build_sets",
+    "data_reference",
     "load_job",
     "rebuild_scene",
-    "reference",
     "score",
     "score_observed",
     "summary",

@@ -1,4 +1,4 @@
-"""Score a scene as it is observed, now, in place of taking the nearest state that is stored."""
+"""Live scoring: the scene as it is observed, instead of the nearest stored state."""
 
 from __future__ import annotations
 
@@ -15,142 +15,130 @@ from tcs.model.grid import Axis
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, find_joints
 from tcs.model.tasks import Task
-from tcs.placement.scoring.job import Job, load_job, references, score_scene
-from tcs.placement.scoring.sets import SetOptions, checked_options
+from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.offline import ScoringSetup
+from tcs.placement.scoring.sets import SetOptions
 from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.store import ScoreFile
 
-Seen = Observation | Mapping[str, float]
-"""An observation, or just values of joints [m or rad]."""
+ObservationLike = Observation | Mapping[str, float]
+"""An observation, or observed joint values alone [m or rad]."""
 
 
 class LiveScorer:
-    """One task in one environment with one robot, kept ready to be scored as it is observed.
+    """Scores one task in one environment with one robot, once for each observation.
 
-    Scene and machine code are made ready once; each observation then costs the scoring alone. Not
-    to be used by two threads at a time: it has one scene.
+    Building the scene and compiling are done once; each observation then takes the time of the
+    scoring alone. Not thread-safe: all observations share one scene.
     """
 
     def __init__(
         self,
         task: str | Path | Task,
+        environment: str | Path | EnvironmentFile = "wheelchair",
         robot: str | Path | RobotFile = "pr2",
         *,
-        environment: str | Path | EnvironmentFile = "wheelchair",
         measure: str = DEFAULT_MEASURE,
         jobs: int = 2,
         on_compile: Callable[[], None] | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
-        """Load everything, build the scene and have the kernel's machine code at hand.
+        """Load everything, build the scene and compile the kernel.
 
         Args:
-            task: Name of a task, path of a task file, or a task.
-            robot: Name, path or robot.
-            environment: Name, path or environment.
-            measure: Name of the dexterity measure, see `tcs.score`.
-            jobs: Number of threads; the result does not depend on it.
-            on_compile: Called before the kernel compiles, when it has to.
-            **sets: Which sets are kept, see `tcs.placement.scoring.SetOptions`.
+            task: As for `tcs.score`; so are `environment`, `robot`, `measure`, `jobs` and
+                `sets`.
+            environment: Environment.
+            robot: Robot.
+            measure: Dexterity measure.
+            jobs: Number of threads.
+            on_compile: Called before the kernel compiles, if it has to.
+            **sets: Options of the kept sets.
 
         Raises:
-            UnknownNameError: If a task, environment, robot, frame or measure of that name does not
-                exist.
-            DataFileError: If a file cannot be used.
-            GridError: If the grid is empty or enormous.
-            TcsError: If an option of the sets is out of range.
+            TcsError: The errors of `tcs.score`.
         """
-        self._sets = checked_options(**sets)
-        self._job = load_job(task, environment, robot)
-        self._named = references(self._job, task, environment, robot)
-        self._scene = self._job.scene()
-        self._measure = measure
-        self._jobs = jobs
-        lowered = self._job_at({}).lowered(self._scene)
+        self._setup = ScoringSetup.load(
+            task, environment, robot, measure=measure, jobs=jobs, sets=sets
+        )
+        lowered = self._job_at({}).lowered(self._setup.scene)
         warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
 
     @property
     def job(self) -> Job:
-        """What is scored, with the observed states that would be scored offline."""
-        return self._job
+        """The job, with the observed states that `tcs.score` would score."""
+        return self._setup.job
 
-    def score(self, observation: Seen | None = None) -> ScoreFile:
+    def score(self, observation: ObservationLike | None = None) -> ScoreFile:
         """Score the scene as it is observed.
 
         Args:
-            observation: How the room is found; by default where everything belongs.
+            observation: The observed environment; by default its nominal state.
 
         Returns:
-            Scores and sets with the one observed state, for `tcs.select`, `tcs.verify` and all
-            that takes a score file. Its metadata tell under `observation` what was seen, and how
-            far the frames seen are from the scene that was scored.
+            Scores and sets of the one observed state, for every function that takes a score file.
+            The entry `observation` of its metadata holds the observed frames, the joint values
+            they were explained by, and the error of the frames in the scored scene.
 
         Raises:
-            UnknownNameError: If a joint or frame is not there.
-            SelectionError: If a joint is chosen and not found, or what is seen is too far from
-                what the scene can do.
-            TcsError: If a joint follows another one, or does not go that far.
+            UnknownNameError: If a joint or frame does not exist.
+            SelectionError: If a joint is an axis of the grid, or no state of the scene is near
+                enough to the observed frames.
+            TcsError: If a joint follows another joint, or a value is beyond its limits.
         """
         begun = time.perf_counter()
         if not isinstance(observation, Observation):
             observation = Observation(joints=dict(observation or {}))
-        chosen = [axis.name for axis in self._job.grid.environment_axes]
-        found = find_joints(self._scene, observation, chosen)
-        told = {
+        grid_axes = [axis.name for axis in self.job.grid.environment_axes]
+        found = find_joints(self._setup.scene, observation, grid_axes)
+        entry = {
             "joints": {name: float(value) for name, value in found.joints.items()},
             "frames": {name: [float(x) for x in at] for name, at in observation.frames.items()},
-            "frames_off": found.off,
-            "frames_turned": found.turned,
+            "frame_position_error": found.off,
+            "frame_rotation_error": found.turned,
         }
-        return score_scene(
-            self._job_at(found.joints),
-            self._scene,
-            self._sets,
-            named={**self._named, "observation": told},
-            measure=self._measure,
-            begun=begun,
-            jobs=self._jobs,
-        )
+        setup = dataclasses.replace(self._setup, job=self._job_at(found.joints))
+        return setup.score(begun=begun, metadata={"observation": entry})
 
     def _job_at(self, joints: Mapping[str, float]) -> Job:
-        """Return the job with the one observed state in which the joints are where they are."""
-        untold = {axis.name: 0.0 for axis in self._job.observed}
+        """Return the job with the one observed state of these joint values; others are 0."""
+        joints = {**{axis.name: 0.0 for axis in self.job.observed}, **joints}
         axes = []
-        for name, value in {**untold, **joints}.items():
-            turns = self._scene.built.environment_joints.turns(name)
-            start = math.degrees(value) if turns else value
-            axes.append(Axis(name, "deg" if turns else "m", start, 0.0, 1))
-        return dataclasses.replace(self._job, observed=tuple(axes))
+        for name, value in joints.items():
+            is_angle = self._setup.scene.built.environment_joints.turns(name)
+            start = math.degrees(value) if is_angle else value
+            axes.append(Axis(name, "deg" if is_angle else "m", start, 0.0, 1))
+        return dataclasses.replace(self.job, observed=tuple(axes))
 
 
 def score_observed(
     task: str | Path | Task,
-    robot: str | Path | RobotFile = "pr2",
-    observation: Seen | None = None,
-    *,
     environment: str | Path | EnvironmentFile = "wheelchair",
+    robot: str | Path | RobotFile = "pr2",
+    *,
+    observation: ObservationLike | None = None,
     measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
 
-    To score more than once, keep a `LiveScorer`: building the scene takes longer than scoring it.
+    For more than one observation use `LiveScorer`: building the scene takes longer than scoring.
 
     Args:
-        task: Name of a task, path of a task file, or a task.
-        robot: Name, path or robot.
-        observation: How the room is found: an `Observation`, or values of its joints [m or rad].
-        environment: Name, path or environment.
-        measure: Name of the dexterity measure, see `tcs.score`.
-        jobs: Number of threads; the result does not depend on it.
-        **sets: Which sets are kept, see `tcs.placement.scoring.SetOptions`.
+        task: As for `tcs.score`; so are `environment`, `robot`, `measure`, `jobs` and `sets`.
+        environment: Environment.
+        robot: Robot.
+        observation: The observed environment: an `Observation`, or values of its joints [m or rad].
+        measure: Dexterity measure.
+        jobs: Number of threads.
+        **sets: Options of the kept sets.
 
     Returns:
-        Scores and sets with the one observed state, as `LiveScorer.score`.
+        Scores and sets of the one observed state, as `LiveScorer.score` returns them.
 
     Raises:
-        TcsError: Whatever `LiveScorer` and its `score` raise.
+        TcsError: The errors of `LiveScorer` and `LiveScorer.score`.
     """
-    scorer = LiveScorer(task, robot, environment=environment, measure=measure, jobs=jobs, **sets)
+    scorer = LiveScorer(task, environment, robot, measure=measure, jobs=jobs, **sets)
     return scorer.score(observation)

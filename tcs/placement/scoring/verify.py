@@ -40,56 +40,87 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Verification:
-    """What re-checking a score file found."""
+    """Result of re-checking a score file; None for values that no check gave."""
 
     measure: str
-    """Name of the dexterity measure the file was made with."""
+    """Name of the file's dexterity measure."""
     ik: str
-    """How the arm is solved, "analytic" or "numeric", and with it what a dense scan is: 11,520
-    values of the free joint, or 400 starts from everywhere."""
+    """Inverse kinematics of the arm, "analytic" or "numeric". A dense scan tries 11,520 values of
+    the free joint, or 400 starts of the numeric solver."""
     checked: int
-    """Reached pairs re-checked with Drake."""
+    """Number of reached pairs re-checked with Drake."""
     false_reached: int
-    """Of these, how many miss the goal, pass a limit or touch something."""
-    max_position_error: float
+    """Number of these that miss the goal, exceed a joint limit or are in contact."""
+    max_position_error: float | None
     """Greatest distance of the tool from its goal [m]."""
-    max_rotation_error: float
+    max_rotation_error: float | None
     """Greatest rotation of the tool from its goal [rad]."""
-    max_isotropy_error: float
-    """Greatest difference of the stored dexterity from that of Drake's
+    max_isotropy_error: float | None
+    """Greatest difference of the stored dexterity, by whichever measure, from that of Drake's
     Jacobian."""
     limit_violations: int
-    """Joints beyond their limits."""
+    """Number of joints beyond their limits."""
     dense_checked: int
-    """Unreached pairs scanned densely."""
+    """Number of unreached pairs scanned densely."""
     missed: int
-    """Of these, how many have a solution that Drake confirms."""
+    """Number of these with a solution that Drake confirms."""
     unconfirmed_hits: int
-    """Solutions of the dense scan that Drake refuses."""
-    recall: float
-    """Estimated share of reachable pairs that are stored as reached."""
-    recall_ci95: tuple[float, float]
-    """Its interval: exact binomial limits in each stratum, added up."""
+    """Number of solutions of the dense scan that Drake refutes."""
+    recall: float | None
+    """Estimated fraction of the reachable pairs that are stored as reached."""
+    recall_ci95: tuple[float, float] | None
+    """Interval of the recall: the sum of exact binomial limits of each stratum."""
     shortfall_checked: int
-    """Reached pairs scanned densely."""
-    mean_shortfall: float
-    """How much more of the file's measure the dense scan finds there, on average."""
+    """Number of reached pairs scanned densely."""
+    mean_shortfall: float | None
+    """Mean of how much more dexterity the dense scan finds at these."""
 
     @property
     def is_sound(self) -> bool:
-        """Whether no answer was found false."""
+        """Whether no checked answer is false; true also if there was none to check."""
+        errors = (
+            (self.max_position_error, POSITION_BAR),
+            (self.max_rotation_error, ROTATION_BAR),
+            (self.max_isotropy_error, DEXTERITY_BAR),
+        )
         return (
             self.false_reached == 0
             and self.limit_violations == 0
             and self.unconfirmed_hits == 0
-            and self.max_position_error <= POSITION_BAR
-            and self.max_rotation_error <= ROTATION_BAR
-            and self.max_isotropy_error <= DEXTERITY_BAR
+            and all(error is None or error <= bar for error, bar in errors)
         )
+
+    @property
+    def verdict(self) -> str:
+        """What the checks show, as a clause."""
+        if not self.is_sound:
+            return "SOME ANSWERS ARE FALSE"
+        if self.checked:
+            return "every answer holds"
+        if self.dense_checked:
+            return f"no reached pair was checked; {self.missed} of the scanned pairs are reachable"
+        return "nothing was checked"
+
+    @property
+    def recall_note(self) -> str | None:
+        """Why the recall is not estimated, None if it is."""
+        if self.recall is not None:
+            return None
+        if not self.dense_checked:
+            return "not estimated: no unreached pair was scanned"
+        if self.recall_ci95 is None:
+            return "not defined: no pair is stored as reached, and none was found reachable"
+        return "not estimated: too few unreached pairs were scanned"
 
     def to_json(self) -> dict[str, Any]:
         """Return the findings as plain containers."""
-        return {**asdict(self), "recall_ci95": list(self.recall_ci95)}
+        interval = None if self.recall_ci95 is None else list(self.recall_ci95)
+        return {
+            **asdict(self),
+            "recall_ci95": interval,
+            "recall_note": self.recall_note,
+            "verdict": self.verdict,
+        }
 
 
 def verify(
@@ -151,9 +182,9 @@ def verify(
         ik=ik_of(problem),
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
-        max_position_error=max((finding.position_error for finding in findings), default=0.0),
-        max_rotation_error=max((finding.rotation_error for finding in findings), default=0.0),
-        max_isotropy_error=max((finding.dexterity_error for finding in findings), default=0.0),
+        max_position_error=max((finding.position_error for finding in findings), default=None),
+        max_rotation_error=max((finding.rotation_error for finding in findings), default=None),
+        max_isotropy_error=max((finding.dexterity_error for finding in findings), default=None),
         limit_violations=sum(finding.limit_violations for finding in findings),
         dense_checked=sum(scanned),
         missed=sum(missed),
@@ -161,7 +192,7 @@ def verify(
         recall=recall,
         recall_ci95=interval,
         shortfall_checked=len(shortfall),
-        mean_shortfall=float(np.mean(shortfall)) if shortfall else 0.0,
+        mean_shortfall=float(np.mean(shortfall)) if shortfall else None,
     )
 
 
@@ -234,39 +265,42 @@ class _Check:
 
 def estimated_recall(
     reached: int, sizes: list[int], scanned: list[int], missed: list[int]
-) -> tuple[float, tuple[float, float]]:
+) -> tuple[float | None, tuple[float, float] | None]:
     """Return the estimated recall and its 95 % interval.
 
     Args:
-        reached: R, how many pairs are stored as reached.
-        sizes: U of each stratum, how many unreached pairs there are.
-        scanned: How many of them were scanned.
-        missed: How many of these turned out to be reachable.
+        reached: Number of pairs that are stored as reached, R.
+        sizes: Number of unreached pairs in each stratum, U.
+        scanned: Number of these that were scanned, n.
+        missed: Number of these that are reachable, k.
 
     Returns:
-        R / (R + sum of U x missed / scanned), and the same at the Clopper-Pearson limits of each
-        stratum, which together are on the safe side.
+        R / (R + sum of U k / n), and the same at the Clopper-Pearson limits of each stratum, which
+        together are conservative. The estimate is None if a stratum has pairs and none was
+        scanned; both are None if no pair is known to be reachable.
 
     >>> estimated_recall(990, [1000], [100], [1])[0]
     0.99
     """
-    # Imported where it is needed: scoring and drawing, which share this room, start faster.
+    # Imported here: importing this package, which drawing does too, is faster without SciPy.
     from scipy.special import betaincinv
 
     tail = (1.0 - CONFIDENCE) / 2.0
     expected = lowest = highest = 0.0
+    is_known = True
     for size, n, k in zip(sizes, scanned, missed, strict=True):
         if n == 0:
-            # Nothing looked at: nothing known, unless there is nothing.
+            # Without a scan, none or all of the stratum may be reachable.
             highest += size
+            is_known &= size == 0
             continue
         expected += size * k / n
         if k > 0:
             lowest += size * float(betaincinv(k, n - k + 1, tail))
         highest += size * (float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0)
     if reached == 0:
-        return (1.0, (0.0, 1.0)) if expected == 0.0 else (0.0, (0.0, 0.0))
-    return reached / (reached + expected), (
+        return (0.0, (0.0, 0.0)) if expected > 0.0 else (None, None)
+    return reached / (reached + expected) if is_known else None, (
         reached / (reached + highest),
         reached / (reached + lowest),
     )

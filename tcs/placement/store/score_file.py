@@ -27,7 +27,6 @@ REQUIRED_METADATA: dict[str, type] = {
     "environment": str,
     "scene_digest": str,
     "measure": str,
-    "hashes": dict,
     "timings": dict,
 }
 """Keys that the metadata must have, and the type of each; others may join."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
 from tcs.model.scene import Observation
-from tcs.placement.scoring import LiveScorer, score, score_observed, verify
+from tcs.placement.scoring import LiveScorer, load_job, score, score_observed, verify
 from tcs.placement.selection import select
 from tcs.placement.store import load_scores, save_scores
 
@@ -33,7 +34,7 @@ TABLES = ("reason", "dexterity", "arm_joints")
 @pytest.fixture(scope="module")
 def scorer(small_environment):
     """Shaving in the small room, ready to be scored."""
-    return LiveScorer("shaving", environment=small_environment)
+    return LiveScorer("shaving", small_environment)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def bedside(tmp_path_factory):
 @pytest.fixture(scope="module")
 def bed_scorer(bedside):
     """Shaving there, ready to be scored."""
-    return LiveScorer("shaving", environment=bedside)
+    return LiveScorer("shaving", bedside)
 
 
 @pytest.fixture
@@ -88,7 +89,7 @@ def test_nothing_off_gives_the_offline_scores_exactly(scorer, small_file, observ
 def test_a_frame_where_it_belongs_gives_the_offline_scores_exactly(scorer, small_file, head):
     file = scorer.score(Observation(frames={"head": head}))
     assert_same_scores(file.nominal, small_file.nominal)
-    assert file.metadata["observation"]["frames_off"] < 1e-9
+    assert file.metadata["observation"]["frame_position_error"] < 1e-9
 
 
 @pytest.mark.parametrize("shift", [-0.05, 0.0, 0.1])
@@ -117,10 +118,16 @@ def test_moving_chair_and_robot_together_changes_nothing_that_is_reached(scorer,
     np.testing.assert_allclose(there, here, atol=1e-6)
 
 
+def test_task_environment_and_robot_come_in_one_order():
+    functions = (score, score_observed, LiveScorer, load_job)
+    orders = [list(inspect.signature(function).parameters)[:3] for function in functions]
+    assert orders == [["task", "environment", "robot"]] * len(functions)
+
+
 def test_drake_confirms_what_was_scored_live(small_environment, tmp_path):
     observation = {"person_x": 0.03, "person_yaw": 0.08, "wheelchair_y": -0.01, "head_tilt": 0.06}
     path = tmp_path / "live.tcs"
-    save_scores(path, score_observed("shaving", "pr2", observation, environment=small_environment))
+    save_scores(path, score_observed("shaving", small_environment, observation=observation))
     file = load_scores(path)
     assert file.observed_states[0] == pytest.approx(observation, abs=1e-15)
     found = verify(file, pairs=60, dense=6)
@@ -151,14 +158,14 @@ def test_frames_with_their_orientation_tell_the_joints(scorer):
     told = file.metadata["observation"]
     # Rounded to a nanometre.
     assert told["joints"] == pytest.approx({**joints, **chair}, abs=2e-9)
-    assert told["frames_off"] < 1e-8
-    assert told["frames_turned"] < 1e-8
+    assert told["frame_position_error"] < 1e-8
+    assert told["frame_rotation_error"] < 1e-8
 
 
 def test_a_place_alone_is_explained_by_the_most_likely_joints(scorer, head):
     seen = [head[0] + 0.04, head[1], head[2]]
     told = scorer.score(Observation(frames={"head": seen})).metadata["observation"]
-    assert told["frames_off"] < 1e-8
+    assert told["frame_position_error"] < 1e-8
     joints = told["joints"]
     # The person's spread is 5 cm and the chair's 1.25 cm: shares go with the squares.
     assert abs(joints["person_x"]) == pytest.approx(0.04 * 16 / 17, abs=1e-6)

@@ -11,8 +11,7 @@ from tcs.cli.reports import NUMERIC_NOTE, report_scores
 from tcs.files.paths import data_folder
 from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons import explain
-from tcs.placement.scoring import score, verify
-from tcs.placement.scoring.job import summary
+from tcs.placement.scoring import score, summary, verify
 from tcs.placement.selection import select
 from tcs.placement.tables import Reason
 

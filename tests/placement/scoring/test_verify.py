@@ -12,6 +12,7 @@ from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
 from tcs.placement.scoring.verify import estimated_recall
 from tcs.placement.store import StateTables
+from tests.environments import BESIDE, write_environment
 
 
 def test_stored_answers_are_true(small_file):
@@ -137,5 +138,25 @@ def test_recall_of_one_stratum_is_the_textbook_formula():
 
 
 def test_an_unscanned_stratum_leaves_recall_open():
-    _, (low, high) = estimated_recall(100, [100], [0], [0])
+    recall, (low, high) = estimated_recall(100, [100], [0], [0])
+    assert recall is None
     assert (low, high) == (0.5, 1.0)
+
+
+def test_recall_is_undefined_where_nothing_is_known_to_be_reachable():
+    assert estimated_recall(0, [100], [10], [0]) == (None, None)
+    assert estimated_recall(0, [100], [10], [1]) == (0.0, (0.0, 0.0))
+
+
+def test_a_file_that_reaches_nothing_claims_nothing(tmp_path):
+    # Bases 4 m from the person: every goal is too far.
+    far = write_environment(tmp_path, "far-away", {**BESIDE, "base_x": [5.0, 0.1, 2]})
+    found = verify(score("shaving", far), pairs=10, dense=10)
+    assert (found.checked, found.dense_checked, found.shortfall_checked) == (0, 0, 0)
+    assert found.is_sound
+    assert found.verdict == "nothing was checked"
+    assert found.recall_note == "not estimated: no unreached pair was scanned"
+    plain = found.to_json()
+    for key in ("max_position_error", "max_isotropy_error", "recall", "recall_ci95"):
+        assert plain[key] is None
+    assert plain["mean_shortfall"] is None

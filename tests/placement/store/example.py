@@ -16,7 +16,6 @@ METADATA = {
     "environment": "wheelchair",
     "scene_digest": "5f" * 32,
     "measure": "isotropy",
-    "hashes": {"kernel": "ab"},
     "timings": {"scoring_seconds": 0.5},
 }
 

@@ -1,0 +1,183 @@
+"""Offline scoring: one task on the whole grid of its environment, and the sets to choose from."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Self, Unpack
+
+from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
+from tcs.model.robots import RobotFile
+from tcs.model.scene import EnvironmentFile, Scene, body_frame_places
+from tcs.model.tasks import Task
+from tcs.placement.scoring.job import Job, data_references, load_job
+from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
+from tcs.placement.scoring.sweep import sweep
+from tcs.placement.store import ScoreFile, StateTables
+
+
+@dataclass(frozen=True, eq=False)
+class ScoringSetup:
+    """A job with its live scene and the options of its scoring."""
+
+    job: Job
+    scene: Scene
+    """The job's scene; scoring leaves its state unchanged."""
+    references: Mapping[str, str]
+    """Names or absolute paths of task, environment and robot."""
+    sets: SetOptions
+    """Which sets are kept."""
+    measure: str
+    """Name of the dexterity measure."""
+    jobs: int
+    """Number of threads; the result does not depend on it."""
+
+    @classmethod
+    def load(
+        cls,
+        task: str | Path | Task,
+        environment: str | Path | EnvironmentFile,
+        robot: str | Path | RobotFile,
+        *,
+        measure: str,
+        jobs: int,
+        sets: SetOptions,
+    ) -> Self:
+        """Load and check everything, and build the scene.
+
+        Raises:
+            UnknownNameError: If a task, environment, robot, frame or measure of that name does not
+                exist.
+            DataFileError: If a file cannot be used.
+            GridError: If the grid is empty or enormous.
+            TcsError: If an option of the sets is out of range.
+        """
+        dexterity(measure)
+        options = checked_options(**sets)
+        job = load_job(task, environment, robot)
+        references = data_references(job, task, environment, robot)
+        return cls(job, job.scene(), references, options, measure, jobs)
+
+    def score(
+        self,
+        *,
+        begun: float,
+        metadata: Mapping[str, Any] | None = None,
+        on_progress: Callable[[int, int], None] | None = None,
+        on_compile: Callable[[], None] | None = None,
+    ) -> ScoreFile:
+        """Score the job and return its score file.
+
+        Args:
+            begun: Start of the work, by `time.perf_counter` [s].
+            metadata: Further entries of the file's metadata.
+            on_progress: Called with the number of scored configurations and their total.
+            on_compile: Called before the kernel compiles, if it has to.
+        """
+        job = self.job
+        lowered = job.lowered(self.scene)
+        swept = sweep(
+            lowered,
+            job.task.weights,
+            tables=job.tables,
+            measure=self.measure,
+            jobs=self.jobs,
+            on_progress=on_progress,
+            on_compile=on_compile,
+        )
+        sets_begun = time.perf_counter()
+        tables = tuple(
+            StateTables.of(scores, build_sets(scores, job.grid, jobs=self.jobs, **self.sets))
+            for scores in swept.tables
+        )
+        done = time.perf_counter()
+        return ScoreFile(
+            metadata={
+                "program_version": version("tcs"),
+                "created": datetime.now(UTC).isoformat(timespec="seconds"),
+                **self.references,
+                **(metadata or {}),
+                "scene_digest": lowered.digest(),
+                "measure": self.measure,
+                "ik": swept.ik,
+                "timings": {
+                    "compile_seconds": swept.compile_seconds,
+                    "scoring_seconds": swept.scoring_seconds,
+                    "sets_seconds": done - sets_begun,
+                    "total_seconds": done - begun,
+                },
+            },
+            task=_task_as_dict(job.task),
+            robot=job.spec.robot.model_dump(mode="json"),
+            environment=job.spec.environment.model_dump(mode="json"),
+            grid=job.grid.to_dict(),
+            observed=[axis.to_dict() for axis in job.observed],
+            body_frames=body_frame_places(self.scene, job.scored_grid),
+            tables=tables,
+        )
+
+
+def score(
+    task: str | Path | Task,
+    environment: str | Path | EnvironmentFile = "wheelchair",
+    robot: str | Path | RobotFile = "pr2",
+    *,
+    measure: str = DEFAULT_MEASURE,
+    jobs: int = 2,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+    **sets: Unpack[SetOptions],
+) -> ScoreFile:
+    """Score a task on the whole grid of an environment and build the sets to choose from.
+
+    Args:
+        task: Name of a task, path of a task file, or a task.
+        environment: Name of an environment, path of its file, or an environment.
+        robot: Name of a robot, path of its file, or a robot.
+        measure: Dexterity measure to maximise at each goal: "isotropy", "inverse-condition", or
+            one of them with a penalty near joint limits, "-limited" or "-limited-thesis".
+            Equations: docs/method.md.
+        jobs: Number of threads; the result does not depend on it.
+        on_progress: Called with the number of scored configurations and their total.
+        on_compile: Called before the kernel compiles, if it has to.
+        **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
+            `min_distance`; see `tcs.placement.scoring.SetOptions`.
+
+    Returns:
+        Scores and sets, ready for `tcs.save` and `tcs.select`.
+
+    Raises:
+        UnknownNameError: If a task, environment, robot, frame or measure of that name does not
+            exist.
+        DataFileError: If a file cannot be used.
+        GridError: If the grid is empty or enormous.
+        TcsError: If an option of the sets is out of range.
+    """
+    begun = time.perf_counter()
+    setup = ScoringSetup.load(task, environment, robot, measure=measure, jobs=jobs, sets=sets)
+    return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
+
+
+def _task_as_dict(task: Task) -> dict[str, Any]:
+    """Return a task as plain containers."""
+    return {
+        "name": task.name,
+        "title": task.title,
+        "source": task.source,
+        "tool": task.tool,
+        "environments": list(task.environments),
+        "allowed_contacts": [list(pair) for pair in task.allowed_contacts],
+        "goals": [
+            {
+                "body_frame": goal.body_frame,
+                "position": goal.position.tolist(),
+                "quaternion_wxyz": goal.quaternion.tolist(),
+                "weight": goal.weight,
+            }
+            for goal in task.goals
+        ],
+    }

@@ -1,0 +1,67 @@
+"""The main figures of a score file: counts, best sets and timings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from tcs.model.grid import Grid
+from tcs.placement.scoring.sweep import ANALYTIC
+from tcs.placement.store import ScoreFile, state_to_json
+
+
+def summary(file: ScoreFile) -> dict[str, Any]:
+    """Return the main figures of a score file.
+
+    Counts are sums over all observed states. The best sets are those of the nominal state. The
+    keys are those of `tcs score --json`, except the name of the file.
+    """
+    timings = file.metadata["timings"]
+    reasons: Counter[str] = Counter()
+    for table in file.tables:
+        reasons.update(table.scores.reason_counts())
+    pairs = sum(reasons.values())
+    goals = file.nominal.sets.weights.size
+    return {
+        "measure": file.metadata["measure"],
+        # Files without the entry were solved in closed form.
+        "ik": file.metadata.get("ik", ANALYTIC),
+        "configurations": pairs // goals,
+        "goals": goals,
+        "pairs": pairs,
+        "reached_pairs": reasons["reached"],
+        "scoring_seconds": timings["scoring_seconds"],
+        "compile_seconds": timings["compile_seconds"],
+        "sets_seconds": timings["sets_seconds"],
+        "total_seconds": timings["total_seconds"],
+        "rule": file.nominal.sets.rule,
+        "same_environment": file.nominal.sets.same_environment,
+        "max_members": file.nominal.sets.max_members,
+        "candidates": sum(len(table.sets.candidates) for table in file.tables),
+        "sets": sum(table.sets.sets for table in file.tables),
+        "best": _set_summary(file, file.nominal.sets.best),
+        "best_single": _set_summary(file, file.nominal.sets.best_single),
+        "reasons": dict(reasons),
+        "tables": [
+            {
+                "observed": state_to_json(file.observed_axes, state),
+                "candidates": len(table.sets.candidates),
+                "sets": table.sets.sets,
+            }
+            for state, table in zip(file.observed_states, file.tables, strict=True)
+        ],
+    }
+
+
+def _set_summary(file: ScoreFile, members: tuple[int, ...]) -> dict[str, Any] | None:
+    """Return scores and members of a set of the nominal table; None if no goal is reached."""
+    if not members:
+        return None
+    grid = Grid.from_dict(file.grid)
+    reachability, manipulability = file.nominal.sets.scores_of(members)
+    return {
+        # Seven sevenths add up to 1 only after rounding.
+        "reachability": round(reachability, 12),
+        "manipulability": round(manipulability, 12),
+        "members": [grid.configuration(h).to_json() for h in members],
+    }
