@@ -13,6 +13,7 @@ import platform
 import shlex
 import statistics
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
 FIGURES = Path(__file__).resolve().parent / "figures"
 PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
-_measured: dict[str, dict[str, dict[str, str]]] = {}
+_cells: dict[str, dict[str, dict[str, str]]] = {}
 """Cells by table, row and column, in the order in which they were measured."""
+_tables: dict[str, dict[str, list[str] | list[list[str]]]] = {}
+"""Tables that were recorded as a whole."""
 _began: dict[str, str] = {}
 
 
@@ -67,7 +70,18 @@ def cell(table: str, line: str, column: str, text: str) -> None:
         column: Heading of the column, such as the robot.
         text: The measured value.
     """
-    _measured.setdefault(table, {}).setdefault(line, {})[column] = text
+    _cells.setdefault(table, {}).setdefault(line, {})[column] = text
+
+
+def record(table: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Record a whole table for the docs.
+
+    Args:
+        table: Name of the table, by which a page refers to it.
+        columns: Headings.
+        rows: Cells, as many in each row as there are headings.
+    """
+    _tables[table] = {"columns": list(columns), "rows": [list(cells) for cells in rows]}
 
 
 def save(options: argparse.Namespace) -> None:
@@ -75,13 +89,17 @@ def save(options: argparse.Namespace) -> None:
     if not options.save:
         return
     script = Path(sys.argv[0])
+    for table, lines in _cells.items():
+        columns = list(dict.fromkeys(column for cells in lines.values() for column in cells))
+        rows = [[line, *(cells.get(c, "") for c in columns)] for line, cells in lines.items()]
+        record(table, ["", *columns], rows)
     saved = {
         "command": shlex.join(
             ["python", f"benchmarks/{script.name}", *(a for a in sys.argv[1:] if a != "--save")]
         ),
         "date": datetime.now(UTC).date().isoformat(),
         **_began,
-        "tables": _measured,
+        "tables": _tables,
     }
     path = FIGURES / f"{script.stem}.json"
     with whole_file(path, "Figures") as file:

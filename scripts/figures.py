@@ -67,13 +67,9 @@ def rewritten(text: str) -> str:
 
 def as_markdown(saved: Mapping[str, Any], table: str) -> str:
     """Return one saved table and where it was measured, as Markdown."""
-    rows: Mapping[str, Mapping[str, str]] = saved["tables"][table]
-    columns = list(dict.fromkeys(column for cells in rows.values() for column in cells))
-    lines = [f"| | {' | '.join(columns)} |", f"|---|{'---|' * len(columns)}"]
-    lines += [
-        f"| {name} | {' | '.join(cells.get(column, '') for column in columns)} |"
-        for name, cells in rows.items()
-    ]
+    columns, rows = saved["tables"][table]["columns"], saved["tables"][table]["rows"]
+    lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
+    lines += [f"| {' | '.join(cells)} |" for cells in rows]
     where = (
         f"*`{saved['command']}`, {saved['date']}: {saved['machine']}, load {saved['load']}; "
         f"Python {saved['python']}, {saved['versions']}.*"

@@ -1,0 +1,63 @@
+"""Run the trajectory-following experiment with scripted operators, for the tables of the docs.
+
+Usage: python benchmarks/experiment.py [--robot iiwa7] [--operators 26] [--trials 3] [--training 4]
+           [--seed 0] [--line-seed 0] [--jobs 2]
+
+It is what `tcs teleop experiment` runs. The operators are scripted, not people. The results depend
+on the seeds alone, not on the machine.
+"""
+
+from __future__ import annotations
+
+import time
+
+from table import header, parser, record, row, save
+
+from tcs.output.report.blocks import Table
+from tcs.output.report.teleop_tables import (
+    group_table,
+    motion_blocks,
+    signed_rank_table,
+    trials_table,
+)
+from tcs.teleop import load_arm
+from tcs.teleop.experiment.course import find_course
+from tcs.teleop.experiment.within_subject import ExperimentPlan, run_experiment
+
+
+def main() -> None:
+    """Run the experiment, print its tables and record them."""
+    command_line = parser(__doc__)
+    command_line.add_argument("--robot", default="iiwa7")
+    command_line.add_argument("--operators", type=int, default=26)
+    command_line.add_argument("--trials", type=int, default=3)
+    command_line.add_argument("--training", type=int, default=4)
+    command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument("--line-seed", type=int, default=0)
+    command_line.add_argument("--jobs", type=int, default=2)
+    options = command_line.parse_args()
+    header("statsmodels")
+    plan = ExperimentPlan(
+        operators=options.operators,
+        trials=options.trials,
+        training=options.training,
+        seed=options.seed,
+    )
+    arm = load_arm(options.robot)
+    course = find_course(arm, options.line_seed)
+    begun = time.perf_counter()
+    experiment = run_experiment(arm, course, plan, jobs=options.jobs)
+    row("experiment", f"{time.perf_counter() - begun:.0f} s on {options.jobs} processes")
+    motion = [block for block in motion_blocks(experiment) if isinstance(block, Table)]
+    names = ("groups", "tests", "motion", "pairs", "trials")
+    tables = (group_table(experiment), signed_rank_table(experiment), *motion)
+    for name, table in zip(names, (*tables, trials_table(experiment)), strict=True):
+        print(f"\n{table.caption}")
+        for cells in table.texts():
+            print("  ".join(cells))
+        record(name, [column.title for column in table.columns], table.texts())
+    save(options)
+
+
+if __name__ == "__main__":
+    main()
