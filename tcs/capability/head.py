@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, PositiveNumber, checked, read_mapping
-from tcs.files.paths import named_file, shipped_files
+from tcs.files.documents import Document, PositiveNumber, read_document
+from tcs.files.paths import DataFiles
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import RobotFile
 from tcs.model.scene import Scene
@@ -45,9 +45,12 @@ class View:
     """Lowest and highest pitch in view, up positive [rad]."""
 
 
+HEADS = DataFiles("head", "models/heads/*.yaml")
+
+
 def head_names() -> tuple[str, ...]:
     """Return the names of the robots whose heads ship with `tcs`, sorted."""
-    return tuple(shipped_files("models/heads/*.yaml"))
+    return HEADS.names()
 
 
 def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
@@ -62,18 +65,17 @@ def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
         RobotError: If no head is named and none ships for the robot, the file cannot be used, or
             it names what the robot does not have.
     """
-    files = shipped_files("models/heads/*.yaml")
+    names = HEADS.names()
     asked = robot.name if head is None else head
-    if head is None and robot.name not in files:
+    if head is None and robot.name not in names:
         raise RobotError(
-            f"robot '{robot.name}': no head camera of it is known, only of {', '.join(files)}. "
+            f"robot '{robot.name}': no head camera of it is known, only of {', '.join(names)}. "
             "Name one of these heads, or a head file of your own (--head), or make an ICM, which "
             "needs none (--kind ICM)."
         )
-    path = named_file("head", asked, files, where=f"robot '{robot.name}'")
+    path = HEADS.path(asked, where=f"robot '{robot.name}'")
     where = f"head file '{path}'"
-    content = read_mapping(path, where, RobotError, known=HeadFile.model_fields)
-    found = checked(content, HeadFile, where, RobotError)
+    found = read_document(path, HeadFile, where, RobotError)
     model = robot.model()
     for kind, name, known in (
         ("link", found.camera_frame, model.links),

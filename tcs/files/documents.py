@@ -1,4 +1,4 @@
-"""YAML files into checked values, and what is wrong with one in a single line."""
+"""YAML documents: read, checked against a model, and refused with one line that names the field."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Vector = tuple[Number, Number, Number]
 
 
 class Document(BaseModel):
-    """A mapping in a file: its keys are known, and it stays as it is."""
+    """A mapping in a file: unknown keys are refused, and the value is frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Placed(Document):
-    """Something that stands at a pose in a frame named elsewhere."""
+    """An entry with a pose in a frame that the entry or its context names."""
 
     xyz: Vector = (0.0, 0.0, 0.0)
     """Position of its origin in that frame [m]."""
@@ -46,6 +46,25 @@ class Placed(Document):
 DocumentT = TypeVar("DocumentT", bound=Document)
 
 
+def read_document(
+    path: Path, model: type[DocumentT], where: str, error: type[DataFileError]
+) -> DocumentT:
+    """Return the content of a YAML file as a checked value.
+
+    Args:
+        path: The file.
+        model: Model of its content.
+        where: Name of the file in messages, e.g. "task file 'shaving.yaml'".
+        error: Class of the error to raise.
+
+    Raises:
+        DataFileError: As `error`, if the file cannot be read, or a value is missing or invalid.
+        UnknownNameError: If a key is unknown.
+    """
+    content = read_mapping(path, where, error, known=model.model_fields)
+    return checked(content, model, where, error)
+
+
 def read_mapping(
     path: Path, where: str, error: type[DataFileError], *, known: Iterable[str]
 ) -> dict[str, Any]:
@@ -53,24 +72,24 @@ def read_mapping(
 
     Args:
         path: The file.
-        where: What to call it in a message, e.g. "task file 'shaving.yaml'".
-        error: What to raise.
-        known: Keys to name when there are none.
+        where: Name of the file in messages, e.g. "task file 'shaving.yaml'".
+        error: Class of the error to raise.
+        known: Keys to list in the message when the file is not a mapping.
 
     Raises:
-        DataFileError: As `error`, if it cannot be read, is no YAML, holds a key twice, or is no
-            mapping.
+        DataFileError: As `error`, if the file cannot be read, is not YAML, holds a key twice, or
+            is not a mapping.
     """
     try:
         content = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as reason:
         raise error(f"{where} cannot be read: {reason.strerror}.") from reason
     except UnicodeDecodeError as reason:
-        raise error(f"{where} is no text file in UTF-8.") from reason
+        raise error(f"{where} is not a text file in UTF-8.") from reason
     except yaml.YAMLError as reason:
-        raise error(f"{where} is no sound YAML: {_yaml_complaint(reason)}.") from reason
+        raise error(f"{where} is not valid YAML: {_yaml_fault(reason)}.") from reason
     except ValueError as reason:
-        # YAML lets them through: a month 13, a whole number of 5000 digits.
+        # The YAML grammar accepts them: a month 13, an integer of 5000 digits.
         raise error(f"{where} holds an impossible value: {reason}.") from reason
     if not isinstance(content, dict):
         raise error(f"{where} must hold keys and values: {', '.join(known)}.")
@@ -79,59 +98,63 @@ def read_mapping(
 
 def checked(
     content: Mapping[str, Any],
-    kind: type[DocumentT],
+    model: type[DocumentT],
     where: str,
     error: type[DataFileError],
     *,
     also_known: Iterable[str] = (),
 ) -> DocumentT:
-    """Return what keys and values stand for.
+    """Return the content of a file as a checked value.
 
     Args:
-        content: What a file holds.
-        kind: What it has to hold.
-        where: What to call it in a message.
-        error: What to raise.
-        also_known: Keys of the file that were taken out before.
+        content: Keys and values of the file.
+        model: Model of its content.
+        where: Name of the file in messages.
+        error: Class of the error to raise.
+        also_known: Keys of the file that the caller has already removed from `content`.
 
     Raises:
-        DataFileError: As `error`, if a value is missing or not what it has to be.
-        UnknownNameError: If a key is not known.
+        DataFileError: As `error`, if a value is missing or invalid.
+        UnknownNameError: If a key is unknown.
     """
     try:
-        return kind.model_validate(content)
+        return model.model_validate(content)
     except ValidationError as reason:
-        raise _complaint(reason, kind, where, error, tuple(also_known)) from None
+        raise _first_fault(reason, model, where, error, tuple(also_known)) from None
+    except UnknownNameError as reason:
+        # Raised by a validator of the model, which knows the field but not the file.
+        located = f"{where}, {reason.where}" if reason.where else where
+        raise UnknownNameError(reason.kind, reason.name, reason.known, where=located) from None
 
 
 _KEY_TAGS = ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge")
 
-# Values are quoted in messages of one line; a whole list of goals must not be.
+# Messages of one line quote the value; a long list is shortened.
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader without two of its silent surprises."""
+    """PyYAML's safe loader, but duplicate keys are refused and 1e-3 is a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Return a mapping, refusing a key that comes twice: PyYAML would drop the first."""
+        """Return a mapping; refuse a duplicate key, of which PyYAML would drop the first."""
         seen = set()
         for key_node, _ in node.value:
             if key_node.tag not in _KEY_TAGS:
                 raise yaml.constructor.ConstructorError(
-                    problem="a key must be a word", problem_mark=key_node.start_mark
+                    problem="a key must be text", problem_mark=key_node.start_mark
                 )
             if key_node.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    problem=f"key '{key_node.value}' is there twice",
+                    problem=f"key '{key_node.value}' appears twice",
                     problem_mark=key_node.start_mark,
                 )
             seen.add(key_node.value)
         return super().construct_mapping(node, deep)
 
 
-# PyYAML follows YAML 1.1, where 1e-3 is a text; YAML 1.2 and everybody's eyes read a number.
+# PyYAML follows YAML 1.1, where 1e-3 is text; in YAML 1.2 it is a number.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
@@ -139,58 +162,67 @@ _Loader.add_implicit_resolver(
 )
 
 
-def _yaml_complaint(error: yaml.YAMLError) -> str:
+def _yaml_fault(error: yaml.YAMLError) -> str:
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         mark = error.problem_mark
         return f"line {mark.line + 1}, column {mark.column + 1}: {error.problem}"
     return " ".join(str(error).split())
 
 
-def _complaint(
+def _first_fault(
     reason: ValidationError,
-    kind: type[BaseModel],
+    model: type[BaseModel],
     where: str,
     error: type[DataFileError],
     also_known: tuple[str, ...],
 ) -> DataFileError | UnknownNameError:
-    """Return the first thing that is wrong, as an error of one line."""
+    """Return an error of one line that names the first fault."""
     details = reason.errors(include_url=False)
-    # A misspelt key also makes the right one missing; the misspelling is the one to name.
+    # A misspelt key also makes the right one missing; the message names the misspelling.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     first, location = details[0], list(details[0]["loc"])
     if first["type"] == "extra_forbidden":
         *holder, key = location
-        known = _keys_at(kind, holder) + (() if holder else also_known)
+        known = _keys_at(model, holder) + (() if holder else also_known)
         return UnknownNameError("key", str(key), known, where=_described(where, holder))
-    text = f"{_described(where, location)}{_what_is_wrong(first)}"
+    text = f"{_described(where, location)}{_fault(first)}"
     others = len(details) - 1
     return error(text + (f" ({others} more after this one.)" if others else ""))
 
 
-def _what_is_wrong(detail: ErrorDetails) -> str:
+# Pydantic names Python types; the author of a file wrote YAML.
+_YAML_TERMS = (
+    (re.compile(r"^(?:Input|List|Tuple|String|Value|Dictionary) should "), "must "),
+    (re.compile(r"valid dictionary(?: or instance of \w+)?"), "mapping of keys to values"),
+    (re.compile(r"valid tuple"), "valid list"),
+    (re.compile(r"valid boolean, unable to interpret input"), "valid boolean (true or false)"),
+    (re.compile(r" after validation, not \d+$"), ""),
+)
+
+
+def _fault(detail: ErrorDetails) -> str:
+    """Return the predicate of a message: " is missing." or " is 4, but must be a valid list."."""
     if detail["type"] == "missing":
         return " is missing."
-    # The file's author wrote a list.
-    said = detail["msg"].replace("tuple", "list").replace("Tuple", "List")
-    if said.startswith("Value error, "):
-        return f": {said.removeprefix('Value error, ')}."
-    # The rest says "Input should be ...", or what else should: a list, its length, a text.
-    must = said.removeprefix("Input should be ")
-    must = f"must be {must}" if must != said else f"{said[0].lower()}{said[1:]}"
-    return f" is {_SHORT.repr(detail['input'])}, but {must}."
+    rule = detail["msg"]
+    if rule.startswith("Value error, "):
+        return f": {rule.removeprefix('Value error, ')}."
+    for pattern, term in _YAML_TERMS:
+        rule = pattern.sub(term, rule)
+    return f" is {_SHORT.repr(detail['input'])}, but {rule}."
 
 
 def _described(where: str, location: list[int | str]) -> str:
-    """Return a place in a file, e.g. "task file 'a.yaml', field 'goals[2].position'"."""
+    """Return a location in a file, e.g. "task file 'a.yaml', field 'goals[2].position'"."""
     if not location:
         return where
     parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return f"{where}, field '{''.join(parts).lstrip('.')}'"
 
 
-def _keys_at(kind: type[BaseModel], location: list[int | str]) -> tuple[str, ...]:
-    """Return the keys known to the document at a place in a document."""
-    owner = kind
+def _keys_at(model: type[BaseModel], location: list[int | str]) -> tuple[str, ...]:
+    """Return the keys of the document at a location inside a document."""
+    owner = model
     for part in location:
         if isinstance(part, str) and part in owner.model_fields:
             owner = _document_inside(owner.model_fields[part].annotation) or owner
@@ -198,7 +230,7 @@ def _keys_at(kind: type[BaseModel], location: list[int | str]) -> tuple[str, ...
 
 
 def _document_inside(annotation: object) -> type[BaseModel] | None:
-    """Return the document held by a type like list[Document] or dict[str, Document]."""
+    """Return the document inside a type such as list[Document] or dict[str, Document]."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in get_args(annotation):

@@ -1,19 +1,19 @@
-"""Where the data that ships with `tcs` lies, and where it may keep what it computes."""
+"""Paths: data files that ship with `tcs` or belong to the user, and the cache folder."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from tcs.errors import DataFileError, OutputError, UnknownNameError
+from tcs.errors import DataFileError, OutputError, TcsError, UnknownNameError
 from tcs.files.writing import make_folder
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _DATA_PARTS = ("models", "tasks")
 _CACHE_VARIABLE = "TCS_CACHE_DIR"
 CACHE_ADVICE = f"Set {_CACHE_VARIABLE} to a folder you may write to."
-"""What to do when the cache cannot be written."""
+"""Advice for messages about a cache that cannot be written."""
 
 
 def data_folder() -> Path:
@@ -22,56 +22,84 @@ def data_folder() -> Path:
     In an installed wheel it is `tcs/_data`; in a checkout, the folder above the package.
 
     Raises:
-        DataFileError: If neither place holds both folders.
+        DataFileError: If neither holds both folders.
     """
     return _data_folder_of(_PACKAGE)
 
 
-def shipped_files(pattern: str) -> dict[str, Path]:
-    """Return the data files that ship with `tcs`, by name, sorted.
+@dataclass(frozen=True)
+class DataFiles:
+    """Data files of one type: those that ship with `tcs`, and those of the user.
+
+    Attributes:
+        noun: Type of the files in messages, e.g. "robot".
+        pattern: Files that ship, relative to the data folder, e.g. "models/robots/*.yaml".
+    """
+
+    noun: str
+    pattern: str
+
+    def shipped(self) -> dict[str, Path]:
+        """Return the files that ship with `tcs` by name, sorted.
+
+        Raises:
+            DataFileError: If there is no data folder.
+        """
+        files = {path.stem: path for path in data_folder().glob(self.pattern)}
+        return dict(sorted(files.items()))
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the files that ship with `tcs`, sorted."""
+        return tuple(self.shipped())
+
+    def path(
+        self, name_or_path: str | Path, *, beside: Path | None = None, where: str = ""
+    ) -> Path:
+        """Return the path of a file.
+
+        Args:
+            name_or_path: Name of a file that ships with `tcs`, or a path: anything that ends in
+                `.yaml` or holds a path separator. The file of a path need not exist.
+            beside: Folder that a relative path starts from; None is the current one.
+            where: Location of the name, for messages.
+
+        Raises:
+            UnknownNameError: If no file of that name ships.
+            DataFileError: If the path starts at the home folder of an unknown user.
+        """
+        text = str(name_or_path)
+        # Either separator: a path copied from another system is still a path, not a name.
+        if isinstance(name_or_path, Path) or text.endswith(".yaml") or "/" in text or "\\" in text:
+            what = f"{where}: {self.noun} file" if where else f"{self.noun} file"
+            return (beside or Path()) / expanded(text, what, DataFileError)
+        shipped = self.shipped()
+        if text not in shipped:
+            raise UnknownNameError(self.noun, text, shipped, where=where)
+        return shipped[text]
+
+
+def expanded(path: str, what: str, error: type[TcsError]) -> Path:
+    """Return a path with a leading `~` or `~user` replaced by that user's home folder.
 
     Args:
-        pattern: Which ones, from the data folder, e.g. "models/robots/*.yaml".
+        path: The path.
+        what: Its name in messages.
+        error: Class of the error to raise.
 
     Raises:
-        DataFileError: If there is no data folder.
+        TcsError: As `error`, if the home folder is unknown.
     """
-    files = {path.stem: path for path in data_folder().glob(pattern)}
-    return dict(sorted(files.items()))
-
-
-def named_file(
-    kind: str,
-    name_or_path: str | Path,
-    shipped: Mapping[str, Path],
-    *,
-    beside: Path | None = None,
-    where: str = "",
-) -> Path:
-    """Return the path of a data file.
-
-    Args:
-        kind: What is looked up, e.g. "robot".
-        name_or_path: Name of a file that ships with `tcs`, or a path: anything that ends in
-            `.yaml` or holds a path separator. Nothing checks that there is a file.
-        shipped: The files that ship, by name.
-        beside: Folder that a relative path starts from; None is the current one.
-        where: Where the name stood, for the message.
-
-    Raises:
-        UnknownNameError: If no file of that name ships.
-    """
-    text = str(name_or_path)
-    # Either separator: a path copied from another system is a path, not a name nobody knows.
-    if isinstance(name_or_path, Path) or text.endswith(".yaml") or "/" in text or "\\" in text:
-        return (beside or Path()) / Path(text).expanduser()
-    if text not in shipped:
-        raise UnknownNameError(kind, text, shipped, where=where)
-    return shipped[text]
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        user = Path(path).parts[0]
+        raise error(
+            f"{what} '{path}': the home folder '{user}' is unknown. Write the whole path."
+        ) from None
 
 
 def cache_folder(*parts: str) -> Path:
-    """Return the user's cache folder for `tcs`, or one inside it, made when it is not there yet.
+    """Return the user's cache folder for `tcs`, or a folder inside it; create it when missing.
 
     It is `$TCS_CACHE_DIR` if that is set, else `$XDG_CACHE_HOME/tcs`, else `~/.cache/tcs`.
 
@@ -79,32 +107,32 @@ def cache_folder(*parts: str) -> Path:
         parts: Names of the folder inside it, from the top.
 
     Raises:
-        OutputError: If the folder cannot be made.
+        OutputError: If the folder cannot be created.
     """
-    folder = _cache_place().joinpath(*parts)
+    folder = _cache_path().joinpath(*parts)
     make_folder(folder, "cache folder", advice=CACHE_ADVICE)
     return folder
 
 
 def _data_folder_of(package: Path) -> Path:
     """Return the data folder that belongs to the package installed at `package`."""
-    # The wheel's own data comes first: site-packages may hold somebody else's `models/`.
-    places = (package / "_data", package.parent)
-    for place in places:
-        if all((place / part).is_dir() for part in _DATA_PARTS):
-            return place
-    looked = " or ".join(f"'{place}'" for place in places)
+    # The data of the wheel comes first: site-packages may hold the `models/` of another package.
+    candidates = (package / "_data", package.parent)
+    for folder in candidates:
+        if all((folder / part).is_dir() for part in _DATA_PARTS):
+            return folder
+    searched = " or ".join(f"'{folder}'" for folder in candidates)
     raise DataFileError(
-        f"the data folders {' and '.join(_DATA_PARTS)} are not in {looked}. "
+        f"the data folders {' and '.join(_DATA_PARTS)} are not in {searched}. "
         "Install tcs again, or run it from a complete checkout."
     )
 
 
-def _cache_place() -> Path:
-    """Return where the cache belongs, without touching the disk."""
+def _cache_path() -> Path:
+    """Return the path of the cache folder, without touching the disk."""
     chosen = os.environ.get(_CACHE_VARIABLE)
     if chosen:
-        return Path(chosen).expanduser().absolute()
+        return expanded(chosen, _CACHE_VARIABLE, OutputError).absolute()
     base = os.environ.get("XDG_CACHE_HOME")
     # The XDG specification says that a relative path here is to be ignored.
     if base and Path(base).is_absolute():

@@ -1,11 +1,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Annotated
 
 import pytest
+from pydantic import Field, model_validator
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, Number, Placed, PositiveNumber, checked, read_mapping
+from tcs.files.documents import (
+    Document,
+    Number,
+    Placed,
+    PositiveNumber,
+    checked,
+    read_document,
+    read_mapping,
+)
 
 
 class Leg(Placed):
@@ -17,6 +27,8 @@ class Table(Document):
     height: Number = 0.7
     legs: tuple[Leg, ...] = ()
     by_name: Mapping[str, Leg] = {}
+    feet: Annotated[tuple[int, ...], Field(min_length=2)] = (1, 2)
+    folds: Annotated[bool, Field(strict=True)] = False
 
 
 def read(tmp_path, text):
@@ -38,14 +50,17 @@ def test_a_sound_file_becomes_a_value(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[a]", "table must hold keys and values: name, height, legs, by_name."),
-        ("name: a\nheight: 1\nname: b", "line 3, column 1: key 'name' is there twice."),
-        ("name: a\nlegs: [{length: 1, length: 2}]", "line 2, column 20: key 'length' is there"),
-        ("1: a", "line 1, column 1: a key must be a word."),
+        ("[a]", "table must hold keys and values: name, height, legs, by_name, feet, folds."),
+        ("name: a\nheight: 1\nname: b", "line 3, column 1: key 'name' appears twice."),
+        ("name: a\nlegs: [{length: 1, length: 2}]", "line 2, column 20: key 'length' appears"),
+        ("1: a", "line 1, column 1: a key must be text."),
         ("height: 1", "table, field 'name' is missing."),
         ("{name: a, height: '1'}", "field 'height' is '1', but must be a valid number."),
         ("{name: a, height: yes}", "field 'height' is True, but must be a valid number."),
         ("{name: a, height: .nan}", "field 'height' is nan, but must be a finite number."),
+        ("{name: a, legs: [4]}", "'legs[0]' is 4, but must be a mapping of keys to values."),
+        ("{name: a, feet: []}", "field 'feet' is [], but must have at least 2 items."),
+        ("{name: a, folds: 3}", "field 'folds' is 3, but must be a valid boolean."),
         ("{name: a, legs: 4}", "field 'legs' is 4, but must be a valid list."),
         ("{name: a, legs: [{length: 0}]}", "'legs[0].length' is 0, but must be greater than 0."),
         ("{name: 1, height: a}", "but must be a valid string. (1 more after this one.)"),
@@ -64,13 +79,32 @@ def test_a_wrong_file_gets_one_line_of_the_callers_error(tmp_path, text, said):
     [
         (
             "{nmae: a}",
-            "table: unknown key 'nmae'. Known: based_on, by_name, height, legs, name. Di",
+            "table: unknown key 'nmae'. Known: based_on, by_name, feet, folds, heig",
         ),
         ("{name: a, legs: [{lenght: 1}]}", "table, field 'legs[0]': unknown key 'lenght'. Known: "),
         ("{name: a, by_name: {x: {xy: 1}}}", "field 'by_name.x': unknown key 'xy'. Known: length"),
     ],
 )
-def test_an_unknown_key_is_told_with_the_known_ones_of_its_place(tmp_path, text, said):
+def test_an_unknown_key_is_reported_with_the_keys_known_there(tmp_path, text, said):
     with pytest.raises(UnknownNameError) as caught:
         read(tmp_path, text)
     assert said in str(caught.value)
+
+
+class Choice(Document):
+    chosen: str
+
+    @model_validator(mode="after")
+    def _is_known(self):
+        if self.chosen != "a":
+            raise UnknownNameError("choice", self.chosen, ["a"], where="field 'chosen'")
+        return self
+
+
+def test_an_unknown_name_is_reported_with_file_and_field(tmp_path):
+    path = tmp_path / "choice.yaml"
+    path.write_text("chosen: b")
+    with pytest.raises(UnknownNameError, match=r"^choice file 'c', field 'chosen': unknown choice"):
+        read_document(path, Choice, "choice file 'c'", RobotError)
+    path.write_text("chosen: a")
+    assert read_document(path, Choice, "choice file 'c'", RobotError) == Choice(chosen="a")

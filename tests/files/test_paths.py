@@ -5,7 +5,7 @@ import pytest
 
 import tcs.files.paths
 from tcs.errors import DataFileError, OutputError, UnknownNameError
-from tcs.files.paths import cache_folder, data_folder, named_file, shipped_files
+from tcs.files.paths import DataFiles, cache_folder, data_folder
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 
@@ -23,14 +23,14 @@ def test_data_of_a_checkout_is_the_checkout():
 def test_data_of_an_installed_package_is_inside_it(tmp_path, monkeypatch):
     package = tmp_path / "site-packages" / "tcs"
     own = make_data(package / "_data")
-    # Some other package's folders of the same names lie beside it.
+    # Folders of the same names that belong to another package.
     make_data(tmp_path / "site-packages")
     monkeypatch.setattr(tcs.files.paths, "_PACKAGE", package)
     assert data_folder() == own
 
 
 @pytest.mark.parametrize("present", [[], ["models"], ["tasks"]], ids=str)
-def test_missing_data_is_said_in_one_line(tmp_path, monkeypatch, present):
+def test_missing_data_is_one_line(tmp_path, monkeypatch, present):
     for part in present:
         (tmp_path / part).mkdir()
     monkeypatch.setattr(tcs.files.paths, "_PACKAGE", tmp_path / "tcs")
@@ -71,7 +71,7 @@ def test_own_variable_comes_first(home, monkeypatch):
     assert not (home / "xdg").exists()
 
 
-def test_cache_that_cannot_be_made_is_said_in_one_line(home, monkeypatch):
+def test_a_cache_that_cannot_be_created_is_one_line(home, monkeypatch):
     blocked = home / "file"
     blocked.write_text("")
     monkeypatch.setenv("TCS_CACHE_DIR", str(blocked / "cache"))
@@ -86,40 +86,61 @@ def test_importing_touches_no_folder(home, monkeypatch):
 
 
 def test_shipped_files_are_found_by_name():
-    files = shipped_files("models/robots/*.yaml")
+    files = DataFiles("robot", "models/robots/*.yaml").shipped()
     assert files["pr2"] == CHECKOUT / "models" / "robots" / "pr2.yaml"
     assert list(files) == sorted(files)
 
 
-SHIPPED = {"bed": Path("/data/bed.yaml")}
+@pytest.fixture
+def beds(tmp_path, monkeypatch):
+    """Data files of one type, of which `bed` ships."""
+    data = make_data(tmp_path / "tcs" / "_data")
+    (data / "models" / "bed.yaml").write_text("")
+    monkeypatch.setattr(tcs.files.paths, "_PACKAGE", tmp_path / "tcs")
+    return DataFiles("environment", "models/*.yaml")
 
 
 @pytest.mark.parametrize(
     ("given", "path"),
     [
-        ("bed", "/data/bed.yaml"),
         ("bed.yaml", "bed.yaml"),
         ("./bed", "bed"),
-        ("C:\\rooms\\bed", "C:\\rooms\\bed"),
-        ("/rooms/bed.yaml", "/rooms/bed.yaml"),
+        ("C:\\scenes\\bed", "C:\\scenes\\bed"),
+        ("/scenes/bed.yaml", "/scenes/bed.yaml"),
         (Path("bed"), "bed"),
         ("~/bed.yaml", "/home/of/user/bed.yaml"),
     ],
 )
-def test_a_file_is_named_or_is_a_path(given, path, monkeypatch):
+def test_a_path_needs_a_separator_or_the_suffix(beds, given, path, monkeypatch):
     monkeypatch.setenv("HOME", "/home/of/user")
-    assert named_file("room", given, SHIPPED) == Path(path)
+    assert beds.path(given) == Path(path)
 
 
-def test_a_relative_path_may_start_beside_another_file():
-    assert named_file("room", "a.yaml", SHIPPED, beside=Path("/b")) == Path("/b/a.yaml")
-    assert named_file("room", "/a.yaml", SHIPPED, beside=Path("/b")) == Path("/a.yaml")
-    assert named_file("room", "bed", SHIPPED, beside=Path("/b")) == Path("/data/bed.yaml")
+def test_a_name_is_that_of_a_shipped_file(beds):
+    assert beds.names() == ("bed",)
+    assert beds.path("bed") == data_folder() / "models" / "bed.yaml"
 
 
-def test_a_name_that_nothing_has_is_told_with_its_place():
-    with pytest.raises(UnknownNameError, match=r"^here: unknown room 'bad'.*Did you mean 'bed'\?"):
-        named_file("room", "bad", SHIPPED, where="here")
+def test_a_relative_path_may_start_beside_another_file(beds):
+    assert beds.path("a.yaml", beside=Path("/b")) == Path("/b/a.yaml")
+    assert beds.path("/a.yaml", beside=Path("/b")) == Path("/a.yaml")
+    assert beds.path("bed", beside=Path("/b")) == beds.path("bed")
+
+
+def test_an_unknown_name_is_reported_with_its_location(beds):
+    message = r"^here: unknown environment 'bad'.*Did you mean 'bed'\?"
+    with pytest.raises(UnknownNameError, match=message):
+        beds.path("bad", where="here")
+
+
+def test_the_home_folder_of_an_unknown_user_is_one_line(beds, home, monkeypatch):
+    with pytest.raises(
+        DataFileError, match=r"^environment file '~nouser/a\.yaml': the home folder"
+    ):
+        beds.path("~nouser/a.yaml")
+    monkeypatch.setenv("TCS_CACHE_DIR", "~nouser/x")
+    with pytest.raises(OutputError, match=r"^TCS_CACHE_DIR '~nouser/x': the home folder '~nouser'"):
+        cache_folder()
 
 
 def test_a_folder_inside_the_cache_is_made(tmp_path, monkeypatch):

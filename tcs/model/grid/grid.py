@@ -253,7 +253,8 @@ class Grid:
         try:
             return cls(axes)
         except GridError as error:
-            raise GridError(f"{where}: {error}" if where else str(error)) from None
+            text = str(error).removeprefix("grid: ") if where.endswith("'grid'") else str(error)
+            raise GridError(f"{where}: {text}" if where else text) from None
 
     def _checked(self, flat: ArrayLike) -> NDArray[np.int64]:
         """Return flat indices as an array, refusing those that are not of this grid."""

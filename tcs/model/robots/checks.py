@@ -1,40 +1,46 @@
-"""Whether a robot file and its URDF fit together."""
+"""Check a robot file against its URDF."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
 from tcs.errors import RobotError, UnknownNameError
+from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Joint, Urdf
 
 
 def check_robot(robot: RobotFile, where: str) -> None:
-    """Refuse a robot file that its URDF contradicts.
+    """Raise an error if a robot file contradicts its URDF.
 
     Args:
         robot: The robot.
-        where: What to call the file in a message.
+        where: Name of the file in messages.
 
     Raises:
-        UnknownNameError: If it names a link, joint or frame that is not there.
-        RobotError: If the arm is no chain of seven turning joints from its base to the tool, a
-            posture breaks hard limits, or a name of its own is taken.
+        UnknownNameError: If the file names an unknown link, joint or frame.
+        RobotError: If the URDF or the primitives cannot be used, the arm is not a chain of seven
+            revolute joints from its base to the tool, a posture exceeds the hard limits, or an
+            extra frame or body has the name of a link.
     """
-    model = robot.model()
+    try:
+        model = robot.model()
+    except RobotError as error:
+        raise RobotError(f"{where}, field 'urdf': {error}") from None
     links = _all_links(robot, model, where)
     _check_links(robot, links, model, where)
     _check_arm(robot, model, where)
     if robot.torso_joint is not None:
-        torso = model.joint(robot.torso_joint, f"{where}, torso_joint")
+        torso = model.joint(robot.torso_joint, f"{where}, field 'torso_joint'")
         if torso.type != "prismatic":
             raise RobotError(
-                f"{where}, torso_joint: '{torso.name}' is {torso.type}, but must be prismatic."
+                f"{where}, field 'torso_joint': '{torso.name}' is {torso.type}, but must be "
+                "prismatic."
             )
-    _check_rest(robot, model, f"{where}, rest")
+    _check_rest(robot, model, f"{where}, field 'rest'")
     for field, choices in (("postures", robot.postures), ("grippers", robot.grippers)):
         for name, positions in choices.items():
-            _check_positions(robot, model, positions, f"{where}, {field}.{name}")
+            _check_positions(robot, model, positions, f"{where}, field '{field}.{name}'")
 
 
 def _all_links(robot: RobotFile, model: Urdf, where: str) -> Mapping[str, str]:
@@ -45,19 +51,22 @@ def _all_links(robot: RobotFile, model: Urdf, where: str) -> Mapping[str, str]:
     for extra in extras:
         if extra.name in parents:
             raise RobotError(
-                f"{where}, frame or body '{extra.name}': this name is taken. Choose another."
+                f"{where}, frame or body '{extra.name}': the name is taken. Choose another."
             )
         parents[extra.name] = extra.parent
     for extra in extras:
         at = f"{where}, frame or body '{extra.name}', parent"
         _check_known(extra.parent, parents, at)
     for extra in extras:
-        # One extra may hang on another: a tool, and a frame at its tip.
+        # An extra body may carry an extra frame: a tool, and the frame at its tip.
         link = extra.name
         for _ in extras:
             link = link if link in model.links else parents[link]
         if link not in model.links:
-            raise RobotError(f"{where}, frame or body '{extra.name}': it hangs on itself.")
+            raise RobotError(
+                f"{where}, frame or body '{extra.name}': its parents lead back to itself, but must "
+                "lead to a link of the URDF."
+            )
     return parents
 
 
@@ -68,22 +77,29 @@ def _check_links(robot: RobotFile, links: Mapping[str, str], model: Urdf, where:
         ("tool_frame", robot.tool_frame),
         *(("standing_bodies", body) for body in robot.standing_bodies),
         *(("disabled_groups", body) for pair in robot.disabled_pairs for body in pair),
-        *((f"primitives '{robot.primitives}'", shape.body) for shape in robot.load_primitives()),
+        *(("primitives", shape.body) for shape in _primitives(robot, where)),
     ):
-        _check_known(name, links, f"{where}, {field}")
+        _check_known(name, links, f"{where}, field '{field}'")
     if robot.root_body != model.root:
         raise RobotError(
-            f"{where}, root_body: '{robot.root_body}' is carried by another link, but must be the "
-            f"root of the URDF, '{model.root}'."
+            f"{where}, field 'root_body': '{robot.root_body}' has a parent link, but must be the "
+            f"root link of the URDF, '{model.root}'."
         )
     for first, second in robot.disabled_pairs:
         if first == second:
-            raise RobotError(f"{where}, disabled_groups: '{first}' is paired with itself.")
+            raise RobotError(f"{where}, field 'disabled_groups': '{first}' is paired with itself.")
+
+
+def _primitives(robot: RobotFile, where: str) -> tuple[Primitive, ...]:
+    try:
+        return robot.load_primitives()
+    except RobotError as error:
+        raise RobotError(f"{where}, field 'primitives': {error}") from None
 
 
 def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Refuse an arm that is no chain of seven turning joints from arm base to tool."""
-    at = f"{where}, arm_joints"
+    """Refuse an arm that is not a chain of seven revolute joints from arm base to tool."""
+    at = f"{where}, field 'arm_joints'"
     for name in robot.arm_joints:
         joint = model.joint(name, at)
         if joint.type not in ("revolute", "continuous"):
@@ -95,10 +111,10 @@ def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
     chain = model.chain(robot.arm_base, tip)
     moving = [] if chain is None else [joint.name for joint in chain if joint.is_movable]
     if tuple(moving) != robot.arm_joints:
-        found = ", ".join(moving) if chain is not None else "no chain at all"
+        found = ", ".join(moving) if chain is not None else "no chain of joints"
         raise RobotError(
             f"{at}: from '{robot.arm_base}' to '{robot.tool_frame}' the URDF has {found}, "
-            f"but the file says {', '.join(robot.arm_joints)}."
+            f"but the file lists {', '.join(robot.arm_joints)}."
         )
 
 
@@ -109,14 +125,16 @@ def _check_positions(
     for name, value in positions.items():
         joint = model.joint(name, where)
         if name in robot.arm_joints or name == robot.torso_joint:
-            raise RobotError(f"{where}: '{name}' is scored, so a posture cannot hold it.")
+            raise RobotError(
+                f"{where}: '{name}' is scored (arm or torso), so a posture cannot set it."
+            )
         if not joint.is_movable:
             raise RobotError(f"{where}: '{name}' is fixed and has no position.")
         _check_within(joint, value, where)
 
 
 def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Refuse a place of rest that names another joint than the arm's, or breaks hard limits."""
+    """Refuse a rest posture with a joint outside the arm, or outside hard limits."""
     for name, value in robot.rest.items():
         if name not in robot.arm_joints:
             raise UnknownNameError("joint of the arm", name, robot.arm_joints, where=where)

@@ -7,58 +7,61 @@ from typing import Any
 
 from tcs.errors import RobotError
 from tcs.files.documents import checked, read_mapping
-from tcs.files.paths import named_file, shipped_files
+from tcs.files.paths import DataFiles, expanded
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.robot_file import RobotFile
 
-_FILES = ("urdf", "primitives")
-"""Fields that name a file, relative to the robot file."""
+ROBOTS = DataFiles("robot", "models/robots/*.yaml")
 BASED_ON = "based_on"
-"""Key of a file that takes over whatever it does not say itself from another robot."""
+"""Key that names another robot file, which gives every field that this one leaves out."""
+_PATH_FIELDS = ("urdf", "primitives")
+"""Fields that hold a path relative to the robot file."""
 
 
 def robot_names() -> tuple[str, ...]:
     """Return the names of the robots that ship with `tcs`, sorted."""
-    return tuple(_shipped())
+    return ROBOTS.names()
 
 
 def load_robot(name_or_path: str | Path) -> RobotFile:
-    """Return a robot, checked against its URDF, the files it names as absolute paths.
+    """Return a robot, checked against its URDF; the paths in it are absolute.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file: anything that ends in `.yaml`
             or holds a path separator.
 
     Raises:
-        UnknownNameError: If there is no robot of that name, or the file names something unknown.
+        UnknownNameError: If no robot has that name, or the file names something unknown.
         RobotError: If the file, or a model it names, cannot be used.
     """
-    path = named_file("robot", name_or_path, _shipped()).resolve()
+    path = ROBOTS.path(name_or_path)
     where = f"robot file '{path}'"
-    content = _content(path)
-    robot = checked(content, RobotFile, where, RobotError, also_known=(BASED_ON,))
+    robot = checked(_content(path), RobotFile, where, RobotError, also_known=(BASED_ON,))
     check_robot(robot, where=where)
     return robot
 
 
-def _content(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Return what a file says, with what it takes over; `above` are the files based on it."""
+def _content(path: Path, based_on_it: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Return the fields of a file, with those of the file it is based on.
+
+    Args:
+        path: The file.
+        based_on_it: Files that are based on this one, resolved.
+    """
     where = f"robot file '{path}'"
     content = read_mapping(path, where, RobotError, known=(*RobotFile.model_fields, BASED_ON))
-    for key in _FILES:
+    file = path.resolve()
+    for key in _PATH_FIELDS:
         value = content.get(key)
         if isinstance(value, str) and not value.startswith("package://"):
-            content[key] = str((path.parent / Path(value).expanduser()).resolve())
+            own = expanded(value, f"{where}, field '{key}'", RobotError)
+            content[key] = str((file.parent / own).resolve())
     base = content.pop(BASED_ON, None)
     if base is None:
         return content
-    chain = (*above, path)
+    chain = (*based_on_it, file)
     field = f"{where}, field '{BASED_ON}'"
-    file = named_file("robot", str(base), _shipped(), beside=path.parent, where=field).resolve()
-    if file in chain:
+    base_file = ROBOTS.path(str(base), beside=path.parent, where=field)
+    if base_file.resolve() in chain:
         raise RobotError(f"{field}: '{base}' is based on this file in turn. Name another one.")
-    return {**_content(file, chain), **content}
-
-
-def _shipped() -> dict[str, Path]:
-    return shipped_files("models/robots/*.yaml")
+    return {**_content(base_file, chain), **content}

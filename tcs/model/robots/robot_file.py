@@ -1,4 +1,4 @@
-"""Robot files: what `tcs` has to know about a robot beyond its URDF, as data."""
+"""Robot files: the arm, torso, tool, postures and collision shapes that a URDF does not name."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tcs.errors import UnknownNameError
-from tcs.files.documents import Document, Number, Placed, PositiveNumber
+from tcs.errors import RobotError, UnknownNameError
+from tcs.files.documents import Document, Number, Placed, PositiveNumber, checked
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
@@ -19,14 +19,14 @@ Positions = Mapping[Name, Number]
 
 
 class _OnLink(Placed):
-    """Something named that is fixed to a link of the robot."""
+    """A named entry that is fixed to a link of the robot."""
 
     name: Name
     parent: Name
 
 
 class ExtraFrame(_OnLink):
-    """A frame that the URDF lacks, e.g. the tip of a tool."""
+    """A frame to add to the URDF, e.g. the tip of a tool."""
 
 
 class BodyPrimitive(Placed):
@@ -38,56 +38,56 @@ class BodyPrimitive(Placed):
 
 
 class ExtraBody(_OnLink):
-    """A body that the URDF lacks, e.g. a tool in the hand."""
+    """A body to add to the URDF, e.g. a tool in the hand."""
 
     primitives: tuple[BodyPrimitive, ...]
 
 
 class DisabledGroup(Document):
-    """Pairs of bodies whose contact is never checked, and why."""
+    """Pairs of bodies whose contact is never checked, and the reason."""
 
     reason: Annotated[str, Field(min_length=10)]
     limits: Literal["soft", "hard"] = "hard"
-    """The widest limits under which the reason holds; "hard" holds under soft ones as well."""
+    """Widest joint limits under which the reason holds; "hard" includes the soft limits."""
     pairs: tuple[tuple[Name, Name], ...]
 
 
 class RobotFile(Document):
-    """A robot as its file says it; `load_robot` has checked it against the URDF."""
+    """Content of a robot file; `load_robot` checks it against the URDF."""
 
     name: Name
     title: str
     urdf: str
-    """`package://...`, or a path."""
+    """A `package://` address or a path."""
     root_body: Name
     """B: the URDF's root link, which the planar base joint carries."""
     arm_base: Name
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
-    """The scored arm's seven joints, from A outward."""
+    """The seven joints of the scored arm, from A to the tool."""
     rest: Mapping[Name, Number] = {}
-    """Where the scored arm's joints are while it rests [rad]; a joint not named is at 0, or at the
-    nearest position its limits allow."""
+    """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
+    nearest to 0."""
     tool_frame: Name
-    """T: what has to come to a goal; a link of the URDF, or an extra frame or body."""
+    """T: the frame that moves to the goals; a link of the URDF, or an extra frame or body."""
     torso_joint: Name | None = None
     limits: Literal["soft", "hard"] = "soft"
-    """Which limits of the URDF hold: `safety_controller` or `limit`."""
+    """Joint limits in force: those of `safety_controller` (soft) or of `limit` (hard)."""
     postures: Mapping[Name, Positions] = {}
-    """Joints other than arm and torso by posture name [rad or m]; a joint not named is at 0, or at
-    the nearest position its limits allow."""
+    """Positions of joints other than arm and torso by posture name [rad or m]; a joint that is
+    left out is at 0, or at the limit nearest to 0."""
     posture: Name | None = None
-    """The posture in force; None leaves every joint at 0."""
+    """Name of the posture in force; None leaves every joint at 0."""
     grippers: Mapping[Name, Positions] = {}
-    """Gripper joints by opening [rad or m]."""
+    """Positions of the gripper joints by name of the opening [rad or m]."""
     gripper: Name | None = None
-    """The opening in force."""
+    """Name of the opening in force."""
     frames: tuple[ExtraFrame, ...] = ()
     bodies: tuple[ExtraBody, ...] = ()
     standing_bodies: tuple[Name, ...] = ()
     """Bodies that may touch the floor."""
     primitives: str
-    """CSV file of the collision shapes."""
+    """Path of the CSV file of the collision primitives."""
     disabled_groups: tuple[DisabledGroup, ...] = ()
     source: str
 
@@ -98,37 +98,37 @@ class RobotFile(Document):
             ("gripper", self.gripper, self.grippers),
         ):
             if choice is not None and choice not in choices:
-                raise UnknownNameError(field, choice, choices, where=f"robot '{self.name}'")
+                raise UnknownNameError(field, choice, choices, where=f"field '{field}'")
         return self
 
     def __hash__(self) -> int:
-        """Hash the content; pydantic's own hash stumbles over the mappings."""
+        """Hash the content; the hash of pydantic fails for mappings."""
         return hash(self.model_dump_json())
 
     @property
     def disabled_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Every pair of bodies whose contact is not checked under the limits in force."""
+        """All pairs of bodies whose contact is not checked under the limits in force."""
         holding = (g for g in self.disabled_groups if g.limits in ("hard", self.limits))
         return tuple(pair for group in holding for pair in group.pairs)
 
     def urdf_path(self) -> Path:
-        """Return where the URDF lies on this machine.
+        """Return the path of the URDF on this machine.
 
         Raises:
-            RobotError: If it is not there.
+            RobotError: If there is no such file.
         """
         return resolve_uri(self.urdf, Path())
 
     def model(self) -> Urdf:
-        """Return what the URDF says.
+        """Return the content of the URDF.
 
         Raises:
-            RobotError: If it cannot be used.
+            RobotError: If the URDF cannot be used.
         """
         return read_urdf(self.urdf_path())
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
-        """Return the limits in force of every movable joint [rad or m], infinite where it turns on.
+        """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
 
         Raises:
             RobotError: If the URDF cannot be used.
@@ -137,10 +137,10 @@ class RobotFile(Document):
         return {j.name: j.soft if self.limits == "soft" else j.hard for j in joints if j.is_movable}
 
     def joint_positions(self) -> dict[str, float]:
-        """Return where every movable joint but the scored arm and the torso stands [rad or m].
+        """Return the position of every movable joint except scored arm and torso [rad or m].
 
-        Joints named by the posture and the gripper opening in force are where these say; joints
-        that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+        The posture and the gripper opening in force set the joints they name; mimic joints follow
+        their leader; all other joints are at 0, or at the limit in force nearest to 0.
 
         Raises:
             RobotError: If the URDF cannot be used.
@@ -154,12 +154,13 @@ class RobotFile(Document):
         return {n: q for n, q in self.with_mimics(given).items() if n not in scored}
 
     def with_mimics(self, given: Mapping[str, float]) -> dict[str, float]:
-        """Return the position of every movable joint, from those of some [rad or m].
+        """Return the position of every movable joint, given those of some [rad or m].
 
-        Joints that mimic another follow it; the rest is at 0, or at the nearest limit in force.
+        Mimic joints follow their leader; all other joints are at 0, or at the limit in force
+        nearest to 0.
 
         Args:
-            given: Joints whose position is known.
+            given: Known positions by joint.
 
         Raises:
             RobotError: If the URDF cannot be used.
@@ -179,7 +180,7 @@ class RobotFile(Document):
         return {name: position(name) for name in limits}
 
     def load_primitives(self) -> tuple[Primitive, ...]:
-        """Return every collision shape: those of the CSV file, then those of the extra bodies.
+        """Return the collision primitives of the CSV file, then those of the extra bodies.
 
         Raises:
             RobotError: If the file cannot be used.
@@ -204,7 +205,7 @@ class RobotFile(Document):
         gripper: str | None = None,
         limits: Literal["soft", "hard"] | None = None,
     ) -> RobotFile:
-        """Return the same robot with another posture, gripper opening or kind of limits in force.
+        """Return the same robot with another posture, gripper opening or type of limits in force.
 
         Args:
             posture: Name of a posture of the file; None keeps the one in force.
@@ -213,10 +214,11 @@ class RobotFile(Document):
 
         Raises:
             UnknownNameError: If the file has no posture or opening of that name.
+            RobotError: If `limits` is neither "soft" nor "hard".
         """
         chosen = {"posture": posture, "gripper": gripper, "limits": limits}
         given = {key: value for key, value in chosen.items() if value is not None}
-        return RobotFile.model_validate(self.model_dump() | given)
+        return checked(self.model_dump() | given, RobotFile, f"robot '{self.name}'", RobotError)
 
 
 def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:

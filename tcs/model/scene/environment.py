@@ -18,7 +18,7 @@ from tcs.files.documents import (
     checked,
     read_mapping,
 )
-from tcs.files.paths import data_folder, named_file, shipped_files
+from tcs.files.paths import DataFiles, data_folder
 from tcs.model.grid import Axis, Grid
 from tcs.model.scene.joint_error import JointError
 from tcs.model.scene.posture import Posture
@@ -154,9 +154,12 @@ NOWHERE = EnvironmentFile(
 """For a robot by itself: not even a floor."""
 
 
+ENVIRONMENTS = DataFiles("environment", "models/beds_wheelchairs/*.yaml")
+
+
 def environment_names() -> tuple[str, ...]:
     """Return the names of the environments that ship with `tcs`, sorted."""
-    return tuple(_shipped())
+    return ENVIRONMENTS.names()
 
 
 def load_environment(name_or_path: str | Path) -> EnvironmentFile:
@@ -175,11 +178,7 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
     >>> load_environment("wheelchair").body_frames["head"]
     'person::head_center'
     """
-    return _read(named_file("environment", name_or_path, _shipped()).absolute())
-
-
-def _shipped() -> dict[str, Path]:
-    return shipped_files("models/beds_wheelchairs/*.yaml")
+    return _read(ENVIRONMENTS.path(name_or_path).absolute())
 
 
 def _folder() -> Path:
@@ -218,7 +217,7 @@ def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> Environment
     """Return the environment that the file at `path` is based on."""
     chain = (*above, path)
     where = f"environment file '{path}', field '{BASED_ON}'"
-    base = named_file("environment", name_or_path, _shipped(), beside=path.parent, where=where)
+    base = ENVIRONMENTS.path(name_or_path, beside=path.parent, where=where)
     base = base.absolute()
     if base.resolve() in [file.resolve() for file in chain]:
         raise EnvironmentFileError(

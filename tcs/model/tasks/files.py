@@ -8,9 +8,11 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from tcs.errors import TaskError, UnknownNameError
-from tcs.files.documents import Document, checked, read_mapping
-from tcs.files.paths import named_file, shipped_files
+from tcs.files.documents import Document, read_document
+from tcs.files.paths import DataFiles
 from tcs.model.tasks.task import Goal, Task
+
+TASKS = DataFiles("task", "tasks/*/*.yaml")
 
 
 class _Entry(Document):
@@ -51,7 +53,7 @@ class TaskFile(_Entry):
 
 def task_names() -> tuple[str, ...]:
     """Return the names of the tasks that ship with `tcs`, sorted."""
-    return tuple(_shipped())
+    return TASKS.names()
 
 
 def load_task(name_or_path: str | Path) -> Task:
@@ -68,17 +70,12 @@ def load_task(name_or_path: str | Path) -> Task:
     >>> len(load_task("shaving").goals)
     8
     """
-    return _read(named_file("task", name_or_path, _shipped()))
-
-
-def _shipped() -> dict[str, Path]:
-    return shipped_files("tasks/*/*.yaml")
+    return _read(TASKS.path(name_or_path))
 
 
 def _read(path: Path) -> Task:
     where = f"task file '{path}'"
-    content = read_mapping(path, where, TaskError, known=TaskFile.model_fields)
-    written = checked(content, TaskFile, where, TaskError)
+    written = read_document(path, TaskFile, where, TaskError)
     goals = []
     for i, entry in enumerate(written.goals):
         try:

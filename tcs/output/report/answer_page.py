@@ -27,7 +27,7 @@ from tcs.output.report.blocks import (
     Text,
 )
 from tcs.output.report.machine import machine, today, versions
-from tcs.output.report.reproduce import commands, estimated
+from tcs.output.report.reproduce import as_given, commands, estimated
 from tcs.output.words import (
     REASON_TEXTS,
     assigned_goals,
@@ -297,9 +297,9 @@ def _made(answer: Answer, command: str) -> list[Block]:
     scored: Sequence[tuple[str, str]] = (
         ("Score file", f"{answer.path.name}, SHA-256 {answer.sha256}"),
         ("Scored by", f"tcs {metadata['program_version']}, {metadata['created']}"),
-        ("Task", metadata["task"]),
-        ("Environment", metadata["environment"]),
-        ("Robot", metadata["robot"]),
+        ("Task", as_given(file, "task")),
+        ("Environment", as_given(file, "environment")),
+        ("Robot", as_given(file, "robot")),
         ("Scene", f"SHA-256 {metadata['scene_digest']}; the models of today are the same"),
         ("Inverse kinematics", answer.verification.ik),
         ("Configurations", _configurations(answer)),

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tcs.errors import DataFileError
-from tcs.files.documents import Document, Number, checked, read_mapping
+from tcs.files.documents import Document, Number, read_document
 
 Percent = Annotated[Number, Field(ge=0, le=100)]
 
@@ -85,5 +85,4 @@ def load_paper() -> Paper:
     """Return the figures of the TCS paper."""
     with as_file(files("tcs.output.report").joinpath("paper.yaml")) as path:
         where = f"paper file '{path.name}'"
-        content = read_mapping(path, where, DataFileError, known=tuple(Paper.model_fields))
-        return checked(content, Paper, where, DataFileError)
+        return read_document(path, Paper, where, DataFileError)

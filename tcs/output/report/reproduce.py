@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+from pathlib import Path
 from typing import Any
 
 from tcs.output.report.answer import Answer
-from tcs.placement.store import state_to_json
+from tcs.placement.store import ScoreFile, state_to_json
 
 PAPER_DISTANCE = 0.40
 """Least distance of two members where nobody asks for another [m], as in the TCS paper."""
@@ -27,8 +29,8 @@ def commands(answer: Answer, report: str) -> str:
 def score_command(answer: Answer) -> str:
     """Return the command that scores the same again; today's models are those of the file."""
     file, sets = answer.file, answer.scored.sets
-    words = ["tcs", "score", file.metadata["task"]]
-    words += ["--environment", file.metadata["environment"], "--robot", file.metadata["robot"]]
+    words = ["tcs", "score", as_given(file, "task")]
+    words += ["--environment", as_given(file, "environment"), "--robot", as_given(file, "robot")]
     words += ["--measure", answer.measure, "--rules", sets.rule]
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
@@ -39,6 +41,20 @@ def score_command(answer: Answer) -> str:
     if abs(sets.min_distance - PAPER_DISTANCE) > 1e-9:
         line += f"  # in Python, with min_distance={sets.min_distance:g}"
     return line
+
+
+def as_given(file: ScoreFile, key: str) -> str:
+    """Return the name or path of a data file as it was given to `tcs score`.
+
+    A relative path that leads elsewhere from the current folder is returned as absolute path.
+
+    Args:
+        file: The score file.
+        key: "task", "environment" or "robot".
+    """
+    located = str(file.metadata[key])
+    given = str(file.metadata.get("given", {}).get(key, located))
+    return given if str(Path(os.path.expanduser(given)).absolute()) == located else located
 
 
 def robustify_command(answer: Answer) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import DataFileError, TcsError
-from tcs.files.documents import Document, checked, read_mapping
+from tcs.files.documents import Document, read_document
 from tcs.model.scene import JointError, Scene
 
 Offsets = Mapping[str, NDArray[np.float64]]
@@ -63,9 +63,7 @@ class ErrorModel:
             where = source = "errors given"
         else:
             where = f"error file '{errors}'"
-            known = tuple(ErrorFile.model_fields)
-            content = read_mapping(Path(errors), where, DataFileError, known=known)
-            read = checked(content, ErrorFile, where, DataFileError)
+            read = read_document(Path(errors), ErrorFile, where, DataFileError)
             source, errors = read.source or str(errors), read.errors
         for name, error in errors.items():
             scene.built.environment_joints.check_error(name, error, where=where)

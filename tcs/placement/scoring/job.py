@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
+from typing import Any
 
-from tcs.errors import TaskError
+from tcs.errors import DataFileError, TaskError
+from tcs.files.paths import expanded
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import (
@@ -93,12 +95,24 @@ def load_job(
     return Job(task, SceneSpec(robot, environment), grid, environment.observed_axes)
 
 
-def data_references(job: Job, task: object, environment: object, robot: object) -> dict[str, str]:
-    """Return the references of a job's data files, given the arguments of `load_job`."""
+def data_references(job: Job, task: object, environment: object, robot: object) -> dict[str, Any]:
+    """Return the metadata that locates a job's data files, given the arguments of `load_job`.
+
+    Returns:
+        `task`, `environment` and `robot` as of `data_reference`, and under `given` the same as the
+        caller wrote them.
+    """
+    loaded = {
+        "task": (task, job.task.name),
+        "environment": (environment, job.spec.environment.name),
+        "robot": (robot, job.spec.robot.name),
+    }
     return {
-        "task": data_reference(task, job.task.name),
-        "environment": data_reference(environment, job.spec.environment.name),
-        "robot": data_reference(robot, job.spec.robot.name),
+        **{key: data_reference(given, name) for key, (given, name) in loaded.items()},
+        "given": {
+            key: str(given) if isinstance(given, str | Path) else name
+            for key, (given, name) in loaded.items()
+        },
     }
 
 
@@ -110,5 +124,5 @@ def data_reference(given: object, name: str) -> str:
         name: The name that the file contains.
     """
     if isinstance(given, Path) or (isinstance(given, str) and given != name):
-        return str(Path(given).absolute())
+        return str(expanded(str(given), "file", DataFileError).absolute())
     return name

@@ -98,7 +98,29 @@ def test_groups_found_under_soft_limits_do_not_hold_under_hard_ones(pr2):
     assert hard < soft
 
 
-def test_unknown_names_are_told_with_the_nearest():
+def test_messages_name_the_file_as_it_was_given(content, tmp_path, monkeypatch):
+    write(tmp_path, content | {"tool_frame": "nowhere"})
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnknownNameError, match=r"^robot file 'mine\.yaml', field 'tool_frame': "):
+        load_robot("mine.yaml")
+
+
+def test_choices_that_do_not_exist_are_one_line(pr2):
+    with pytest.raises(UnknownNameError, match=r"^robot 'pr2', field 'gripper': unknown gripper"):
+        pr2.with_choices(gripper="ajar")
+    with pytest.raises(RobotError, match=r"^robot 'pr2', field 'limits' is 'none', but must be"):
+        pr2.with_choices(limits="none")
+
+
+def test_the_home_folder_of_an_unknown_user_is_one_line(content, tmp_path):
+    path = write(tmp_path, content | {"primitives": "~nouser/shapes.csv"})
+    with pytest.raises(
+        RobotError, match=r"mine\.yaml', field 'primitives' '~nouser/shapes\.csv': "
+    ):
+        load_robot(path)
+
+
+def test_an_unknown_name_is_reported_with_the_nearest():
     with pytest.raises(UnknownNameError, match="Did you mean 'pr2'"):
         load_robot("pr3")
 
@@ -114,36 +136,42 @@ def put(field, name, value):
 WRONG = {
     "unknown tool frame": (
         change("tool_frame", "l_gripper_tool_fram"),
-        "tool_frame: unknown .*'l_gripper_tool_fram'.*Did you mean 'l_gripper_tool_frame'",
+        "field 'tool_frame': unknown .*'l_gripper_tool_fram'.*Did you mean 'l_gripper_tool_frame'",
     ),
     "unknown key": (change("tol_frame", "x"), "unknown key 'tol_frame'.*Did you mean 'tool_frame'"),
     "missing key": (lambda content: content.pop("urdf"), "field 'urdf' is missing"),
     "unknown arm joint": (
         lambda content: content["arm_joints"].__setitem__(3, "l_elbow_flx_joint"),
-        "arm_joints: unknown joint.*Did you mean 'l_elbow_flex_joint'",
+        "field 'arm_joints': unknown joint.*Did you mean 'l_elbow_flex_joint'",
     ),
     "six arm joints": (
         lambda content: content["arm_joints"].pop(),
-        r"field 'arm_joints' is .*, but list should have at least 7",
+        r"field 'arm_joints' is .*, but must have at least 7 items",
     ),
     "wrong order": (
         lambda content: content["arm_joints"].reverse(),
-        "arm_joints: from 'torso_lift_link' to 'l_gripper_tool_frame' the URDF has l_shoulder_pan",
+        "field 'arm_joints': from 'torso_lift_link' to 'l_gripper_tool_frame' the URDF has l_sh",
     ),
-    "tool of the other arm": (change("tool_frame", "r_gripper_tool_frame"), "arm_joints: from"),
-    "root that is carried": (change("root_body", "base_link"), "must be the root.*base_footprint"),
+    "tool of the other arm": (
+        change("tool_frame", "r_gripper_tool_frame"),
+        "field 'arm_joints': from",
+    ),
+    "root that is carried": (
+        change("root_body", "base_link"),
+        "must be the root link.*base_footprint",
+    ),
     "torso that turns": (change("torso_joint", "head_pan_joint"), "must be prismatic"),
     "posture beyond its limits": (
         put("postures", "wild", {"r_elbow_flex_joint": 0.3}),
-        r"postures.wild: 'r_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
+        r"field 'postures.wild': 'r_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
     ),
     "posture of an unknown joint": (
         put("postures", "wild", {"r_elbow": 0.0}),
-        "postures.wild: unknown joint 'r_elbow'",
+        "field 'postures.wild': unknown joint 'r_elbow'",
     ),
     "posture of the scored arm": (
         put("postures", "wild", {"l_elbow_flex_joint": -1.0}),
-        "'l_elbow_flex_joint' is scored",
+        "'l_elbow_flex_joint' is scored \\(arm or torso\\)",
     ),
     "posture of a fixed joint": (
         put("postures", "wild", {"base_laser_joint": 0.0}),
@@ -155,29 +183,38 @@ WRONG = {
     ),
     "rest of another joint": (
         change("rest", {"r_elbow_flex_joint": -1.0}),
-        "rest: unknown joint of the arm 'r_elbow_flex_joint'.*Did you mean 'l_elbow_flex_joint'",
+        "field 'rest': unknown joint of the arm 'r_elbow_flex_joint'.*Did you mean 'l_elbow_flex",
     ),
     "rest beyond its limits": (
         change("rest", {"l_elbow_flex_joint": 0.3}),
-        r"rest: 'l_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
+        r"field 'rest': 'l_elbow_flex_joint' is 0.3, but must be in \[-2.3213, 0\]",
     ),
-    "unknown posture": (change("posture", "tuckd"), "unknown posture 'tuckd'.*Did you mean"),
-    "unknown gripper": (change("gripper", "ajar"), "unknown gripper 'ajar'"),
-    "limits of another kind": (
+    "unknown posture": (
+        change("posture", "tuckd"),
+        "mine\\.yaml', field 'posture': unknown posture 'tuckd'.*Did you mean",
+    ),
+    "unknown gripper": (change("gripper", "ajar"), "field 'gripper': unknown gripper 'ajar'"),
+    "limits of another type": (
         change("limits", "none"),
         "field 'limits' is 'none', but must be 'soft' or 'hard'",
     ),
-    "URDF not there": (change("urdf", "nowhere.urdf"), "there is no file"),
+    "URDF not there": (
+        change("urdf", "nowhere.urdf"),
+        "mine\\.yaml', field 'urdf': .*there is no file",
+    ),
     "package not there": (
         change("urdf", "package://no_such_robot/a.urdf"),
         "'no_such_robot' is neither installed nor a folder above",
     ),
-    "primitives not there": (change("primitives", "nowhere.csv"), "cannot be read"),
+    "primitives not there": (
+        change("primitives", "nowhere.csv"),
+        "mine\\.yaml', field 'primitives': .*cannot be read",
+    ),
     "disabled pair of an unknown body": (
         change(
             "disabled_groups", [{"reason": "because I say so", "pairs": [["l_arm", "base_link"]]}]
         ),
-        "disabled_groups: unknown link or frame 'l_arm'",
+        "field 'disabled_groups': unknown link or frame 'l_arm'",
     ),
     "disabled pair without reason": (
         change("disabled_groups", [{"pairs": [["base_link", "torso_lift_link"]]}]),
@@ -185,11 +222,11 @@ WRONG = {
     ),
     "extra frame with a taken name": (
         change("frames", [{"name": "base_link", "parent": "base_footprint"}]),
-        "this name is taken",
+        "the name is taken",
     ),
     "extra frame on itself": (
         change("frames", [{"name": "tip", "parent": "tip"}]),
-        "'tip': it hangs on itself",
+        "'tip': its parents lead back to itself",
     ),
     "extra frame on an unknown parent": (
         change("frames", [{"name": "tip", "parent": "l_palm"}]),
@@ -220,7 +257,7 @@ def test_a_key_that_comes_twice_is_refused(content, tmp_path):
     path = write(tmp_path, content)
     path.write_text(path.read_text() + "title: another\n")
     with pytest.raises(
-        RobotError, match=r"mine\.yaml' is no sound YAML: line .*'title' is there tw"
+        RobotError, match=r"mine\.yaml' is not valid YAML: line .*'title' appears tw"
     ):
         load_robot(path)
 

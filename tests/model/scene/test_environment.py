@@ -220,7 +220,14 @@ def test_what_is_no_mapping_is_refused(tmp_path, text):
 def test_a_key_that_comes_twice_is_refused(tmp_path):
     path = written(tmp_path)
     path.write_text(path.read_text() + "title: another\n")
-    with pytest.raises(EnvironmentFileError, match=r"line .*: key 'title' is there twice"):
+    with pytest.raises(EnvironmentFileError, match=r"line .*: key 'title' appears twice"):
+        load_environment(path)
+
+
+def test_a_fault_of_the_grid_names_the_field_once(tmp_path):
+    axis = {"unit": "m", "start": 0.0, "step": 0.1, "count": 1}
+    path = written(tmp_path, grid={"base_x": axis})
+    with pytest.raises(GridError, match=r"room\.yaml', field 'grid': needs axis base_y"):
         load_environment(path)
 
 

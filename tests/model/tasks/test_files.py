@@ -176,13 +176,13 @@ def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, said):
         ("[wheelchair]", "wheelchair", "field 'environments' is 'wheelchair', but must be a valid"),
         ("source: made up\n", "", "field 'source' is missing."),
         ("goals:", "allowed_contacts: [[a]]\ngoals:", "field 'allowed_contacts[0]' is ['a']"),
-        ("goals:", "1: 2\ngoals:", "line 5, column 1: a key must be a word"),
-        ("goals:", "? [a, b]\n: 2\ngoals:", "line 5, column 3: a key must be a word"),
+        ("goals:", "1: 2\ngoals:", "line 5, column 1: a key must be text"),
+        ("goals:", "? [a, b]\n: 2\ngoals:", "line 5, column 3: a key must be text"),
         ("Wiping the mouth", f"[{'9' * 999}]", "field 'title' is [9"),
         ("Wiping the mouth", "2015-13-01", "holds an impossible value: month must be in 1..12."),
-        ("goals:", "name: other\ngoals:", "line 5, column 1: key 'name' is there twice"),
-        ("[wheelchair]", "[wheelchair", "is no sound YAML: line "),
-        ("name: wiping", "name: !!python/name:os.system", "is no sound YAML: line 1"),
+        ("goals:", "name: other\ngoals:", "line 5, column 1: key 'name' appears twice"),
+        ("[wheelchair]", "[wheelchair", "is not valid YAML: line "),
+        ("name: wiping", "name: !!python/name:os.system", "is not valid YAML: line 1"),
     ],
 )
 def test_impossible_values_are_refused_with_their_place(refused, old, new, said):
@@ -201,8 +201,8 @@ def test_goals_are_needed(refused):
     [
         ("", "must hold keys and values: name, title"),
         ("- a\n- b\n", "must hold keys and values"),
-        (b"\xff\xfe\x00", "is no text file in UTF-8"),
-        ("name: a\x00", "is no sound YAML"),
+        (b"\xff\xfe\x00", "is not a text file in UTF-8"),
+        ("name: a\x00", "is not valid YAML"),
     ],
     ids=["empty", "list", "binary", "control"],
 )

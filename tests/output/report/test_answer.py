@@ -24,7 +24,7 @@ from tcs.output.report.answer_tables import (
     success_table,
     verification_table,
 )
-from tcs.output.report.reproduce import robustify_command, score_command
+from tcs.output.report.reproduce import as_given, robustify_command, score_command
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
@@ -222,6 +222,19 @@ def test_estimates_of_success_are_those_of_the_file(answer):
     plain = dataclasses.replace(answer, file=file)
     assert success_table(plain) is None
     assert "tcs robustify" in as_markdown(answer_page(plain, command="c"))
+
+
+def test_data_files_are_named_as_they_were_given(answer, tmp_path, monkeypatch):
+    own = tmp_path / "mine.yaml"
+    located = {**answer.file.metadata, "robot": str(own)}
+    file = dataclasses.replace(
+        answer.file, metadata={**located, "given": {"robot": "mine.yaml", "task": "shaving"}}
+    )
+    monkeypatch.chdir(tmp_path)
+    assert (as_given(file, "robot"), as_given(file, "task")) == ("mine.yaml", "shaving")
+    # From another folder the relative path would lead nowhere.
+    monkeypatch.chdir(tmp_path.parent)
+    assert as_given(file, "robot") == str(own)
 
 
 def test_commands_make_the_same_again(answer, score_path):

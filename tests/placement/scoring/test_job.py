@@ -10,6 +10,7 @@ import pytest
 from tcs.errors import TaskError, TcsError, UnknownNameError
 from tcs.model.tasks import load_task
 from tcs.placement.scoring import load_job, score, summary, sweep
+from tcs.placement.scoring.job import data_references
 from tcs.placement.store import load_scores, save_scores
 
 
@@ -113,3 +114,18 @@ def test_an_unknown_body_frame_names_task_and_goal(tmp_path, small_environment):
     )
     with pytest.raises(UnknownNameError, match=r"goal 0.*haed.*Did you mean 'head'"):
         score(path, small_environment)
+
+
+def test_metadata_locates_the_files_and_keeps_how_they_were_given(small_job, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    made = data_references(small_job, "shaving", small_job.spec.environment, "~/mine.yaml")
+    assert made["robot"] == str(tmp_path / "mine.yaml")
+    assert made["given"] == {
+        "task": "shaving",
+        "environment": small_job.spec.environment.name,
+        "robot": "~/mine.yaml",
+    }
+    assert data_references(small_job, "a", "b", "./mine.yaml")["robot"] == str(
+        tmp_path / "mine.yaml"
+    )
