@@ -12,7 +12,7 @@ import numpy as np
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.robots import RobotFile, load_robot
-from tcs.model.scene import NOWHERE, Scene, SceneSpec, arm_chain
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 
 JOINTS = 7
 DEFAULT_VELOCITY = 1.0
@@ -171,7 +171,7 @@ def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm
     if not math.isfinite(torso_height):
         raise TcsError(f"torso height: must be a finite number [m], not {torso_height}.")
     file = robot if isinstance(robot, RobotFile) else load_robot(robot)
-    scene = Scene(SceneSpec(file, NOWHERE))
+    scene = Scene(SceneSpec(file, EMPTY_ENVIRONMENT))
     used = scene.set_torso(torso_height)
     scene.set_arm(np.zeros(JOINTS))
     chain, _ = arm_chain(scene)

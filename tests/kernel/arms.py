@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from tcs.kernel.arrays import Chain
 from tcs.model.robots.urdf.kinematic import kinematic_urdf
-from tcs.model.scene.chain import Axis, link_frames
+from tcs.model.scene.chain import JointAxis, link_frames
 
 _ROBOTS = "package://example-robot-data/robots"
 _PR2 = "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll"
@@ -89,7 +89,9 @@ class DrakeArm:
         axes = []
         for joint in self._joints:
             X_AJ = joint.frame_on_child().CalcPose(self._context, self._base)
-            axes.append(Axis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
+            axes.append(
+                JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis())
+            )
         frames = [RigidTransform()]
         for R, p in zip(*link_frames(tuple(axes)), strict=True):
             frames.append(RigidTransform(RotationMatrix(R), p))

@@ -5,19 +5,18 @@ import pytest
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.model.robots import load_robot
-from tcs.model.scene import EnvironmentFile, Scene, SceneSpec
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
 from tcs.teleop import load_arm
 from tcs.teleop.arm import DEFAULT_VELOCITY, Arm
 
 ROBOTS = ("iiwa7", "pr2", "tiago", "panda", "pr2_right")
-NOWHERE = EnvironmentFile(name="nowhere", title="", origin="", source="none", floor=False, grid={})
 
 
 @pytest.mark.parametrize("lift", [0.0, 0.2])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_tool_and_jacobian_are_those_of_drake(name, lift, rng):
     arm = load_arm(name, torso_height=lift)
-    scene = Scene(SceneSpec(load_robot(name), NOWHERE))
+    scene = Scene(SceneSpec(load_robot(name), EMPTY_ENVIRONMENT))
     assert scene.set_torso(lift) == arm.torso_height
     for joints in arm.random_joints(rng, 20):
         scene.set_arm(joints)

@@ -14,7 +14,7 @@ from tcs.model.robots import RobotFile
 from tcs.model.robots.fitting import BodyEnclosure, enclosure
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
-from tcs.model.scene import NOWHERE, Contact, Scene, SceneSpec, arm_chain
+from tcs.model.scene import EMPTY_ENVIRONMENT, Contact, Scene, SceneSpec, arm_chain
 
 MOST_EXCESS = 2.0
 """Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
@@ -206,7 +206,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         RobotError: If a model or mesh of the robot cannot be used.
         OutputError: If the kernel's cache cannot be written.
     """
-    scene = Scene(SceneSpec(robot, NOWHERE))
+    scene = Scene(SceneSpec(robot, EMPTY_ENVIRONMENT))
     scene.set_arm(np.zeros(len(robot.arm_joints)))
     arm = arm_class(arm_chain(scene)[0])
     positions = robot.with_mimics({**robot.joint_positions(), **robot.rest})
@@ -219,7 +219,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         limits=_limits(robot),
         bodies=enclosure(robot),
         rest=rest,
-        margin=NOWHERE.contact_margin,
+        margin=EMPTY_ENVIRONMENT.contact_margin,
         lowest=_lowest(robot, positions),
         contacts=contacts,
         trip=round_trip(scene, arm.solver, samples, seed),

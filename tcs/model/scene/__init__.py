@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
+from tcs.model.scene.body_frames import body_frame_positions
 from tcs.model.scene.environment import (
-    NOWHERE,
+    EMPTY_ENVIRONMENT,
     EnvironmentFile,
     ModelEntry,
     Obstacle,
     environment_names,
     load_environment,
 )
-from tcs.model.scene.frames import body_frame_places
-from tcs.model.scene.joint_error import JointError
+from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.lowering import LoweredScene, arm_chain, environment_at, goal_poses, lower
-from tcs.model.scene.observation import Found, Observation, find_joints
+from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
 from tcs.model.scene.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
 from tcs.model.scene.spec import SceneSpec
 
 __all__ = [
-    "NOWHERE",
+    "EMPTY_ENVIRONMENT",
     "Contact",
     "EnvironmentFile",
-    "Found",
-    "JointError",
+    "ErrorDistribution",
+    "JointEstimate",
     "LoweredScene",
     "ModelEntry",
     "Observation",
@@ -32,10 +32,10 @@ __all__ = [
     "Scene",
     "SceneSpec",
     "arm_chain",
-    "body_frame_places",
+    "body_frame_positions",
     "environment_at",
     "environment_names",
-    "find_joints",
+    "estimate_joints",
     "goal_poses",
     "load_environment",
     "lower",

@@ -18,7 +18,7 @@ meet is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class JointAxis:
     """A joint axis and the frame of the link it moves, all joints at zero.
 
     Attributes:
@@ -37,7 +37,7 @@ class Axis:
         return self.R_AJ @ self.direction_J
 
 
-def link_frames(axes: tuple[Axis, ...]) -> tuple[FloatArray, FloatArray]:
+def link_frames(axes: tuple[JointAxis, ...]) -> tuple[FloatArray, FloatArray]:
     """Return the poses of link frames L1..L7 in the arm base A, all joints at zero.
 
     Each L turns about its own z. Its origin is that of the joint frame, except where sliding it
@@ -68,7 +68,7 @@ def link_frames(axes: tuple[Axis, ...]) -> tuple[FloatArray, FloatArray]:
 
 
 def _common_points(
-    first: Axis, middle: Axis, last: Axis
+    first: JointAxis, middle: JointAxis, last: JointAxis
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return where three axes in a row meet in one point, one point on each, in A [m], or None."""
     # The outer two may be parallel at zero, so each is met with the middle one, where the point is
@@ -79,14 +79,14 @@ def _common_points(
     return inner[0], inner[1], outer[0]
 
 
-def meeting_points(first: Axis, second: Axis) -> tuple[FloatArray, FloatArray] | None:
+def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, FloatArray] | None:
     """Return where two axes meet, expressed in A [m], or None if they pass each other.
 
     Axes given in rounded figures miss each other by a hair, so there is one point on each: every
     link origin stays on its own axis, and the chain stays exact.
 
-    >>> z = Axis(np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    >>> x = Axis(np.eye(3), np.array([5.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]))
+    >>> z = JointAxis(np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    >>> x = JointAxis(np.eye(3), np.array([5.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]))
     >>> [point.tolist() for point in meeting_points(z, x)]
     [[0.0, 0.0, 2.0], [0.0, 0.0, 2.0]]
     """

@@ -1,4 +1,4 @@
-"""Environment files: furniture, person, the user's own obstacles, grid and error model, as data."""
+"""Environment files: furniture, person, the user's own obstacles, grid and error model."""
 
 from __future__ import annotations
 
@@ -20,36 +20,36 @@ from tcs.files.documents import (
 )
 from tcs.files.paths import DataFiles, data_folder
 from tcs.model.grid import Axis, Grid
-from tcs.model.scene.joint_error import JointError
+from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
 
 FLOOR = "floor"
 """Name under which the floor is reported."""
 BASED_ON = "based_on"
-"""Key of a file that takes over whatever it does not say itself from another environment."""
+"""Key that names the environment a file inherits all its missing keys from."""
 WORLD = "world"
 """Name of the environment frame W as a parent."""
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
-class _NamedPlace(Placed):
-    """Something named that stands in its parent's frame."""
+class _NamedEntry(Placed):
+    """A named object with a pose in its parent's frame."""
 
     name: Name
 
 
-class ModelEntry(_NamedPlace):
+class ModelEntry(_NamedEntry):
     """An SDFormat model that is part of the environment."""
 
     file: str
     parent: str = WORLD
     """Where its root link is fixed: "world" or "model::link"."""
     named_by: Literal["link", "collision"] = "collision"
-    """What a blocked configuration is blamed on: the link, or the single collision shape."""
+    """Name under which contacts are reported: the link's, or the single collision shape's."""
 
 
-class Obstacle(_NamedPlace):
+class Obstacle(_NamedEntry):
     """An obstacle of the user's own: a box, or any SDFormat model, fixed to the world."""
 
     box: tuple[PositiveNumber, PositiveNumber, PositiveNumber] | None = None
@@ -67,7 +67,7 @@ E = TypeVar("E", ModelEntry, Obstacle)
 
 
 class EnvironmentFile(Document):
-    """Everything that surrounds the robot, as its file says it."""
+    """Everything that surrounds the robot, as written in its file."""
 
     name: Name
     title: str
@@ -75,27 +75,30 @@ class EnvironmentFile(Document):
     """Where the origin of W is and where its axes point, in words."""
     source: str
     models: tuple[ModelEntry, ...] = ()
+    person: Name | None = None
+    """Name of the model that is the person; without it the model named "person", if there is one.
+    All other models are furniture, also those with body frames."""
     obstacles: tuple[Obstacle, ...] = ()
     floor: bool = True
-    """A floor at z = 0 that the arm must not touch; what stands on it is exempt."""
+    """A floor at z = 0 that the arm must not touch; the rest of the robot stands on it."""
     joints: Mapping[str, Number] = {}
     """Joint positions that differ from 0 [m or rad]."""
     posture: Mapping[str, Posture] = {}
-    """For each joint that others follow, e.g. a head rest, where those others stand."""
+    """For each leading joint, e.g. a head rest, the positions of the joints that follow it."""
     body_frames: Mapping[str, str] = {}
-    """Names that goals use for parts of the person, each a "model::link"."""
+    """Frames that goals may be fixed to, e.g. parts of the person: name and "model::link"."""
     padding: Mapping[str, Length] = {}
-    """How far the true surface may stand out of a link's shapes, by "model::link" [m]."""
+    """How far the true surface may protrude from a link's shapes, by "model::link" [m]."""
     contact_margin: Length = 0.001
     """Contacts closer than this count as collision [m]."""
     grid: Mapping[str, Mapping[str, Any]]
-    """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis that is
-    none of the robot's moves the joint of its name."""
+    """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis other
+    than the robot's moves the joint of its name."""
     observed: Mapping[str, Mapping[str, Any]] = {}
-    """Axes that the robot finds as they are and cannot choose, in the same form: the joint of that
-    name is scored at each of the values."""
-    errors: Mapping[str, JointError] = {}
-    """How far off each joint may be (Table II of the TCS paper)."""
+    """Axes that the robot observes and cannot choose, in the same form: the joint of that name is
+    scored at each of the values."""
+    errors: Mapping[str, ErrorDistribution] = {}
+    """Error distribution of each joint (Table II of the TCS paper)."""
 
     @model_validator(mode="after")
     def _names_are_distinct(self) -> Self:
@@ -104,6 +107,15 @@ class EnvironmentFile(Document):
             if entry.name in names:
                 raise ValueError(f"name '{entry.name}' is used twice or reserved; rename one")
             names.append(entry.name)
+        return self
+
+    @model_validator(mode="after")
+    def _person_is_a_model(self) -> Self:
+        known = [model.name for model in self.models]
+        if self.person is not None and self.person not in known:
+            raise ValueError(
+                f"person: no model is named '{self.person}'; there are {', '.join(known) or 'none'}"
+            )
         return self
 
     @model_validator(mode="after")
@@ -121,14 +133,14 @@ class EnvironmentFile(Document):
             for name in getattr(self, field):
                 if name in leader_of:
                     raise ValueError(
-                        f"{field}: '{name}' follows '{leader_of[name]}', so it cannot be set by "
-                        "hand; take it out here or under 'posture'"
+                        f"{field}: '{name}' follows '{leader_of[name]}', so it cannot be set "
+                        "itself; remove it here or under 'posture'"
                     )
         return self
 
     @property
     def observed_axes(self) -> tuple[Axis, ...]:
-        """The axes under `observed`, in the order they are written in."""
+        """The axes under `observed`, in the order of the file."""
         return tuple(
             Axis.from_dict({**plain, "name": name}) for name, plain in self.observed.items()
         )
@@ -138,20 +150,24 @@ class EnvironmentFile(Document):
         """Models, then obstacles."""
         return (*self.models, *self.obstacles)
 
+    def is_person(self, model: str) -> bool:
+        """Return whether the model of that name is the person, rather than furniture."""
+        return model == (self.person or "person") and any(m.name == model for m in self.models)
+
     def __hash__(self) -> int:
-        """Hash the content; pydantic's own hash stumbles over the mappings."""
+        """Return a hash of the content; pydantic's own hash fails on mappings."""
         return hash(self.model_dump_json())
 
 
-NOWHERE = EnvironmentFile(
-    name="nowhere",
-    title="Nothing at all",
+EMPTY_ENVIRONMENT = EnvironmentFile(
+    name="empty",
+    title="Empty space",
     origin="the robot's base",
     source="none: there is nothing in it",
     floor=False,
     grid={},
 )
-"""For a robot by itself: not even a floor."""
+"""An environment without any object, not even a floor."""
 
 
 ENVIRONMENTS = DataFiles("environment", "models/beds_wheelchairs/*.yaml")
@@ -166,14 +182,14 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
     """Return an environment, its model files resolved to absolute paths.
 
     Args:
-        name_or_path: One of `environment_names()`, or the path of a file: anything that ends in
-            `.yaml` or holds a path separator. Files it names are looked for beside it, then in
+        name_or_path: One of `environment_names()`, or the path of a file: a text that ends in
+            `.yaml` or contains a path separator. Files named in it are searched beside it, then in
             the data folder.
 
     Raises:
-        UnknownNameError: If no environment has that name, or a key in the file is not known.
-        EnvironmentFileError: If the file cannot be read or says something impossible.
-        GridError: If its grid is none, or an observed axis is none.
+        UnknownNameError: If no environment has that name, or a key in the file is unknown.
+        EnvironmentFileError: If the file cannot be read or its content is invalid.
+        GridError: If its grid or an observed axis is invalid.
 
     >>> load_environment("wheelchair").body_frames["head"]
     'person::head_center'
@@ -186,7 +202,7 @@ def _folder() -> Path:
 
 
 def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
-    """Return the environment of a file; `above` are the files that are based on it."""
+    """Return the environment of a file; `above` are the files based on it."""
     where = f"environment file '{path}'"
     known = (*EnvironmentFile.model_fields, BASED_ON)
     content = read_mapping(path, where, EnvironmentFileError, known=known)
@@ -196,25 +212,25 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     environment = checked(
         content, EnvironmentFile, where, EnvironmentFileError, also_known=(BASED_ON,)
     )
-    # Only to refuse a bad grid here, where the file's name can be given.
+    # Only to reject an invalid grid here, where the message can name the file.
     Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
     _check_observed(environment, where=f"{where}, field 'observed'")
     return _with_files_resolved(environment, path)
 
 
 def _check_observed(environment: EnvironmentFile, where: str) -> None:
-    """Refuse observed axes that are none, or that the grid has as well."""
+    """Raise for invalid observed axes, and for those that are also in the grid."""
     for name, plain in environment.observed.items():
         Axis.from_dict({**plain, "name": name}, where=where)
         if name in environment.grid:
             raise GridError(
-                f"{where}: axis '{name}' is one of the grid's too. The robot either chooses it "
-                "('grid') or finds it ('observed'): take it out of one of them."
+                f"{where}: axis '{name}' is also in 'grid'. The robot either chooses it ('grid') "
+                "or observes it ('observed'): remove it from one of them."
             )
 
 
 def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> EnvironmentFile:
-    """Return the environment that the file at `path` is based on."""
+    """Return the environment that the file at `path` inherits from."""
     chain = (*above, path)
     where = f"environment file '{path}', field '{BASED_ON}'"
     base = ENVIRONMENTS.path(name_or_path, beside=path.parent, where=where)

@@ -10,7 +10,7 @@ from pydrake.multibody.tree import Joint
 
 from tcs.errors import EnvironmentFileError, GridError, TcsError, UnknownNameError
 from tcs.model.grid import Axis
-from tcs.model.scene.joint_error import JointError
+from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
 
 _ROUNDING = 1e-9
@@ -91,7 +91,7 @@ class EnvironmentJoints:
         for value in (axis.values[0], axis.values[-1]):
             self._check_position(axis.name, float(value), f"{where}, axis '{axis.name}'", GridError)
 
-    def check_error(self, name: str, error: JointError, *, where: str) -> None:
+    def check_error(self, name: str, error: ErrorDistribution, *, where: str) -> None:
         """Refuse an error of a joint that cannot have it.
 
         Raises:

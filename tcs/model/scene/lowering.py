@@ -16,7 +16,7 @@ from pydrake.multibody.tree import Frame
 from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.model.grid import Grid
-from tcs.model.scene.chain import Axis, link_frames
+from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
 from tcs.model.scene.scene import Scene
 from tcs.model.tasks import Task
@@ -156,7 +156,7 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
     axes = []
     for joint in built.arm_joints:
         X_AJ = joint.frame_on_child().CalcPose(state, built.arm_base_frame)
-        axes.append(Axis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
+        axes.append(JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
     R_AL, p_AL = link_frames(tuple(axes))
     X_AL = [_transform(R, p) for R, p in zip(R_AL, p_AL, strict=True)]
     X_AT = built.tool_frame.CalcPose(state, built.arm_base_frame)

@@ -1,4 +1,4 @@
-"""What a robot sees of the room, turned into values of its joints."""
+"""Observed joints and frames of the environment, and the joint positions that fit them best."""
 
 from __future__ import annotations
 
@@ -15,83 +15,84 @@ from tcs.errors import SelectionError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.scene.scene import Scene
 
-FARTHEST = 0.05
-"""Greatest distance [m], root mean square over the frames seen, that no value of the joints
-explains: one standard deviation of the person in Table II of the TCS paper. Farther off, the person
-sits or lies in another way than the model can."""
-FARTHEST_TURN = math.radians(10.0)
-"""The same for the orientation [rad]: two standard deviations of the person's turn in Table II,
-which is also what trackers of heads are off by."""
+MAX_POSITION_ERROR = 0.05
+"""Greatest residual distance of the frames, root mean square [m]: one standard deviation of the
+person in Table II of the TCS paper. Beyond it the person sits or lies in a posture that the model
+cannot take."""
+MAX_ROTATION_ERROR = math.radians(10.0)
+"""Greatest residual angle of the frames, root mean square [rad]: two standard deviations of the
+person's yaw in Table II, which is also the error of head trackers."""
 
-_UNKNOWN_SPREAD = 0.05
-"""How far a joint without an error model is taken to be off [m or rad]: as the person is in the
-paper's Table II. It matters only where too little is seen to tell joints apart."""
-_LEVER = 0.2
-"""How much a radian weighs beside metres [m]: what turns is half a head or a trunk across."""
+_DEFAULT_STD = 0.05
+"""Standard deviation of a joint without an error model [m or rad]: that of the person in Table II.
+It matters only where the frames do not determine all joints."""
+_LENGTH_SCALE = 0.2
+"""Metres that a radian weighs in the residuals [m]: the rotated parts, a head or a trunk, have
+about this radius."""
 _STEP = 1e-6
 """Step of the central differences [m or rad]: their error is then about 1e-10."""
-_ROUNDS = 30
-"""Most rounds of Gauss-Newton; five are common."""
+_MAX_ITERATIONS = 30
+"""Limit of the Gauss-Newton iterations; five are common."""
 _CONVERGED = 1e-11
-"""Change of the joints that ends them [multiples of the spread]: below a picometre."""
+"""Change of the joints at which the iteration ends [standard deviations]: below a picometre."""
 _RANK = 1e-6
-"""Singular values below this share of the largest are zeros that the differences blur."""
+"""Singular values below this fraction of the largest are rounding errors of the differences."""
 _DECIMALS = 9
-"""Fitted values are rounded to a nanometre, so that what is seen where it belongs is exactly there
-and scores as it did offline."""
+"""Fitted values are rounded to a nanometre, so that a frame observed at its nominal pose gives
+exactly the offline scores."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """How the room is found: joints that are known, and frames that are seen."""
+    """Observed state of the environment: values of joints and poses of frames."""
 
     joints: Mapping[str, float] = field(default_factory=dict)
-    """Values of joints of the environment [m or rad]; what is not told is where the environment
-    file puts it, unless a frame tells."""
+    """Values of joints of the environment [m or rad]. All others keep the positions of the
+    environment file, unless they are fitted to `frames`."""
     frames: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    """Poses in W by body frame ("head") or link ("wheelchair::base_link"): x, y, z [m], and where
-    the orientation is seen too a quaternion, qw, qx, qy, qz."""
+    """Poses in W by body frame ("head") or link ("wheelchair::base_link"): x, y, z [m], followed
+    by a quaternion qw, qx, qy, qz where the orientation is observed too."""
     setting: Mapping[str, float] = field(default_factory=dict)
-    """How the axes of the grid that move the room are set while the frames are seen [m or rad],
-    e.g. the height of the bed."""
+    """Values of the grid's environment axes at the time the frames were observed [m or rad], e.g.
+    the height of the bed."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """What an observation says of the joints, and how well it fits."""
+class JointEstimate:
+    """Joint positions estimated from an observation, and the residuals of the fit."""
 
     joints: dict[str, float]
-    """Value of each joint that is known or was fitted [m or rad]."""
-    off: float | None
-    """Root mean square distance of the frames seen from the fitted scene [m]; None without."""
-    turned: float | None
-    """Root mean square angle between their orientations [rad]; None where none was seen."""
+    """Value of each observed or fitted joint [m or rad]."""
+    position_error: float | None
+    """Root mean square distance between observed and fitted frames [m]; None without frames."""
+    rotation_error: float | None
+    """Root mean square angle between their orientations [rad]; None where none is observed."""
 
 
-def find_joints(scene: Scene, observation: Observation, chosen: Iterable[str]) -> Found:
-    """Return the values of the joints that explain an observation best.
+def estimate_joints(scene: Scene, observation: Observation, chosen: Iterable[str]) -> JointEstimate:
+    """Return the joint positions that fit an observation best.
 
-    Frames are fitted in least squares over the joints that the environment observes or has an
-    error model for. Where that leaves a choice, the most likely values are taken: the least in
-    standard deviations of the error model.
+    The frames are fitted by least squares over the joints that are observed axes or have an error
+    model. Where they do not determine all of them, the solution is the most likely one: the one of
+    least norm in standard deviations of the error model.
 
     Args:
-        scene: The scene; its state is left as it was.
-        observation: What is known and seen.
-        chosen: Joints that are axes of the grid, so the robot sets them and does not find them.
+        scene: The scene; its state is restored.
+        observation: Observed joint values and frames.
+        chosen: Joints that are axes of the grid, which the robot sets rather than observes.
 
     Raises:
-        UnknownNameError: If a joint or frame is not there.
-        SelectionError: If a joint is chosen, frames are seen in a room that is set nobody knows
-            how, a number is not finite, or what is seen is too far from what the scene can do.
-        TcsError: If a joint follows another one, or does not go that far.
+        UnknownNameError: If there is no such joint or frame.
+        SelectionError: If an observed joint is one of `chosen`, frames come without a `setting` of
+            all of these, a number is not finite, or the residuals are too large.
+        TcsError: If a joint follows another one, or a value exceeds its limits.
     """
     chosen = tuple(chosen)
     for name, value in observation.joints.items():
         if name in chosen:
             raise SelectionError(
-                f"Observed '{name}' is an axis of the grid: it is chosen, not found. To choose "
-                "among other values of it, score an environment with another grid."
+                f"Observed '{name}' is an axis of the grid: the robot sets it. To choose among "
+                "other values of it, score an environment with another grid."
             )
         if not math.isfinite(value):
             raise SelectionError(f"Observed '{name}' is {value}; must be a finite number.")
@@ -100,47 +101,47 @@ def find_joints(scene: Scene, observation: Observation, chosen: Iterable[str]) -
         for name, value in observation.joints.items():
             scene.set_joint(name, value)
         if not observation.frames:
-            return Found(dict(observation.joints), None, None)
-        _set_as_seen(scene, observation, chosen)
+            return JointEstimate(dict(observation.joints), None, None)
+        _apply_setting(scene, observation, chosen)
         return _fitted(scene, observation)
     finally:
         scene.restore(before)
 
 
-def _set_as_seen(scene: Scene, observation: Observation, chosen: tuple[str, ...]) -> None:
-    """Set the room as it was when the frames were seen."""
+def _apply_setting(scene: Scene, observation: Observation, chosen: tuple[str, ...]) -> None:
+    """Set the grid's environment axes as they were when the frames were observed."""
     setting = observation.setting
     for name in setting:
         if name not in chosen:
             raise UnknownNameError("environment axis", name, chosen, where="observation, setting")
-    untold = [name for name in chosen if name not in setting]
-    if untold:
+    missing = [name for name in chosen if name not in setting]
+    if missing:
         raise SelectionError(
-            f"Frames are seen ({', '.join(observation.frames)}), but not how "
-            f"{', '.join(untold)} was set then; that moves the person too. Tell it as well."
+            f"Observed frames ({', '.join(observation.frames)}) also depend on "
+            f"{', '.join(missing)}. Give the values at the time of the observation as well."
         )
     for name, value in setting.items():
         scene.set_joint(name, value)
 
 
-def _fitted(scene: Scene, observation: Observation) -> Found:
-    """Return the joints at which the frames are nearest to where they are seen."""
-    spread = _free_joints(scene, observation.joints)
-    seen = [(_frame(scene, name), *_pose(name, at)) for name, at in observation.frames.items()]
-    limits = np.array([scene.built.environment_joints.limits(name) for name in spread]).reshape(
+def _fitted(scene: Scene, observation: Observation) -> JointEstimate:
+    """Return the joint positions at which the frames are nearest to the observed ones."""
+    deviations = _free_joints(scene, observation.joints)
+    observed = [(_frame(scene, name), *_pose(name, at)) for name, at in observation.frames.items()]
+    limits = np.array([scene.built.environment_joints.limits(name) for name in deviations]).reshape(
         -1, 2
     )
-    scale = np.array(list(spread.values()))
+    scale = np.array(list(deviations.values()))
 
-    def offsets(z: FloatArray) -> FloatArray:
-        for name, value in zip(spread, z * scale, strict=True):
+    def residuals(z: FloatArray) -> FloatArray:
+        for name, value in zip(deviations, z * scale, strict=True):
             scene.set_joint(name, float(value))
-        return np.concatenate([_offset(scene, *one) for one in seen])
+        return np.concatenate([_residual(scene, *one) for one in observed])
 
-    z = np.zeros(len(spread))
-    for _ in range(_ROUNDS if spread else 0):
-        r, J = offsets(z), _jacobian(offsets, z, _STEP / scale)
-        # Among all that fit, the solution nearest to the origin: the most likely one.
+    z = np.zeros(len(deviations))
+    for _ in range(_MAX_ITERATIONS if deviations else 0):
+        r, J = residuals(z), _jacobian(residuals, z, _STEP / scale)
+        # The solution of least norm among all that fit is the most likely one.
         step = np.linalg.lstsq(J, J @ z - r, rcond=_RANK)[0]
         step = np.clip(step * scale, limits[:, 0] + _STEP, limits[:, 1] - _STEP) / scale
         done = float(np.max(np.abs(step - z), initial=0.0)) < _CONVERGED
@@ -148,45 +149,47 @@ def _fitted(scene: Scene, observation: Observation) -> Found:
         if done:
             break
     values = np.round(z * scale, _DECIMALS) + 0.0
-    return _judged(scene, observation, seen, dict(zip(spread, values.tolist(), strict=True)))
+    fitted = dict(zip(deviations, values.tolist(), strict=True))
+    return _checked(scene, observation, observed, fitted)
 
 
-def _judged(
+def _checked(
     scene: Scene,
     observation: Observation,
-    seen: list[tuple[Frame, FloatArray, RotationMatrix | None]],
+    observed: list[tuple[Frame, FloatArray, RotationMatrix | None]],
     fitted: dict[str, float],
-) -> Found:
-    """Return the fit, refusing one that leaves too much unexplained."""
+) -> JointEstimate:
+    """Return the fit; raise if its residuals are too large."""
     for name, value in fitted.items():
         scene.set_joint(name, value)
-    parts = [_offset(scene, *one) for one in seen]
-    off = math.sqrt(float(np.mean([part[:3] @ part[:3] for part in parts])))
-    turns = [float(part[3:] @ part[3:]) / _LEVER**2 for part in parts if part.size > 3]
-    turned = math.sqrt(float(np.mean(turns))) if turns else None
+    parts = [_residual(scene, *one) for one in observed]
+    position_error = math.sqrt(float(np.mean([part[:3] @ part[:3] for part in parts])))
+    squares = [float(part[3:] @ part[3:]) / _LENGTH_SCALE**2 for part in parts if part.size > 3]
+    rotation_error = math.sqrt(float(np.mean(squares))) if squares else None
     listed = ", ".join(observation.frames)
-    if off > FARTHEST:
+    if position_error > MAX_POSITION_ERROR:
         raise SelectionError(
-            f"What is seen ({listed}) is {off:.3f} m from the nearest the scene can be, more than "
-            f"{FARTHEST:.2f} m. Check the frames, that they are in the environment frame, and how "
-            "the room was set."
+            f"Observed frames ({listed}): after the best fit {position_error:.3f} m from the "
+            f"scene's, more than {MAX_POSITION_ERROR:.2f} m. Check that they are given in the "
+            "environment frame, and the setting of the grid's axes."
         )
-    if turned is not None and turned > FARTHEST_TURN:
+    if rotation_error is not None and rotation_error > MAX_ROTATION_ERROR:
         raise SelectionError(
-            f"What is seen ({listed}) is turned by {math.degrees(turned):.1f} deg from the nearest "
-            f"the scene can be, more than {math.degrees(FARTHEST_TURN):.0f} deg. Check the "
-            "orientation (qw qx qy qz), or tell the position alone."
+            f"Observed frames ({listed}): after the best fit rotated by "
+            f"{math.degrees(rotation_error):.1f} deg from the scene's, more than "
+            f"{math.degrees(MAX_ROTATION_ERROR):.0f} deg. Check the orientation (qw qx qy qz), "
+            "or give the position alone."
         )
-    return Found({**observation.joints, **fitted}, off, turned)
+    return JointEstimate({**observation.joints, **fitted}, position_error, rotation_error)
 
 
 def _free_joints(scene: Scene, known: Mapping[str, float]) -> dict[str, float]:
-    """Return the joints to fit and how far each is commonly off [m or rad]."""
+    """Return the joints to fit and the standard deviation of each [m or rad]."""
     environment = scene.spec.environment
-    spread = {name: error.standard_deviation for name, error in environment.errors.items()}
+    deviations = {name: error.standard_deviation for name, error in environment.errors.items()}
     for axis in environment.observed_axes:
-        spread.setdefault(axis.name, _UNKNOWN_SPREAD)
-    return {name: std for name, std in spread.items() if std > 0.0 and name not in known}
+        deviations.setdefault(axis.name, _DEFAULT_STD)
+    return {name: std for name, std in deviations.items() if std > 0.0 and name not in known}
 
 
 def _frame(scene: Scene, name: str) -> Frame:
@@ -204,34 +207,37 @@ def _frame(scene: Scene, name: str) -> Frame:
 
 
 def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | None]:
-    """Return place and orientation of a frame as they are seen."""
+    """Return the observed position and orientation of a frame."""
     numbers = np.asarray(at, dtype=np.float64)
     if numbers.shape not in ((3,), (7,)) or not np.all(np.isfinite(numbers)):
         raise SelectionError(
-            f"Frame '{name}' is seen at {list(at)!r}; must be three finite numbers (x y z, m), or "
+            f"Observed frame '{name}' is {list(at)!r}; must be three finite numbers (x y z, m) or "
             "seven (x y z qw qx qy qz)."
         )
     if numbers.size == 3:
         return numbers, None
     length = float(np.linalg.norm(numbers[3:]))
-    # Trackers write four or more digits.
+    # Trackers print four or more digits.
     if abs(length - 1.0) > 1e-3:
         raise SelectionError(
-            f"Frame '{name}': its quaternion (qw qx qy qz) has length {length:.4f}; must be 1."
+            f"Observed frame '{name}': its quaternion (qw qx qy qz) has length {length:.4f}; "
+            "must be 1."
         )
     return numbers[:3], RotationMatrix(Quaternion(numbers[3:] / length))
 
 
-def _offset(
+def _residual(
     scene: Scene, frame: Frame, p_WH: FloatArray, R_WH: RotationMatrix | None
 ) -> FloatArray:
-    """Return where a frame is minus where it is seen: metres, then radians times the lever."""
+    """Return the pose of a frame minus the observed one: metres, then radians as metres."""
     X_WH: RigidTransform = frame.CalcPoseInWorld(scene.plant_context)
-    away = np.asarray(X_WH.translation() - p_WH)
+    position = np.asarray(X_WH.translation() - p_WH)
     if R_WH is None:
-        return away
-    turn = (X_WH.rotation() @ R_WH.inverse()).ToAngleAxis()
-    return np.concatenate([away, _LEVER * turn.angle() * np.asarray(turn.axis())])
+        return position
+    rotation = (X_WH.rotation() @ R_WH.inverse()).ToAngleAxis()
+    return np.concatenate(
+        [position, _LENGTH_SCALE * rotation.angle() * np.asarray(rotation.axis())]
+    )
 
 
 def _jacobian(

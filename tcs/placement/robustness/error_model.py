@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import DataFileError, TcsError
 from tcs.files.documents import Document, read_document
-from tcs.model.scene import JointError, Scene
+from tcs.model.scene import ErrorDistribution, Scene
 
 Offsets = Mapping[str, NDArray[np.float64]]
 """For each joint by how much it is off in each sample [m or rad], shapes (samples,)."""
@@ -28,7 +28,7 @@ class ErrorFile(Document):
 
     title: str = ""
     source: str = ""
-    errors: Mapping[str, JointError]
+    errors: Mapping[str, ErrorDistribution]
     """For each joint how far off it may be."""
 
 
@@ -36,14 +36,14 @@ class ErrorFile(Document):
 class ErrorModel:
     """Independent errors on joints of an environment, as in Table II of the TCS paper."""
 
-    errors: Mapping[str, JointError]
+    errors: Mapping[str, ErrorDistribution]
     """For each joint how far off it may be; the others are where they are believed to be."""
     source: str
     """Where the figures come from."""
 
     @classmethod
     def of(
-        cls, scene: Scene, errors: str | Path | Mapping[str, JointError] | None = None
+        cls, scene: Scene, errors: str | Path | Mapping[str, ErrorDistribution] | None = None
     ) -> ErrorModel:
         """Return the errors of a scene.
 

@@ -16,7 +16,7 @@ from tcs.errors import SelectionError, TcsError
 from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
-from tcs.model.scene import JointError, LoweredScene, Scene, environment_at
+from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -29,7 +29,7 @@ AT_ONCE = 1000
 BATCH = 500
 """Configurations in samples that a thread takes at once: some milliseconds of work."""
 
-Errors = str | Path | Mapping[str, JointError] | None
+Errors = str | Path | Mapping[str, ErrorDistribution] | None
 Progress = Callable[[int, int], None] | None
 
 

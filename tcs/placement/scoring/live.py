@@ -13,7 +13,7 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
 from tcs.model.grid import Axis
 from tcs.model.robots import RobotFile
-from tcs.model.scene import EnvironmentFile, Observation, find_joints
+from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.offline import ScoringSetup
@@ -90,12 +90,12 @@ class LiveScorer:
         if not isinstance(observation, Observation):
             observation = Observation(joints=dict(observation or {}))
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
-        found = find_joints(self._setup.scene, observation, grid_axes)
+        found = estimate_joints(self._setup.scene, observation, grid_axes)
         entry = {
             "joints": {name: float(value) for name, value in found.joints.items()},
             "frames": {name: [float(x) for x in at] for name, at in observation.frames.items()},
-            "frame_position_error": found.off,
-            "frame_rotation_error": found.turned,
+            "frame_position_error": found.position_error,
+            "frame_rotation_error": found.rotation_error,
         }
         setup = dataclasses.replace(self._setup, job=self._job_at(found.joints))
         return setup.score(begun=begun, metadata={"observation": entry})

@@ -12,7 +12,7 @@ from typing import Any, Self, Unpack
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.robots import RobotFile
-from tcs.model.scene import EnvironmentFile, Scene, body_frame_places
+from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
@@ -116,7 +116,7 @@ class ScoringSetup:
             environment=job.spec.environment.model_dump(mode="json"),
             grid=job.grid.to_dict(),
             observed=[axis.to_dict() for axis in job.observed],
-            body_frames=body_frame_places(self.scene, job.scored_grid),
+            body_frames=body_frame_positions(self.scene, job.scored_grid),
             tables=tables,
         )
 

@@ -8,7 +8,7 @@ import pytest
 from tcs.kernel.arrays import Chain
 from tcs.model.checkup import check_up
 from tcs.model.checkup.arm import arm_class, round_trip
-from tcs.model.scene import NOWHERE, Scene, SceneSpec, arm_chain
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 
 UP, TURNED = np.eye(3), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
@@ -49,7 +49,7 @@ def test_parallel_axes_have_no_distance():
 
 def test_a_wrong_solver_is_found_out(pr2):
     """The round trip judges by Drake: a solver of an arm 1 mm longer recovers nothing."""
-    scene = Scene(SceneSpec(pr2, NOWHERE))
+    scene = Scene(SceneSpec(pr2, EMPTY_ENVIRONMENT))
     chain, _ = arm_chain(scene)
     solver = arm_class(chain).solver
     assert round_trip(scene, solver, 20, seed=0).recovered == 20
@@ -74,7 +74,7 @@ def test_a_numeric_solver_that_finds_too_little_is_a_problem(pr2):
 
 def test_a_closed_arm_is_solved_numerically_too(pr2):
     """Without its closed form, Drake still has to confirm what comes back."""
-    scene = Scene(SceneSpec(pr2, NOWHERE))
+    scene = Scene(SceneSpec(pr2, EMPTY_ENVIRONMENT))
     trip = round_trip(scene, None, 20, seed=0)
     assert (trip.method, trip.joint_error) == ("numeric", None)
     # Of 200 poses it found 200; one of 20 may be lost to chance.

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tcs.model.scene.chain import AXES_MEET, Axis, link_frames, meeting_points
+from tcs.model.scene.chain import AXES_MEET, JointAxis, link_frames, meeting_points
 
 
 def axis_through(point, direction, slide=0.0, turn=0.0):
     """An axis whose joint frame sits `slide` along it and is turned arbitrarily."""
     direction = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     R_AJ = Rotation.from_euler("xyz", [turn, 2 * turn, -turn]).as_matrix()
-    return Axis(R_AJ, np.asarray(point) + slide * direction, R_AJ.T @ direction)
+    return JointAxis(R_AJ, np.asarray(point) + slide * direction, R_AJ.T @ direction)
 
 
 def arm(wrist_miss=0.0, shoulder_miss=0.0):

@@ -150,7 +150,7 @@ def test_unknown_name_gets_the_nearest():
                 "posture": {"a": FOLLOWED_BY_B},
                 "errors": {"b": {"distribution": "normal", "std": 1}},
             },
-            r"errors: 'b' follows 'a', so it cannot be set by hand",
+            r"errors: 'b' follows 'a', so it cannot be set itself",
         ),
         (
             {"posture": {"a": FOLLOWED_BY_B}, "observed": {"b": SHIFT}},
@@ -180,7 +180,7 @@ def test_a_bad_grid_names_the_file(tmp_path):
         ({"person_y": {**SHIFT, "unit": "cm"}}, GridError, "axis 'person_y': unit is 'cm'"),
         ({"person_y": {"unit": "m"}}, GridError, "axis 'person_y' needs start, step, count"),
         ({"person_y": {**SHIFT, "stop": 1}}, UnknownNameError, "axis 'person_y': unknown key"),
-        ({"torso": SHIFT}, GridError, "axis 'torso' is one of the grid's too.*'observed'"),
+        ({"torso": SHIFT}, GridError, "axis 'torso' is also in 'grid'.*'observed'"),
     ],
     ids=["empty", "unit", "missing", "key", "both"],
 )

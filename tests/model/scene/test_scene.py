@@ -10,7 +10,14 @@ import pytest
 from pydrake.geometry import Role
 
 from tcs.errors import EnvironmentFileError, TcsError, UnknownNameError
-from tcs.model.scene import EnvironmentFile, JointError, ModelEntry, Obstacle, Scene, SceneSpec
+from tcs.model.scene import (
+    EnvironmentFile,
+    ErrorDistribution,
+    ModelEntry,
+    Obstacle,
+    Scene,
+    SceneSpec,
+)
 from tcs.model.scene.contacts import Group
 
 # Elbow bent, hand in front of the shoulder: free of the robot itself.
@@ -291,7 +298,7 @@ def test_a_model_that_cannot_be_used_is_refused_in_one_line(spec, tmp_path, shap
 def test_names_that_are_not_there_are_refused(spec):
     environment = spec.environment
     entry = ModelEntry(name="copy", file=environment.models[0].file, parent="person::hed")
-    bends = {"person_x": JointError(distribution="normal", std_deg=1.0)}
+    bends = {"person_x": ErrorDistribution(distribution="normal", std_deg=1.0)}
     for changes, said in (
         ({"models": (*environment.models, entry)}, r"'copy': unknown parent 'person::hed'"),
         ({"padding": {"person::hed": 0.01}}, r"'padding': unknown link 'person::hed'"),

@@ -9,13 +9,13 @@ import pytest
 from scipy import stats
 
 from tcs.errors import DataFileError, EnvironmentFileError, TcsError, UnknownNameError
-from tcs.model.scene import JointError
+from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import ErrorModel
 from tcs.placement.robustness.error_model import named_generator
 
-NORMAL = JointError(distribution="normal", std=0.05)
-TILT = JointError(distribution="normal", std_deg=5.0)
-EVEN = JointError(distribution="uniform", half_width=0.02)
+NORMAL = ErrorDistribution(distribution="normal", std=0.05)
+TILT = ErrorDistribution(distribution="normal", std_deg=5.0)
+EVEN = ErrorDistribution(distribution="uniform", half_width=0.02)
 MODEL = ErrorModel({"person_x": NORMAL, "head_tilt": TILT, "wheelchair_y": EVEN}, "made up")
 MANY = 20_000
 

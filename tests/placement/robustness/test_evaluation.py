@@ -9,12 +9,12 @@ import pytest
 
 import tcs
 from tcs.errors import SelectionError, TcsError, UnknownNameError
-from tcs.model.scene import JointError
+from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import Trials, compare_methods, evaluate, mean_of
 from tcs.placement.robustness.comparison import METHODS
 from tcs.placement.tables import tc_reachability
 
-NOTHING = {"person_x": JointError(distribution="normal", std=0.0)}
+NOTHING = {"person_x": ErrorDistribution(distribution="normal", std=0.0)}
 
 
 def drawn_sets(file, rng, count):
@@ -90,7 +90,7 @@ def test_methods_meet_the_same_samples(bed_trials):
 
 def test_larger_errors_leave_less(chair_file):
     def mean(sd):
-        errors = {"person_x": JointError(distribution="normal", std=sd)}
+        errors = {"person_x": ErrorDistribution(distribution="normal", std=sd)}
         return evaluate(chair_file, samples=200, errors=errors).summary.mean
 
     assert mean(0.0) > mean(0.05) > mean(0.3)

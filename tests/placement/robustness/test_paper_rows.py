@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.model.scene import JointError
+from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import Trials, evaluate
 from tcs.placement.scoring import score, task_environment_pairs
 
 NOTHING = {
-    "bed": {"person_x": JointError(distribution="normal", std=0.0)},
+    "bed": {"person_x": ErrorDistribution(distribution="normal", std=0.0)},
     "wheelchair": {
-        "wheelchair_yaw": JointError(distribution="normal", std_deg=0.0),
-        "head_tilt": JointError(distribution="uniform", half_width_deg=0.0),
+        "wheelchair_yaw": ErrorDistribution(distribution="normal", std_deg=0.0),
+        "head_tilt": ErrorDistribution(distribution="uniform", half_width_deg=0.0),
     },
 }
 

@@ -10,7 +10,7 @@ import pytest
 
 from tcs.errors import GridError, SelectionError, StoreMismatchError, TcsError
 from tcs.kernel.arrays import GridArrays
-from tcs.model.scene import JointError, environment_at, goal_poses
+from tcs.model.scene import ErrorDistribution, environment_at, goal_poses
 from tcs.placement.robustness import Trials
 from tcs.placement.robustness import trials as trials_module
 from tcs.placement.scoring.verify import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
@@ -177,7 +177,7 @@ def test_the_twin_confirms_solutions_in_displaced_rooms(trials, rng):
 
 
 def test_a_joint_stops_at_its_limit(bed_file):
-    errors = {"head_rest": JointError(distribution="uniform", half_width_deg=20.0)}
+    errors = {"head_rest": ErrorDistribution(distribution="uniform", half_width_deg=20.0)}
     trials = Trials.of(bed_file, errors=errors)
     sets = trials.scored.sets
     flat, high = (sets.candidates[sets.state % 2 == side][:1] for side in (0, 1))

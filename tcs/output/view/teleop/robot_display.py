@@ -11,7 +11,7 @@ from pydrake.geometry import Box, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import BodyIndex
 
-from tcs.model.scene import NOWHERE, Scene, SceneSpec
+from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec
 from tcs.output.view.shapes import draw_ground, draw_shapes, rgba, robot_shapes
 from tcs.teleop import Arm
 
@@ -47,7 +47,7 @@ class RobotDisplay:
         Raises:
             RobotError: If the robot's model cannot be used.
         """
-        self._scene = Scene(SceneSpec(arm.robot, NOWHERE), meshes=meshes)
+        self._scene = Scene(SceneSpec(arm.robot, EMPTY_ENVIRONMENT), meshes=meshes)
         self._scene.set_torso(arm.torso_height)
         self._shapes = robot_shapes(self._scene, meshes)
         self._shoulder = arm.frames[0, :3, 3]

@@ -8,7 +8,7 @@ from tcs.model.grid import Grid
 from tcs.model.scene.scene import Scene
 
 
-def body_frame_places(scene: Scene, grid: Grid) -> dict[str, list[float]]:
+def body_frame_positions(scene: Scene, grid: Grid) -> dict[str, list[float]]:
     """Return where each body frame is in W for each environment state of a grid.
 
     Args:

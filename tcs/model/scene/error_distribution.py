@@ -15,7 +15,7 @@ _WIDTHS = {"normal": ("std", "std_deg"), "uniform": ("half_width", "half_width_d
 """How the width of each distribution is called, of joints that slide [m] and that turn [deg]."""
 
 
-class JointError(Document):
+class ErrorDistribution(Document):
     """The error of one joint: a distribution about zero."""
 
     distribution: Literal["normal", "uniform"]
