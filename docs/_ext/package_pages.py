@@ -6,8 +6,8 @@ A fence such as
     ```
 
 becomes the package's docstring with the names it exports, then one section for each module below
-it with the names that the package does not export. A package below it with a page of its own is
-left to that page. Modules may thus be added, renamed and moved without touching the pages.
+it with the names that no package above exports. A package below it with a page of its own is left
+to that page. Modules may thus be added, renamed and moved without touching the pages.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
@@ -36,49 +37,69 @@ def modules_below(package: str) -> list[str]:
     return [f"{package}.{name}" for name in sorted(names)]
 
 
-def description(module: str, options: str) -> str:
-    """Return the Markdown that describes one module."""
-    return f"```{{eval-rst}}\n.. automodule:: {module}\n{options}```\n"
+def sections(package: str, pages: set[str], described: set[int]) -> Iterator[str]:
+    """Yield the Markdown of a package and of all below it.
 
-
-def members_of(module: str, left_out: list[str]) -> str:
-    """Return the Markdown of a module whose own name is that of a function its package exports.
-
-    Only one of the two can be the target of links: the function.
+    Args:
+        package: Its dotted name.
+        pages: Packages with pages of their own.
+        described: Identities of the objects that the packages above export.
     """
-    found = vars(importlib.import_module(module)).items()
-    lines = [
-        f".. auto{'class' if inspect.isclass(value) else 'function'}:: {module}::{name}"
-        for name, value in found
-        if getattr(value, "__module__", "") == module and not name.startswith("_")
-        if name not in left_out and (inspect.isclass(value) or inspect.isroutine(value))
-    ]
-    members = "".join(f"\n{line}\n" for line in lines)
-    return (
-        f"```{{eval-rst}}\n.. automodule:: {module}\n   :no-members:\n   :no-index:\n{members}```\n"
-    )
-
-
-def exported(package: str) -> list[str]:
-    """Return the names that a package exports."""
-    return list(getattr(importlib.import_module(package), "__all__", []))
-
-
-def sections(package: str, pages: set[str]) -> Iterator[str]:
-    """Yield the Markdown of a package and of what is below it."""
-    names = exported(package)
-    yield description(package, "   :imported-members:\n" if names else "   :no-members:\n")
-    left_out = f"   :exclude-members: {', '.join(names)}\n" if names else ""
-    for module in modules_below(package):
-        if module in pages:
+    here = importlib.import_module(package)
+    names = list(getattr(here, "__all__", []))
+    options = ["imported-members"] if names else ["no-members"]
+    yield automodule(package, options, omitted(here, names, described))
+    described = described | {id(getattr(here, name)) for name in names}
+    for name in modules_below(package):
+        if name in pages:
             continue
-        yield f"## {module.removeprefix('tcs.')}\n"
-        if modules_below(module):
-            yield from sections(module, pages)
-        elif module.rpartition(".")[2] in names:
-            yield members_of(module, names)
+        yield f"## {name.removeprefix('tcs.')}\n"
+        if modules_below(name):
+            yield from sections(name, pages, described)
+            continue
+        module = importlib.import_module(name)
+        left_out = omitted(module, list(vars(module)), described)
+        # Only one of a function and the module it is named after can be the target of links.
+        if name.rpartition(".")[2] in names:
+            yield automodule(name, ["no-members", "no-index"], [], members(module, left_out))
         else:
-            yield description(module, left_out)
+            yield automodule(name, [], left_out)
+
+
+def omitted(module: ModuleType, names: list[str], described: set[int]) -> list[str]:
+    """Return the names of a module's classes and functions that are described already."""
+    return [
+        name
+        for name in names
+        if is_code(vars(module)[name]) and id(vars(module)[name]) in described
+    ]
+
+
+def is_code(value: object) -> bool:
+    """Return whether an object has a home of its own: equal numbers and texts may be one object."""
+    return inspect.isclass(value) or callable(value)
+
+
+def members(module: ModuleType, left_out: list[str]) -> list[str]:
+    """Return the directives that describe a module's own classes and functions one by one."""
+    return [
+        f".. auto{'class' if inspect.isclass(value) else 'function'}:: {module.__name__}::{name}"
+        for name, value in vars(module).items()
+        if getattr(value, "__module__", "") == module.__name__ and is_code(value)
+        if not name.startswith("_") and name not in left_out
+    ]
+
+
+def automodule(
+    module: str, options: list[str], left_out: list[str], others: list[str] | None = None
+) -> str:
+    """Return the Markdown that describes one module, followed by other directives."""
+    lines = [f".. automodule:: {module}", *(f"   :{option}:" for option in options)]
+    if left_out:
+        lines.append(f"   :exclude-members: {', '.join(left_out)}")
+    for directive in others or []:
+        lines += ["", directive]
+    return "\n".join(["```{eval-rst}", *lines, "```", ""])
 
 
 def write_out(app: Sphinx, document: str, source: list[str]) -> None:
@@ -89,7 +110,7 @@ def write_out(app: Sphinx, document: str, source: list[str]) -> None:
         package = fence[1]
         if not (PACKAGE.joinpath(*package.split(".")[1:]) / "__init__.py").is_file():
             raise ExtensionError(f"{document}: there is no package {package}; rename the page")
-        return "\n".join(sections(package, pages - {package}))
+        return "\n".join(sections(package, pages - {package}, set()))
 
     source[0] = FENCE.sub(written, source[0])
 
