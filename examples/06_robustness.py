@@ -19,7 +19,9 @@ def main() -> None:
     # rooms.
     for select in ("single", "best"):
         found = tcs.evaluate(file, select=select, samples=100, seed=0)
-        low, high = found.summary.ci95
+        interval = found.summary.ci95
+        assert interval is not None  # Only a single sample has none.
+        low, high = interval
         print(f"{select}: {found.summary.mean:.1%} (95 % between {low:.1%} and {high:.1%})")
 
     # Estimates for the best sets. `success` is the weight of the estimate's lower end, delta.

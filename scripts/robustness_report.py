@@ -80,7 +80,7 @@ def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> N
     file = tcs.load(path)
     check_row(path, file, *row, ROBOT)
     made = file.metadata.get("robustness", [None] * len(file.tables))[file.nominal_index]
-    if made is not None and made["errors_of_environment"] and not made["check_base"]:
+    if made is not None and made["environment_errors"] and not made["check_base"]:
         # Whoever has estimated more thoroughly is believed.
         if made["samples"] >= RACE_SAMPLES and made["sets"] >= RACED_SETS:
             return

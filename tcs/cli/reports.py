@@ -155,7 +155,7 @@ def report_choice(result: Mapping[str, Any]) -> None:
         )
     if result["unreachable"]:
         out.print(
-            f"left out: {result['unreachable']:,} configurations to which there is no way from here"
+            f"unreachable from here: {result['unreachable']:,} configurations, which were left out"
         )
     if "observed" in result:
         off = [deviation_text(name, value) for name, value in result["observed_error"].items()]

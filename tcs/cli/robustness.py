@@ -1,4 +1,4 @@
-"""The commands about success under error: `tcs evaluate` and `tcs robustify`."""
+"""Commands for success under error: `tcs evaluate` and `tcs robustify`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tcs.output.words.robustness import error_width
 _Errors = Annotated[
     Path | None,
     typer.Option(
-        help="YAML file of errors by joint, in place of the environment's own.",
+        help="YAML file of errors by joint, in place of those of the environment.",
         show_default="those of the environment, TCS Table II",
     ),
 ]
@@ -25,12 +25,15 @@ Delta = Annotated[
     float,
     typer.Option(
         help="Weight of the success under error; above 0 only sets with an estimate by "
-        "`tcs robustify` can be chosen."
+        "`tcs robustify` can be selected."
     ),
 ]
 _CheckBase = Annotated[
     bool,
-    typer.Option("--check-base", help="The base must stay free, too; the paper leaves that out."),
+    typer.Option(
+        "--check-base",
+        help="Check the base for collisions in every sample, which the paper does not.",
+    ),
 ]
 
 
@@ -43,21 +46,23 @@ def evaluate(
         str,
         typer.Option(
             metavar="best|single|robust|uniform",
-            help="Which set: the best one, the best place alone, the one with the greatest "
-            "success that `tcs robustify` has estimated, or in each sample another one drawn from "
-            "all that reach as much as the best (98 % of it).",
+            help="Set to evaluate: the best set, the best single configuration, the most robust "
+            "set (greatest lower confidence bound on success, by `tcs robustify`), or another set "
+            "in each sample, drawn from all with P_R of at least 98 % of the greatest.",
         ),
     ] = "best",
     members: Annotated[
         int | None,
-        typer.Option(min=1, max=2, help="Members of the sets drawn uniformly.", show_default="2"),
+        typer.Option(
+            min=1, max=2, help="Number of members of the sets drawn uniformly.", show_default="2"
+        ),
     ] = None,
     observed: options.Observed = None,
     check_base: _CheckBase = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Try a set again in rooms a little off: how much of the task is still done?"""
+    """Evaluate the success of a set in randomly perturbed environments."""
     if members is not None and select != "uniform":
         raise typer.BadParameter("goes with --select uniform only.", param_hint="--members")
     import tcs
@@ -87,10 +92,10 @@ def robustify(
         Path | None, typer.Option(help="File to write.", show_default="FILE itself")
     ] = None,
     sets: Annotated[
-        int, typer.Option(help="Sets of two to estimate; of one, a quarter as many.")
+        int, typer.Option(help="Greatest number of pairs to estimate; a quarter as many singles.")
     ] = 2000,
     samples: Annotated[
-        int, typer.Option(help="Samples for the sets that may be the best; others get fewer.")
+        int, typer.Option(help="Number of samples of the best sets; other sets get fewer.")
     ] = 1024,
     seed: options.Seed = 0,
     errors: _Errors = None,
@@ -101,7 +106,7 @@ def robustify(
 ) -> None:
     """Estimate the success under error of the best sets, for `tcs select --delta`.
 
-    Without --observed, for every state of the person that was scored.
+    Without --observed, for every observed state that was scored.
     """
     import tcs
     from tcs.cli.places import check_writable
@@ -130,9 +135,9 @@ def robustify(
 
 
 def report_robustified(result: Mapping[str, Any]) -> None:
-    """Print the most robust set of each size, and what was estimated."""
+    """Print the most robust set of each size with its estimate."""
     out = talk.paper()
-    table = reports.new_table("observed", "set", ">success", ">95 % between", ">sets", "members")
+    table = reports.new_table("observed", "set", ">success", ">95 % interval", ">sets", "members")
     for row in result["tables"]:
         state = settings_text(row["observed"]) or "-"
         for best in row["best"]:
@@ -141,17 +146,17 @@ def report_robustified(result: Mapping[str, Any]) -> None:
                 state,
                 f"of {len(best['members'])}",
                 f"{best['success']:.1%}",
-                f"{low:.1%} {high:.1%}",
+                f"{low:.1%} to {high:.1%}",
                 f"{best['sets']:,}",
                 "; ".join(member_text(member) for member in best["members"]),
             )
     out.print(table)
-    out.print(f"wrote {result['file']}. To weigh it, where X Y YAW_DEG is where the robot is now:")
+    out.print(f"wrote {result['file']}. To select by success, with the current base X Y YAW_DEG:")
     typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")
 
 
 def _table(loaded: Any, observed: list[str] | None) -> int | None:
-    """Return the number of the table nearest to what is observed, None where nothing is."""
+    """Return the number of the table nearest to the observation, None without one."""
     if not observed:
         return None
     from tcs.placement.selection.observed import nearest_table
@@ -161,27 +166,30 @@ def _table(loaded: Any, observed: list[str] | None) -> int | None:
 
 
 def report_evaluation(result: Mapping[str, Any]) -> None:
-    """Print what is left of a set under error."""
+    """Print the success of a set under error."""
     out = talk.paper()
     if result["members"]:
         out.print(reports.members_table(result["members"]))
     else:
-        out.print(f"Each sample: a set drawn from {result['choices']:,} that reach as much.")
-    low, high = result["ci95"]
+        out.print(f"one of {result['choices']:,} sets with equal P_R is drawn for each sample")
+    interval = ""
+    if result["ci95"] is not None:
+        low, high = result["ci95"]
+        interval = f" (95 % interval {low:.1%} to {high:.1%})"
     out.print(
         f"without error {result['reachability']:.1%} of the goals, manipulability "
         f"{result['manipulability']:.3f}"
     )
     out.print(
-        f"under error {result['mean']:.1%} of the goals (95 % between {low:.1%} and {high:.1%}), "
+        f"under error {result['mean']:.1%} of the goals{interval}, "
         f"standard deviation {result['std']:.1%}; all goals in {result['complete']:.1%} of "
         f"{result['samples']:,} samples"
     )
-    goals = ", ".join(f"{i}: {share:.1%}" for i, share in enumerate(result["per_goal"]))
+    goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"]))
     out.print(f"by goal  {goals}")
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
     base = "" if result["check_base"] else "; the base is not checked, as in the paper"
     out.print(f"errors  {widths}{base}")
     if result["clipped"]:
-        out.print(f"in {result['clipped']:,} samples a joint was stopped at its limit")
+        out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")

@@ -1,7 +1,8 @@
-"""`tcs evaluate` and `tcs robustify`: what they print, write and refuse."""
+"""`tcs evaluate` and `tcs robustify`: output, files and errors."""
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -49,13 +50,25 @@ def test_json_is_what_python_returns(tcs_command, stored, words, options):
     ran = tcs_command("evaluate", stored, "--samples", 40, *words, "--json")
     assert (ran.code, ran.err) == (0, "")
     expected = tcs.evaluate(tcs.load(stored), samples=40, **options).to_json()
-    told = ran.json
-    assert told.pop("seconds") > 0
+    printed = ran.json
+    assert printed.pop("seconds") > 0
     expected.pop("seconds")
-    assert told == expected
+    assert printed == expected
 
 
-def test_a_person_reads_the_mean_and_the_errors(tcs_command, stored):
+@pytest.mark.parametrize("select", ["best", "uniform"])
+def test_a_single_sample_has_no_interval(tcs_command, stored, select):
+    words = ("evaluate", stored, "--samples", 1, "--select", select)
+    ran = tcs_command(*words, "--json")
+    assert ran.code == 0
+    # Python reads NaN, which is not JSON.
+    found = json.loads(ran.out, parse_constant=pytest.fail)
+    assert found["ci95"] is None
+    assert 0.0 <= found["mean"] <= 1.0
+    assert "interval" not in tcs_command(*words).out
+
+
+def test_the_text_shows_the_mean_and_the_errors(tcs_command, stored):
     ran = tcs_command("evaluate", stored, "--samples", 40)
     found = tcs.evaluate(tcs.load(stored), samples=40)
     assert f"under error {found.summary.mean:.1%} of the goals" in ran.out
@@ -66,8 +79,8 @@ def test_a_person_reads_the_mean_and_the_errors(tcs_command, stored):
 def test_an_error_file_takes_the_place_of_the_environments(tcs_command, stored, tmp_path):
     path = tmp_path / "errors.yaml"
     path.write_text("errors: {person_x: {distribution: uniform, half_width: 0.01}}\n")
-    told = tcs_command("evaluate", stored, "--errors", path, "--samples", 5, "--json").json
-    assert told["errors"] == {"person_x": {"distribution": "uniform", "half_width": 0.01}}
+    found = tcs_command("evaluate", stored, "--errors", path, "--samples", 5, "--json").json
+    assert found["errors"] == {"person_x": {"distribution": "uniform", "half_width": 0.01}}
 
 
 def test_a_misspelt_joint_is_named_with_the_nearest(tcs_command, stored, tmp_path):
@@ -80,7 +93,7 @@ def test_a_misspelt_joint_is_named_with_the_nearest(tcs_command, stored, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         (("--samples", 0), 1, "samples is 0; must be a whole number, 1 to 1,000,000."),
         (("--select", "bets"), 1, "Did you mean 'best'?"),
@@ -90,10 +103,10 @@ def test_a_misspelt_joint_is_named_with_the_nearest(tcs_command, stored, tmp_pat
     ],
     ids=str,
 )
-def test_what_makes_no_sense_is_refused(tcs_command, stored, words, code, said):
+def test_invalid_options_are_refused(tcs_command, stored, words, code, message):
     ran = tcs_command("evaluate", stored, *words)
     assert (ran.code, ran.out) == (code, "")
-    assert said in ran.err
+    assert message in ran.err
 
 
 def test_a_file_of_other_models_is_refused(tcs_command, tmp_path):
@@ -113,8 +126,8 @@ def test_robustify_writes_estimates_that_select_weighs(tcs_command, stored, tmp_
     expected = success_summary(made)
     assert ran.json == {"file": str(out), **expected}
     here = ("--here", 1.4, -1.2, 180)
-    told = tcs_command("select", out, *here, "--delta", 100, "--json").json
-    assert told["success_ci95"][0] == made.nominal.success.low.max()
+    choice = tcs_command("select", out, *here, "--delta", 100, "--json").json
+    assert choice["success_ci95"][0] == made.nominal.success.low.max()
     assert "under error" in tcs_command("select", out, *here, "--delta", 100).out
     assert tcs.load(stored).nominal.success is None
     robust = tcs_command("evaluate", out, "--select", "robust", "--samples", 5, "--json").json
@@ -122,12 +135,12 @@ def test_robustify_writes_estimates_that_select_weighs(tcs_command, stored, tmp_
     assert robust["members"] in (best, expected["tables"][0]["best"][0]["members"])
 
 
-def test_robustify_tells_a_person_the_best(tcs_command, stored, tmp_path):
+def test_robustify_prints_the_most_robust_sets(tcs_command, stored, tmp_path):
     out = tmp_path / "robust.tcs"
     ran = tcs_command("robustify", stored, "--samples", 64, "--sets", 8, "--out", out)
     assert ran.code == 0
     assert "of 1" in ran.out
-    # What it says to type works, once the place is filled in.
+    # The suggested command works with a base pose filled in.
     *words, last = ran.out.splitlines()[-1].split()
     words = [{"X": "1.4", "Y": "-1.2", "YAW_DEG": "180"}.get(word, word) for word in words]
     assert words[:2] == ["tcs", "select"]
@@ -143,7 +156,7 @@ def test_delta_and_robust_need_estimates(tcs_command, stored):
     assert "Estimate it first: tcs robustify FILE." in ran.err
 
 
-def test_choosing_by_success_loads_nothing_heavy(process, tcs_command, stored, tmp_path):
+def test_selecting_by_success_loads_nothing_heavy(process, tcs_command, stored, tmp_path):
     out = tmp_path / "robust.tcs"
     tcs_command("robustify", stored, "--samples", 64, "--sets", 8, "--out", out)
     before = (

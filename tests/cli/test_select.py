@@ -40,9 +40,9 @@ def test_members_come_in_the_order_of_the_tour(tcs_command, small_file):
         words = ("select", small_file, "--here", x, 0, 0, "--gamma", 0.01, "--json")
         members = tcs_command(*words).json["members"]
         assert len(members) == 2
-        way = [abs(x - member["base_x"]) for member in members]
+        distance = [abs(x - member["base_x"]) for member in members]
         turned += members[0]["base_x"] > members[1]["base_x"]
-        assert way[0] <= way[1]
+        assert distance[0] <= distance[1]
     assert turned == 1
 
 
@@ -101,6 +101,12 @@ def test_misuse_exits_with_2(tcs_command, small_file, words):
         pytest.param((*HERE, "--travel", "arround"), "Did you mean 'around'?", id="no route"),
         pytest.param((*HERE, "--alpha", "nan"), "Weight alpha (reachability) is nan", id="nan"),
         pytest.param(("--here", "inf", "0", "0"), "base_x is inf", id="far away"),
+        pytest.param(
+            (*HERE, "--at", "bed_height=5"),
+            "bed_height is 5 m, out of range: the scores cover 0 to 0.1 m.",
+            id="bed out of range",
+        ),
+        pytest.param((*HERE, "--torso", "5"), "torso is 5 m, out of range", id="torso"),
         pytest.param((*HERE, "--at", "bed=high"), "--at is 'bed=high'; must be", id="no number"),
         pytest.param((*HERE, "--at", "bed_hight=1"), "Did you mean 'bed_height'?", id="no axis"),
         pytest.param(
@@ -243,7 +249,7 @@ def test_travel_around_the_furniture(tcs_command, tmp_path):
     assert straight["unreachable"] == 0
     assert around["unreachable"] == int(np.count_nonzero(sets.cell == 0)) > 0
     assert around["cost"] != straight["cost"]
-    assert "to which there is no way from here" in tcs_command(*words, "--travel", "around").out
+    assert "unreachable from here:" in tcs_command(*words, "--travel", "around").out
 
 
 def test_three_places_to_stand(tcs_command, tmp_path):

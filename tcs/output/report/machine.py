@@ -1,4 +1,4 @@
-"""What a report says about where it was made: program, libraries, machine and load."""
+"""Facts about the program, its libraries and the machine, for reports."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LIBRARIES = ("drake", "numba", "numpy", "scipy", "matplotlib", "example-robot-da
 
 
 def versions() -> list[tuple[str, str]]:
-    """Return versions of the program and of what its numbers hang on."""
+    """Return the versions of the program and of the libraries its results depend on."""
     python = f"{platform.python_implementation()} {platform.python_version()}"
     return [
         ("tcs", version("tcs")),
@@ -21,7 +21,7 @@ def versions() -> list[tuple[str, str]]:
 
 
 def machine() -> list[tuple[str, str]]:
-    """Return what the machine is, and how busy it is now."""
+    """Return operating system, processor and load of the machine."""
     facts = [
         ("Machine", f"{platform.system()} {platform.machine()}, {_processor()}"),
         ("Processors", str(os.cpu_count())),
@@ -32,7 +32,7 @@ def machine() -> list[tuple[str, str]]:
 
 
 def today() -> str:
-    """Return date and time, UTC.
+    """Return the current date and time (UTC).
 
     >>> len(today())
     20
@@ -41,7 +41,7 @@ def today() -> str:
 
 
 def _processor() -> str:
-    """Return the processor's name."""
+    """Return the name of the processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:
             for line in lines:

@@ -1,4 +1,4 @@
-"""The paper's figures, which ours are put beside."""
+"""Figures of the TCS paper, for comparison."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Compared(Document):
     without: tuple[Percent, Percent] | None = None
     """Without TC-manipulability."""
     with_: tuple[Percent, Percent] | None = Field(None, alias="with")
-    """With it."""
+    """With TC-manipulability."""
 
 
 class Exempt(Document):
-    """A task for which the paper's p is not below its bar."""
+    """A task whose p-value in the paper is not below the common bound."""
 
     task: str
     environment: str
@@ -44,14 +44,14 @@ class Exempt(Document):
 
 
 class PValues(Document):
-    """What the paper says of its tests."""
+    """p-values that the paper reports."""
 
     below: Number
     but: tuple[Exempt, ...] = ()
 
 
 class Paper(Document):
-    """The tables of the TCS paper that we put ours beside."""
+    """Tables I and III of the TCS paper."""
 
     source: str
     table_1: tuple[Published, ...]
@@ -59,14 +59,14 @@ class Paper(Document):
     p_values: PValues
 
     def published(self, task: str, environment: str) -> Published | None:
-        """Return the row of Table I of a task, None if the paper has none."""
+        """Return the row of Table I for a task and environment, None if there is none."""
         for row in self.table_1:
             if (row.task, row.environment) == (task, environment):
                 return row
         return None
 
     def compared(self, task: str, environment: str, members: int) -> Compared | None:
-        """Return the row of Table III of a task, None if the paper has none."""
+        """Return the row of Table III for a task and a size of set, None if there is none."""
         for row in self.table_3:
             if (row.task, row.environment, row.members) == (task, environment, members):
                 return row

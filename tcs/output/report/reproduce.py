@@ -67,7 +67,7 @@ def robustify_command(answer: Answer) -> str:
     words += ["--seed", str(made["seed"])]
     if made["check_base"]:
         words.append("--check-base")
-    if not made["errors_of_environment"]:
+    if not made["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
     records = answer.file.metadata["robustness"]
     if any(record != made for record in records):

@@ -1,4 +1,4 @@
-"""The robustness report: Tables I and III of the TCS paper on our scenes, beside the paper's."""
+"""Robustness report: Tables I and III of the TCS paper beside the figures of tcs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.paper import Paper
 from tcs.output.report.row_pictures import RowPictures
 from tcs.output.report.tables import (
-    NEAR,
+    ROUNDING,
     contrasts_table,
     find_contrast,
     gain_table,
@@ -36,7 +36,7 @@ from tcs.output.words import p_value, percent, signed
 from tcs.output.words.robustness import lost_goal, mean_and_std
 from tcs.placement.robustness import RowStudy, StudyPlan
 
-SERIES = ("best set, by P_R + P_M", "best single configuration", "surest set, by success")
+SERIES = ("best set, by P_R + P_M", "best single configuration", "most robust set, by success")
 METHODS = ("with TC-manipulability", "", "without")
 
 
@@ -52,38 +52,41 @@ def robustness_page(
     """Return the report as a page.
 
     Args:
-        rows: What was found, in the order to show it.
+        rows: Results of each row, in the order of the page.
         pictures: Pictures of each row.
         paper: The paper's figures.
-        plan: How much was tried.
-        seconds: How long it took, wall clock.
-        command: How to make it again.
+        plan: Sample sizes of the study.
+        seconds: Wall-clock time of the study [s].
+        command: Command that makes the report.
     """
     compared = [row for row in rows if row.methods is not None]
     sections = [
-        Section("What was found", findings(rows, paper)),
+        Section("Findings", findings(rows, paper)),
         Section("Table I: success under error", _table_1(rows, paper)),
     ]
     if compared:
         sections.append(
-            Section("Table III: TC-manipulability, one and two places", _table_3(compared, paper))
+            Section(
+                "Table III: TC-manipulability, one and two configurations",
+                _table_3(compared, paper),
+            )
         )
     if any(row.gains for row in rows):
-        sections.append(Section("What choosing by success gains", _gains(rows)))
+        sections.append(Section("Gain of selecting by success", _gains(rows)))
     sections += [
         Section("How well P_M predicts success", _prediction(rows)),
-        Section("What is lost, and why", _losses(rows, paper)),
-        Section("Chosen configurations", _chosen(rows, pictures)),
-        Section("How it was made", _made(rows, paper, plan, seconds, command)),
+        Section("Lost goals", _losses(rows, paper)),
+        Section("Selected configurations", _chosen(rows, pictures)),
+        Section("Reproduction", _made(rows, paper, plan, seconds, command)),
     ]
     robots = ", ".join(sorted({row.titles[2] for row in rows}))
     return Page(
-        title="How sure is it when the room is a few centimetres off?",
+        title="Robustness to errors of the environment",
         lead=(
             f"{len(rows)} tasks from the TCS paper with {robots}. In each of {plan.samples:,} "
-            "samples the person, and the wheelchair, are somewhere else than the robot believes "
-            "(Table II of the paper); the robot stands where it was told to, and what its arm "
-            "still reaches is counted."
+            "samples the person and the wheelchair are displaced from their assumed poses (Table "
+            "II of the paper). The robot takes the selected configurations, and the goals that "
+            "its arm still reaches are counted."
         ),
         sections=sections,
         foot=f"tcs {versions()[0][1]}, {today()}, seed {plan.seed}, {plan.samples:,} samples.",
@@ -91,31 +94,31 @@ def robustness_page(
 
 
 def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
-    """Return the main findings in a few sentences."""
+    """Return the main findings as a list of sentences."""
     known = [row for row in rows if paper.published(row.task, row.environment)]
     short = [row for row in known if is_short(row, paper)]
     items = []
     if known:
         items.append(
-            f"In {len(known) - len(short)} of {len(known)} rows the mean is at or above the "
+            f"In {len(known) - len(short)} of {len(known)} rows the mean is equal to or above the "
             "paper's."
             + (
-                " Below it: " + "; ".join(_short_of(row, paper) for row in short) + "."
+                " Below the paper: " + "; ".join(_short_of(row, paper) for row in short) + "."
                 if short
                 else ""
             )
         )
-    told = [(row, m, find_contrast(row, m)) for row in rows for m in (1, 2)]
-    tests = [(row, m, contrast) for row, m, contrast in told if contrast is not None]
+    contrasts = [(row, m, find_contrast(row, m)) for row in rows for m in (1, 2)]
+    tests = [(row, m, contrast) for row, m, contrast in contrasts if contrast is not None]
     if tests:
         above = [one for one in tests if one[2].paired.mean > 0.0]
-        sure = [one for one in above if one[2].independent.p < 0.01]
+        significant = [one for one in above if one[2].independent.p < 0.01]
         items.append(
             f"With TC-manipulability the mean is above that without in {len(above)} of "
-            f"{len(tests)} comparisons, in {len(sure)} of them with p < 0.01 (rank sum, as in the "
-            "paper)."
+            f"{len(tests)} comparisons, in {len(significant)} of them with p < 0.01 (rank sum "
+            "test, as in the paper)."
         )
-        items += [_exception(one[0], one[1]) for one in tests if one not in sure]
+        items += [_exception(one[0], one[1]) for one in tests if one not in significant]
     items += _gain_findings(rows, paper)
     found = [
         one.rho
@@ -125,35 +128,37 @@ def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
     ]
     if found:
         items.append(
-            "Among sets that reach as much without error, P_M goes with success in "
+            "Among sets with equal P_R, P_M correlates positively with success in "
             f"{sum(rho > 0.0 for rho in found)} of {len(found)} cases; the rank correlation is "
-            f"{min(found):+.2f} to {max(found):+.2f}, {np.median(found):+.2f} in the middle."
+            f"{min(found):+.2f} to {max(found):+.2f}, median {np.median(found):+.2f}."
         )
     return [Bullets(items)]
 
 
 def _gain_findings(rows: Sequence[RowStudy], paper: Paper) -> list[str]:
-    """Return what choosing by success gains, in a sentence or two; nothing where nobody did."""
-    told = [(row, row.gain) for row in rows if row.gain is not None]
-    if not told:
+    """Return the gain of selecting by success in one item, none without estimates."""
+    gains = [(row, row.gain) for row in rows if row.gain is not None]
+    if not gains:
         return []
-    gained = [row for row, gain in told if gain.paired.mean > 0.0 and gain.paired.p < 0.01]
-    most, greatest = max(told, key=lambda one: one[1].paired.mean)
-    said = (
-        f"Choosing by estimated success gains in {len(gained)} of {len(told)} rows (p < 0.01, "
-        f"signed rank), most in {most.name}: {signed(100.0 * greatest.paired.mean)} points."
+    gained = [row for row, gain in gains if gain.paired.mean > 0.0 and gain.paired.p < 0.01]
+    most, greatest = max(gains, key=lambda one: one[1].paired.mean)
+    text = (
+        f"Selecting by estimated success gains in {len(gained)} of {len(gains)} rows (p < 0.01, "
+        f"signed rank test), most in {most.name}: {signed(100.0 * greatest.paired.mean)} "
+        "percentage points."
     )
-    known = [(row, gain) for row, gain in told if paper.published(row.task, row.environment)]
+    known = [(row, gain) for row, gain in gains if paper.published(row.task, row.environment)]
     below = [
         f"{row.name} ({percent(gain.robust.summary.mean)})"
         for row, gain in known
-        if 100.0 * gain.robust.summary.mean < _published_mean(row, paper) - NEAR
+        if 100.0 * gain.robust.summary.mean < _published_mean(row, paper) - ROUNDING
     ]
     if known:
-        said += f" With it {len(known) - len(below)} of {len(known)} are at or above the paper's."
+        count = len(known) - len(below)
+        text += f" With it {count} of {len(known)} rows are equal to or above the paper's."
     if below:
-        said += f" Below: {', '.join(below)}."
-    return [said]
+        text += f" Below: {', '.join(below)}."
+    return [text]
 
 
 def _short_of(row: RowStudy, paper: Paper) -> str:
@@ -171,28 +176,32 @@ def _exception(row: RowStudy, members: int) -> str:
     if found is None or row.methods is None:
         return ""
     drawn = row.methods.paired[members, False]
-    places = "one place" if members == 1 else "two places"
-    said = (
-        f"{row.name}, {places}: with TC-manipulability the mean is "
-        f"{signed(100.0 * found.paired.mean)} points from that without (rank sum p "
+    text = (
+        f"{row.name}, {_configurations(members)}: with TC-manipulability the mean differs by "
+        f"{signed(100.0 * found.paired.mean)} percentage points from that without (rank sum p "
         f"{p_value(found.independent.p)}, signed rank p {p_value(found.paired.p)})."
     )
     if drawn.choices <= 20:
-        said += (
-            f" Only {drawn.choices} sets reach as much as the best, so there is little to choose "
-            "between."
+        text += (
+            f" Only {drawn.choices} sets have a P_R equal to that of the best, which leaves little "
+            "choice."
         )
     else:
-        said += (
-            f" The set with the greatest P_R + P_M is one of {drawn.choices:,} that reach as much; "
-            "isotropy knows neither joint limits nor what is near the arm."
+        text += (
+            f" The set with the greatest P_R + P_M is one of {drawn.choices:,} with equal P_R; "
+            "dexterity measures such as isotropy consider neither joint limits nor obstacles near "
+            "the arm."
         )
     lost = row.single_losses if members == 1 else row.losses
-    # What is never reached is not lost by the errors.
-    at_times = [loss for loss in lost.goals if loss.success > 0.0] if lost is not None else []
-    if at_times:
-        said += f" {lost_goal(at_times[0])}"
-    return said
+    # A goal that is never reached is not lost because of the errors.
+    occasional = [loss for loss in lost.goals if loss.success > 0.0] if lost is not None else []
+    if occasional:
+        text += f" {lost_goal(occasional[0])}"
+    return text
+
+
+def _configurations(members: int) -> str:
+    return "one configuration" if members == 1 else "two configurations"
 
 
 def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
@@ -214,10 +223,10 @@ def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
             as_svg(figure, "table-1"),
             "svg",
             "Box plots of the percentage of goals reached, for each row of Table I the best "
-            "single configuration, the best set, and the surest set.",
-            "Box: the middle half of the samples; line: median; whiskers: 5th and 95th percentile; "
-            "dot: mean; rings: samples beyond the whiskers. Diamond with a line: the paper's "
-            "mean and one standard deviation to each side, cut at 100 %.",
+            "single configuration, the best set, and the most robust set.",
+            "Box: first to third quartile; line: median; whiskers: 5th and 95th percentile; dot: "
+            "mean; rings: samples beyond the whiskers. Diamond with a line: the paper's mean plus "
+            "and minus one standard deviation, up to 100 %.",
         ),
     ]
 
@@ -237,8 +246,7 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
                 if (members, is_with) in cells
             ]
             if boxes:
-                place = "one place" if members == 1 else "two places"
-                groups.append(Group(f"{row.name}\n{place}", boxes))
+                groups.append(Group(f"{row.name}\n{_configurations(members)}", boxes))
     figure = draw_boxes(groups, METHODS, label="goals reached [%]", reference="paper, Table III")
     return [
         table_3(rows, paper),
@@ -247,7 +255,7 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
             "svg",
             "Box plots of the percentage of goals reached with one and with two configurations, "
             "with and without TC-manipulability.",
-            "As above; on the same samples for both methods.",
+            "Symbols as above. Both methods are evaluated on the same samples.",
         ),
         Folded("All comparisons", [contrasts_table(rows)]),
     ]
@@ -256,9 +264,9 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
 def _gains(rows: Sequence[RowStudy]) -> list[Block]:
     return [
         Text(
-            "P_R and P_M are computed for the room as it is believed to be. Success under error "
-            "can be estimated for each set instead (tcs robustify). The surest set is the one "
-            "whose estimate has the greatest lower end of its 95 % interval."
+            "P_R and P_M are computed without errors of the environment. Success under error can "
+            "be estimated for each set instead (tcs robustify). The most robust set is the one "
+            "with the greatest lower confidence bound (95 %) on its success."
         ),
         gain_table(rows),
     ]
@@ -288,9 +296,9 @@ def _prediction(rows: Sequence[RowStudy]) -> list[Block]:
         Picture(
             as_svg(figure, "prediction"),
             "svg",
-            "For each row a cloud of sets: success with error over P_M without error.",
-            "Dots: random sets whose P_R is at least 0.98 of the greatest. Diamond: the best set, "
-            "over all samples. Each panel has axes of its own.",
+            "Scatter plots of sets for each row: success under error over P_M without error.",
+            "Dots: random sets with P_R of at least 0.98 of the greatest. Diamond: the best set, "
+            "on all samples. Each panel has its own axes.",
         ),
     ]
 
@@ -298,12 +306,13 @@ def _prediction(rows: Sequence[RowStudy]) -> list[Block]:
 def _losses(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
     blocks: list[Block] = [
         Text(
-            "The goals that the best set does not reach in every sample: in how many it does [%], "
-            "from which stop most often, and what stops the arm there in the others. A gripper "
-            "that would touch something at the goal does so wherever the robot stands: the ceiling "
-            "is the most that any set could reach on average with the room set as here. Off in the "
-            "losses: the joint whose error tells them from the other samples best, and its mean "
-            "there in standard deviations."
+            "The goals that the best set does not reach in every sample: the percentage of "
+            "samples in which they are reached, the stop from which they are reached most often, "
+            "and the reasons why the arm fails there in the other samples. The ceiling is an "
+            "upper bound on the mean of every set that leaves the environment (such as the bed) "
+            "in the same states: at the other goals the gripper touches the environment, for "
+            "every base pose. The last column names the joint error that is largest on average in "
+            "the failed samples, in standard deviations."
         )
     ]
     lossless = [row.name for row in rows if not row.losses.goals]
@@ -315,26 +324,25 @@ def _losses(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
         else:
             blocks.append(Folded(row.name, [losses_table(row)]))
     if lossless:
-        blocks.append(Text(f"Nothing is lost in any sample: {'; '.join(lossless)}."))
+        blocks.append(Text(f"Every goal is reached in every sample: {'; '.join(lossless)}."))
     return blocks
 
 
 def _reading(row: RowStudy) -> str:
-    """Return what a row that falls short comes down to."""
+    """Return the main cause of a mean below the paper's."""
     weights = row.best.weights
     lost = sum((1.0 - loss.success) * weights[loss.goal] for loss in row.losses.goals)
     worst = row.losses.goals[0]
-    share = (1.0 - worst.success) * weights[worst.goal] / lost
-    said = f"{row.name}. Of all that is lost, {percent(share, 0)} % is goal {worst.goal}. "
-    said += lost_goal(worst)
+    fraction = (1.0 - worst.success) * weights[worst.goal] / lost
+    text = f"{row.name}. Goal {worst.goal} accounts for {percent(fraction, 0)} % of the losses. "
+    text += lost_goal(worst)
     if row.gain is not None and row.gain.paired.mean > 0.0:
-        surest = row.gain.robust
-        said += (
-            " It need not be so: the surest set reaches "
-            f"{mean_and_std(surest)} %, though its P_M is "
-            f"{row.best.manipulability - surest.manipulability:.3f} less."
+        robust = row.gain.robust
+        text += (
+            f" The most robust set reaches {mean_and_std(robust)} % with a P_M that is lower by "
+            f"{row.best.manipulability - robust.manipulability:.3f}."
         )
-    return said
+    return text
 
 
 def _chosen(rows: Sequence[RowStudy], pictures: Sequence[RowPictures]) -> list[Block]:
@@ -348,12 +356,12 @@ def _chosen(rows: Sequence[RowStudy], pictures: Sequence[RowPictures]) -> list[B
             Picture(
                 drawn.scene,
                 "png",
-                f"The robot at each place of the best set for {row.name}.",
+                f"The robot at each base pose of the best set for {row.name}.",
                 f"{row.titles[0]} – {row.titles[1]}. P_R {row.best.reachability:.2f}, P_M "
                 f"{row.best.manipulability:.3f}; under error {mean_and_std(row.best)} %. {words}.",
             ),
             Folded(
-                f"{row.name} from above",
+                f"{row.name}: map",
                 [Picture(drawn.map, "png", f"Map of {row.name} with the best set.", row.name)],
             ),
         ]
@@ -368,7 +376,7 @@ def _made(
     scores = [
         (
             row.name,
-            f"scored by tcs {row.made_by['version']} at {row.made_by['created']}, measure "
+            f"scored by tcs {row.made_by['version']} on {row.made_by['created']}, measure "
             f"{row.made_by['measure']}, scene {row.made_by['scene'][:12]}, SHA-256 of the file "
             f"{row.made_by['sha256'][:16]}; errors on {', '.join(row.best.errors.errors)}",
         )
@@ -381,10 +389,10 @@ def _made(
                 *versions(),
                 *machine(),
                 ("Seed", str(plan.seed)),
-                ("Samples", f"{plan.samples:,} of each method, the same errors for all"),
+                ("Samples", f"{plan.samples:,} of each method, the same for all methods"),
                 (
-                    "Sets for the prediction",
-                    f"{plan.sets} of each kind, {plan.set_samples} samples",
+                    "Sets for the correlations",
+                    f"{plan.sets} of each class, {plan.set_samples} samples",
                 ),
                 ("Time", f"{seconds:.0f} s, {cpu:.0f} s of processor time"),
                 (
@@ -396,9 +404,10 @@ def _made(
             ]
         ),
         Text(
-            "As in the paper: the configuration is not planned anew; a goal counts when any member "
-            "of the set has a solution free of contact; whether the base touches something is not "
-            "asked again; on the bed the person is scored where they belong (shift 0)."
+            "As in the paper, the initial configurations are not planned again; a goal counts as "
+            "reached if any member of the set has a collision-free solution; collisions of the "
+            "base are not checked again; on the bed the person is at the nominal position (shift "
+            "0)."
         ),
         Folded("Score files", [Facts(scores)]),
     ]

@@ -1,52 +1,51 @@
-"""The tables of the robustness report, ours beside the paper's."""
+"""Tables of the robustness report: figures of tcs beside those of the TCS paper."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from tcs.output.report.blocks import Cell, Column, Table
 from tcs.output.report.paper import Compared, Paper
 from tcs.output.words import p_value, percent, signed
 from tcs.output.words.robustness import goes_with, mean_and_std, stopped_by
-from tcs.placement.robustness import Contrast, Evaluation, Prediction, RowStudy
+from tcs.placement.robustness import Contrast, Evaluation, Prediction, RowStudy, method_name
 
-NEAR = 0.05
-"""Percentage points within which two printed means are the same: both are rounded to a tenth."""
+ROUNDING = 0.05
+"""Percentage points within which two printed means are equal: both are rounded to a tenth."""
 
 
 def table_1(rows: Sequence[RowStudy], paper: Paper) -> Table:
-    """Return Table I: the best set of each row, the paper's figure and the difference."""
+    """Return Table I: the best set of each row beside the paper's figure and the difference."""
     columns = [
-        Column("Task, room", is_number=False),
-        Column("Ours"),
+        Column("Task, environment", is_number=False),
+        Column("tcs"),
         Column("Paper"),
         Column("Difference"),
-        Column("95 % of our mean"),
-        Column("Places"),
-        Column("All at once"),
+        Column("95 % interval"),
+        Column("Members"),
+        Column("All goals"),
         Column("Best single"),
     ]
     body = []
     for row in rows:
         published = paper.published(row.task, row.environment)
-        low, high = row.best.summary.ci95
         body.append(
             [
                 row.name,
                 mean_and_std(row.best),
                 f"{published.mean:.1f} ({published.std:.1f})" if published else "–",
                 _difference(row.best, published.mean if published else None),
-                f"{percent(low)} to {percent(high)}",
+                _interval(row.best.summary.ci95, percent),
                 str(row.best.sets.shape[1]),
                 percent(row.best.complete),
                 mean_and_std(row.single),
             ]
         )
     return Table(
-        "Table I. Percentage of goals reached with the room off at random: mean (standard "
-        "deviation) over the samples, of the best set of one or two places. 95 %: interval of the "
-        "mean. All at once: share of the samples in which nothing is lost. Best single: the best "
-        "set of one place.",
+        "Table I. Percentage of goals reached in randomly perturbed environments: mean (standard "
+        "deviation) over the samples, of the best set of one or two configurations. 95 % interval: "
+        "confidence interval of the mean. All goals: percentage of the samples in which every goal "
+        "is reached. Best single: the best single configuration.",
         columns,
         body,
     )
@@ -56,14 +55,14 @@ def table_3(rows: Sequence[RowStudy], paper: Paper) -> Table:
     """Return Table III: one or two configurations, with and without TC-manipulability."""
     columns = [
         Column("Task", is_number=False),
-        Column("Places"),
+        Column("Members"),
         Column("Without"),
-        Column("Paper's"),
+        Column("Without, paper"),
         Column("With"),
-        Column("Paper's"),
+        Column("With, paper"),
         Column("Gain"),
         Column("p, rank sum"),
-        Column("p, signed"),
+        Column("p, signed rank"),
         Column("Spread"),
     ]
     body: list[list[Cell | str]] = []
@@ -73,18 +72,19 @@ def table_3(rows: Sequence[RowStudy], paper: Paper) -> Table:
                 _methods_row(row, members, paper.compared(row.task, row.environment, members))
             )
     return Table(
-        "Table III. Without TC-manipulability: in each sample another set, drawn uniformly from "
-        "those that reach as much (P_R of at least 0.98 of the greatest). With: the best set. Mean "
-        "(std) of the percentage of goals reached. Gain: with less without, in points. Rank sum on "
-        "independent draws, as in the paper; signed rank on the same samples for both. Spread: of "
-        "with, beside that of without.",
+        "Table III. Percentage of goals reached, mean (standard deviation). Without "
+        "TC-manipulability: another set in each sample, drawn uniformly from the sets with P_R "
+        "of at least 0.98 of the greatest. With: the best set. Gain: with minus without, in "
+        "percentage points. Rank sum test on independent samples, as in the paper; signed rank "
+        "test on the same samples for both. Spread: whether the standard deviation with is "
+        "smaller than the one without.",
         columns,
         body,
     )
 
 
 def contrasts_table(rows: Sequence[RowStudy]) -> Table:
-    """Return every contrast of Table III with its tests."""
+    """Return all comparisons of Table III with their tests."""
     columns = [
         Column("Task", is_number=False),
         Column("Contrast", is_number=False),
@@ -97,9 +97,9 @@ def contrasts_table(rows: Sequence[RowStudy]) -> Table:
     body = [
         [
             row.name,
-            f"{_method(contrast.first)} – {_method(contrast.second)}",
+            f"{method_name(contrast.first)} – {method_name(contrast.second)}",
             signed(100.0 * contrast.paired.mean),
-            " to ".join(signed(100.0 * end) for end in contrast.paired.ci95),
+            _interval(contrast.paired.ci95, _points_of),
             p_value(contrast.paired.p),
             signed(100.0 * contrast.independent.mean),
             p_value(contrast.independent.p),
@@ -108,21 +108,21 @@ def contrasts_table(rows: Sequence[RowStudy]) -> Table:
         if row.methods is not None
         for contrast in row.methods.contrasts
     ]
-    return Table("Every comparison of Table III with both tests.", columns, body)
+    return Table("All comparisons of Table III with both tests.", columns, body)
 
 
 def gain_table(rows: Sequence[RowStudy]) -> Table:
-    """Return what choosing by estimated success gains over choosing by P_R + P_M."""
+    """Return the gain of selecting by estimated success over selecting by P_R + P_M."""
     columns = [
         Column("Task", is_number=False),
-        Column("Places"),
+        Column("Members"),
         Column("By P_R + P_M"),
         Column("By success"),
         Column("Gain"),
-        Column("95 %"),
+        Column("95 % interval"),
         Column("p"),
-        Column("All at once"),
-        Column("P_M given up"),
+        Column("All goals"),
+        Column("Loss of P_M"),
     ]
     body: list[list[Cell | str]] = [
         [
@@ -131,7 +131,7 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
             mean_and_std(gain.scored),
             mean_and_std(gain.robust),
             _toned(100.0 * gain.paired.mean),
-            " to ".join(signed(100.0 * end) for end in gain.paired.ci95),
+            _interval(gain.paired.ci95, _points_of),
             p_value(gain.paired.p),
             f"{percent(gain.scored.complete)} → {percent(gain.robust.complete)}",
             f"{gain.scored.manipulability - gain.robust.manipulability:.3f}",
@@ -140,10 +140,11 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
         for gain in row.gains
     ]
     return Table(
-        "The surest set against the set with the greatest P_R + P_M: percentage of goals reached, "
-        "on the same samples for both, none of which had a part in the "
-        "estimate. Gain: in points, with its interval and the p of the signed rank test. All at "
-        "once: share of the samples in which nothing is lost, before and after.",
+        "The most robust set compared with the set with the greatest P_R + P_M: percentage of "
+        "goals reached, mean (standard deviation), on the same fresh samples for both. Gain: in "
+        "percentage points, with its confidence interval and the p-value of the signed rank "
+        "test. All goals: percentage of the samples in which every goal is reached, by P_R + P_M "
+        "and by success.",
         columns,
         body,
     )
@@ -151,12 +152,12 @@ def gain_table(rows: Sequence[RowStudy]) -> Table:
 
 def prediction_table(rows: Sequence[RowStudy]) -> Table:
     """Return how well P_M predicts success, row by row."""
-    kinds = [(1, True), (2, True), (1, False), (2, False)]
+    cases = [(1, True), (2, True), (1, False), (2, False)]
     columns = [
         Column("Task", is_number=False),
         *(
-            Column(f"{places}, {'equal' if equal else 'any'} reach")
-            for places, equal in ((("one", "two")[m - 1], e) for m, e in kinds)
+            Column(f"{('one', 'two')[members - 1]}, {'equal' if equal else 'any'} P_R")
+            for members, equal in cases
         ),
     ]
     body = [
@@ -167,20 +168,20 @@ def prediction_table(rows: Sequence[RowStudy]) -> Table:
                     (
                         _correlation(found)
                         for found in row.predictions
-                        if (found.members, found.equal_reach) == kind
+                        if (found.members, found.equal_reach) == case
                     ),
                     "–",
                 )
-                for kind in kinds
+                for case in cases
             ),
         ]
         for row in rows
     ]
     return Table(
-        "How well P_M, computed without error, orders sets by the mean share of goals reached with "
-        "it: Spearman's rank correlation and its 95 % interval, among sets of one and two drawn "
-        "evenly over P_M. Equal reach: only sets whose P_R is at least 0.98 of the greatest, those "
-        "between which P_M decides. A dash where sets are too few or all do equally well.",
+        "How well P_M, computed without error, predicts the mean fraction of goals reached under "
+        "error: Spearman's rank correlation with its 95 % interval, among sets of one and two "
+        "configurations drawn evenly over P_M. Equal P_R: only sets with P_R of at least 0.98 of "
+        "the greatest, among which P_M decides. A dash: too few sets, or all equally successful.",
         columns,
         body,
     )
@@ -193,14 +194,14 @@ def _correlation(found: Prediction) -> str:
 
 
 def losses_table(row: RowStudy) -> Table:
-    """Return the goals that the best set of a row loses at times, and why."""
+    """Return the goals that the best set of a row does not reach in every sample, and why."""
     columns = [
         Column("Goal"),
-        Column("On the", is_number=False),
+        Column("Body", is_number=False),
         Column("Reached"),
         Column("Stop"),
-        Column("What stops it there otherwise", is_number=False),
-        Column("Off in the losses", is_number=False),
+        Column("Reasons for failure", is_number=False),
+        Column("Mean error in the losses [sd]", is_number=False),
     ]
     body = [
         [
@@ -222,7 +223,7 @@ def losses_table(row: RowStudy) -> Table:
 
 
 def find_contrast(row: RowStudy, members: int) -> Contrast | None:
-    """Return the contrast of with against without TC-manipulability, None where there is none."""
+    """Return the contrast of with against without TC-manipulability, None if there is none."""
     for contrast in row.methods.contrasts if row.methods is not None else ():
         if contrast.first == (members, True) and contrast.second == (members, False):
             return contrast
@@ -232,7 +233,7 @@ def find_contrast(row: RowStudy, members: int) -> Contrast | None:
 def is_short(row: RowStudy, paper: Paper) -> bool:
     """Return whether the best set's mean, as printed, is below the paper's."""
     published = paper.published(row.task, row.environment)
-    return published is not None and 100.0 * row.best.summary.mean < published.mean - NEAR
+    return published is not None and 100.0 * row.best.summary.mean < published.mean - ROUNDING
 
 
 def _methods_row(row: RowStudy, members: int, published: Compared | None) -> list[Cell | str]:
@@ -266,16 +267,21 @@ def _points(contrast: Contrast | None) -> Cell | str:
     return "–" if contrast is None else _toned(100.0 * contrast.paired.mean)
 
 
+def _points_of(fraction: float) -> str:
+    return signed(100.0 * fraction)
+
+
+def _interval(ends: tuple[float, float] | None, text: Callable[[float], str]) -> str:
+    """Return both ends of a confidence interval, a dash for a single sample."""
+    return "–" if ends is None else f"{text(ends[0])} to {text(ends[1])}"
+
+
 def _difference(ours: Evaluation, theirs: float | None) -> Cell | str:
     return "–" if theirs is None else _toned(100.0 * ours.summary.mean - theirs)
 
 
 def _toned(points: float) -> Cell:
-    """Return percentage points: above, below, or the same as printed."""
-    if abs(points) <= NEAR:
+    """Return percentage points, coloured by their sign if they are not 0 as printed."""
+    if abs(points) <= ROUNDING:
         return Cell(signed(points))
     return Cell(signed(points), "good" if points > 0.0 else "bad")
-
-
-def _method(cell: tuple[int, bool]) -> str:
-    return f"{('one', 'two')[cell[0] - 1]} {'with' if cell[1] else 'without'}"

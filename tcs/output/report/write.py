@@ -1,4 +1,4 @@
-"""Write a study down: the page, its tables as Markdown and every sample as CSV."""
+"""Files of the robustness report: the page, its text as Markdown and every sample as CSV."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tcs.output.report.samples import samples_csv
 from tcs.placement.robustness import RowStudy, StudyPlan
 
 NAMES = ("robustness.html", "robustness.md", "samples.csv")
-"""What is written into the folder."""
+"""Names of the files in the folder."""
 
 
 def write_report(
@@ -30,15 +30,15 @@ def write_report(
     """Write a robustness report and return its files, each whole or not at all.
 
     Args:
-        folder: Where to; made if it is not there.
+        folder: Folder of the files, created if missing.
         rows: Results of each row.
         pictures: Pictures of each row.
-        plan: How much was tried.
-        seconds: How long it took, wall clock.
-        command: How to make it again.
+        plan: Sample sizes of the study.
+        seconds: Wall-clock time of the study [s].
+        command: Command that makes the report.
 
     Raises:
-        OutputError: If something cannot be written there.
+        OutputError: If a file cannot be written.
     """
     make_folder(folder)
     page = robustness_page(rows, pictures, load_paper(), plan, seconds=seconds, command=command)

@@ -14,7 +14,7 @@ from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.changes import Change, ahead_and_left, changes_between, sentence
 from tcs.placement.reasons.explained import Standing
 from tcs.placement.selection import TravelWeights
-from tcs.placement.selection.distances import Distances, FloorDistances, StraightDistances
+from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from
 from tcs.placement.tables import BaseLattice, Reason, ScoreTable, tc_manipulability, tc_reachability
 
@@ -200,7 +200,7 @@ def _ways(
     """
     place = standing.place
     if route == "around" and (standing.off or standing.reason != Reason.BODY_BLOCKED):
-        around = FloorDistances(cell_xy, lattice)
+        around = LatticeDistances(cell_xy, lattice)
         try:
             around.from_position(place.base_x, place.base_y)
         except SelectionError:

@@ -1,4 +1,8 @@
-"""Robustness: what is left of a set of configurations when the room is a little off."""
+"""Robustness: success of sets of configurations in perturbed environments, TCS sections IV and V.
+
+In: a score file and an error model of the environment's joints. Out: Monte-Carlo evaluations of
+sets, estimates of success for selection, and the study behind the robustness report.
+"""
 
 from __future__ import annotations
 

@@ -11,34 +11,34 @@ from tcs.placement.robustness.statistics import Difference, rank_sum, signed_ran
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile
 
-Cell = tuple[int, bool]
-"""Members of the set, and whether TC-manipulability decided."""
+Method = tuple[int, bool]
+"""Number of members of the set, and whether TC-manipulability selects it."""
 
-METHODS: tuple[Cell, ...] = ((1, False), (1, True), (2, False), (2, True))
+METHODS: tuple[Method, ...] = ((1, False), (1, True), (2, False), (2, True))
 """The methods that are compared."""
 
-CONTRASTS: tuple[tuple[Cell, Cell], ...] = (
+CONTRASTS: tuple[tuple[Method, Method], ...] = (
     ((1, True), (1, False)),
     ((2, True), (2, False)),
     ((2, True), (1, True)),
     ((2, False), (1, False)),
 )
-"""Which is compared with which: with against without, two against one."""
+"""Pairs of methods that are compared: with against without, two members against one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """One method against another."""
+    """Comparison of one method with another."""
 
-    first: Cell
-    second: Cell
+    first: Method
+    second: Method
     independent: Difference
-    """Rank sum of samples drawn for each method by itself, as in the paper."""
+    """Rank sum test on samples drawn for each method separately, as in the paper."""
     paired: Difference
-    """Signed rank on the same samples for both."""
+    """Signed rank test on the same samples for both."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the contrast as plain containers."""
         return {
             "first": method_name(self.first),
             "second": method_name(self.second),
@@ -49,29 +49,30 @@ class Contrast:
 
 @dataclass(frozen=True, eq=False)
 class MethodComparison:
-    """The four methods on one row; a method that has no set is missing."""
+    """The four methods on one row; a method without a set is missing."""
 
-    paired: dict[Cell, Evaluation]
-    """On the same samples for all."""
-    independent: dict[Cell, Evaluation]
-    """On samples drawn for each by itself."""
+    paired: dict[Method, Evaluation]
+    """Evaluations on the same samples for all."""
+    independent: dict[Method, Evaluation]
+    """Evaluations on samples drawn for each method separately."""
     contrasts: tuple[Contrast, ...]
+    """The comparisons of `CONTRASTS` whose methods are both there."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the comparison as plain containers."""
         return {
-            "methods": {method_name(cell): found.to_json() for cell, found in self.paired.items()},
+            "methods": {method_name(one): found.to_json() for one, found in self.paired.items()},
             "contrasts": [contrast.to_json() for contrast in self.contrasts],
         }
 
 
-def method_name(cell: Cell) -> str:
-    """Return a method in words.
+def method_name(method: Method) -> str:
+    """Return the name of a method, which also names its stream of independent samples.
 
     >>> method_name((2, False))
     'two without'
     """
-    return f"{('one', 'two')[cell[0] - 1]} {'with' if cell[1] else 'without'}"
+    return f"{('one', 'two')[method[0] - 1]} {'with' if method[1] else 'without'}"
 
 
 def compare_methods(
@@ -84,26 +85,26 @@ def compare_methods(
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> MethodComparison:
-    """Return a row of Table III, with its tests.
+    """Return a row of Table III with its tests.
 
     With TC-manipulability: the best single configuration, and the best set of two. Without:
-    in each sample another single or pair, drawn uniformly from those with P_R of at least 0.98 of
-    the greatest. A method is missing where there is no such set, as where no pair is better than
-    the best single.
+    another single or pair in each sample, drawn uniformly from those with P_R of at least 0.98 of
+    the greatest. A method is missing if it has no set, e.g. if no pair is better than the best
+    single.
 
     Args:
         file: A score file, or its trials.
-        samples: How many samples for each method, twice: paired, and drawn by itself.
-        seed: Seed of all of them.
-        errors: Path of an error file, or errors by joint, in place of the environment's own. Not
-            for trials, which have theirs.
+        samples: Number of samples of each method, for paired and independent evaluations each.
+        seed: Seed of all samples.
+        errors: Path of an error file, or errors by joint, in place of those of the environment.
+            Not for trials, which include their errors.
         jobs: Number of threads.
-        on_progress: Called with evaluations done and in all.
-        on_compile: Called first, when the kernel has to be compiled.
+        on_progress: Called with the number of evaluations done and of all evaluations.
+        on_compile: Called first if the kernel has to be compiled.
 
     Raises:
-        StoreMismatchError: If the models are not those the file was made from.
-        TcsError: Whatever `evaluate` raises.
+        StoreMismatchError: If the file was made from other models.
+        TcsError: As `evaluate`.
     """
     if isinstance(file, Trials):
         trials = file
@@ -111,15 +112,14 @@ def compare_methods(
         trials = Trials.of(file, errors=errors, on_compile=on_compile)
     sets = trials.scored.sets
     has_two = len(sets.best) > 1 and sets.kept_pairs > 0
-    shown = [cell for cell in METHODS if cell[0] == 1 or has_two]
-    paired: dict[Cell, Evaluation] = {}
-    alone: dict[Cell, Evaluation] = {}
-    for i, (members, with_manipulability) in enumerate(shown):
+    compared = [method for method in METHODS if method[0] == 1 or has_two]
+    paired: dict[Method, Evaluation] = {}
+    independent: dict[Method, Evaluation] = {}
+    for i, (members, with_manipulability) in enumerate(compared):
+        method = (members, with_manipulability)
         best = "best" if members == 2 else "single"
-        for j, (found, stream) in enumerate(
-            ((paired, ""), (alone, method_name((members, with_manipulability))))
-        ):
-            found[members, with_manipulability] = evaluate(
+        for j, (found, stream) in enumerate(((paired, ""), (independent, method_name(method)))):
+            found[method] = evaluate(
                 trials,
                 samples=samples,
                 seed=seed,
@@ -129,15 +129,15 @@ def compare_methods(
                 jobs=jobs,
             )
             if on_progress is not None:
-                on_progress(2 * i + j + 1, 2 * len(shown))
+                on_progress(2 * i + j + 1, 2 * len(compared))
     contrasts = tuple(
         Contrast(
             first,
             second,
-            rank_sum(alone[first].fractions, alone[second].fractions),
+            rank_sum(independent[first].fractions, independent[second].fractions),
             signed_rank(paired[first].fractions, paired[second].fractions),
         )
         for first, second in CONTRASTS
         if first in paired and second in paired
     )
-    return MethodComparison(paired, alone, contrasts)
+    return MethodComparison(paired, independent, contrasts)

@@ -1,4 +1,4 @@
-"""How far off the environment may be: which joints, how distributed, and random draws of it."""
+"""Error model of the environment: distributions of joint errors, and random samples of them."""
 
 from __future__ import annotations
 
@@ -15,41 +15,42 @@ from tcs.files.documents import Document, read_document
 from tcs.model.scene import ErrorDistribution, Scene
 
 Offsets = Mapping[str, NDArray[np.float64]]
-"""For each joint by how much it is off in each sample [m or rad], shapes (samples,)."""
+"""Error of each joint in each sample [m or rad], shapes (samples,)."""
 
 MAX_SAMPLES = 1_000_000
-"""More samples than this are a mistake: the mean would be known to a thousandth of a percent."""
+"""More samples are a mistake: a hundredth of a percentage point needs no more."""
 MAX_SEED = 2**63 - 1
 """Greatest seed."""
 
 
 class ErrorFile(Document):
-    """A file of errors of the user's own."""
+    """User-defined error file."""
 
     title: str = ""
     source: str = ""
     errors: Mapping[str, ErrorDistribution]
-    """For each joint how far off it may be."""
+    """Error distribution of each joint."""
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """Independent errors on joints of an environment, as in Table II of the TCS paper."""
+    """Independent errors of joints of an environment, as in Table II of the TCS paper."""
 
     errors: Mapping[str, ErrorDistribution]
-    """For each joint how far off it may be; the others are where they are believed to be."""
+    """Error distribution of each joint; all other joints have no error."""
     source: str
-    """Where the figures come from."""
+    """Source of the figures."""
 
     @classmethod
     def of(
         cls, scene: Scene, errors: str | Path | Mapping[str, ErrorDistribution] | None = None
     ) -> ErrorModel:
-        """Return the errors of a scene.
+        """Return the error model of a scene.
 
         Args:
-            scene: The scene whose joints they are.
-            errors: The path of a file, or the errors themselves, in place of the environment's.
+            scene: The scene with the joints.
+            errors: Path of an error file, or errors by joint, in place of those of the
+                environment.
 
         Raises:
             DataFileError: If the file cannot be used, or an error is not in its joint's unit.
@@ -60,7 +61,7 @@ class ErrorModel:
             where, source = f"environment '{environment.name}', field 'errors'", environment.source
             errors = environment.errors
         elif isinstance(errors, Mapping):
-            where = source = "errors given"
+            where = source = "given errors"
         else:
             where = f"error file '{errors}'"
             read = read_document(Path(errors), ErrorFile, where, DataFileError)
@@ -72,22 +73,23 @@ class ErrorModel:
     def draw(self, samples: int, seed: int, *, stream: str = "") -> Offsets:
         """Return random errors of every joint.
 
-        Each joint has a stream of its own, started by the seed and the joint's name: adding a
+        Each joint has its own random stream, seeded by the seed and the joint's name: adding a
         joint changes no other joint's errors, and a hundred samples are the first hundred of a
         thousand.
 
         Args:
-            samples: How many.
-            seed: Where the streams start; the same seed gives the same numbers.
-            stream: Another text gives independent numbers.
+            samples: Number of samples.
+            seed: Seed of the streams; the same seed gives the same numbers.
+            stream: Name of the draw; another name gives independent numbers.
 
         Raises:
-            TcsError: If there are no samples or too many, the seed is none, or no joint is off.
+            TcsError: If the number of samples or the seed is out of range, or no joint has an
+                error.
         """
         check_draws(samples, seed)
         if not self.errors:
             raise TcsError(
-                "No joint is said to be off, so there is nothing to try. Name joints in an error "
+                "No joint has an error, so there is nothing to evaluate. Name joints in an error "
                 "file (--errors), or in the environment file under 'errors'."
             )
         return {
@@ -96,7 +98,7 @@ class ErrorModel:
         }
 
     def to_json(self) -> dict[str, dict[str, float | str]]:
-        """Return the errors as an error file holds them."""
+        """Return the errors in the form of an error file."""
         return {
             name: error.model_dump(mode="json", exclude_none=True)
             for name, error in self.errors.items()
@@ -104,23 +106,23 @@ class ErrorModel:
 
 
 def named_generator(seed: int, name: str) -> np.random.Generator:
-    """Return the stream of random numbers of that name: PCG64, independent of other names'.
+    """Return the random stream of a name (PCG64), independent of the streams of other names.
 
     Args:
-        seed: From 0.
+        seed: Seed, 0 or greater.
         name: Any text.
     """
     key = name.encode()
-    # The checksum keeps names of other lengths apart in every 32-bit word of the key.
+    # The checksum makes names of different lengths differ in every 32-bit word of the key.
     words = (zlib.crc32(key), len(key), *key)
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=words)))
 
 
 def check_draws(samples: int, seed: int) -> None:
-    """Refuse a number of samples, or a seed, that is none.
+    """Refuse a number of samples or a seed that is out of range.
 
     Raises:
-        TcsError: If one is out of range.
+        TcsError: If either is out of range.
     """
     if samples % 1 or not 1 <= samples <= MAX_SAMPLES:
         raise TcsError(f"samples is {samples}; must be a whole number, 1 to {MAX_SAMPLES:,}.")

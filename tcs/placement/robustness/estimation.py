@@ -1,4 +1,4 @@
-"""Success under error as a criterion: estimate it for the sets that are worth choosing."""
+"""Estimates of success under error for the best sets, as a criterion of selection."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.model.grid import Grid
 from tcs.placement.robustness.error_model import check_draws
-from tcs.placement.robustness.pairs import AS_GOOD, Pairs, kept_pairs
+from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.successive_halving import Estimates, round_sizes, successive_halving
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
@@ -24,14 +24,16 @@ from tcs.placement.tables.success import NO_MEMBER
 IntArray = NDArray[np.int64]
 
 SETS = 2000
-"""Sets of two that get an estimate; of one, a quarter as many."""
-FEW = 200
-"""Where fewer sets than this reach as much as the best, the next best join them."""
+"""Greatest number of pairs that get an estimate; a quarter as many singles."""
+MIN_CONTENDERS = 200
+"""If fewer sets than this are equal in P_R to the best, the next best are added."""
 SCREENED = 32
-"""Samples by which the sets to race are picked, where there are more; the race does not use
-them again, so luck in the picking does not flatter its estimates."""
+"""Samples that select the sets for successive halving if there are more; halving does not use them
+again, so that the selection does not bias its estimates."""
 MOST_SCREENED = 800
-"""Configurations that are tried in those samples, the ones with the best scores."""
+"""Greatest number of configurations evaluated on these samples, those with the best scores."""
+_STREAM = "race"
+"""Name of the random stream of the estimates. Another name would give other numbers."""
 
 
 def robustify(
@@ -49,25 +51,25 @@ def robustify(
 ) -> ScoreFile:
     """Return a score file with estimates of success under error for its best sets.
 
-    Of each size, one and two, those sets count that reach at least 98 % of what the best of them
-    does. Where they are too many, those that do best in a few samples of their own are taken, and
-    among them always the sets with the best scores. They race: all meet the same samples, and the
-    better half of those that may still be the best meets more of them (see `race`).
+    Of each size, one and two, the contenders are the sets with P_R of at least 98 % of the greatest
+    of that size. If there are too many, those that succeed most often in a few separate samples are
+    selected; the sets with the best scores always are. Successive halving evaluates them all on the
+    same samples and gives more samples to the better half of those that may still be the best.
 
     Args:
-        file: A score file; it stays as it is.
-        sets: How many sets of two at most; of one, a quarter as many.
-        samples: Samples for the sets that stay to the end.
+        file: A score file, which is not modified.
+        sets: Greatest number of pairs; a quarter as many singles.
+        samples: Number of samples of the sets that remain to the end.
         seed: Seed of the samples; results are the same for any number of jobs.
-        errors: Path of an error file, or errors by joint, in place of the environment's own.
-        check_base: Whether the base must be free in every sample.
-        tables: Numbers of the tables; all by default. The others keep what estimates they have.
+        errors: Path of an error file, or errors by joint, in place of those of the environment.
+        check_base: Whether the base must be collision-free in every sample.
+        tables: Numbers of the tables; all by default. The others keep their estimates.
         jobs: Number of threads.
-        on_progress: Called with rounds done and in all.
-        on_compile: Called first, when the kernel has to be compiled.
+        on_progress: Called with the number of rounds done and of all rounds.
+        on_compile: Called first if the kernel has to be compiled.
 
     Raises:
-        StoreMismatchError: If the models are not those the file was made from.
+        StoreMismatchError: If the file was made from other models.
         DataFileError: If the error file cannot be used.
         UnknownNameError: If a joint has no such name.
         SelectionError: If there is no such table.
@@ -92,29 +94,29 @@ def robustify(
         here = trials.at_table(number)
         success = success_of(here, sets=sets, samples=samples, seed=seed, jobs=jobs, step=step)
         scored[number] = dataclasses.replace(here.scored, success=success)
-    made = {
+    settings = {
         "program_version": version("tcs"),
         "samples": samples,
         "seed": seed,
         "sets": sets,
         "errors": trials.errors.to_json(),
-        "errors_of_environment": errors is None,
+        "environment_errors": errors is None,
         "check_base": check_base,
     }
-    # Each table has a record of its own: others may have been estimated at another time.
+    # One record for each table, because tables may be estimated at different times.
     records = list(file.metadata.get("robustness", [None] * len(scored)))
     for number in chosen:
-        records[number] = made
+        records[number] = settings
     metadata = {**file.metadata, "robustness": records}
     return dataclasses.replace(file, metadata=metadata, tables=tuple(scored))
 
 
 def success_summary(file: ScoreFile) -> dict[str, Any]:
-    """Return what was estimated, as plain containers: what `tcs robustify --json` prints."""
+    """Return the most robust sets as plain containers, as printed by `tcs robustify --json`."""
     grid = Grid.from_dict(file.grid)
     tables = []
     records = file.metadata.get("robustness", [None] * len(file.tables))
-    for scored, state, made in zip(file.tables, file.observed_states, records, strict=True):
+    for scored, state, settings in zip(file.tables, file.observed_states, records, strict=True):
         success = scored.success
         if success is None:
             continue
@@ -134,7 +136,7 @@ def success_summary(file: ScoreFile) -> dict[str, Any]:
                 }
             )
         observed = state_to_json(file.observed_axes, state)
-        tables.append({"observed": observed, "best": best, "made": made})
+        tables.append({"observed": observed, "best": best, "settings": settings})
     return {"tables": tables}
 
 
@@ -147,33 +149,35 @@ def success_of(
     jobs: int = 2,
     step: Callable[[], None] = lambda: None,
 ) -> SuccessTable:
-    """Return estimates for the best sets of one table; see `robustify`.
+    """Return the estimates for the best sets of one table; see `robustify`.
 
     Args:
         trials: Trials of the table.
-        sets: How many sets of two at most; of one, a quarter as many.
-        samples: Samples for the sets that stay to the end.
+        sets: Greatest number of pairs; a quarter as many singles.
+        samples: Number of samples of the sets that remain to the end.
         seed: Seed of the samples.
         jobs: Number of threads.
-        step: Called once for the screening and once for each round, of each size.
+        step: Called after the screening and after each round, for each size.
     """
     table = trials.scored.sets
-    offsets = trials.errors.draw(samples, seed, stream="race")
+    offsets = trials.errors.draw(samples, seed, stream=_STREAM)
 
     def attempt(rows: IntArray, start: int, stop: int) -> NDArray[np.bool_]:
-        some = {name: values[start:stop] for name, values in offsets.items()}
-        return trials.reached(table.candidates[rows], some, jobs=jobs)
+        part = {name: values[start:stop] for name, values in offsets.items()}
+        return trials.reached(table.candidates[rows], part, jobs=jobs)
 
     found: list[tuple[IntArray, Estimates]] = []
     for pool, most in ((_singles(table), -(-sets // 4)), (_pairs(table), sets)):
-        raced = _screened(trials, pool, most, seed, jobs)
+        contenders = _screened(trials, pool, most, seed, jobs)
         step()
-        found.append((raced, successive_halving(raced, table.weights, samples, attempt, step)))
+        found.append(
+            (contenders, successive_halving(contenders, table.weights, samples, attempt, step))
+        )
     return _as_table(table, found)
 
 
 def _as_table(table: SetTable, found: list[tuple[IntArray, Estimates]]) -> SuccessTable:
-    """Return the estimates of sets of several sizes, in order."""
+    """Return the estimates of sets of several sizes as one table, in order."""
     width = max((rows.shape[1] for rows, _ in found if len(rows)), default=1)
     members, columns = [], []
     for rows, estimates in found:
@@ -184,62 +188,62 @@ def _as_table(table: SetTable, found: list[tuple[IntArray, Estimates]]) -> Succe
         members.append(flat)
         parts = (estimates.mean, estimates.low, estimates.high, estimates.samples)
         columns.append([part[order] for part in parts])
-    mean, low, high, had = (np.concatenate(parts) for parts in zip(*columns, strict=True))
+    mean, low, high, samples = (np.concatenate(parts) for parts in zip(*columns, strict=True))
     return SuccessTable(
         members=np.concatenate(members),
         success=mean,
         low=low,
         high=high,
-        samples=had.astype(np.int32),
+        samples=samples.astype(np.int32),
     )
 
 
 def _singles(table: SetTable) -> IntArray:
-    """Return the singles in question, best scores first, shape (K, 1)."""
+    """Return the contending singles, best scores first, shape (K, 1)."""
     reachability = table.single_reachability
     rows = np.arange(len(table.candidates))
-    return _in_question(rows[:, None], reachability, table.single_manipulability)
+    return _contenders(rows[:, None], reachability, table.single_manipulability)
 
 
 def _pairs(table: SetTable) -> IntArray:
-    """Return the kept pairs in question, best scores first, shape (K, 2)."""
+    """Return the contending pairs, best scores first, shape (K, 2)."""
     greatest = float(table.pair_reachability.max(initial=0.0))
-    least = AS_GOOD * greatest - SHARE_TOLERANCE
+    least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
     pairs = Pairs.joined(kept_pairs(table, least_reachability=least))
-    if pairs.first.size < FEW:
+    if pairs.first.size < MIN_CONTENDERS:
         pairs = Pairs.joined(kept_pairs(table))
     rows = np.stack([pairs.first, pairs.second], axis=1)
-    return _in_question(rows, pairs.reachability, pairs.manipulability)
+    return _contenders(rows, pairs.reachability, pairs.manipulability)
 
 
-def _in_question(
+def _contenders(
     rows: IntArray, reachability: NDArray[np.float64], manipulability: NDArray[np.float64]
 ) -> IntArray:
-    """Return the sets that reach as much as the best, or the FEW best; best scores first."""
+    """Return the sets equal in P_R to the best, or the MIN_CONTENDERS best; best scores first."""
     order = np.argsort(-(reachability + manipulability), kind="stable")
     greatest = float(reachability.max(initial=0.0))
-    as_good = reachability[order] >= AS_GOOD * greatest - SHARE_TOLERANCE
-    as_good[: max(0, FEW)] |= np.count_nonzero(as_good) < FEW
-    return np.asarray(rows[order][as_good])
+    contends = reachability[order] >= EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
+    contends[:MIN_CONTENDERS] |= np.count_nonzero(contends) < MIN_CONTENDERS
+    return np.asarray(rows[order][contends])
 
 
 def _screened(trials: Trials, pool: IntArray, most: int, seed: int, jobs: int) -> IntArray:
-    """Return the sets to race, at most so many."""
+    """Return the sets for successive halving, at most `most`."""
     if len(pool) <= most:
         return pool
     members, first = np.unique(pool, return_index=True)
-    # The earlier a candidate comes up, the better the best set that it is in.
+    # The earlier a candidate occurs, the better the best set that contains it.
     early = members[np.argsort(first, kind="stable")[:MOST_SCREENED]]
-    able = pool[np.isin(pool, early).all(axis=1)]
+    screened = pool[np.isin(pool, early).all(axis=1)]
     offsets = trials.errors.draw(SCREENED, seed, stream="screening")
-    tried = np.unique(able)
+    tried = np.unique(screened)
     found = trials.reached(trials.scored.sets.candidates[tried], offsets, jobs=jobs)
-    number = np.searchsorted(tried, able)
-    mean = np.empty(len(able))
-    for start in range(0, len(able), 4096):
+    number = np.searchsorted(tried, screened)
+    mean = np.empty(len(screened))
+    for start in range(0, len(screened), 4096):
         part = number[start : start + 4096]
         reached = np.logical_or.reduce([found[column] for column in part.T], axis=0)
         mean[start : start + 4096] = tc_reachability(reached, trials.weights).mean(axis=1)
-    # A tenth of the places is for the best scores, whatever their luck in these samples.
+    # A tenth of the selection has the best scores, regardless of these few samples.
     mean[: max(1, most // 10)] = np.inf
-    return np.asarray(able[np.sort(np.argsort(-mean, kind="stable")[:most])])
+    return np.asarray(screened[np.sort(np.argsort(-mean, kind="stable")[:most])])

@@ -1,4 +1,4 @@
-"""Success under error: what sets of configurations reach when the room is a little off."""
+"""Success under error: Monte-Carlo evaluation of sets of configurations."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
 SELECTIONS = ("best", "single", "robust", "uniform")
-"""Which sets to evaluate: the set with the best scores; the best single configuration; the set
-with the surest success under error, where `robustify` has estimated it; or, as the paper's
-"without TC-manipulability", another set in every sample, drawn uniformly from those whose P_R is
-at least 0.98 of the greatest."""
+"""Sets to evaluate: the set with the greatest P_R + P_M; the best single configuration; the most
+robust set (greatest lower confidence bound on success, estimated by `robustify`); or, as the
+paper's "without TC-manipulability", another set in every sample, drawn uniformly from those whose
+P_R is at least 0.98 of the greatest."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evaluation:
-    """What was reached in each sample, and how that came about; arrays are read-only."""
+    """Goals that a set reaches in each sample, with the settings; arrays are read-only."""
 
     select: str
     """One of `SELECTIONS`, or "given"."""
     sets: NDArray[np.int64]
     """Flat configuration indices of the members, shape (1, m), or (samples, m) if "uniform"."""
     offsets: Offsets
-    """By how much joints were off in each sample [m or rad], shapes (samples,)."""
+    """Error of each joint in each sample [m or rad], shapes (samples,)."""
     reached: NDArray[np.bool_]
     """Whether any member reaches a goal, shape (samples, goals)."""
     weights: NDArray[np.float64]
@@ -45,18 +45,19 @@ class Evaluation:
     manipulability: float
     """P_M without error; likewise."""
     choices: int
-    """How many sets there were to draw from; 1 unless "uniform"."""
+    """Number of sets to draw from; 1 unless "uniform"."""
     clipped: int
-    """In how many samples a joint was stopped at its limit."""
+    """Number of samples in which an error is limited at a joint limit."""
     errors: ErrorModel
-    """How far off joints may be."""
+    """Error model of the joints."""
     check_base: bool
-    """Whether the base had to be free as well."""
+    """Whether the base had to be collision-free in every sample."""
     seed: int
+    """Seed of the samples."""
     seconds: float
-    """How long it took, compiling left out [s]."""
+    """Duration without compilation [s]."""
     observed: Mapping[str, float]
-    """How the person is found, by joint, angles in degrees under `..._deg` names."""
+    """Observed state of the table, by joint; angles in degrees under `..._deg` names."""
     about: Mapping[str, str]
     """Names of task, environment and robot."""
     members: tuple[dict[str, float], ...]
@@ -64,31 +65,32 @@ class Evaluation:
 
     @cached_property
     def fractions(self) -> NDArray[np.float64]:
-        """Share of the goals reached in each sample, by weight, shape (samples,)."""
+        """Weighted fraction of the goals reached in each sample, shape (samples,)."""
         return tc_reachability(self.reached, self.weights)
 
     @cached_property
     def summary(self) -> Mean:
-        """Mean of the fractions, its standard deviation and interval."""
+        """Mean of the fractions, with standard deviation and interval."""
         return mean_of(self.fractions)
 
     @property
     def samples(self) -> int:
-        """How many samples."""
+        """Number of samples."""
         return len(self.reached)
 
     @property
     def per_goal(self) -> NDArray[np.float64]:
-        """Share of the samples in which each goal is reached, shape (goals,)."""
+        """Fraction of the samples in which each goal is reached, shape (goals,)."""
         return np.asarray(self.reached.mean(axis=0))
 
     @property
     def complete(self) -> float:
-        """Share of the samples in which all goals are reached."""
+        """Fraction of the samples in which all goals are reached."""
         return float(self.reached.all(axis=1).mean())
 
     def to_json(self) -> dict[str, Any]:
-        """Return the figures as plain containers: what `tcs evaluate --json` prints."""
+        """Return the figures as plain containers, as printed by `tcs evaluate --json`."""
+        interval = self.summary.ci95
         return {
             **self.about,
             "select": self.select,
@@ -99,7 +101,7 @@ class Evaluation:
             "manipulability": round(self.manipulability, 12),
             "mean": round(self.summary.mean, 12),
             "std": self.summary.std,
-            "ci95": list(self.summary.ci95),
+            "ci95": None if interval is None else list(interval),
             "per_goal": self.per_goal.tolist(),
             "complete": self.complete,
             "samples": self.samples,
@@ -126,40 +128,41 @@ def evaluate(
     on_progress: Progress = None,
     on_compile: Callable[[], None] | None = None,
 ) -> Evaluation:
-    """Return how much of a task is still done when the room is not where it is believed to be.
+    """Return which goals a set of configurations reaches in perturbed environments.
 
-    In each sample the joints of the error model are moved by random amounts. A goal counts when
-    any member of the set has a collision-free solution for it there. The configurations are not
-    planned anew, the arm is. The same seed gives the same samples for whatever is compared.
+    In each sample the joints of the error model are displaced by random errors. A goal is reached
+    if any member of the set has a collision-free solution for it. The initial configurations are
+    not planned again, the arm is. The same seed gives the same samples for every set.
 
     Args:
-        file: A score file; or its trials, which is faster when evaluating repeatedly.
-        samples: How many samples.
+        file: A score file; or its trials, which is faster for repeated evaluation.
+        samples: Number of samples.
         seed: Seed of the samples; results are the same for any number of jobs.
-        errors: Path of an error file, or errors by joint, in place of the environment's own. Not
-            for trials, which have theirs.
+        errors: Path of an error file, or errors by joint, in place of those of the environment.
+            Not for trials, which include their errors.
         select: One of `SELECTIONS`, or flat configuration indices of the members of a set.
-        members: How many configurations the sets of "uniform" have, 1 or 2.
+        members: Number of members of the sets of "uniform", 1 or 2.
         table: Number of the file's table; by default the nominal one. Not for trials.
-        check_base: Whether the base must be free in every sample; the paper leaves that out.
-            Not for trials.
-        stream: Another text gives samples independent of these.
+        check_base: Whether the base must be collision-free in every sample, which the paper does
+            not check. Not for trials.
+        stream: Name of the draw; another name gives independent samples.
         jobs: Number of threads.
-        on_progress: Called with configurations in samples done and in all.
-        on_compile: Called first, when the kernel has to be compiled.
+        on_progress: Called with the number of evaluated pairs of configuration and sample, and of
+            all such pairs.
+        on_compile: Called first if the kernel has to be compiled.
 
     Returns:
-        What was reached, with mean, standard deviation and interval.
+        Goals reached in each sample, with mean, standard deviation and interval.
 
     Raises:
-        StoreMismatchError: If the models are not those the file was made from.
+        StoreMismatchError: If the file was made from other models.
         UnknownNameError: If a joint or a selection has no such name.
         DataFileError: If the error file cannot be used.
         SelectionError: If there is no set to evaluate.
         TcsError: If a number is out of range.
 
     Source:
-        TCS section IV; the drawing of "uniform" as in hrl_base_selection in
+        TCS section IV; "uniform" draws as in hrl_base_selection in
         gt-ros-pkg/hrl-assistive (BSD), 30 April 2015.
     """
     check_draws(samples, seed)
@@ -168,7 +171,9 @@ def evaluate(
     if isinstance(file, Trials):
         trials = file
         if errors is not None or table is not None or check_base:
-            raise TcsError("Trials have errors, table and base check already: give them there.")
+            raise TcsError(
+                "Trials already include errors, table and base check. Set them in Trials.of."
+            )
     else:
         trials = Trials.of(
             file, errors=errors, table=table, check_base=check_base, on_compile=on_compile
@@ -178,7 +183,7 @@ def evaluate(
     sets, choices = _chosen(trials.scored, select, members, samples, seed)
     is_drawn = select == "uniform"
     if is_drawn:
-        # Every member of every set meets the one sample that is the set's.
+        # Set i is evaluated on sample i only, with all of its members.
         tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
         found = trials.reached_each(sets.T.ravel(), tiled, jobs=jobs, on_progress=on_progress)
         found = found.reshape(sets.shape[1], samples, -1)
@@ -217,16 +222,16 @@ def evaluate(
 def _chosen(
     scored: StateTables, select: str | Sequence[int], members: int, samples: int, seed: int
 ) -> tuple[NDArray[np.int64], int]:
-    """Return the sets to evaluate, shape (1, m) or (samples, m), and how many there were."""
+    """Return the sets to evaluate, shape (1, m) or (samples, m), and the number to draw from."""
     sets = scored.sets
     if not len(sets.candidates):
         raise SelectionError(
-            "Nothing to evaluate: no goal is reached from any initial configuration. Look at the "
-            "reasons in the score table."
+            "Nothing to evaluate: no goal is reached from any initial configuration. See the "
+            "reasons with `tcs explain`."
         )
     if not isinstance(select, str):
         given = np.array([int(h) for h in select], dtype=np.int64)
-        # Refuses what is no set of candidates.
+        # Raises an error if the indices are not a set of candidates.
         sets.scores_of(tuple(given.tolist()))
         return given[None], 1
     if select == "uniform":

@@ -1,4 +1,4 @@
-"""What choosing by estimated success gains over TC-manipulability, and how well that predicts."""
+"""Gain of selecting by estimated success, and how well TC-manipulability predicts success."""
 
 from __future__ import annotations
 
@@ -12,28 +12,31 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.placement.robustness.error_model import check_draws, named_generator
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
-from tcs.placement.robustness.pairs import AS_GOOD, Pairs, kept_pairs
+from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.statistics import CONFIDENCE, Difference, signed_rank
 from tcs.placement.robustness.trials import Trials
 from tcs.placement.tables import tc_reachability
 from tcs.placement.tables.rules import SHARE_TOLERANCE
 
 STRATA = 10
-"""Equal parts of the order of P_M from which as many sets are drawn each."""
+"""Number of equal strata of P_M, from each of which the same number of sets is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """The set chosen by estimated success against the one chosen by the scores, of one size."""
+    """The set selected by estimated success compared with the one selected by the scores."""
 
     members: int
+    """Greatest number of members of both sets."""
     robust: Evaluation
+    """The most robust set: the greatest lower confidence bound on success."""
     scored: Evaluation
+    """The set with the greatest P_R + P_M."""
     paired: Difference
-    """Share of the goals of the first less that of the second, signed rank."""
+    """Fraction of goals reached by the former minus that of the latter, signed rank test."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the result as plain containers."""
         return {
             "members": self.members,
             "robust": self.robust.to_json(),
@@ -44,28 +47,30 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """How well P_M orders sets by their success under error."""
+    """Rank correlation between P_M and success under error."""
 
     members: int
+    """Number of members of the sets."""
     equal_reach: bool
-    """Whether only sets with P_R of at least 0.98 of the greatest of their size were drawn:
-    those between which P_M decides."""
+    """Whether only sets with P_R of at least 0.98 of the greatest of their size were drawn, among
+    which P_M decides."""
     population: int
-    """How many such sets there are."""
+    """Number of such sets."""
     sets: int
-    """How many were drawn, evenly from ten strata of P_M."""
+    """Number of sets drawn, evenly from ten strata of P_M."""
     rho: float | None
-    """Spearman's rank correlation of P_M and success; None where one of them does not vary."""
+    """Spearman's rank correlation of P_M and success; None if one of them does not vary."""
     ci95: tuple[float, float] | None
     """Its 95 % interval: Fisher's transformation, with the variance of Bonett and Wright."""
     p: float | None
+    """Two-sided p-value of the correlation."""
     manipulability: NDArray[np.float64] = field(compare=False)
-    """P_M of each set that was drawn, shape (sets,)."""
+    """P_M of each drawn set, shape (sets,)."""
     success: NDArray[np.float64] = field(compare=False)
-    """Its mean share of goals reached, shape (sets,)."""
+    """Mean fraction of goals reached by each drawn set, shape (sets,)."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the result as plain containers."""
         return {
             "members": self.members,
             "equal_reach": self.equal_reach,
@@ -80,14 +85,14 @@ class Prediction:
 def robust_gains(
     trials: Trials, *, samples: int = 1000, seed: int = 0, jobs: int = 2
 ) -> tuple[Gain, ...]:
-    """Return what choosing by success gains, for sets of one and of up to two.
+    """Return the gain of selecting by success, for sets of one and of up to two.
 
-    Both sets meet the same samples, and none that the estimates were made from: those have
-    streams of their own.
+    Both sets are evaluated on the same fresh samples, which are independent of those that the
+    estimates were made from.
 
     Args:
-        trials: Trials of a table whose success was estimated (`robustify`).
-        samples: How many samples.
+        trials: Trials of a table with estimates of success (`robustify`).
+        samples: Number of samples.
         seed: Seed of the samples.
         jobs: Number of threads.
 
@@ -96,7 +101,10 @@ def robust_gains(
     """
     success, sets = trials.scored.success, trials.scored.sets
     if success is None:
-        raise SelectionError("No success was estimated for this table: see tcs robustify.")
+        raise SelectionError(
+            "No success under error was estimated for this table. Estimate it first: "
+            "tcs robustify FILE."
+        )
     gains = []
     for members, scored in ((1, sets.best_single), (2, sets.best)):
         robust = success.most_robust(sets, max_members=members)
@@ -113,13 +121,13 @@ def robust_gains(
 def predictions(
     trials: Trials, *, sets: int = 60, samples: int = 100, seed: int = 0, jobs: int = 2
 ) -> tuple[Prediction, ...]:
-    """Return how well P_M predicts success, for sets of one and two, of any and of equal reach.
+    """Return how well P_M predicts success, for sets of one and two, of any and of equal P_R.
 
     Args:
         trials: Trials of a table.
-        sets: How many sets to draw for each of the four, evenly from ten strata of P_M.
-        samples: Samples in which each set is tried, the same for all.
-        seed: Seed of samples and drawing.
+        sets: Number of sets to draw for each of the four cases, evenly from ten strata of P_M.
+        samples: Number of samples of each set, the same samples for all.
+        seed: Seed of samples and draw.
         jobs: Number of threads.
 
     Raises:
@@ -141,7 +149,7 @@ def predictions(
     ):
         greatest = float(reachability.max(initial=0.0))
         for equal in (False, True):
-            least = AS_GOOD * greatest - SHARE_TOLERANCE if equal else 0.0
+            least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE if equal else 0.0
             pool = np.flatnonzero(reachability >= least)
             rng = named_generator(seed, f"strata {rows.shape[1]} {equal}")
             drawn = _stratified(rng, pool, manipulability, sets)
@@ -162,16 +170,16 @@ def _stratified(
     manipulability: NDArray[np.float64],
     count: int,
 ) -> NDArray[np.int64]:
-    """Return so many of the pool, evenly from strata of P_M; all of it where it is smaller."""
+    """Return `count` sets of a pool, evenly from strata of P_M; all sets of a smaller pool."""
     if pool.size <= count:
         return pool
     order = pool[np.argsort(manipulability[pool], kind="stable")]
     parts = np.array_split(order, STRATA)
-    fractions = np.diff(np.linspace(0, count, STRATA + 1).round().astype(np.int64))
+    counts = np.diff(np.linspace(0, count, STRATA + 1).round().astype(np.int64))
     return np.concatenate(
         [
             rng.choice(part, min(n, part.size), replace=False)
-            for part, n in zip(parts, fractions, strict=True)
+            for part, n in zip(parts, counts, strict=True)
         ]
     )
 
@@ -179,7 +187,7 @@ def _stratified(
 def _rank_correlation(
     first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> tuple[float | None, tuple[float, float] | None, float | None]:
-    """Return Spearman's rank correlation, its interval and its p."""
+    """Return Spearman's rank correlation, its interval and its p-value."""
     from scipy import stats
 
     varies = all(values.size > 3 and np.ptp(values) > 0.0 for values in (first, second))

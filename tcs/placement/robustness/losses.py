@@ -1,4 +1,4 @@
-"""What stops a goal from being reached when the room is off, and which error it goes with."""
+"""Goals lost under error: what stops the arm, and which joint error goes with the losses."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from tcs.placement.tables import Reason
 
 @dataclass(frozen=True)
 class Loss:
-    """One goal that some samples lose."""
+    """A goal that is not reached in some samples."""
 
     goal: int
     """Number of the goal."""
     body_frame: str
-    """What it rides on."""
+    """Frame of the body part or furniture that the goal is fixed to."""
     success: float
-    """Share of the samples in which it is reached."""
+    """Fraction of the samples in which it is reached."""
     member: int
     """Number of the set's member that reaches it most often."""
     reasons: dict[Reason, float]
-    """Why that member fails in the other samples: share of each reason, most frequent first."""
+    """Why that member fails in the other samples: fraction of each reason, most frequent first."""
     pair: tuple[str, str] | None
-    """The two bodies that are most often in each other's way there."""
+    """The most frequent colliding pair of bodies in these samples, if there is one."""
     pair_fraction: float
-    """In which share of the losses."""
+    """Fraction of these samples in which that pair collides."""
     joint: str
-    """The joint whose error tells losses from the rest best."""
+    """The joint whose mean error in these samples is greatest in standard deviations."""
     standardized_error: float
-    """By how many of its standard deviations that error is off on average in the losses."""
+    """That mean error divided by the standard deviation over all samples."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the loss as plain containers."""
         return {
             "goal": self.goal,
             "body_frame": self.body_frame,
             "success": self.success,
             "member": self.member,
-            "reasons": {reason.name.lower(): share for reason, share in self.reasons.items()},
+            "reasons": {reason.name.lower(): part for reason, part in self.reasons.items()},
             "pair": list(self.pair) if self.pair else None,
             "pair_fraction": self.pair_fraction,
             "joint": self.joint,
@@ -53,16 +53,18 @@ class Loss:
 
 @dataclass(frozen=True)
 class Losses:
-    """What a set loses when the room is off."""
+    """Goals that a set loses under error, and an upper bound for every set."""
 
     goals: tuple[Loss, ...]
-    """The goals that are not reached in every sample, the worst first."""
+    """The goals that are not reached in every sample, least often reached first."""
     ceiling: float
-    """The greatest mean share of goals that any set could reach with the room set as this one
-    sets it: the gripper at the other goals touches something, wherever the robot stands."""
+    """Upper bound on the mean fraction of goals reached by any set that leaves the environment in
+    the states of this set's members: at the other goals the gripper touches the environment, which
+    depends neither on base pose nor on torso height. Contacts of the gripper with the robot do, so
+    they do not lower the bound."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the losses as plain containers."""
         return {"ceiling": self.ceiling, "goals": [loss.to_json() for loss in self.goals]}
 
 
@@ -70,8 +72,8 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     """Return the goals that a set does not reach in every sample, and why.
 
     Args:
-        trials: What the set was evaluated with.
-        evaluation: Of one set, not of drawn ones.
+        trials: The trials that the set was evaluated with.
+        evaluation: Evaluation of a single set, not of sets drawn at random.
     """
     lost = ~evaluation.reached
     if not lost.any():
@@ -79,9 +81,9 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     offsets = evaluation.offsets
     outcomes = [trials.outcome(int(h), offsets) for h in evaluation.sets[0]]
     reached = np.array([found.reason == Reason.REACHED for found in outcomes])
-    barred = np.all([found.reason == Reason.GRIPPER_BLOCKED for found in outcomes], axis=0)
-    robot, room = trials.lowered.robot_bodies, trials.lowered.room_bodies
-    others = (*room, *robot)
+    hopeless = np.all([found.reason == Reason.GRIPPER_BLOCKED for found in outcomes], axis=0)
+    robot = trials.lowered.robot_bodies
+    others = (*trials.lowered.room_bodies, *robot)
     found = []
     for goal in np.flatnonzero(lost.any(axis=0)).tolist():
         rows = lost[:, goal]
@@ -90,12 +92,12 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
         contacts = Counter(outcomes[member].contact[rows, goal].tolist())
         del contacts[-1]
         pair, times = contacts.most_common(1)[0] if contacts else (-1, 0)
-        tilts = {
+        errors = {
             name: float(values[rows].mean() / values.std())
             for name, values in offsets.items()
             if values.std() > 0.0
         }
-        joint = max(tilts, key=lambda name: abs(tilts[name]), default="")
+        joint = max(errors, key=lambda name: abs(errors[name]), default="")
         found.append(
             Loss(
                 goal=goal,
@@ -106,8 +108,8 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
                 pair=(robot[pair // len(others)], others[pair % len(others)]) if times else None,
                 pair_fraction=times / int(rows.sum()),
                 joint=joint,
-                standardized_error=tilts.get(joint, 0.0),
+                standardized_error=errors.get(joint, 0.0),
             )
         )
     found.sort(key=lambda loss: loss.success)
-    return Losses(tuple(found), float(np.mean(~barred @ evaluation.weights)))
+    return Losses(tuple(found), float(np.mean(~hopeless @ evaluation.weights)))

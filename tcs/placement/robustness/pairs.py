@@ -1,4 +1,4 @@
-"""Go through the kept sets one by one: those with the best scores, random ones, all of them."""
+"""Kept pairs of a set table: enumerated in chunks, and drawn uniformly."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
 CHUNK = 200_000
-"""Pairs formed at once: their scores need some 10 MB."""
+"""Pairs formed together: their scores need some 10 MB."""
 
-AS_GOOD = 0.98
-"""Sets count as equally reachable from this share of the greatest P_R on: hrl_base_selection in
+EQUAL_REACHABILITY = 0.98
+"""Sets count as equal in P_R from this fraction of the greatest P_R: hrl_base_selection in
 gt-ros-pkg/hrl-assistive (BSD), state of 30 April 2015."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Kept sets of two."""
+    """Kept pairs with their scores."""
 
     first: IntArray
     """Candidate number of the first member, shape (n,)."""
     second: IntArray
-    """Of the second, greater, shape (n,)."""
+    """Candidate number of the second member, greater than the first, shape (n,)."""
     reachability: FloatArray
     """P_R, shape (n,)."""
     manipulability: FloatArray
     """P_M, shape (n,)."""
 
     def only(self, which: NDArray[np.bool_] | IntArray) -> Pairs:
-        """Return some of them."""
+        """Return a selection of the pairs."""
         return Pairs(
             self.first[which],
             self.second[which],
@@ -48,7 +48,7 @@ class Pairs:
 
     @classmethod
     def joined(cls, parts: Iterable[Pairs]) -> Pairs:
-        """Return all pairs of several parts."""
+        """Return the pairs of several parts as one."""
         parts = list(parts)
         none: IntArray = np.empty(0, np.int64)
         return cls(
@@ -62,7 +62,7 @@ class Pairs:
 def kept_pairs(
     sets: SetTable, *, least_reachability: float = 0.0, least_sum: float = 0.0
 ) -> Iterator[Pairs]:
-    """Yield the kept sets of two with at least these scores, some at a time.
+    """Yield the kept pairs with at least these scores, in chunks.
 
     Args:
         sets: The table.
@@ -71,15 +71,16 @@ def kept_pairs(
     """
     if sets.max_members < 2:
         return
-    room = SHARE_TOLERANCE
-    groups = (sets.pair_reachability >= least_reachability - room) & (
-        sets.pair_sum >= least_sum - room
+    margin = SHARE_TOLERANCE
+    groups = (sets.pair_reachability >= least_reachability - margin) & (
+        sets.pair_sum >= least_sum - margin
     )
-    able = (sets.member_reachability >= least_reachability - room) & (
-        sets.member_sum >= least_sum - room
+    feasible = (sets.member_reachability >= least_reachability - margin) & (
+        sets.member_sum >= least_sum - margin
     )
     of_cell = [
-        cell[able[cell]] for cell in np.split(sets.by_cell, sets.cell_start[1:-1].astype(np.intp))
+        cell[feasible[cell]]
+        for cell in np.split(sets.by_cell, sets.cell_start[1:-1].astype(np.intp))
     ]
     batch: list[tuple[IntArray, IntArray]] = []
     size = 0
@@ -101,10 +102,10 @@ def _kept(
     least_reachability: float,
     least_sum: float,
 ) -> Pairs:
-    """Return those of some pairs of candidates that are kept sets with these scores."""
+    """Return the pairs of candidates in a batch that are kept and have these scores."""
     a, b = (np.concatenate(column) for column in zip(*batch, strict=True))
     first, second = np.minimum(a, b), np.maximum(a, b)
-    # Within one cell each pair comes twice, and a candidate meets itself.
+    # Within one cell each pair occurs twice, and a candidate is paired with itself.
     once = (first < second) & ((sets.cell[first] != sets.cell[second]) | (a < b))
     if sets.same_environment:
         once &= sets.state[first] == sets.state[second]
@@ -126,20 +127,20 @@ def _kept(
 
 
 def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[IntArray, int]:
-    """Return sets drawn uniformly from those that reach as much as the best, and how many exist.
+    """Return sets drawn uniformly from those equal in P_R to the best, and how many there are.
 
     Args:
         sets: The table.
         members: 1 or 2: singles with P_R of at least 0.98 of the greatest of a single, or kept
             pairs with P_R of at least 0.98 of the greatest of any set.
-        count: How many to draw, with replacement.
-        seed: Seed of the drawing.
+        count: Number of sets to draw, with replacement.
+        seed: Seed of the draw.
 
     Returns:
         Flat configuration indices, shape (count, members); the number of sets to draw from.
 
     Raises:
-        SelectionError: If there are none.
+        SelectionError: If there is no such set.
         TcsError: If `members` is neither 1 nor 2.
     """
     if members not in (1, 2):
@@ -148,15 +149,15 @@ def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[I
     greatest = float(singles.max(initial=0.0))
     rng = named_generator(seed, f"sets of {members}")
     if members == 1:
-        pool = np.flatnonzero(singles >= AS_GOOD * greatest - SHARE_TOLERANCE)[:, None]
+        pool = np.flatnonzero(singles >= EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE)[:, None]
     else:
         greatest = max(greatest, float(sets.pair_reachability.max(initial=0.0)))
-        least = AS_GOOD * greatest - SHARE_TOLERANCE
+        least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
         pairs = Pairs.joined(kept_pairs(sets, least_reachability=least))
         pool = np.stack([pairs.first, pairs.second], axis=1)
     if not len(pool):
         raise SelectionError(
-            f"There is no set of {members} that reaches as much as the best set, so none can be "
-            "drawn. Draw sets of 1, or evaluate the best set."
+            f"No set of {members} has P_R of at least {EQUAL_REACHABILITY} of the greatest, so "
+            "none can be drawn. Draw sets of 1, or evaluate the best set."
         )
     return sets.candidates[pool[rng.integers(len(pool), size=count)]].astype(np.int64), len(pool)

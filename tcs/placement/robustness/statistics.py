@@ -1,4 +1,4 @@
-"""What samples say: means with their intervals, and tests of differences."""
+"""Statistics of samples: means with confidence intervals, and tests of differences."""
 
 from __future__ import annotations
 
@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+FloatArray = NDArray[np.float64]
+
 CONFIDENCE = 0.95
+"""Confidence level of every interval."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """A mean of samples between 0 and 1, and what is known of it."""
+    """Mean of samples between 0 and 1, with its spread and confidence interval."""
 
     mean: float
+    """The mean."""
     std: float
-    """Standard deviation of the samples, of n - 1 degrees of freedom; 0 of a single one."""
-    ci95: tuple[float, float]
-    """95 % interval of the mean."""
+    """Standard deviation of the samples with n - 1 degrees of freedom; 0 for a single sample."""
+    ci95: tuple[float, float] | None
+    """95 % confidence interval of the mean; None for a single sample."""
 
 
 def mean_of(samples: ArrayLike) -> Mean:
@@ -30,34 +34,37 @@ def mean_of(samples: ArrayLike) -> Mean:
         samples: Shape (n,), n >= 1.
 
     Returns:
-        The interval is that of `intervals_of`.
+        Mean, standard deviation and the interval of `intervals_of`; a single sample, which says
+        nothing about the spread, has no interval.
 
     >>> mean_of([0.5, 1.0, 1.0]).mean
     0.8333333333333334
     """
     values = np.asarray(samples, dtype=np.float64)
     mean, low, high = (float(found[0]) for found in intervals_of(values[None]))
-    std = float(np.std(values, ddof=1)) if values.size > 1 else 0.0
-    return Mean(mean, std, (low, high))
+    if values.size < 2:
+        return Mean(mean, 0.0, None)
+    return Mean(mean, float(np.std(values, ddof=1)), (low, high))
 
 
 def intervals_of(
     samples: NDArray[np.float64] | NDArray[np.float32],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return means of samples between 0 and 1, and both ends of their 95 % intervals.
 
     Args:
         samples: Shape (k, n), n >= 1.
 
     Returns:
-        Shapes (k,). The intervals are Student's t of the samples and two more, a 0 and a 1, cut to
-        [0, 1]. Without the two, samples that are all equal would claim certainty, and one failure
-        among a thousand would look surer than none.
+        Shapes (k,). The intervals are Student's t of the samples and two more, a 0 and a 1, clipped
+        to [0, 1]. Without these two, equal samples would imply certainty, and one failure in a
+        thousand would look more certain than none.
 
     Source:
-        The two added samples: Agresti and Coull, The American Statistician 52 (1998), for shares.
+        The two added samples: Agresti and Coull, The American Statistician 52 (1998), for
+        proportions.
     """
-    # Imported where it is needed: much of this room does without.
+    # Imported here because selection with estimates must not load SciPy.
     from scipy.special import stdtrit
 
     values = samples.astype(np.float64)
@@ -74,25 +81,27 @@ def intervals_of(
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """How samples of two methods differ, and how likely that is by chance."""
+    """Difference between the samples of two methods, with a test of its significance."""
 
     mean: float
-    """Mean of the first less mean of the second."""
-    ci95: tuple[float, float]
-    """95 % interval of that: Student's t of the paired differences, Welch's t otherwise."""
+    """Mean of the first minus mean of the second."""
+    ci95: tuple[float, float] | None
+    """95 % confidence interval of that: Student's t of the paired differences, Welch's t otherwise;
+    None for a single sample."""
     p: float
-    """Two-sided p of the Wilcoxon test: rank sum of independent samples, signed rank of paired
-    ones; 1 where no two samples differ."""
+    """Two-sided p-value of the Wilcoxon test: rank sum of independent samples, signed rank of
+    paired ones; 1 if no two samples differ."""
     test: str
-    """Which of the two tests."""
+    """Name of the test, "rank sum" or "signed rank"."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
-        return {"mean": self.mean, "ci95": list(self.ci95), "p": self.p, "test": self.test}
+        """Return the difference as plain containers."""
+        interval = None if self.ci95 is None else list(self.ci95)
+        return {"mean": self.mean, "ci95": interval, "p": self.p, "test": self.test}
 
 
-def rank_sum(first: NDArray[np.float64], second: NDArray[np.float64]) -> Difference:
-    """Return how two independent samples differ: Wilcoxon rank sum, ties corrected.
+def rank_sum(first: FloatArray, second: FloatArray) -> Difference:
+    """Return the difference between independent samples, with the Wilcoxon rank sum test.
 
     Source:
         TCS section V. With ties this is the Mann-Whitney test in its normal approximation.
@@ -100,40 +109,63 @@ def rank_sum(first: NDArray[np.float64], second: NDArray[np.float64]) -> Differe
     from scipy import stats
 
     mean = float(np.mean(first) - np.mean(second))
-    first, second = _tied(first), _tied(second)
+    first, second = _rounded(first), _rounded(second)
     both = np.concatenate([first, second])
     if np.all(both == both[0]):
-        return Difference(mean, (0.0, 0.0), 1.0, "rank sum")
+        return Difference(mean, _no_width(0.0, both.size // 2), 1.0, "rank sum")
     found = stats.mannwhitneyu(first, second, alternative="two-sided", method="asymptotic")
-    welch = _welch_interval(first, second)
-    return Difference(mean, welch, float(found.pvalue), "rank sum")
+    return Difference(mean, _welch_interval(first, second), float(found.pvalue), "rank sum")
 
 
-def signed_rank(first: NDArray[np.float64], second: NDArray[np.float64]) -> Difference:
-    """Return how paired samples differ: Wilcoxon signed rank, zero differences after Pratt."""
+def signed_rank(first: FloatArray, second: FloatArray) -> Difference:
+    """Return the difference between paired samples, with the Wilcoxon signed rank test.
+
+    Zero differences are treated after Pratt.
+    """
     from scipy import stats
 
-    off = _tied(first - second)
-    if not np.any(off):
-        return Difference(0.0, (0.0, 0.0), 1.0, "signed rank")
-    found = stats.wilcoxon(off, zero_method="pratt", method="asymptotic")
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, off.size - 1))
-    half *= float(np.std(off, ddof=1)) / math.sqrt(off.size)
-    mean = float(np.mean(off))
-    return Difference(mean, (mean - half, mean + half), float(found.pvalue), "signed rank")
+    difference = _rounded(first - second)
+    count, mean = difference.size, float(np.mean(difference))
+    if not np.any(difference):
+        return Difference(0.0, _no_width(0.0, count), 1.0, "signed rank")
+    found = stats.wilcoxon(difference, zero_method="pratt", method="asymptotic")
+    interval = _no_width(mean, count)
+    if interval is not None and np.ptp(difference) > 0.0:
+        half = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1))
+        half *= float(np.std(difference, ddof=1)) / math.sqrt(count)
+        interval = (mean - half, mean + half)
+    return Difference(mean, interval, float(found.pvalue), "signed rank")
 
 
-def _tied(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return shares or their differences such that what is equal but for rounding is equal.
+def _rounded(values: FloatArray) -> FloatArray:
+    """Return fractions or their differences with rounding errors removed, so that ties are equal.
 
-    Six sevenths less five is not five sevenths less four, by a last bit; ranks must not see that.
-    Sums of some tens of weights are good to 1e-14, and no two shares lie 1e-9 apart.
+    Six sevenths minus five is not five sevenths minus four in the last bit, which would give the
+    two different ranks. Sums of some tens of weights are accurate to 1e-14, and distinct fractions
+    differ by more than 1e-9.
     """
     return np.round(values, 9)
 
 
-def _welch_interval(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float, float]:
+def _no_width(mean: float, count: int) -> tuple[float, float] | None:
+    """Return the interval of equal differences, None if there are fewer than two."""
+    return None if count < 2 else (mean, mean)
+
+
+def _welch_interval(first: FloatArray, second: FloatArray) -> tuple[float, float] | None:
+    """Return Welch's interval of the difference between two means, None for single samples."""
     from scipy import stats
 
-    interval = stats.ttest_ind(first, second, equal_var=False).confidence_interval(CONFIDENCE)
-    return float(interval.low), float(interval.high)
+    if min(first.size, second.size) < 2:
+        return None
+    mean = float(np.mean(first) - np.mean(second))
+    variances = [float(np.var(x, ddof=1)) / x.size for x in (first, second)]
+    error = math.sqrt(sum(variances))
+    # SciPy warns of lost precision for samples without spread, whose interval has no width.
+    if np.ptp(first) == 0.0 and np.ptp(second) == 0.0:
+        return mean, mean
+    freedom = sum(variances) ** 2 / sum(
+        v**2 / (x.size - 1) for v, x in zip(variances, (first, second), strict=True)
+    )
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, freedom)) * error
+    return mean - half, mean + half

@@ -1,7 +1,7 @@
-"""Upper bounds on the utility of sets, from here: of groups, of their members, of single sets.
+"""Upper bounds on the utility of sets from the current state: of groups, members and single sets.
 
-A bound is either computed by the very operations of the utility on greater scores and smaller
-costs (rounding is monotone, so it cannot fall below), or widened by `SLACK`.
+A bound is either computed by the operations of the utility on greater scores and smaller costs
+(rounding is monotone, so it cannot fall below the utility), or widened by `SLACK`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SLACK = 1e-12
-"""Relative room for rounding in bounds that are not computed by the very operations of the
-utility: a dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could
-end up one bit below the utility it bounds, and lose a tie."""
+"""Relative margin for rounding in bounds that are not computed by the operations of the utility: a
+dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could end up one
+bit below the utility it bounds, and lose a tie."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds for one query."""
+    """Upper bounds for one query."""
 
     index: GroupIndex
     """The groups of sets."""
@@ -43,44 +43,44 @@ class Bounds:
 
     @cached_property
     def groups(self) -> FloatArray:
-        """Bound on the utility of each group, shape (K,); -inf out of reach."""
+        """Bound on the utility of each group, shape (K,); -inf where a cell is unreachable."""
         index, legs = self.index, self.legs
         bounds = self._group_gain - self.travel * self._driving
         if index.members > 2:
-            # A path of several legs was not summed as the cost is.
-            bounds += self._room
-        # Each member's best set is no better than this, and the way to it no shorter.
-        by_cell = np.maximum.reduceat(self._rest[index.all.sets.by_cell], index.all.start)
-        rest = by_cell[index.cells[0]]
+            # A path of several legs is not summed in the order of the cost.
+            bounds += self._slack
+        # No set of a member is better than this, and no path to it is shorter.
+        by_cell = np.maximum.reduceat(self._net_gain[index.all.sets.by_cell], index.all.start)
+        net = by_cell[index.cells[0]]
         for cells in index.cells[1:]:
-            rest = np.minimum(rest, by_cell[cells])
-        np.minimum(bounds, rest - self.travel * self._driving + self._room, out=bounds)
+            net = np.minimum(net, by_cell[cells])
+        np.minimum(bounds, net - self.travel * self._driving + self._slack, out=bounds)
         if not np.all(legs.reachable):
             for cells in index.cells:
                 bounds[~legs.reachable[cells]] = -np.inf
         return bounds
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
-        """Return a bound on the sets of a group that a candidate is in, shape (n,)."""
-        gain = np.minimum(self._rest[member], self._group_gain[group] - self._levels[member])
-        return gain - (self.travel * self._driving[group] - self._room[group])
+        """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
+        gain = np.minimum(self._net_gain[member], self._group_gain[group] - self._levels[member])
+        return gain - (self.travel * self._driving[group] - self._slack[group])
 
     def of_two(self, group: IntArray, a: IntArray, b: IntArray) -> FloatArray:
-        """Return a bound on the sets of a group that two candidates are in, shape (n,).
+        """Return bounds on the sets of a group that contain two candidates, shape (n,).
 
-        A tour through both pays at least the change from here to one and on to the other.
+        A tour through both costs at least the change from here to one and on to the other.
         """
         gain = np.minimum(self._member_gain[a], self._member_gain[b])
         levels = np.minimum(self._levels[a], self._levels[b])
-        levels += self._paid(self.legs.levels_between(a, b))
-        rest = np.minimum(gain, self._group_gain[group]) - levels
-        # As many roundings again as in the bound of one member.
-        return rest - (self.travel * self._driving[group] - 2.0 * self._room[group])
+        levels += self._least_cost(self.legs.levels_between(a, b))
+        net = np.minimum(gain, self._group_gain[group]) - levels
+        # Twice the roundings of the bound of one member.
+        return net - (self.travel * self._driving[group] - 2.0 * self._slack[group])
 
     def of_set(
         self, group: IntArray, members: tuple[IntArray, ...], cost: FloatArray
     ) -> FloatArray:
-        """Return a bound on the utility of sets whose cost is known, shape (n,)."""
+        """Return bounds on the utility of sets whose cost is known, shape (n,)."""
         gain = self._group_gain[group]
         for member in members:
             gain = np.minimum(gain, self._member_gain[member])
@@ -99,16 +99,16 @@ class Bounds:
     def _gain(
         self, reachability: FloatArray, manipulability: FloatArray, total: FloatArray
     ) -> FloatArray:
-        """Return a bound on alpha P_R + beta P_M from bounds on P_R, P_M and their sum."""
+        """Return bounds on alpha P_R + beta P_M from bounds on P_R, P_M and their sum."""
         alpha, beta = float(self.weights.reachability), float(self.weights.manipulability)
-        # The best reachability and the best manipulability may belong to two different sets.
-        apart = alpha * reachability + beta * manipulability
+        # The greatest P_R and the greatest P_M may belong to different sets.
+        separate = alpha * reachability + beta * manipulability
         # alpha P_R + beta P_M = (alpha - beta) P_R + beta (P_R + P_M), or with the roles swapped.
         if alpha >= beta:
             together = (alpha - beta) * reachability + beta * total
         else:
             together = alpha * total + (beta - alpha) * manipulability
-        return np.minimum(apart, together + SLACK * (alpha + beta))
+        return np.minimum(separate, together + SLACK * (alpha + beta))
 
     @cached_property
     def _driving(self) -> FloatArray:
@@ -121,27 +121,27 @@ class Bounds:
 
     @cached_property
     def _levels(self) -> FloatArray:
-        """Gamma times the least cost of everything but driving with each candidate, shape (C,).
+        """Gamma times the least cost of all but driving with each candidate, shape (C,).
 
-        Turning, lifting and moving the bed obey the triangle inequality: a tour pays at least
-        the direct change from the current state to each of its members.
+        Changes of heading, torso and bed obey the triangle inequality: a tour costs at least the
+        direct change from the current state to each of its members.
         """
-        return self._paid(self.legs.levels_from_here)
+        return self._least_cost(self.legs.levels_from_here)
 
-    def _paid(self, levels: FloatArray) -> FloatArray:
-        """Return gamma times a cost of changing levels, rounded down."""
+    def _least_cost(self, levels: FloatArray) -> FloatArray:
+        """Return gamma times a cost of changes other than driving, rounded down."""
         # Wrapping an angle leaves an absolute rounding error of some 1e-15 rad.
         wrapping = SLACK * sum(self.legs.level_weights)
         return self.travel * np.maximum(levels * (1.0 - SLACK) - wrapping, 0.0)
 
     @cached_property
-    def _rest(self) -> FloatArray:
-        """What is left of the gain with each candidate after that cost, shape (C,)."""
+    def _net_gain(self) -> FloatArray:
+        """Bound on the gain of the sets of each candidate minus that cost, shape (C,)."""
         return self._member_gain - self._levels
 
     @cached_property
-    def _room(self) -> FloatArray:
-        """Room for rounding in the difference of gain, levels and driving, shape (K,)."""
+    def _slack(self) -> FloatArray:
+        """Margin for rounding in the difference of gain, levels and driving, shape (K,)."""
         most = float(self.weights.reachability) + float(self.weights.manipulability)
         most += float(self._levels.max(initial=0.0))
         return SLACK * (most + self.travel * self._driving)

@@ -1,4 +1,4 @@
-"""Choose the set to use now: the online part of TCS."""
+"""Selection of the stored set with the greatest utility from the current state."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _DEFAULT_TRAVEL = TravelWeights()
 
 @dataclass(frozen=True)
 class SelectionTables:
-    """What can be chosen from: the sets, and the grid their members are of.
+    """The sets of one table, their grid and their estimates.
 
-    Keeps what the search derives from the sets, so that later choices from the same tables
-    are faster than the first.
+    Caches what the search derives from the sets, so that later selections from the same tables are
+    faster than the first.
     """
 
     sets: SetTable
@@ -38,7 +38,7 @@ class SelectionTables:
     grid: Grid
     """The grid of initial configurations."""
     success: SuccessTable | None = None
-    """Estimated success under error of some of the sets."""
+    """Estimated success under error of some of the sets, if any."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
@@ -54,7 +54,7 @@ class SelectionTables:
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The set with the greatest utility, and what it was chosen for."""
+    """The set with the greatest utility, with its scores and cost."""
 
     members: tuple[InitialConfiguration, ...]
     """The members, in the order of their configuration indices."""
@@ -69,18 +69,18 @@ class Choice:
     cost: float
     """D of the set from the current state."""
     utility: float
-    """alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where delta is not 0; P_S is
-    the lower end of `success_ci95`."""
+    """alpha P_R + beta P_M - gamma D, TCS eq. (5), plus delta P_S if delta is not 0; P_S is the
+    lower end of `success_ci95`."""
     success: float | None
-    """Estimated success of the set under error; None where it was not estimated."""
+    """Estimated success of the set under error; None if it was not estimated."""
     success_ci95: tuple[float, float] | None
-    """Its 95 % interval."""
+    """95 % confidence interval of the success."""
     unreachable: int
-    """How many candidates were left out because there is no way to them from here."""
+    """Number of candidates to which no path leads from the current position."""
     seconds: float
-    """How long choosing took [s]."""
+    """Duration of the selection [s]."""
     match: Match | None = None
-    """Which table of the file was chosen from, and how far it is from what was observed."""
+    """The table of the file that was used, and its distance from the observation."""
 
 
 def select(
@@ -93,33 +93,34 @@ def select(
     observed: Mapping[str, float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
 ) -> Choice:
-    """Return the stored set with the greatest utility from where the robot is.
+    """Return the stored set with the greatest utility from the current state.
 
-    The result equals a search through all stored sets; where delta is above 0, through all sets
-    whose success under error was estimated (`tcs.placement.robustness`). Of sets with the same
-    utility the first wins: singles by configuration index, then pairs and then triples in
-    lexicographic order.
+    The result equals an exhaustive search of all stored sets; if delta is above 0, of all sets
+    whose success under error was estimated (`tcs.placement.robustness`). Ties go to the first set:
+    singles by configuration index, then pairs and then triples in lexicographic order.
 
     Args:
-        scores: A loaded score file; or its tables, which is faster when choosing repeatedly.
-        here: The current state of robot and environment, h_0, in the environment frame.
+        scores: A loaded score file; or its tables, which is faster for repeated selection.
+        here: The current state of robot and environment, h_0, in the environment frame. The base
+            may be anywhere; torso and environment axes must be within their scored range, with
+            half a step to spare.
         weights: alpha, beta, gamma, delta.
-        travel: What each kind of motion costs.
-        max_members: 1 to choose a single configuration, 2 to allow a pair, 3 a triple; by default
-            whatever is stored.
+        travel: Cost of each type of motion.
+        max_members: 1 to select a single configuration, 2 to allow a pair, 3 a triple; by default
+            the greatest stored size.
         observed: Observed state of the person: values of the file's observed axes [m or rad]. The
             table scored for the nearest values is used; an axis that is not given counts as zero.
         frames: Positions of body frames in W [m], by name, in place of `observed`.
 
     Raises:
-        SelectionError: If no goal is reached from anywhere, the current state is not finite or
-            lacks an axis that costs something, `max_members` is not stored, there is no way
-            around the furniture to anywhere, or delta is above 0 and no set has an estimate,
-            or no set of three where three are asked for.
+        SelectionError: If no goal is reached from anywhere, the current state is not finite, is out
+            of range or lacks an axis with a weight, `max_members` is not stored, no set is
+            reachable around the furniture, or delta is above 0 and no set has an estimate, or no
+            triple although `max_members` is 3.
         UnknownNameError: If an environment axis has no such name.
 
     Source:
-        TCS eq. (5). The paper leaves D open; ours is the shortest tour through the members.
+        TCS eq. (5). The paper leaves D open; here it is the shortest tour through the members.
     """
     start = time.perf_counter()
     match = None
@@ -128,7 +129,7 @@ def select(
         tables = SelectionTables.of(scores, match.index)
     elif observed or frames:
         raise SelectionError(
-            "Observations choose among the tables of a score file, but one table was given. "
+            "Observations select among the tables of a score file, but a single table is given. "
             "Give the file."
         )
     else:
@@ -141,16 +142,16 @@ def select(
     _check_members(max_members, sets.max_members)
     if not len(sets.candidates):
         raise SelectionError(
-            "Nothing to choose from: no goal is reached from any initial configuration. Look at "
-            "the reasons in the score table, then change the task, the grid or the environment."
+            "Nothing to choose from: no goal is reached from any initial configuration. See the "
+            "reasons with `tcs explain`, then change the task, the grid or the environment."
         )
     legs = legs_from(
         here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
     )
     if not np.any(legs.reachable):
         raise SelectionError(
-            f"From ({here.base_x:.2f}, {here.base_y:.2f}) m there is no way around the furniture "
-            "to any place worth standing at. Check the place, or take straight lines."
+            f"From ({here.base_x:.2f}, {here.base_y:.2f}) m no path around the furniture leads to "
+            "any candidate base pose. Check the position, or take straight lines."
         )
     if weights.success > 0.0:
         chosen = best_estimated(sets, tables.success, legs, weights, max_members)
@@ -167,17 +168,17 @@ def select(
     return _choice(tables, legs, weights, rows, start, match)
 
 
-def _check_members(asked: int, held: int) -> None:
-    """Refuse a number of members that is none, or greater than what the table holds."""
-    if asked < 1:
-        raise SelectionError(f"At most {asked} members asked for; must be 1 or more.")
-    if asked > held:
-        sizes = " and ".join(str(n) for n in range(1, held + 1))
+def _check_members(requested: int, stored: int) -> None:
+    """Refuse a number of members below 1, or greater than the table holds."""
+    if requested < 1:
+        raise SelectionError(f"max_members is {requested}; must be 1 or more.")
+    if requested > stored:
+        sizes = " and ".join(str(n) for n in range(1, stored + 1))
         raise SelectionError(
-            f"At most {asked} members asked for, but the table holds sets of {sizes} only. "
+            f"max_members is {requested}, but the table holds sets of {sizes} only. "
             + (
-                f"Score the task again: tcs score ... --max-members {asked}."
-                if asked <= MOST_MEMBERS
+                f"Score the task again: tcs score ... --max-members {requested}."
+                if requested <= MOST_MEMBERS
                 else f"No set has more than {MOST_MEMBERS}."
             )
         )
@@ -191,18 +192,18 @@ def _choice(
     start: float,
     match: Match | None,
 ) -> Choice:
-    """Return the choice of the candidates with these numbers, begun at time `start`."""
+    """Return the choice of the set of candidates `rows`; `start` is when selection began."""
     member = np.array(rows)
     between = legs.between(member[:, None], member[None, :])
     cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
     indices = tuple(int(h) for h in tables.sets.candidates[member])
     reachability, manipulability = tables.sets.scores_of(indices)
     row = tables.success.row_of(indices) if tables.success is not None else None
-    success, interval, sure = None, None, None
+    success, interval, low = None, None, None
     if tables.success is not None and row is not None:
         success = float(tables.success.success[row])
         interval = (float(tables.success.low[row]), float(tables.success.high[row]))
-        sure = interval[0]
+        low = interval[0]
     return Choice(
         members=tuple(tables.grid.configuration(h) for h in indices),
         indices=indices,
@@ -210,7 +211,7 @@ def _choice(
         reachability=reachability,
         manipulability=manipulability,
         cost=cost,
-        utility=utility(reachability, manipulability, cost, weights, sure),
+        utility=utility(reachability, manipulability, cost, weights, low),
         success=success,
         success_ci95=interval,
         unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),

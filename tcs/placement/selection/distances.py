@@ -1,7 +1,8 @@
-"""How far it is to drive: in straight lines, or around the furniture.
+"""Driving distances between base cells: along straight lines, or around the furniture.
 
-Around the furniture means along `tcs.placement.tables.BaseLattice`, whose moves go to the eight
-neighbours of a cell. In the open such a path is up to 8 percent longer than a straight line.
+Distances around the furniture are shortest paths over `tcs.placement.tables.BaseLattice`, whose
+moves lead to the eight neighbours of a lattice position. On free floor such a path is up to 8
+percent longer than the straight line.
 """
 
 from __future__ import annotations
@@ -22,62 +23,71 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]
 
 ROUTES = ("straight", "around")
-"""Names of the two."""
+"""Names of the two routes."""
 
-AT_ONCE = 64
-"""Cells from which ways are found at once: their distances to all places are some megabytes."""
+CHUNK = 64
+"""Cells whose shortest paths are computed in one call: their distances take some megabytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Distances(abc.ABC):
-    """Distances between the current place and base cells."""
+    """Driving distances from the current position to base cells, and between cells."""
 
     cell_xy: FloatArray
-    """Places of the cells in W [m], shape (N, 2)."""
+    """Positions of the cells in W [m], shape (N, 2)."""
 
     @abc.abstractmethod
     def from_position(self, x: float, y: float) -> FloatArray:
-        """Return how far it is from a place to each cell [m], inf where there is no way, (N,)."""
+        """Return the distance of each cell from a position [m], shape (N,).
+
+        Infinite where no path leads.
+        """
 
     @abc.abstractmethod
     def between(self, first: IntArray, second: IntArray) -> FloatArray:
-        """Return how far it is between cells that have a way from one place [m], shape (...)."""
+        """Return the distance between cells that one position can reach [m], shape (...)."""
 
 
 class StraightDistances(Distances):
-    """Straight lines, whatever is in the way: the paper's choice."""
+    """Straight-line distances that ignore obstacles: the paper's choice."""
 
     def from_position(self, x: float, y: float) -> FloatArray:
-        """Return the distance of each cell from a place [m], shape (N,)."""
+        """Return the distance of each cell from a position [m], shape (N,)."""
         return _distance(np.array([x, y]), self.cell_xy)
 
     def between(self, first: IntArray, second: IntArray) -> FloatArray:
-        """Return the distance of two cells [m], shape (...)."""
+        """Return the distance between two cells [m], shape (...)."""
         return _distance(self.cell_xy[first], self.cell_xy[second])
 
 
 @dataclass(frozen=True, eq=False)
-class FloorDistances(Distances):
-    """Shortest ways over the lattice. The first use finds those between all cells, and is slow."""
+class LatticeDistances(Distances):
+    """Lengths of shortest paths over the lattice.
+
+    The paths between all cells are computed on first use; keep the object for repeated selection.
+    """
 
     lattice: BaseLattice
     """Where the base can drive."""
 
     def from_position(self, x: float, y: float) -> FloatArray:
-        """Return how far it is from a place to each cell [m], inf where there is no way, (N,).
+        """Return the distance of each cell from a position [m], shape (N,).
 
-        Inside the lattice the robot first drives straight to a corner of the square it is in, if
-        the base can move from there. Everything outside is free, and it drives straight to any
-        place of the border that it can see.
+        Inside the lattice the robot first drives straight to a corner of the square it is in from
+        which the base can move. Outside the lattice the floor is free, and it drives straight to
+        any border position in line of sight.
+
+        Returns:
+            Distances, infinite where no path leads.
 
         Raises:
             SelectionError: If the base cannot move from any corner of the square.
         """
         nodes, legs = self._entries(x, y)
-        # The robot is one more node, after those of the lattice.
         from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import dijkstra
 
+        # The robot is one more node, after those of the lattice.
         graph = self._graph
         size = graph.shape[0]
         with_robot = csr_matrix(
@@ -92,18 +102,18 @@ class FloorDistances(Distances):
         return found
 
     def between(self, first: IntArray, second: IntArray) -> FloatArray:
-        """Return how far it is between cells that have a way from one place [m], shape (...)."""
+        """Return the distance between cells that one position can reach [m], shape (...)."""
         return np.asarray(self._between[first, second])
 
     @cached_property
     def _node(self) -> IntArray:
-        """Number of the lattice's place at each cell, shape (N,)."""
+        """Lattice node of each cell, shape (N,)."""
         along = np.rint((self.cell_xy - self.lattice.start) / self.lattice.step).astype(np.int64)
         return np.asarray(along[:, 0] * self.lattice.shape[1] + along[:, 1])
 
     @cached_property
     def _graph(self) -> Any:
-        """The moves as a sparse matrix of lengths [m], both ways."""
+        """The moves in both directions as a sparse matrix of lengths [m]."""
         from scipy.sparse import csr_matrix
 
         number = np.arange(self.lattice.moves[0].size)
@@ -115,31 +125,31 @@ class FloorDistances(Distances):
             end += [back, there]
             one = np.hypot(dx * self.lattice.step[0], dy * self.lattice.step[1])
             length.append(np.full(2 * there.size, one))
-        places = (np.concatenate(begin), np.concatenate(end))
-        return csr_matrix((np.concatenate(length), places), shape=(number.size, number.size))
+        positions = (np.concatenate(begin), np.concatenate(end))
+        return csr_matrix((np.concatenate(length), positions), shape=(number.size, number.size))
 
     @cached_property
     def _between(self) -> FloatArray:
-        """How far it is between all cells [m], shape (N, N)."""
+        """Distances between all cells [m], shape (N, N)."""
         from scipy.sparse.csgraph import dijkstra
 
         parts = [
-            dijkstra(self._graph, indices=self._node[begin : begin + AT_ONCE])[:, self._node]
-            for begin in range(0, self._node.size, AT_ONCE)
+            dijkstra(self._graph, indices=self._node[begin : begin + CHUNK])[:, self._node]
+            for begin in range(0, self._node.size, CHUNK)
         ]
         found = np.concatenate(parts) if parts else np.zeros((0, 0))
-        # Either way round the same steps are added in another order. Where there is no way
-        # between two cells, none can be driven to from where the other can, and nobody asks.
+        # The two directions add the same steps in another order. Two cells without a path between
+        # them are never reachable from one position, so their entry is never read.
         return np.nan_to_num(np.minimum(found, found.T), posinf=0.0)
 
     @cached_property
     def _movable(self) -> NDArray[np.bool_]:
-        """Whether the base can move at all from a place, shape (X, Y)."""
+        """Whether the base can move away from a lattice position, shape (X, Y)."""
         degree = np.diff(self._graph.indptr)
         return np.asarray(degree > 0).reshape(self.lattice.shape)
 
     def _entries(self, x: float, y: float) -> tuple[IntArray, FloatArray]:
-        """Return the places the robot drives to first, and how far they are [m]."""
+        """Return the lattice nodes the robot can drive to first, and their distances [m]."""
         (nx, ny), start, step = self.lattice.shape, np.array(self.lattice.start), self.lattice.step
         along = (np.array([x, y]) - start) / step
         if np.all((along >= 0.0) & (along <= (nx - 1, ny - 1))):
@@ -148,25 +158,25 @@ class FloorDistances(Distances):
             entries = square[self._movable[square[:, 0], square[:, 1]]]
             if not len(entries):
                 raise SelectionError(
-                    f"Current state: the base at ({x:.2f}, {y:.2f}) m stands where the scores "
-                    "leave it no room, so no way around the furniture starts there. Check the "
-                    "place, or take straight lines."
+                    f"Current state: the base at ({x:.2f}, {y:.2f}) m is where the scores find it "
+                    "in collision, so no path around the furniture starts there. Check the "
+                    "position, or take straight lines."
                 )
         else:
             i, j = np.indices((nx, ny))
-            # From outside one sees the sides of the rectangle that one is beyond.
-            seen = (
+            # From outside, the sides of the rectangle that face the robot are in line of sight.
+            visible = (
                 ((i == 0) & (along[0] < 0.0))
                 | ((i == nx - 1) & (along[0] > nx - 1))
                 | ((j == 0) & (along[1] < 0.0))
                 | ((j == ny - 1) & (along[1] > ny - 1))
             )
-            entries = np.argwhere(seen)
+            entries = np.argwhere(visible)
         legs = _distance(np.array([x, y]), start + entries * np.array(step))
         return np.asarray(entries[:, 0] * ny + entries[:, 1]), legs
 
 
 def _distance(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Return the straight distance of places, shapes (..., 2), as shape (...)."""
+    """Return the Euclidean distance of positions of shapes (..., 2), shape (...)."""
     dx, dy = q[..., 0] - p[..., 0], q[..., 1] - p[..., 1]
     return np.asarray(np.sqrt(dx * dx + dy * dy))

@@ -1,4 +1,4 @@
-"""Choose among the sets whose success under error was estimated: few enough to look at each."""
+"""Selection among the sets with an estimated success under error: few enough to evaluate all."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ def best_estimated(
     weights: UtilityWeights,
     max_members: int,
 ) -> tuple[int, ...]:
-    """Return the estimated set with the greatest utility, the first among equals.
+    """Return the set with an estimate that has the greatest utility, the first among equals.
 
     Args:
         sets: The kept sets.
-        success: Estimates for some of them.
+        success: Estimates for some of them, if there are any.
         legs: Travel costs from the current state.
         weights: alpha, beta, gamma, delta.
-        max_members: Sets of at most so many members.
+        max_members: Greatest number of members of a set.
 
     Returns:
         Candidate numbers of its members, ascending.
 
     Raises:
-        SelectionError: If no set has an estimate, or there is no way to any that has.
+        SelectionError: If no set has an estimate, or none with an estimate is reachable.
     """
     if success is None:
         raise SelectionError(
-            "Weight delta asks for the success under error, which was estimated for no set of this "
+            "Weight delta needs success under error, which was not estimated for any set of this "
             "table. Estimate it first: tcs robustify FILE."
         )
     best: tuple[int, ...] | None = None
@@ -44,36 +44,37 @@ def best_estimated(
     for size in range(1, max_members + 1):
         rows = success.of_size(size)
         members = np.searchsorted(sets.candidates, success.members[rows, :size])
-        able = np.all(legs.reachable[sets.cell[members]], axis=1)
-        rows, members = rows[able], members[able]
+        feasible = np.all(legs.reachable[sets.cell[members]], axis=1)
+        rows, members = rows[feasible], members[feasible]
         if not rows.size:
             continue
         found = _utilities(sets, success.low[rows], legs, weights, members)
         first = int(np.argmax(found))
-        # The table is in the order that breaks ties.
+        # The table is sorted in the order that breaks ties.
         if found[first] > most:
             most = float(found[first])
             best = tuple(int(i) for i in members[first])
     if best is None:
         raise SelectionError(
-            "There is no way from here to any set whose success under error was estimated, or none "
-            "has so few members. Take --delta 0, or estimate more sets: tcs robustify FILE --sets."
+            "No set whose success under error was estimated is reachable from here with at most "
+            f"{max_members} members. Take --delta 0, or estimate more sets: tcs robustify FILE "
+            "--sets."
         )
     return best
 
 
 def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: int) -> None:
-    """Refuse to choose among sets of three by a success that was estimated for smaller ones only.
+    """Refuse to select triples by success if only smaller sets have estimates.
 
     Raises:
-        SelectionError: If there are sets of three, and none has an estimate.
+        SelectionError: If there are triples, and none has an estimate.
     """
     if max_members < 3 or success is None or sets.triples is None or not sets.triples.kept:
         return
     if not success.of_size(3).size:
         raise SelectionError(
-            "max_members is 3 and weight delta above 0, but the success under error was estimated "
-            "for no set of three. Take max_members 2, or delta 0."
+            "max_members is 3 and weight delta above 0, but success under error was not estimated "
+            "for any set of three. Take max_members 2, or delta 0."
         )
 
 
@@ -84,7 +85,7 @@ def _utilities(
     weights: UtilityWeights,
     members: NDArray[np.intp],
 ) -> NDArray[np.float64]:
-    """Return the utility of sets of one size, given their candidates, shape (n, size)."""
+    """Return the utility of sets of one size, given their candidates of shape (n, size)."""
     columns = tuple(np.ascontiguousarray(column) for column in members.T)
     reached = np.logical_or.reduce([sets.reached[column] for column in columns], axis=0)
     dexterity = np.maximum.reduce([sets.dexterity[column] for column in columns], axis=0)

@@ -1,4 +1,4 @@
-"""What the search needs of a set table, independent of the query."""
+"""Index of a set table for the search, independent of the query."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.selection.distances import Distances, FloorDistances, StraightDistances
+from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.tables import SetTable
 from tcs.placement.tables.groups import Groups
 
@@ -18,33 +18,36 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SetIndex:
-    """The candidates, by cell and by goal."""
+    """The candidates of a set table, by cell and by goal."""
 
     sets: SetTable
     """The table."""
 
     @cached_property
     def groups(self) -> tuple[GroupIndex, ...]:
-        """The groups of pairs, and of triples where the table holds them."""
-        kinds = [self.sets.pairs]
+        """The groups of pairs, and of triples if the table holds them."""
+        groups = [self.sets.pairs]
         if self.sets.triples is not None:
-            kinds.append(self.sets.triples)
-        return tuple(GroupIndex(self, kind) for kind in kinds)
+            groups.append(self.sets.triples)
+        return tuple(GroupIndex(self, one) for one in groups)
 
     @cached_property
     def distances(self) -> dict[str, Distances]:
-        """Distances between the cells by each of the routes."""
+        """Distances between the cells, by route."""
         xy = self.sets.cell_xy
-        return {"straight": StraightDistances(xy), "around": FloorDistances(xy, self.sets.lattice)}
+        return {
+            "straight": StraightDistances(xy),
+            "around": LatticeDistances(xy, self.sets.lattice),
+        }
 
     @cached_property
     def start(self) -> IntArray:
-        """Where each cell starts in `by_cell`, shape (N,)."""
+        """Position of each cell's first candidate in `by_cell`, shape (N,)."""
         return self.sets.cell_start[:-1]
 
     @cached_property
     def size(self) -> IntArray:
-        """How many candidates each cell has, shape (N,)."""
+        """Number of candidates of each cell, shape (N,)."""
         return np.asarray(np.diff(self.sets.cell_start))
 
     @cached_property
@@ -72,11 +75,11 @@ class GroupIndex:
     groups: Groups
     """The groups."""
     _paths: dict[type[Distances], FloatArray] = field(default_factory=dict, repr=False)
-    """Shortest paths through the cells of each group that were asked for, by kind of way."""
+    """Computed lengths of paths through the cells of each group, by class of distances."""
 
     @property
     def members(self) -> int:
-        """m, how many members each set has."""
+        """m, the number of members of each set."""
         return int(self.groups.cells.shape[1])
 
     @cached_property
@@ -88,7 +91,7 @@ class GroupIndex:
     def group_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Bounds on P_R, P_M and P_R + P_M of each group in double precision, shapes (K,).
 
-        Products with float32 arrays would round to float32, and might round a bound down.
+        Products of float32 arrays would round to float32, and might round a bound down.
         """
         groups = self.groups
         return (
@@ -99,7 +102,7 @@ class GroupIndex:
 
     @cached_property
     def member_scores(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The same of the kept sets that each candidate is in, shapes (C,)."""
+        """The same for the kept sets that contain each candidate, shapes (C,)."""
         groups = self.groups
         return (
             groups.member_reachability,
@@ -109,17 +112,17 @@ class GroupIndex:
 
     @cached_property
     def candidates_within(self) -> IntArray:
-        """How many candidates there are in the cells of each group, shape (K,)."""
+        """Number of candidates in the cells of each group, shape (K,)."""
         return np.asarray(sum(self.all.size[cells] for cells in self.cells))
 
     def path(self, distances: Distances) -> FloatArray:
-        """Return the least distance to drive between the cells of each group [m], shape (K,)."""
+        """Return the least driving distance through the cells of each group [m], shape (K,)."""
         if type(distances) not in self._paths:
             legs = [
                 distances.between(first, second)
                 for i, first in enumerate(self.cells)
                 for second in self.cells[i + 1 :]
             ]
-            # Of three legs a path takes two.
+            # A path through three cells takes two of the three legs.
             self._paths[type(distances)] = np.sort(legs, axis=0)[: self.members - 1].sum(axis=0)
         return self._paths[type(distances)]

@@ -1,8 +1,9 @@
-"""Find the best kept set without going through all of them: best-first branch and bound.
+"""Best-first branch and bound: find the best kept set without evaluating all of them.
 
 Sets of two or three are grouped by the base cells of their members. Groups are opened in the order
-of their bounds until no unopened one can win. In an opened group, members that cannot win with any
-partners are left out, then sets whose way is too long; the scores of the others are computed.
+of their bounds until no unopened group can hold a better set. In an open group, infeasible members
+(those whose bound with any partners is too low) are discarded, then sets whose path is too long;
+the scores of the others are computed.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FIRST_CANDIDATES = 200
-"""Candidates looked at in the first round, of which most searches need no more; later rounds
-double, so that a search which has to open many groups does not spend its time on bookkeeping."""
+"""Candidates examined in the first round, which is enough for most searches; later rounds double,
+so that a search that opens many groups does not spend its time on bookkeeping."""
 
 MOST_CANDIDATES = 100_000
-"""Most candidates looked at in one round: a few milliseconds."""
+"""Most candidates examined in one round: a few milliseconds."""
 
-AT_ONCE = 500_000
-"""Sets, or parts of them, formed at once: their scores need some 30 MB."""
+CHUNK = 500_000
+"""Sets, or parts of them, formed together: their scores need some 30 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class Found:
     """Candidate numbers of the members, ascending."""
 
     def beats(self, other: Found | None) -> bool:
-        """Return whether this set is to be chosen over another: utility, then order."""
+        """Return whether this set is preferred to another: by utility, then by order."""
         if other is None or self.utility != other.utility:
             return other is None or self.utility > other.utility
         return self.members < other.members
@@ -57,19 +58,19 @@ def best_set(
         index: The groups of sets.
         legs: Travel costs from the current state.
         weights: alpha, beta, gamma.
-        to_beat: Utility of the best smaller set; a set has to be better, not as good.
+        to_beat: Utility of the best smaller set; only a greater utility counts.
 
     Returns:
         The set, or None when no set is better than `to_beat`.
     """
     bounds = Bounds(index, legs, weights)
-    left = np.flatnonzero(bounds.groups > to_beat)
+    remaining = np.flatnonzero(bounds.groups > to_beat)
     search = _Search(bounds, to_beat)
     budget = FIRST_CANDIDATES
-    while left.size:
-        now, left = _split(bounds, left, budget)
+    while remaining.size:
+        now, remaining = _split(bounds, remaining, budget)
         search.open(now)
-        left = _still_able_to_win(bounds, left, search.best)
+        remaining = _promising(bounds, remaining, search.best)
         budget = min(2 * budget, MOST_CANDIDATES)
     return search.best
 
@@ -84,116 +85,119 @@ class _Search:
 
     @property
     def least(self) -> float:
-        """The utility that a set must have to be looked at."""
+        """The utility that a set must have to be examined."""
         return self.to_beat if self.best is None else self.best.utility
 
     def open(self, groups: IntArray) -> None:
-        """Look at the sets of some groups."""
-        able = [
-            _members_able_to_win(self.bounds, groups, cells[groups], self.least)
+        """Examine the sets of some groups."""
+        feasible = [
+            _feasible_members(self.bounds, groups, cells[groups], self.least)
             for cells in self.bounds.index.cells
         ]
-        which = np.repeat(np.arange(groups.size), able[0].size)
-        self._join(groups, which, (able[0].numbers,), able[1:])
+        which = np.repeat(np.arange(groups.size), feasible[0].size)
+        self._join(groups, which, (feasible[0].numbers,), feasible[1:])
 
     def _join(
         self,
         groups: IntArray,
         which: IntArray,
         members: tuple[IntArray, ...],
-        able: list[_Able],
+        feasible: list[_Feasible],
     ) -> None:
-        """Add the remaining members to parts of sets, and note the best of the whole sets.
+        """Add the remaining members to parts of sets, and record the best complete set.
 
         Args:
             groups: The groups.
-            which: Position among them of each part, shape (n,).
+            which: Group of each part, as a position in `groups`, shape (n,).
             members: First members of each part, from the first cells of its group, shapes (n,).
-            able: Able members of the cells that remain.
+            feasible: Feasible members of the remaining cells.
         """
-        if not able:
+        if not feasible:
             ascending = tuple(np.sort(members, axis=0))
             found = _best_of(self.bounds, ascending, groups[which], self.least)
             if found is not None and found.utility > self.to_beat and found.beats(self.best):
                 self.best = found
             return
-        count = able[0].size[which]
+        count = feasible[0].size[which]
         some = np.flatnonzero(count)
         while some.size:
-            # At least one part, and as many as do not make too many at once.
-            end = max(1, int(np.searchsorted(np.cumsum(count[some]), AT_ONCE, "right")))
+            # At least one part, and as many as fit into one chunk.
+            end = max(1, int(np.searchsorted(np.cumsum(count[some]), CHUNK, "right")))
             now, some = some[:end], some[end:]
             part = np.repeat(now, count[now])
             within = np.arange(part.size) - np.repeat(
                 np.cumsum(count[now]) - count[now], count[now]
             )
-            last = able[0].numbers[able[0].start[which[part]] + within]
-            self._keep_on(groups, which[part], (*(m[part] for m in members), last), able[1:])
+            last = feasible[0].numbers[feasible[0].start[which[part]] + within]
+            parts = (*(m[part] for m in members), last)
+            self._filter(groups, which[part], parts, feasible[1:])
 
-    def _keep_on(
+    def _filter(
         self,
         groups: IntArray,
         which: IntArray,
         members: tuple[IntArray, ...],
-        able: list[_Able],
+        feasible: list[_Feasible],
     ) -> None:
-        """Leave out parts of sets that cannot win or come up twice, and go on with the others."""
+        """Discard parts of sets that are infeasible or duplicates, and extend the others."""
         one, other = self.bounds.index.cells[len(members) - 2 : len(members)]
         group = groups[which]
-        # Within one cell each set comes up several times, and a candidate meets itself.
+        # Within one cell each set occurs several times, and a candidate is paired with itself.
         keep = (one[group] != other[group]) | (members[-2] < members[-1])
-        if able and self.bounds.legs.level_weights:
+        if feasible and self.bounds.legs.level_weights:
             keep &= self.bounds.of_two(group, members[-2], members[-1]) >= self.least
         if not np.all(keep):
             which, members = which[keep], tuple(member[keep] for member in members)
-        self._join(groups, which, members, able)
+        self._join(groups, which, members, feasible)
 
 
-def _split(bounds: Bounds, left: IntArray, budget: int) -> tuple[IntArray, IntArray]:
-    """Return the groups to open now, those with the greatest bounds, and the others."""
-    # A group has at least two candidates, so there are never more groups than the budget.
-    if left.size > budget:
-        order = np.argpartition(-bounds.groups[left], budget)
-        front, rest = left[order[:budget]], left[order[budget:]]
+def _split(bounds: Bounds, remaining: IntArray, budget: int) -> tuple[IntArray, IntArray]:
+    """Return the groups to open now, which have the greatest bounds, and the others."""
+    # A group has at least two candidates, so the budget never covers more groups than its number.
+    if remaining.size > budget:
+        order = np.argpartition(-bounds.groups[remaining], budget)
+        front, rest = remaining[order[:budget]], remaining[order[budget:]]
     else:
-        front, rest = left, left[:0]
-    # Among equal bounds, open first what comes first in the order: all others can then be left.
+        front, rest = remaining, remaining[:0]
+    # Among equal bounds the first in order is opened first: the others need not be opened then.
     earliest = _earliest(bounds.index, front)
     front = front[np.lexsort((*reversed(earliest), -bounds.groups[front]))]
-    looked_at = np.cumsum(bounds.index.candidates_within[front])
-    opened = max(1, int(np.searchsorted(looked_at, budget, "right")))
+    examined = np.cumsum(bounds.index.candidates_within[front])
+    opened = max(1, int(np.searchsorted(examined, budget, "right")))
     return front[:opened], np.concatenate([front[opened:], rest])
 
 
-def _still_able_to_win(bounds: Bounds, left: IntArray, best: Found | None) -> IntArray:
+def _promising(bounds: Bounds, remaining: IntArray, best: Found | None) -> IntArray:
     """Return the groups that may hold a better set, or an equal one earlier in the order."""
     if best is None:
-        return left
-    bound = bounds.groups[left]
-    able = bound > best.utility
+        return remaining
+    bound = bounds.groups[remaining]
+    promising = bound > best.utility
     equal = np.flatnonzero(bound == best.utility)
     earlier = np.zeros(equal.size, dtype=np.bool_)
     tied = np.ones(equal.size, dtype=np.bool_)
-    for number, of_best in zip(_earliest(bounds.index, left[equal]), best.members, strict=True):
+    for number, of_best in zip(
+        _earliest(bounds.index, remaining[equal]), best.members, strict=True
+    ):
         earlier |= tied & (number < of_best)
         tied &= number == of_best
-    able[equal] = earlier
-    return np.asarray(left[able])
+    promising[equal] = earlier
+    return np.asarray(remaining[promising])
 
 
 def _earliest(index: GroupIndex, groups: IntArray) -> tuple[IntArray, ...]:
-    """Return, for each group, ascending candidate numbers that none of its sets comes before."""
+    """Return ascending candidate numbers that precede or equal every set of each group."""
     return tuple(np.sort([index.all.earliest[cells[groups]] for cells in index.cells], axis=0))
 
 
 def _best_of(
     bounds: Bounds, members: tuple[IntArray, ...], group: IntArray, least: float
 ) -> Found | None:
-    """Return the best kept of some sets with at least this utility, the first of equals."""
+    """Return the best kept set of at least this utility, the first among equals."""
     cost = tour_costs(bounds.legs, members)
-    # The way is known now; scores take longer, and few sets can make up for theirs.
-    able = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
-    members, cost = tuple(member[able] for member in members), cost[able]
+    # The exact travel cost rejects most sets before their scores, which take longer.
+    feasible = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
+    members, cost = tuple(member[feasible] for member in members), cost[feasible]
     every, sets = bounds.index.all, bounds.index.all.sets
     manipulability = np.zeros(cost.size)
     for dexterity, weight in zip(every.dexterity, sets.weights, strict=True):
@@ -240,7 +244,7 @@ def _is_kept(
 def tour_costs(legs: Legs, members: tuple[IntArray, ...]) -> FloatArray:
     """Return the cost D of the shortest open tour from here through each set, shape (n,).
 
-    Legs are added in the order they are driven, as `tcs.placement.selection.shortest_tour` does.
+    Legs are summed in the order they are driven, as in `tcs.placement.selection.shortest_tour`.
     """
     numbers = range(len(members))
     between = {
@@ -256,24 +260,24 @@ def tour_costs(legs: Legs, members: tuple[IntArray, ...]) -> FloatArray:
     return np.asarray(least)
 
 
-class _Able(NamedTuple):
-    """Candidates of one cell of each of some groups that may be in a set that wins."""
+class _Feasible(NamedTuple):
+    """Candidates of one cell of each group that may be in a better set."""
 
     numbers: IntArray
     """Their numbers, group by group."""
     start: IntArray
-    """Where each group starts among them."""
+    """Position of each group's first candidate."""
     size: IntArray
-    """How many each group has."""
+    """Number of candidates of each group."""
 
 
-def _members_able_to_win(bounds: Bounds, groups: IntArray, cells: IntArray, least: float) -> _Able:
+def _feasible_members(bounds: Bounds, groups: IntArray, cells: IntArray, least: float) -> _Feasible:
     """Return candidates of one cell of each group that may be in a set with this utility."""
     every = bounds.index.all
     size = every.size[cells]
     which = np.repeat(np.arange(groups.size), size)
     within = np.arange(which.size) - np.repeat(np.cumsum(size) - size, size)
     member = every.sets.by_cell[every.start[cells][which] + within]
-    able = bounds.of_member(groups[which], member) >= least
-    count = np.bincount(which[able], minlength=groups.size)
-    return _Able(member[able], np.cumsum(count) - count, count)
+    feasible = bounds.of_member(groups[which], member) >= least
+    count = np.bincount(which[feasible], minlength=groups.size)
+    return _Feasible(member[feasible], np.cumsum(count) - count, count)

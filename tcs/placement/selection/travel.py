@@ -1,8 +1,7 @@
-"""What it costs to get from the current state to a set: D(h_k, h_0) in TCS eq. (5).
+"""Travel cost D(h_k, h_0) of TCS eq. (5): the shortest open tour through the members of a set.
 
-D is the shortest open tour that starts at the current state h_0 and visits every
-member of the set. A leg is driven straight, or around the furniture: see
-`tcs.placement.selection.distances`.
+The tour starts at the current state h_0 and visits every member. Each leg is driven straight or
+around the furniture, see `tcs.placement.selection.distances`.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.selection.checks import check_coordinate, check_weight
+from tcs.placement.selection.checks import check_coordinate, check_weight, check_within_axis
 from tcs.placement.selection.distances import ROUTES, Distances
 
 FloatArray = NDArray[np.float64]
@@ -26,17 +25,17 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TravelWeights:
-    """What each kind of motion costs; by default only metres of driving do.
+    """Cost of each type of motion; by default only driving costs.
 
-    Each is a number from 0 to 1e9. D has the unit of the driven metres.
+    Each is a number from 0 to 1e9. D has the unit of the metres driven.
     """
 
     metre: float = 1.0
-    """Per metre driven."""
+    """Per metre of driving."""
     turn: float = 0.0
-    """Per radian between base headings, the shorter way round (0 to pi)."""
+    """Per radian of base rotation, the shorter way round (0 to pi)."""
     torso: float = 0.0
-    """Per metre of torso lift."""
+    """Per metre of torso height."""
     environment: tuple[tuple[str, float], ...] = ()
     """Per metre or radian of each named environment axis, e.g. ("bed_height", 2.0)."""
     route: str = "straight"
@@ -46,7 +45,7 @@ class TravelWeights:
         """Refuse weights that are negative or not finite, and unknown routes.
 
         Raises:
-            SelectionError: If a weight is no number from 0 to 1e9, or an axis is named twice.
+            SelectionError: If a weight is not a number from 0 to 1e9, or an axis is named twice.
             UnknownNameError: If there is no such route.
         """
         if self.route not in ROUTES:
@@ -64,25 +63,25 @@ class TravelWeights:
 class Legs:
     """Costs of single legs between the current state, candidates and base cells.
 
-    A leg is summed in a fixed order, driving first: then driving alone is never more than the
-    whole leg, in floating point too, and can bound it.
+    A leg is summed in a fixed order, driving first: in floating point too, the cost of driving is
+    then never more than that of the whole leg, and can bound it.
     """
 
     cell: NDArray[np.int32]
     """Base cells of the candidates, shape (C,)."""
     distances: Distances
-    """Distances between the cells."""
+    """Driving distances between the cells."""
     here_to_cell: FloatArray
-    """Cost of driving from the current place to each cell, 0 where there is no way, shape (N,)."""
+    """Cost of driving from the current position to each cell, 0 where no path leads, shape (N,)."""
     reachable: NDArray[np.bool_]
-    """Whether there is a way from the current place to each cell, shape (N,)."""
+    """Whether a path leads from the current position to each cell, shape (N,)."""
     levels: FloatArray
-    """What else the candidates differ in and costs something: heading if it has a weight,
-    torso, environment axes [rad or m], shape (C, L)."""
+    """Coordinates of the candidates beside x and y that have a weight: heading, torso height,
+    environment axes [rad or m], shape (C, L)."""
     level_weights: tuple[float, ...]
     """Weight of each column of `levels`."""
     turns: bool
-    """Whether the first column of `levels` is the heading, which wraps round."""
+    """Whether the first column of `levels` is the heading, which is periodic."""
     here_levels: FloatArray
     """The current values of `levels`, shape (L,)."""
     metre: float
@@ -100,18 +99,18 @@ class Legs:
 
     @cached_property
     def levels_from_here(self) -> FloatArray:
-        """Cost of that leg without the driving, shape (C,)."""
+        """Cost of that leg without driving, shape (C,)."""
         nothing = np.zeros(len(self.cell))
         return self._with_levels(nothing, self.here_levels, self.levels)
 
     def levels_between(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> FloatArray:
-        """Return the cost of the leg between candidates without the driving, shape (...)."""
+        """Return the cost of the leg between candidates without driving, shape (...)."""
         return self._with_levels(np.zeros(np.shape(a)), self.levels[a], self.levels[b])
 
     def _with_levels(
         self, driving: FloatArray, from_levels: FloatArray, to_levels: FloatArray
     ) -> FloatArray:
-        """Return the cost of legs whose driving is already known, shape (...)."""
+        """Return the cost of legs whose cost of driving is known, shape (...)."""
         cost = driving
         for column, weight in enumerate(self.level_weights):
             change = np.abs(to_levels[..., column] - from_levels[..., column])
@@ -132,21 +131,22 @@ def legs_from(
     """Return the legs between the current state and the candidates of a grid.
 
     Args:
-        here: The current state h_0. Environment axes matter only where they have a weight.
+        here: The current state h_0. Environment axes matter only if they have a weight.
         grid: Grid of the candidates.
         candidates: Flat indices of the candidates, shape (C,).
         cell: Their base cells, shape (C,).
-        distances: Distances between the cells.
-        weights: What each kind of motion costs.
+        distances: Driving distances between the cells.
+        weights: Cost of each type of motion.
 
     Raises:
         UnknownNameError: If a weight names an axis that the environment does not have.
-        SelectionError: If the current state is not finite, lacks an axis with a weight, or is no
-            place from which there is a way anywhere.
+        SelectionError: If the current state is not finite, is out of the range of an axis, lacks an
+            axis with a weight, or if no path starts at its position.
     """
     names, level_weights = _weighted_levels(grid, weights)
     current = current_values(here, grid, names)
-    # Columns are read only when they cost something: looking them up takes longer than choosing.
+    _check_range(current, grid)
+    # Coordinates are looked up only if they have a weight: that takes longer than selecting.
     values = grid.values(candidates) if names else {}
     levels = [values[name] for name in names]
     metres = distances.from_position(float(here.base_x), float(here.base_y))
@@ -191,7 +191,7 @@ def shortest_tour(from_here: Sequence[float], between: FloatArray) -> tuple[floa
 def _weighted_levels(
     grid: Grid, weights: TravelWeights
 ) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """Return names and weights of the axes beside x and y that cost something, heading first."""
+    """Return names and weights of the axes beside x and y that have a weight, heading first."""
     known = [axis.name for axis in grid.environment_axes]
     for name, _ in weights.environment:
         if name not in known:
@@ -204,7 +204,17 @@ def _weighted_levels(
 def current_values(
     here: InitialConfiguration, grid: Grid, names: tuple[str, ...]
 ) -> dict[str, float]:
-    """Return the current value of every axis that is needed, checked."""
+    """Return the checked current value of every axis that the state gives [m or rad].
+
+    Args:
+        here: The current state.
+        grid: The grid whose axes it refers to.
+        names: Axes that must be given.
+
+    Raises:
+        UnknownNameError: If an environment axis has no such name.
+        SelectionError: If a value is not finite or in another unit, or an axis is missing.
+    """
     values = {
         "base_x": here.base_x,
         "base_y": here.base_y,
@@ -222,7 +232,7 @@ def current_values(
         values[name] = value
     for name, value in values.items():
         check_coordinate(name, value)
-    # Whole turns mean nothing, and would take digits from the differences of headings.
+    # Full rotations mean nothing, and would cost digits in the differences of headings.
     values["base_yaw"] = math.remainder(here.base_yaw, 2.0 * math.pi)
     missing = [name for name in names if name not in values]
     if missing:
@@ -231,3 +241,12 @@ def current_values(
             "Give its current value, or weight 0."
         )
     return values
+
+
+def _check_range(values: dict[str, float], grid: Grid) -> None:
+    """Refuse a torso or environment out of range; the base may be anywhere."""
+    # A lowered torso is possible even if the grid starts higher.
+    check_within_axis(grid.axis("torso"), values["torso"], lowest=0.0)
+    for axis in grid.environment_axes:
+        if axis.name in values:
+            check_within_axis(axis, values[axis.name])

@@ -1,4 +1,4 @@
-"""How good a set is now: its two scores against the way there."""
+"""Utility of a set: its task-centric scores minus the cost of travel, TCS eq. (5)."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Number = TypeVar("Number", float, NDArray[np.float64])
 class UtilityWeights:
     """Weights of the terms of the utility, TCS eq. (5); each a number from 0 to 1e9.
 
-    The travel weight is per metre. It is 0.05 by default: one metre more is worth five percent
-    of the task. At 1 a metre would cancel a task that is reached in full.
+    The travel weight is per metre. By default it is 0.05: one metre costs five percent of the
+    task. At 1, a metre would cancel a task that is reached in full.
     """
 
     reachability: float = 1.0
@@ -28,15 +28,15 @@ class UtilityWeights:
     travel: float = 0.05
     """gamma, the weight of the travel cost D."""
     success: float = 0.0
-    """delta, the weight of the success under error P_S: the lower end of the 95 % interval of its
-    estimate, so that a lucky set of few samples is not ahead of a good one of many. Above 0, only
-    sets with an estimate can be chosen."""
+    """delta, the weight of the success under error P_S: the lower confidence bound of its estimate,
+    so that a set with few, favourable samples does not outrank a good set with many. Above 0, only
+    sets with an estimate can be selected."""
 
     def __post_init__(self) -> None:
         """Refuse weights that are negative or not finite.
 
         Raises:
-            SelectionError: If a weight is no number from 0 to 1e9.
+            SelectionError: If a weight is not a number from 0 to 1e9.
         """
         check_weight("alpha (reachability)", self.reachability)
         check_weight("beta (manipulability)", self.manipulability)
@@ -51,18 +51,20 @@ def utility(
     weights: UtilityWeights,
     success: Number | None = None,
 ) -> Number:
-    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5), and + delta P_S where that is given.
+    """Return alpha P_R + beta P_M - gamma D, TCS eq. (5), plus delta P_S if that is given.
 
-    The order of the operations is part of the contract: the search bounds the
-    utility by the same operations on greater scores and smaller costs, and
-    rounding keeps that order.
+    The order of the operations is part of the contract: the search bounds the utility by the same
+    operations on greater scores and smaller costs, and rounding is monotone.
 
     Args:
         reachability: P_R of the sets.
         manipulability: P_M of the sets.
         cost: D of the sets.
         weights: alpha, beta, gamma, delta.
-        success: P_S of the sets, what they reach under error.
+        success: P_S of the sets, a lower bound of their success under error.
+
+    Returns:
+        The utility of each set.
 
     >>> utility(1.0, 0.5, 2.0, UtilityWeights())
     1.4

@@ -30,7 +30,7 @@ def test_every_table_gets_estimates_of_singles_and_pairs(chair_file, done):
     (made,) = done.metadata["robustness"]
     assert (made["samples"], made["seed"], made["check_base"]) == (128, 0, False)
     assert made["errors"]["person_y"] == {"distribution": "normal", "std": 0.05}
-    assert made["errors_of_environment"]
+    assert made["environment_errors"]
 
 
 @pytest.mark.parametrize("many", [250, 50])
@@ -39,9 +39,9 @@ def test_sets_that_reach_as_much_as_the_best_are_in_question(rng, many):
     reachability = np.where(np.arange(400) < many, 1.0, 0.9)
     manipulability = rng.uniform(0.0, 0.05, 400)
     rows = np.arange(400)[:, None]
-    found = estimation._in_question(rows, reachability, manipulability)[:, 0]
+    found = estimation._contenders(rows, reachability, manipulability)[:, 0]
     best = np.argsort(-(reachability + manipulability))
-    assert found.tolist() == best[: max(many, estimation.FEW)].tolist()
+    assert found.tolist() == best[: max(many, estimation.MIN_CONTENDERS)].tolist()
 
 
 def test_only_configurations_of_the_best_sets_are_screened(monkeypatch):
@@ -102,7 +102,7 @@ def test_one_table_alone(bed_file):
     # Each table keeps the record of how it was estimated.
     both = robustify(done, samples=65, sets=10, check_base=True, tables=[0])
     assert [made["samples"] for made in both.metadata["robustness"]] == [65, 64]
-    assert [table["made"]["check_base"] for table in success_summary(both)["tables"]] == [
+    assert [table["settings"]["check_base"] for table in success_summary(both)["tables"]] == [
         True,
         False,
     ]

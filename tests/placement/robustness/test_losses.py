@@ -1,4 +1,4 @@
-"""Why goals are lost when the room is off."""
+"""Analysis of goals that are lost under error."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_losses_by_hand():
     assert told[1].reasons == {Reason.GRIPPER_BLOCKED: 1.0}
     # Sample 2 loses goal 0: the chair is 0.2 / 0.0707 of its deviations off, the person -3 / 1.73.
     assert told[0].joint == "chair_x"
-    assert told[0].tilt == pytest.approx(2.0 * np.sqrt(2.0))
+    assert told[0].standardized_error == pytest.approx(2.0 * np.sqrt(2.0))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -1,7 +1,8 @@
-"""Means, intervals and tests, against closed forms and scipy on known samples."""
+"""Means, intervals and tests against closed forms and SciPy on known samples."""
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -21,23 +22,23 @@ def test_mean_std_and_interval_by_hand():
     assert found.ci95 == pytest.approx((0.5 - half, 0.5 + half), abs=1e-4)
 
 
-def test_the_interval_stays_within_what_is_possible():
+def test_the_interval_stays_between_zero_and_one():
     assert mean_of([0.0, 1.0, 1.0]).ci95 == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
-def test_equal_samples_claim_no_certainty(value):
+def test_equal_samples_imply_no_certainty(value):
     found = mean_of(np.full(1000, value))
     low, high = found.ci95
     assert found.std == 0.0
     assert low <= value <= high
-    # Something never seen in n samples happens in fewer than 3.7 / n of them (97.5 %).
+    # An event absent from n samples has a probability below 3.7 / n (97.5 %).
     assert 0.5e-3 < high - low < 3.7e-3
     assert mean_of([value]).std == 0.0
 
 
 @pytest.mark.parametrize("count", [10, 64, 1024])
-def test_a_failure_never_makes_surer(count):
+def test_failures_lower_both_ends_of_the_interval(count):
     ends = []
     for failures in range(6):
         samples = np.ones(count)
@@ -50,22 +51,22 @@ def test_a_failure_never_makes_surer(count):
 
 
 @pytest.mark.parametrize("chance", [0.95, 0.99, 0.998])
-def test_the_interval_of_rare_failures_covers_as_often_as_it_says(rng, chance):
+def test_the_interval_of_rare_failures_has_its_coverage(rng, chance):
     covered = 0
     for _ in range(400):
         low, high = mean_of(rng.binomial(1, chance, 500)).ci95
         covered += low <= chance <= high
-    # Four standard errors of a share of 0.95 in 400; more often is no fault.
+    # Four standard errors of a proportion of 0.95 in 400; greater coverage is acceptable.
     assert covered / 400 > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 400)
 
 
-def test_the_interval_covers_the_mean_as_often_as_it_says(rng):
-    # Shares of eight goals, each reached with probability 0.8.
+def test_the_interval_of_fractions_has_its_coverage(rng):
+    # Fractions of eight goals, each reached with probability 0.8.
     covered = 0
     for _ in range(400):
         low, high = mean_of(rng.binomial(8, 0.8, 50) / 8).ci95
         covered += low <= 0.8 <= high
-    # Four standard errors of a share of 0.95 in 400.
+    # Four standard errors of a proportion of 0.95 in 400.
     assert abs(covered / 400 - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 400)
 
 
@@ -80,11 +81,11 @@ def test_rank_sum_is_scipys_with_ties_corrected(rng):
     assert rank_sum(one, other).p == pytest.approx(stats.ranksums(one, other).pvalue, rel=0.02)
 
 
-def test_ranks_do_not_see_the_rounding_of_shares(rng):
+def test_ranks_ignore_the_rounding_of_fractions(rng):
     ones = rng.integers(0, 8, 200)
     others = np.clip(ones + rng.integers(-1, 2, 200), 0, 7)
     weights = np.full(7, 1 / 7)
-    # Shares as they come about, by adding up weights, in two different orders.
+    # Fractions as sums of weights in two different orders.
     first = np.array([weights[:n].sum() for n in ones])
     second = np.array([1.0 - weights[n:].sum() for n in others])
     assert len(np.unique(np.abs(first - second))) > len(np.unique(np.abs(ones - others)))
@@ -93,8 +94,8 @@ def test_ranks_do_not_see_the_rounding_of_shares(rng):
         assert test(first, second).p == pytest.approx(test(1.0 * ones, 1.0 * others).p, rel=1e-12)
 
 
-def test_zero_differences_take_their_ranks_as_pratt_has_it(rng):
-    """The normal approximation written out: zeros are ranked, and then left out of both sums."""
+def test_zero_differences_are_ranked_after_pratt(rng):
+    """The normal approximation written out: zeros are ranked, then excluded from both sums."""
     first, second = rng.binomial(8, 0.8, (2, 60)) / 8
     off = first - second
     n, zeros = off.size, int((off == 0.0).sum())
@@ -109,7 +110,7 @@ def test_zero_differences_take_their_ranks_as_pratt_has_it(rng):
     assert signed_rank(first, second).p == pytest.approx(math.erfc(z / math.sqrt(2)), rel=1e-9)
 
 
-def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
+def test_signed_rank_detects_a_paired_difference(rng):
     luck = rng.normal(size=100)
     first, second = luck + 0.05, luck + rng.normal(0, 0.05, 100)
     assert signed_rank(first, second).p < 1e-6
@@ -118,13 +119,50 @@ def test_signed_rank_sees_in_pairs_what_rank_sum_does_not(rng):
     assert low < 0.05 < high
 
 
+def test_a_single_sample_has_no_interval():
+    found = mean_of([0.5])
+    assert (found.mean, found.std, found.ci95) == (0.5, 0.0, None)
+    for test in (rank_sum, signed_rank):
+        for second in (0.25, 0.5):
+            difference = test(np.array([0.5]), np.array([second]))
+            assert difference.ci95 is None
+            assert difference.mean == 0.5 - second
+            assert 0.0 < difference.p <= 1.0
+            # Strict JSON, without NaN.
+            json.dumps(difference.to_json(), allow_nan=False)
+
+
+def test_different_constant_samples_have_an_interval_without_width():
+    """SciPy's t-test would warn of lost precision, and warnings are errors here."""
+    first, second = np.full(10, 1.0), np.full(10, 0.7)
+    for test in (rank_sum, signed_rank):
+        found = test(first, second)
+        assert found.mean == pytest.approx(0.3)
+        assert found.ci95 == pytest.approx((0.3, 0.3))
+        assert found.p < 0.01
+
+
+@pytest.mark.parametrize("count", [2, 7, 40])
+def test_the_interval_of_independent_samples_is_welchs(rng, count):
+    first, second = rng.uniform(size=30).round(3), rng.uniform(size=count).round(3)
+    expected = stats.ttest_ind(first, second, equal_var=False).confidence_interval(0.95)
+    assert rank_sum(first, second).ci95 == pytest.approx(tuple(expected), rel=1e-12)
+
+
+def test_one_constant_sample_leaves_the_spread_of_the_other(rng):
+    first, second = rng.binomial(8, 0.8, 20) / 8, np.ones(20)
+    half = stats.t.ppf(0.975, 19) * first.std(ddof=1) / math.sqrt(20)
+    low, high = rank_sum(first, second).ci95
+    assert (high - low) / 2 == pytest.approx(half, rel=1e-6)
+
+
 def test_equal_samples_do_not_differ():
     ones = np.ones(10)
     assert rank_sum(ones, ones).p == signed_rank(ones, ones).p == 1.0
     assert signed_rank(ones, ones).ci95 == (0.0, 0.0)
 
 
-def test_p_is_even_where_nothing_differs(rng):
+def test_p_is_uniform_without_a_difference(rng):
     found = [signed_rank(*rng.binomial(8, 0.8, (2, 80)) / 8).p < 0.05 for _ in range(400)]
-    # Four standard errors of a share of 0.05 in 400.
+    # Four standard errors of a proportion of 0.05 in 400.
     assert abs(np.mean(found) - 0.05) < 4 * math.sqrt(0.05 * 0.95 / 400)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from tcs.placement.robustness import (
     study_rows,
 )
 from tcs.placement.store import load_scores, save_scores
+from tests.placement.store.example import score_file
 
 PLAN = StudyPlan(samples=60, sets=12, set_samples=6)
 
@@ -71,8 +73,8 @@ def test_points_of_a_prediction_are_those_it_ranks(study):
             assert found.rho == pytest.approx(ranks[0, 1], abs=1e-12)
 
 
-def test_a_file_of_another_row_is_refused(score_path):
-    file = load_scores(score_path)
-    check_row(score_path, file, "shaving", "small-chair", "pr2")
+def test_a_file_of_another_row_is_refused():
+    path, file = Path("feeding-wheelchair-pr2.tcs"), score_file()
+    check_row(path, file, "shaving", "wheelchair", "pr2")
     with pytest.raises(StoreMismatchError, match="is of task 'shaving', not 'feeding'"):
-        check_row(score_path, file, "feeding", "small-chair", "pr2")
+        check_row(path, file, "feeding", "wheelchair", "pr2")

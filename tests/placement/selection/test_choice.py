@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 
 from tcs.errors import SelectionError, UnknownNameError
-from tcs.model.grid import InitialConfiguration
+from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.sets import build_sets
 from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
@@ -19,7 +19,7 @@ HERE = InitialConfiguration(base_x=-2.0, base_y=0.5, base_yaw=0.0, torso=0.0)
 
 
 def leg(p, q, travel):
-    """Cost of one leg between two configurations, in plain numbers."""
+    """Cost of one leg between two configurations, in scalar arithmetic."""
     dx, dy = q.base_x - p.base_x, q.base_y - p.base_y
     cost = travel.metre * math.sqrt(dx * dx + dy * dy)
     turn = abs(q.base_yaw - p.base_yaw)
@@ -32,7 +32,7 @@ def leg(p, q, travel):
 
 
 def brute_force(kept, grid, here, weights, travel):
-    """Members, utility and cost of the first best of all kept sets."""
+    """Members, utility and cost of the best of all kept sets, the first among equals."""
     best = None
     configuration = {h: grid.configuration(h) for members in kept for h in members}
     for members, (reachability, manipulability) in kept.items():
@@ -69,8 +69,8 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     min_distance=st.sampled_from([0.0, 0.4]),
     weights=utility_weights,
     travel=st.tuples(weight, weight, weight, weight, weight),
-    where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.3)),
-    bed_now=st.floats(0.0, 0.3),
+    where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.2)),
+    bed_now=st.floats(0.0, 0.15),
     first_candidates=st.sampled_from([1, 5, search.FIRST_CANDIDATES]),
     options=st.fixed_dictionaries(
         {
@@ -79,7 +79,7 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
             "max_members": st.sampled_from([1, 2, 3]),
         }
     ).filter(lambda options: options["rule"] == "paper" or options["max_members"] < 3),
-    at_once=st.sampled_from([3, search.AT_ONCE]),
+    chunk=st.sampled_from([3, search.CHUNK]),
 )
 def test_equals_brute_force_over_all_kept_sets(
     seed,
@@ -94,7 +94,7 @@ def test_equals_brute_force_over_all_kept_sets(
     bed_now,
     first_candidates,
     options,
-    at_once,
+    chunk,
 ):
     bed, head = beds
     grid = small_grid(nx=5, ny=2, yaws=3, torsos=2 if not bed else 1, bed=bed, head=head)
@@ -111,7 +111,7 @@ def test_equals_brute_force_over_all_kept_sets(
     here = InitialConfiguration(
         base_x=where[0],
         base_y=where[1],
-        # A heading beyond half a turn means the same as one within.
+        # Headings are equal modulo a full rotation.
         base_yaw=math.remainder(where[2], 2 * math.pi),
         torso=where[3],
         environment=tuple((axis.name, bed_now) for axis in axes),
@@ -119,9 +119,9 @@ def test_equals_brute_force_over_all_kept_sets(
     )
     tables = SelectionTables(build_sets(scores, grid, min_distance=min_distance, **options), grid)
     with pytest.MonkeyPatch.context() as patch:
-        # Small tables open everything in the first round, unless it is made small too.
+        # Small tables open every group in the first round, unless that is small too.
         patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
-        patch.setattr(search, "AT_ONCE", at_once)
+        patch.setattr(search, "CHUNK", chunk)
         choice = select(tables, here, weights=weights, travel=travel)
     members, value, cost = brute_force(kept, grid, here, weights, travel)
     assert choice.indices == members
@@ -129,10 +129,10 @@ def test_equals_brute_force_over_all_kept_sets(
     assert (choice.reachability, choice.manipulability) == kept[members]
 
 
-def floor_with_walls(grid, seed, share):
-    """A floor on which so many places of the grid can't be driven to, nor away from."""
+def floor_with_walls(grid, seed, fraction):
+    """A floor on which this fraction of the grid's positions is blocked."""
     rng = np.random.default_rng(seed)
-    blocked = rng.random((grid.axis("base_x").count, grid.axis("base_y").count)) < share
+    blocked = rng.random((grid.axis("base_x").count, grid.axis("base_y").count)) < fraction
     reason = np.full((grid.size, 1), Reason.TOO_FAR, dtype=np.uint8)
     along = grid.indices(np.arange(grid.size))[:, -4:]
     reason[blocked[along[:, 0], along[:, 1]]] = Reason.BODY_BLOCKED
@@ -173,7 +173,7 @@ def test_equals_brute_force_around_the_furniture(
     try:
         metres = distances.from_position(*where)
     except SelectionError:
-        with pytest.raises(SelectionError, match="no way around the furniture starts there"):
+        with pytest.raises(SelectionError, match="no path around the furniture starts there"):
             select(tables, here, weights=weights, travel=travel)
         return
     cell = dict(zip(sets.candidates.tolist(), sets.cell.tolist(), strict=True))
@@ -194,14 +194,14 @@ def test_equals_brute_force_around_the_furniture(
         if best is None or value > best[1]:
             best = (members, value, min(costs))
     if best is None:
-        with pytest.raises(SelectionError, match="there is no way around the furniture"):
+        with pytest.raises(SelectionError, match="no path around the furniture leads to"):
             select(tables, here, weights=weights, travel=travel)
         return
     choice = select(tables, here, weights=weights, travel=travel)
     assert choice.unreachable == sum(not np.isfinite(metres[c]) for c in cell.values())
     assert choice.utility == pytest.approx(best[1], rel=1e-12, abs=1e-12)
     if not turn:
-        # Turns go through a modulus there and not here, which may cost a tie its last bit.
+        # Only the library wraps rotations, which may cost a tie its last bit.
         assert (choice.indices, choice.utility, choice.cost) == best
 
 
@@ -213,7 +213,7 @@ def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
     scores = random_scores(grid, 8, seed, levels=levels, share=0.2)
     kept = all_sets(scores, grid, 0.4)
     tables = SelectionTables(build_sets(scores, grid), grid)
-    assert tables.sets.kept_pairs > 100  # else the first round would open them all
+    assert tables.sets.kept_pairs > 100  # otherwise the first round opens every group
     rng = np.random.default_rng(seed)
     members = list(kept)
     reachability, manipulability = np.array(list(kept.values())).T
@@ -256,7 +256,7 @@ def tables():
     return SelectionTables(build_sets(random_scores(grid, 5, seed=1, share=0.3), grid), grid)
 
 
-def test_choice_says_what_was_chosen(tables):
+def test_the_choice_holds_the_selected_set(tables):
     choice = select(tables, HERE, weights=UtilityWeights(travel=0.0))
     assert choice.indices == tables.sets.best
     assert len(choice.indices) == 2
@@ -274,7 +274,7 @@ def test_choice_says_what_was_chosen(tables):
 def test_one_member_at_most(tables):
     free = UtilityWeights(travel=0.0)
     assert select(tables, HERE, weights=free, max_members=1).indices == tables.sets.best_single
-    with pytest.raises(SelectionError, match="At most 0 members"):
+    with pytest.raises(SelectionError, match="max_members is 0; must be 1 or more"):
         select(tables, HERE, max_members=0)
     held = "holds sets of 1 and 2 only. Score the task again: tcs score ... --max-members 3."
     with pytest.raises(SelectionError, match=held):
@@ -283,14 +283,14 @@ def test_one_member_at_most(tables):
         select(tables, HERE, max_members=4)
 
 
-def test_whole_turns_of_the_robot_change_nothing(tables):
+def test_full_rotations_of_the_robot_change_nothing(tables):
     travel = TravelWeights(turn=0.5)
     turned = InitialConfiguration(base_x=-2.0, base_y=0.5, base_yaw=2 * math.pi, torso=0.0)
     one, two = select(tables, HERE, travel=travel), select(tables, turned, travel=travel)
     assert (one.indices, one.cost) == (two.indices, two.cost)
 
 
-def test_dear_travel_stays_near(tables):
+def test_expensive_travel_selects_a_near_set(tables):
     near = select(tables, HERE, weights=UtilityWeights(travel=1e6))
     sets = tables.sets
     nearest = np.hypot(*(sets.cell_xy - [HERE.base_x, HERE.base_y]).T).min()
@@ -312,12 +312,12 @@ def state(**changes):
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e7, None, "1"])
 @pytest.mark.parametrize("axis", ["base_x", "base_yaw", "torso"])
-def test_an_impossible_place_is_refused(tables, axis, value):
+def test_an_impossible_state_is_refused(tables, axis, value):
     with pytest.raises(SelectionError, match=f"Current state: {axis} is"):
         select(tables, state(**{axis: value}))
 
 
-def test_the_bed_is_needed_only_where_it_costs(tables):
+def test_the_bed_is_needed_only_if_it_has_a_weight(tables):
     select(tables, state())
     travel = TravelWeights(environment=(("bed_height", 1.0),))
     with pytest.raises(SelectionError, match="lacks bed_height"):
@@ -337,3 +337,54 @@ def test_an_unknown_axis_is_named(tables):
     other = state(environment=(("table_height", 0.1),), environment_units=("m",))
     with pytest.raises(UnknownNameError, match=r"current state: unknown .* 'table_height'"):
         select(tables, other)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"torso": 5.0}, "torso is 5 m, out of range: the scores cover 0 to 0.15 m"),
+        ({"torso": -0.08}, "torso is -0.08 m"),
+        ({"bed_height": 5.0}, "bed_height is 5 m, out of range: the scores cover 0 to 0.1 m"),
+        ({"bed_height": 0.151}, "at most half a step beyond"),
+        ({"bed_height": -0.051}, "bed_height is -0.051 m"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_a_torso_or_bed_out_of_range_is_refused(tables, weight, changes, said):
+    robot = {name: value for name, value in changes.items() if name == "torso"}
+    bed = (("bed_height", changes.get("bed_height", 0.0)),)
+    travel = TravelWeights(torso=weight, environment=(("bed_height", weight),))
+    with pytest.raises(SelectionError, match=said) as caught:
+        select(tables, state(**robot, environment=bed, environment_units=("m",)), travel=travel)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_angle_out_of_range_is_reported_in_degrees():
+    grid = small_grid(bed=2, head=2)
+    tables = SelectionTables(build_sets(random_scores(grid, 3, seed=0), grid), grid)
+    axes = {"environment": (("head_rest", math.radians(80)),), "environment_units": ("rad",)}
+    with pytest.raises(SelectionError, match=r"head_rest is 80 deg, .* cover 0 to 35 deg"):
+        select(tables, state(**axes))
+
+
+def test_states_within_half_a_step_and_any_position_are_allowed(tables):
+    select(tables, state(base_x=-40.0, base_y=99.0, torso=0.225))
+    for bed in (-0.05, 0.15):
+        select(tables, state(environment=(("bed_height", bed),), environment_units=("m",)))
+
+
+def test_a_lowered_torso_and_a_single_value_are_allowed():
+    axes = ("base_x", "base_y", "base_yaw", "torso")
+    spec = {axis: {"unit": "m", "start": 0.0, "step": 0.2, "count": 3} for axis in axes}
+    spec["base_yaw"] |= {"unit": "deg", "step": 120.0}
+    spec["bed_height"] = {"unit": "m", "start": 0.0, "step": 0.1, "count": 1}
+    # The torso has never been scored as low as 0.
+    spec["torso"] |= {"start": 0.2, "step": 0.1}
+    grid = Grid.from_spec(spec)
+    tables = SelectionTables(build_sets(random_scores(grid, 3, seed=0), grid), grid)
+    # One bed height was scored, which says nothing about its range.
+    bed = {"environment": (("bed_height", 0.3),), "environment_units": ("m",)}
+    select(tables, state(torso=0.0, **bed))
+    with pytest.raises(SelectionError, match=r"cover 0\.2 to 0\.4 m"):
+        select(tables, state(torso=-0.01, **bed))

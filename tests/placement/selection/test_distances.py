@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from tcs.errors import SelectionError
-from tcs.placement.selection.distances import FloorDistances
+from tcs.placement.selection.distances import LatticeDistances
 from tcs.placement.tables import BaseLattice
 from tcs.placement.tables.base_lattice import MOVES
 
@@ -16,28 +16,28 @@ STEP = (0.1, 0.2)
 
 
 def lattice_of(free, step=STEP):
-    """The lattice whose places are free or not, in one state of everything."""
+    """The lattice with free and blocked lattice positions."""
     moves = np.zeros((4, *free.shape), dtype=bool)
-    for kind, i, j in np.ndindex(moves.shape):
-        dx, dy = MOVES[kind]
-        places = [(i + p, j + q) for p in {0, dx} for q in {0, dy}]
-        if all(0 <= p < free.shape[0] and 0 <= q < free.shape[1] for p, q in places):
-            moves[kind, i, j] = all(free[place] for place in places)
+    for move, i, j in np.ndindex(moves.shape):
+        dx, dy = MOVES[move]
+        corners = [(i + p, j + q) for p in {0, dx} for q in {0, dy}]
+        if all(0 <= p < free.shape[0] and 0 <= q < free.shape[1] for p, q in corners):
+            moves[move, i, j] = all(free[corner] for corner in corners)
     return BaseLattice(start=(-1.0, 2.0), step=step, moves=moves)
 
 
-def place(lattice, i, j):
+def position(lattice, i, j):
     return lattice.start[0] + i * lattice.step[0], lattice.start[1] + j * lattice.step[1]
 
 
 def distances_over(lattice):
     """Distances whose cells are all places of a lattice, row by row."""
-    xy = np.array([place(lattice, i, j) for i, j in np.ndindex(lattice.shape)])
-    return FloorDistances(xy, lattice)
+    xy = np.array([position(lattice, i, j) for i, j in np.ndindex(lattice.shape)])
+    return LatticeDistances(xy, lattice)
 
 
 def shortest(lattice, entries):
-    """How far all places are from some, {(i, j): metres}: Dijkstra's search in plain loops."""
+    """Distances from some entries, {(i, j): metres}: Dijkstra's algorithm in plain loops."""
     done, queue = {}, [(metres, at) for at, metres in entries.items()]
     heapq.heapify(queue)
     while queue:
@@ -45,20 +45,20 @@ def shortest(lattice, entries):
         if (i, j) in done:
             continue
         done[i, j] = metres
-        for kind, (dx, dy) in enumerate(MOVES):
+        for move, (dx, dy) in enumerate(MOVES):
             length = math.hypot(dx * lattice.step[0], dy * lattice.step[1])
-            if lattice.moves[kind, i, j]:
+            if lattice.moves[move, i, j]:
                 heapq.heappush(queue, (metres + length, (i + dx, j + dy)))
             back = (i - dx, j - dy)
             inside = 0 <= back[0] < lattice.shape[0] and 0 <= back[1] < lattice.shape[1]
-            if inside and lattice.moves[kind, *back]:
+            if inside and lattice.moves[move, *back]:
                 heapq.heappush(queue, (metres + length, back))
     return done
 
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.3, 0.6]))
-def test_ways_agree_with_plain_loops(seed, blocked):
+def test_distances_agree_with_plain_loops(seed, blocked):
     free = np.random.default_rng(seed).random((6, 5)) >= blocked
     lattice = lattice_of(free)
     distances = distances_over(lattice)
@@ -71,14 +71,14 @@ def test_ways_agree_with_plain_loops(seed, blocked):
             )
 
 
-def seen_from(lattice, x, y):
-    """Border places to which the straight line from (x, y) does not enter the lattice."""
+def visible_from(lattice, x, y):
+    """Border positions whose straight line from (x, y) does not enter the lattice."""
     (nx, ny), entries = lattice.shape, {}
     for i, j in np.ndindex(nx, ny):
-        p, q = place(lattice, i, j)
-        # Ten points along the way, none of them strictly inside.
+        p, q = position(lattice, i, j)
+        # Ten points along the line, none of them strictly inside.
         line = [(x + t * (p - x), y + t * (q - y)) for t in np.linspace(0.05, 0.95, 10)]
-        low, high = place(lattice, 0, 0), place(lattice, nx - 1, ny - 1)
+        low, high = position(lattice, 0, 0), position(lattice, nx - 1, ny - 1)
         if not any(low[0] < a < high[0] and low[1] < b < high[1] for a, b in line):
             entries[i, j] = math.dist((x, y), (p, q))
     return entries
@@ -86,42 +86,42 @@ def seen_from(lattice, x, y):
 
 @pytest.mark.parametrize("x", [-1.7, -0.77, -0.2])
 @pytest.mark.parametrize("y", [0.9, 2.33, 3.4])
-def test_from_outside_one_drives_straight_to_the_border(x, y):
+def test_from_outside_the_robot_drives_straight_to_the_border(x, y):
     free = np.ones((6, 5), dtype=bool)
     free[1:-1, 2] = False
     lattice = lattice_of(free)
-    low, high = place(lattice, 0, 0), place(lattice, 5, 4)
+    low, high = position(lattice, 0, 0), position(lattice, 5, 4)
     outside = not (low[0] <= x <= high[0] and low[1] <= y <= high[1])
     found = distances_over(lattice).from_position(x, y)
     if outside:
-        expected = shortest(lattice, seen_from(lattice, x, y))
+        expected = shortest(lattice, visible_from(lattice, x, y))
     else:
         i, j = math.floor((x + 1.0) / 0.1), math.floor((y - 2.0) / 0.2)
         corners = itertools.product((i, i + 1), (j, j + 1))
-        movable = {c: math.dist((x, y), place(lattice, *c)) for c in corners if free[c]}
+        movable = {c: math.dist((x, y), position(lattice, *c)) for c in corners if free[c]}
         expected = shortest(lattice, movable)
     for i, j in np.ndindex(free.shape):
         assert found[5 * i + j] == pytest.approx(expected.get((i, j), math.inf), abs=1e-14)
 
 
-def test_round_a_bed():
-    """Two places on both sides of a bed: 1.8 m by line, 1.8 m more around its end."""
+def test_around_a_bed():
+    """Two positions on both sides of a bed: 1.8 m along the line, 4 m around its end."""
     free = np.ones((41, 41), dtype=bool)
     free[:31, 12:29] = False  # 3 m along x from the wall, 1.6 m wide
     lattice = lattice_of(free, step=(0.1, 0.1))
-    one, other = place(lattice, 20, 11), place(lattice, 20, 29)
-    distances = FloorDistances(np.array([one, other]), lattice)
+    one, other = position(lattice, 20, 11), position(lattice, 20, 29)
+    distances = LatticeDistances(np.array([one, other]), lattice)
     # 11 steps to beyond the end, 18 across, 11 back; the corners cannot be cut.
     assert distances.between(np.array(0), np.array(1)) == pytest.approx(4.0, abs=1e-12)
     np.testing.assert_allclose(distances.from_position(*one), [0.0, 4.0], atol=1e-12)
 
 
-def test_a_place_with_a_wall_round_it_is_out_of_reach():
+def test_a_walled_position_is_unreachable():
     free = np.ones((7, 7), dtype=bool)
     free[2:5, 2:5] = False
     free[3, 3] = True
     lattice = lattice_of(free)
     distances = distances_over(lattice)
     assert distances.from_position(0.0, 0.0)[7 * 3 + 3] == math.inf
-    with pytest.raises(SelectionError, match=r"base at \(-0.75, 2.50\) m stands where"):
+    with pytest.raises(SelectionError, match=r"base at \(-0.75, 2.50\) m is where"):
         distances.from_position(-0.75, 2.5)

@@ -1,4 +1,4 @@
-"""Choosing with delta: exactly the best of all estimated sets, by brute force."""
+"""Selection with delta: the best of all sets with an estimate, by exhaustive search."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HERE = InitialConfiguration(base_x=0.3, base_y=-0.4, base_yaw=1.0, torso=0.1)
 
 
 def estimated(sets, rng, singles=15, pairs=60):
-    """Made-up estimates for some of the sets; few different ones, so that ties come up."""
+    """Synthetic estimates for some of the sets, with few distinct values so that ties occur."""
     alone = np.sort(rng.choice(len(sets.candidates), singles, replace=False))
     kept = Pairs.joined(kept_pairs(sets))
     some = rng.choice(kept.first.size, pairs, replace=False)
@@ -58,7 +58,7 @@ def with_success(file, success):
 
 
 def costs(file, here, travel):
-    """D of each estimated set: what choosing is charged when there is no other."""
+    """D of each set with an estimate: its cost when it is the only one."""
     success, found = file.nominal.success, []
     for row in range(len(success.success)):
         alone = with_success(file, only(success, slice(row, row + 1)))
@@ -69,7 +69,7 @@ def costs(file, here, travel):
 
 
 def by_hand(file, cost, weights, max_members):
-    """Utility and members of the first set with the greatest utility, one set after the other."""
+    """Utility and members of the set with the greatest utility, by a plain loop."""
     table, best = file.nominal, None
     for row, success in enumerate(table.success.low.tolist()):
         members = table.success.set_at(row)
@@ -84,7 +84,7 @@ def by_hand(file, cost, weights, max_members):
 
 
 @pytest.mark.parametrize("moves", ["straight", "everything"])
-def test_the_best_of_all_that_are_estimated(file, moves):
+def test_the_best_of_all_sets_with_an_estimate(file, moves):
     here, travel = HERE, TravelWeights()
     if moves == "everything":
         travel = TravelWeights(turn=0.3, torso=2.0, environment=(("bed_height", 0.5),))
@@ -125,7 +125,7 @@ def test_delta_needs_estimates():
 def test_delta_needs_an_estimate_of_a_set_as_small(file):
     success = file.nominal.success
     only_pairs = with_success(file, only(success, success.of_size(2)))
-    with pytest.raises(SelectionError, match="none has so few members"):
+    with pytest.raises(SelectionError, match="with at most 1 members"):
         select(only_pairs, HERE, weights=UtilityWeights(success=1.0), max_members=1)
 
 
@@ -135,9 +135,9 @@ def test_three_members_are_not_chosen_by_estimates_of_two():
     assert sets.triples.kept
     file = with_success(plain, estimated(sets, np.random.default_rng(1), 5, 20))
     weights = UtilityWeights(success=1.0)
-    with pytest.raises(SelectionError, match=r"for no set of three\. Take max_members 2"):
+    with pytest.raises(SelectionError, match=r"for any set of three\. Take max_members 2"):
         select(file, HERE, weights=weights, max_members=3)
-    # Who does not say how many gets the best that has an estimate.
+    # Without max_members the best set with an estimate is selected.
     assert (
         select(file, HERE, weights=weights).indices
         == select(file, HERE, weights=weights, max_members=2).indices

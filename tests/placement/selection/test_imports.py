@@ -3,7 +3,7 @@ from tests.fresh import fresh
 
 def test_choosing_needs_neither_simulator_nor_compiler():
     code = (
-        "import sys, tcs.select, tcs.placement.store, tcs.placement.tables;"
+        "import sys, tcs.placement.selection, tcs.placement.store, tcs.placement.tables;"
         "print([m for m in ('pydrake', 'numba', 'matplotlib') if m in sys.modules])"
     )
     assert fresh(code) == "[]"

@@ -1,4 +1,4 @@
-"""Which table of a file is chosen from."""
+"""Matching observations with the tables of a score file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def at(**environment):
 
 @pytest.fixture(scope="module")
 def file():
-    """Five shifts in two heights of the bed; the head is where both put it."""
+    """Five shifts at two bed heights, which together determine the position of the head."""
     grid = small_grid(nx=6, ny=4, bed=2)
     head = [
         [0.3, shift, 0.7 + height]
@@ -53,7 +53,7 @@ def test_the_nearest_shift_is_used(file, person_y, index):
     assert match.observed_error["person_y"] == pytest.approx(person_y - scored, abs=1e-12)
 
 
-def test_what_is_not_told_is_nominal(file):
+def test_without_observation_the_nominal_table_is_used(file):
     match = nearest_table(file)
     assert (match.index, match.observed_error) == (file.nominal_index, {})
     assert nearest_table(score_file(), at()).index == 0
@@ -63,17 +63,17 @@ def test_what_is_not_told_is_nominal(file):
     ("step", "near", "far"),
     [(0.05, (0.276, 0.324), (0.274, 5.0)), (0.0, (0.21, 0.39), (0.19, -5.0))],
 )
-def test_a_single_value_does_not_stand_for_everything(step, near, far):
+def test_a_single_value_covers_a_limited_range(step, near, far):
     alone = {**SHIFTS, "start": 0.3, "step": step, "count": 1}
     file = score_file(observed=[alone])
     assert nearest_table(file).index == 0
-    for told in near:
-        assert nearest_table(file, at(), {"person_y": told}).observed_error[
+    for value in near:
+        assert nearest_table(file, at(), {"person_y": value}).observed_error[
             "person_y"
-        ] == pytest.approx(told - 0.3, abs=1e-12)
-    for told in far:
+        ] == pytest.approx(value - 0.3, abs=1e-12)
+    for value in far:
         with pytest.raises(SelectionError, match=r"scored is only 0\.3 m"):
-            nearest_table(file, at(), {"person_y": told})
+            nearest_table(file, at(), {"person_y": value})
 
 
 def test_two_axes_are_matched_one_by_one():
@@ -84,7 +84,7 @@ def test_two_axes_are_matched_one_by_one():
     assert file.observed_states[match.index] == match.state
 
 
-def test_the_choice_is_that_of_the_table(file):
+def test_selection_uses_the_matched_table(file):
     for i, shift in enumerate((-0.1, -0.05, 0.0, 0.05, 0.1)):
         choice = select(file, at(), observed={"person_y": shift})
         alone = select(SelectionTables.of(file, i), at())
@@ -97,7 +97,7 @@ def test_the_choice_is_that_of_the_table(file):
     [
         ({"head": (0.3, 0.06, 0.7)}, at(), 3, 0.01),
         ({"head": (0.3, 0.06, 0.8)}, at(), 3, 0.01),
-        # Told how high the bed is, the head is expected there.
+        # With a known bed height, the head is expected at that height.
         ({"head": (0.3, 0.06, 0.75)}, at(bed_height=0.1), 3, math.hypot(0.01, 0.05)),
         ({"head": (0.3, -0.1, 0.7), "chest": (1.0, 1.0, 1.0)}, at(), 0, 0.0),
     ],
@@ -109,7 +109,7 @@ def test_observed_frames_select_the_shift(file, frames, here, index, error):
 
 
 @pytest.mark.parametrize(
-    ("told", "error", "said"),
+    ("observation", "error", "message"),
     [
         ({"observed": {"person_y": 0.13}}, SelectionError, "scored are only -0.1 to 0.1 m, 5 val"),
         ({"observed": {"person_y": np.nan}}, SelectionError, "must be a finite number"),
@@ -128,11 +128,11 @@ def test_observed_frames_select_the_shift(file, frames, here, index, error):
         ),
     ],
 )
-def test_what_was_not_scored_is_told(file, told, error, said):
-    with pytest.raises(error, match=said):
-        nearest_table(file, at(), **told)
+def test_observations_beyond_the_scored_states_are_refused(file, observation, error, message):
+    with pytest.raises(error, match=message):
+        nearest_table(file, at(), **observation)
 
 
-def test_tables_by_themselves_cannot_be_observed(file):
+def test_a_single_table_takes_no_observation(file):
     with pytest.raises(SelectionError, match="Give the file"):
         select(SelectionTables.of(file), at(), observed={"person_y": 0.0})

@@ -32,9 +32,9 @@ def state(yaw_deg=0.0, torso=0.0, bed=0.0):
     )
 
 
-def test_by_default_only_metres_count():
+def test_by_default_only_driving_costs():
     everywhere = range(GRID.size)
-    cost = legs(state(yaw_deg=77.0, torso=0.2, bed=1.0), TravelWeights(), everywhere).from_here
+    cost = legs(state(yaw_deg=77.0, torso=0.2, bed=0.12), TravelWeights(), everywhere).from_here
     # Grid steps of 0.2 m carry a rounding error of their own.
     np.testing.assert_allclose(cost, GRID.values(everywhere)["base_x"] + 0.7, atol=1e-15)
 
@@ -43,7 +43,7 @@ def test_by_default_only_metres_count():
     ("yaw_deg", "expected_deg"),
     [(10, 10), (-10, 10), (350, 10), (190, 170), (180, 180), (-535, 175)],
 )
-def test_turns_go_the_shorter_way_round(yaw_deg, expected_deg):
+def test_rotations_take_the_shorter_direction(yaw_deg, expected_deg):
     cost = legs(state(yaw_deg=yaw_deg), TravelWeights(turn=2.0), [0]).from_here
     # A few roundings of angles up to ten radians.
     assert cost[0] == pytest.approx(2.0 * math.radians(expected_deg), abs=1e-14)
@@ -65,7 +65,7 @@ def test_costs_are_a_metric():
     np.testing.assert_array_equal(cost, cost.T)
     np.testing.assert_array_equal(np.diag(cost), 0.0)
     detour = (cost[:, :, None] + cost[None, :, :]).min(axis=1)
-    # Going through a third place is never shorter, up to rounding.
+    # A detour through a third configuration is never shorter, up to rounding.
     assert np.all(cost <= detour + 1e-14)
 
 

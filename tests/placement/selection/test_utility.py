@@ -14,7 +14,7 @@ def test_utility_is_equation_five():
     np.testing.assert_array_equal(many, [0.5, 1.0])
 
 
-def test_defaults_let_no_metre_cancel_a_task():
+def test_by_default_a_metre_costs_five_percent_of_a_task():
     weights = UtilityWeights()
     assert (weights.reachability, weights.manipulability, weights.travel) == (1.0, 1.0, 0.05)
 
