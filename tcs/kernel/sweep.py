@@ -11,7 +11,8 @@ from tcs.kernel.analytic.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
 from tcs.kernel.analytic.ik import wrist_goal
 from tcs.kernel.analytic.pairs import (
     BODY_BLOCKED,
-    GRIPPER_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
     JOINT_LIMITS,
     REACHED,
     TOO_FAR,
@@ -124,7 +125,7 @@ def _score_slice(
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
             if grippers[state, g] != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ENVIRONMENT
                 scores.contact[row, g] = grippers[state, g]
                 continue
             goal_in_arm_base(problem, work, state, torso, g)
@@ -135,7 +136,7 @@ def _score_slice(
                 continue
             code = gripper_body_contact(problem, work, body_A)
             if code != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
                 scores.contact[row, g] = code
                 continue
             if not room_placed:

@@ -13,7 +13,8 @@ import pytest
 from tcs.kernel.analytic.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
-    GRIPPER_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
     JOINT_LIMITS,
     REACHED,
     TOO_FAR,
@@ -43,7 +44,9 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches(lowered, seed):
     scene, grid = toy_scene(chain, seed, obstacles=3), toy_grid()
     closed = scores_of(scene, grid)
     numeric = scores_of(scene, grid, numeric=True)
-    blocked = np.isin(closed.reason, (BODY_BLOCKED, GRIPPER_BLOCKED))
+    blocked = np.isin(
+        closed.reason, (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT)
+    )
     # Which comes first, too far or the gripper on the robot, is a matter of how sharp the bound is.
     assert np.mean(numeric.reason[blocked] == closed.reason[blocked]) > 0.9
     reached = closed.reason == REACHED
@@ -141,10 +144,12 @@ def test_nothing_too_far_is_found_by_many_starts(seed, rng):
 def test_without_obstacles_only_the_robot_is_in_the_way():
     _, _, scores = offset_scene(0, obstacles=0)
     assert set(np.unique(scores.reason)) <= {
-        REACHED, TOO_FAR, JOINT_LIMITS, GRIPPER_BLOCKED, ARM_BLOCKED,
+        REACHED, TOO_FAR, JOINT_LIMITS, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED,
     }  # fmt: skip
     named = scores.contact >= 0
-    np.testing.assert_array_equal(named, np.isin(scores.reason, (GRIPPER_BLOCKED, ARM_BLOCKED)))
+    np.testing.assert_array_equal(
+        named, np.isin(scores.reason, (GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED))
+    )
 
 
 def test_tight_limits_leave_no_solution():

@@ -37,7 +37,13 @@ def test_two_jobs_give_what_one_gives(real):
 def test_pairs_are_named_exactly_where_something_blocks(real):
     _, _, scores = real
     blocked = np.isin(
-        scores.reason, (Reason.BODY_BLOCKED, Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED)
+        scores.reason,
+        (
+            Reason.BODY_BLOCKED,
+            Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
+            Reason.GRIPPER_BLOCKED_BY_ROBOT,
+            Reason.ARM_BLOCKED,
+        ),
     )
     np.testing.assert_array_equal(scores.pair >= 0, blocked)
     assert scores.pair.max() == len(scores.pair_names) - 1

@@ -11,7 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import ARM_BLOCKED, BODY_BLOCKED, GRIPPER_BLOCKED, REACHED
+from tcs.kernel.analytic.pairs import (
+    ARM_BLOCKED,
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
+    REACHED,
+)
 from tcs.kernel.arrays import BOX, SPHERE, GridArrays
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference import (
@@ -143,16 +149,23 @@ def test_an_obstacle_more_reaches_nothing_more(lowered, seed):
         assert is_true(scene, grid, h, g, after.joints[h, g])
     assert np.sum(after.reason == REACHED) <= np.sum(before.reason == REACHED)
     # Base and gripper are exact questions: for them the law holds without exception.
-    for reason in (BODY_BLOCKED, GRIPPER_BLOCKED):
+    for reason, later in (
+        (BODY_BLOCKED, (BODY_BLOCKED,)),
+        (GRIPPER_BLOCKED_BY_ENVIRONMENT, (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT)),
+        (
+            GRIPPER_BLOCKED_BY_ROBOT,
+            (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT),
+        ),
+    ):
         blocked = before.reason == reason
-        assert np.all(np.isin(after.reason[blocked], (BODY_BLOCKED, GRIPPER_BLOCKED)))
+        assert np.all(np.isin(after.reason[blocked], later))
 
 
 def test_an_obstacle_on_the_gripper_blocks_it_wherever_the_robot_stands(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=0, states=1), toy_grid(states=1)
     fuller = with_obstacle(scene, placed(SPHERE, [0.02, 0, 0], p=scene.goal_p[0, 1], body=9))
     scores = scores_of(fuller, grid)
-    assert np.all(np.isin(scores.reason[:, 1], (BODY_BLOCKED, GRIPPER_BLOCKED)))
+    assert np.all(np.isin(scores.reason[:, 1], (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT)))
 
 
 def test_states_of_the_environment_are_scored_each_for_itself(lowered):

@@ -28,7 +28,8 @@ from tcs.kernel.dexterity import ISOTROPY, UNLIMITED
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
 
-REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED, GRIPPER_BLOCKED, ARM_BLOCKED = 0, 1, 2, 3, 4, 5
+REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
+GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
 """Reasons, the numbers of `tcs.placement.tables.Reason`."""
 
 ONE_LANE, NOTHING = whole(1), whole(-1)

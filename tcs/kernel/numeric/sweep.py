@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.pairs import BODY_BLOCKED, GRIPPER_BLOCKED, REACHED, TOO_FAR
+from tcs.kernel.analytic.pairs import (
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
+    REACHED,
+    TOO_FAR,
+)
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
@@ -77,7 +83,7 @@ def _score_numeric_slice(
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
             if grippers[state, g] != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ENVIRONMENT
                 scores.contact[row, g] = grippers[state, g]
                 continue
             goal_in_arm_base(problem, work, state, torso, g)
@@ -86,7 +92,7 @@ def _score_numeric_slice(
                 continue
             code = gripper_body_contact(problem, work, body_A)
             if code != NO_CONTACT:
-                scores.reason[row, g] = GRIPPER_BLOCKED
+                scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
                 scores.contact[row, g] = code
                 continue
             if not room_placed:

@@ -18,7 +18,8 @@ from tcs.kernel.analytic.arcs import INSET, PEAK_SLOPE
 from tcs.kernel.analytic.pairs import (
     ARM_BLOCKED,
     BODY_BLOCKED,
-    GRIPPER_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
     JOINT_LIMITS,
     REACHED,
     REFINE_LANES,
@@ -172,13 +173,13 @@ def score(
     if blocked:
         return verdict(BODY_BLOCKED)
     if stand.gripper_touches(with_body=False):
-        return verdict(GRIPPER_BLOCKED)
+        return verdict(GRIPPER_BLOCKED_BY_ENVIRONMENT)
     chain = scene.chain
     arcs, possible = elbow_arcs(chain, stand.X_AG)
     if not arcs:
         return verdict(JOINT_LIMITS if possible else TOO_FAR)
     if stand.gripper_touches(with_body=True):
-        return verdict(GRIPPER_BLOCKED)
+        return verdict(GRIPPER_BLOCKED_BY_ROBOT)
     candidates = find_candidates(chain, stand.X_AG, arcs)
     if not candidates:
         return verdict(JOINT_LIMITS)

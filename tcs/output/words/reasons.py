@@ -9,7 +9,8 @@ REASON_TEXTS = {
     Reason.TOO_FAR: "too far for the arm",
     Reason.JOINT_LIMITS: "no arm posture within the joint limits",
     Reason.BODY_BLOCKED: "the robot's body would touch something",
-    Reason.GRIPPER_BLOCKED: "the gripper would touch something at the goal",
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "the gripper would touch the environment at the goal",
+    Reason.GRIPPER_BLOCKED_BY_ROBOT: "the gripper would touch the robot at the goal",
     Reason.ARM_BLOCKED: "every arm posture would touch something",
 }
 """Each reason as part of a sentence."""
@@ -18,7 +19,8 @@ REASON_NAMES = {
     Reason.TOO_FAR: "too far",
     Reason.JOINT_LIMITS: "joint limits",
     Reason.BODY_BLOCKED: "body blocked",
-    Reason.GRIPPER_BLOCKED: "gripper blocked",
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "gripper blocked by environment",
+    Reason.GRIPPER_BLOCKED_BY_ROBOT: "gripper blocked by robot",
     Reason.ARM_BLOCKED: "arm blocked",
 }
 """Each reason as the title of a column or in a legend."""
@@ -27,7 +29,8 @@ REASON_COLOURS = {
     Reason.TOO_FAR: "#56b4e9",
     Reason.JOINT_LIMITS: "#f0e442",
     Reason.BODY_BLOCKED: "#4d4d4d",
-    Reason.GRIPPER_BLOCKED: "#e69f00",
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "#e69f00",
+    Reason.GRIPPER_BLOCKED_BY_ROBOT: "#cc79a7",
     Reason.ARM_BLOCKED: "#d55e00",
 }
 """The palette of Okabe and Ito, distinct under colour vision deficiency, and a dark grey."""
@@ -36,7 +39,8 @@ COLOUR_NAMES = {
     Reason.TOO_FAR: "light blue",
     Reason.JOINT_LIMITS: "yellow",
     Reason.BODY_BLOCKED: "grey",
-    Reason.GRIPPER_BLOCKED: "light orange",
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "light orange",
+    Reason.GRIPPER_BLOCKED_BY_ROBOT: "pink",
     Reason.ARM_BLOCKED: "dark orange",
 }
 """Names of the colours, for text without colour."""

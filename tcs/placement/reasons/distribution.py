@@ -11,8 +11,9 @@ from tcs.placement.tables import Reason, ScoreTable
 
 CHECKS = (
     Reason.BODY_BLOCKED,
-    Reason.GRIPPER_BLOCKED,
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
     Reason.TOO_FAR,
+    Reason.GRIPPER_BLOCKED_BY_ROBOT,
     Reason.JOINT_LIMITS,
     Reason.ARM_BLOCKED,
 )

@@ -81,7 +81,8 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     offsets = evaluation.offsets
     outcomes = [trials.outcome(int(h), offsets) for h in evaluation.sets[0]]
     reached = np.array([found.reason == Reason.REACHED for found in outcomes])
-    hopeless = np.all([found.reason == Reason.GRIPPER_BLOCKED for found in outcomes], axis=0)
+    gripper = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
+    hopeless = np.all([found.reason == gripper for found in outcomes], axis=0)
     robot = trials.lowered.robot_bodies
     others = (*trials.lowered.room_bodies, *robot)
     found = []

@@ -67,7 +67,7 @@ def decode(content: object, explain: Explain = lambda read: read()) -> ScoreFile
     if version < FORMAT_VERSION:
         raise StoreFormatError(
             f"has format version {version}, written by an older tcs, and this program reads "
-            f"version {FORMAT_VERSION}"
+            f"version {FORMAT_VERSION}: score the task again"
         )
     return ScoreFile(
         **{name: _dict(content.get(name), name) for name in DESCRIPTIONS},

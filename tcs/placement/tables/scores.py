@@ -24,8 +24,11 @@ class Reason(IntEnum):
     TOO_FAR = 1
     JOINT_LIMITS = 2
     BODY_BLOCKED = 3
-    GRIPPER_BLOCKED = 4
-    ARM_BLOCKED = 5
+    GRIPPER_BLOCKED_BY_ENVIRONMENT = 4
+    """The gripper at the goal touches the environment, whatever the base pose."""
+    GRIPPER_BLOCKED_BY_ROBOT = 5
+    """The gripper at the goal touches the robot itself."""
+    ARM_BLOCKED = 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

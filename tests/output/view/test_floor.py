@@ -15,8 +15,8 @@ from tcs.placement.tables import Reason, SuccessTable
 
 # Worst first: blocked where it stands, then the checks in the order in which they are made.
 ORDER = [
-    Reason.BODY_BLOCKED, Reason.GRIPPER_BLOCKED, Reason.TOO_FAR, Reason.JOINT_LIMITS,
-    Reason.ARM_BLOCKED, Reason.REACHED,
+    Reason.BODY_BLOCKED, Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT, Reason.TOO_FAR,
+    Reason.GRIPPER_BLOCKED_BY_ROBOT, Reason.JOINT_LIMITS, Reason.ARM_BLOCKED, Reason.REACHED,
 ]  # fmt: skip
 
 

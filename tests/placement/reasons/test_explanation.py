@@ -257,7 +257,8 @@ def test_goal_that_is_reached_needs_no_change():
 
 def test_goal_that_nothing_reaches():
     grid = small_grid(nx=4, ny=3, yaws=1, torsos=1)
-    reasons = [Reason.BODY_BLOCKED] * 6 + [Reason.TOO_FAR] * 4 + [Reason.GRIPPER_BLOCKED] * 2
+    gripper = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
+    reasons = [Reason.BODY_BLOCKED] * 6 + [Reason.TOO_FAR] * 4 + [gripper] * 2
     file = made(grid, reasons.__getitem__)
     for configuration in (None, 7):
         explained = tcs.explain(file, 0, configuration)

@@ -44,7 +44,11 @@ def test_reasons_are_those_of_losses_alone(found):
         # The base is not checked again.
         assert Reason.BODY_BLOCKED not in loss.reasons
         assert (loss.pair is None) == (loss.pair_fraction == 0.0)
-        blocked = (Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED)
+        blocked = (
+            Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
+            Reason.GRIPPER_BLOCKED_BY_ROBOT,
+            Reason.ARM_BLOCKED,
+        )
         assert loss.pair_fraction <= sum(loss.reasons.get(r, 0.0) for r in blocked) + 1e-12
 
 
@@ -70,7 +74,8 @@ def test_a_person_lifted_away_is_too_far(chair_trials):
 def by_hand():
     """Four samples, three goals, two members whose outcomes are written down, and their room."""
     reached, far, gripper, arm = (
-        Reason.REACHED, Reason.TOO_FAR, Reason.GRIPPER_BLOCKED, Reason.ARM_BLOCKED,
+        Reason.REACHED, Reason.TOO_FAR, Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
+        Reason.ARM_BLOCKED,
     )  # fmt: skip
     # Bodies of the robot: base 0, hand 1; then a contact is robot body * 5 + other, where others
     # are bed 0, person 1, chair 2, base 3, hand 4.
@@ -113,7 +118,7 @@ def test_losses_by_hand():
     assert (told[1].pair, told[1].pair_fraction) == (("hand", "bed"), 1.0)
     assert told[2].pair is None
     assert told[0].reasons == {Reason.ARM_BLOCKED: 1.0}
-    assert told[1].reasons == {Reason.GRIPPER_BLOCKED: 1.0}
+    assert told[1].reasons == {Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: 1.0}
     # Sample 2 loses goal 0: the chair is 0.2 / 0.0707 of its deviations off, the person -3 / 1.73.
     assert told[0].joint == "chair_x"
     assert told[0].standardized_error == pytest.approx(2.0 * np.sqrt(2.0))

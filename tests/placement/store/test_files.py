@@ -327,7 +327,7 @@ FORGED = {
 
 FORGED_SCORES = {
     "reason with a row too few": ("scores", "reason", lambda a: a[1:]),
-    "reason beyond the last": ("scores", "reason", lambda a: a + np.uint8(6)),
+    "reason beyond the last": ("scores", "reason", lambda a: a + np.uint8(7)),
     "reason flat": ("scores", "reason", lambda a: a.ravel()),
     "reason missing": ("scores", "reason", lambda a: None),
     "reached by no candidate": ("scores", "reason", lambda a: a * np.uint8(0)),

@@ -11,7 +11,7 @@ def parts():
     """Two configurations, two goals, three reached pairs."""
     return {
         "dexterity": np.array([[0.5, 0.25], [0.0, 0.75]], dtype=np.float32),
-        "reason": np.array([[0, 0], [5, 0]], dtype=np.uint8),
+        "reason": np.array([[0, 0], [6, 0]], dtype=np.uint8),
         "pair": np.array([[-1, -1], [0, -1]], dtype=np.int32),
         "pair_names": (("forearm", "headrest"),),
         "arm_joints": np.arange(21, dtype=np.float32).reshape(3, 7),
@@ -32,7 +32,8 @@ def test_reasons_are_counted_by_name():
         "too_far": 0,
         "joint_limits": 0,
         "body_blocked": 0,
-        "gripper_blocked": 0,
+        "gripper_blocked_by_environment": 0,
+        "gripper_blocked_by_robot": 0,
         "arm_blocked": 1,
     }
 
@@ -75,7 +76,7 @@ WRONG = {
     "dexterity below zero": ("dexterity", lambda a: a - 1.0, "dexterity"),
     "dexterity not a number": ("dexterity", lambda a: a * np.float32(np.nan), "dexterity"),
     "dexterity where not reached": ("dexterity", lambda a: a + np.float32(0.1), "not reached"),
-    "reason unknown": ("reason", lambda a: a + np.uint8(1), r"outside 0\.\.5"),
+    "reason unknown": ("reason", lambda a: a + np.uint8(1), r"outside 0\.\.6"),
     "pair unknown": ("pair", lambda a: a + np.int32(1), r"outside -1\.\.0"),
     "joints missing": ("arm_joints", lambda a: a[:2], "2 rows of arm joints for 3"),
     "six joints": ("arm_joints", lambda a: a[:, :6].copy(), "shape"),
@@ -100,6 +101,7 @@ def test_reason_numbers_are_those_of_stored_files():
         ("TOO_FAR", 1),
         ("JOINT_LIMITS", 2),
         ("BODY_BLOCKED", 3),
-        ("GRIPPER_BLOCKED", 4),
-        ("ARM_BLOCKED", 5),
+        ("GRIPPER_BLOCKED_BY_ENVIRONMENT", 4),
+        ("GRIPPER_BLOCKED_BY_ROBOT", 5),
+        ("ARM_BLOCKED", 6),
     ]
