@@ -239,18 +239,13 @@ def room_solids(scene: Scene) -> list[Solid]:
 
 
 def room_parts(scene: Scene) -> list[tuple[Part, Kind]]:
-    """Return every shape of the room but the floor, and what it is of.
-
-    Whatever carries a body frame is the person.
-    """
-    frames = scene.spec.environment.body_frames.values()
-    people = {link.split("::", maxsplit=1)[0] for link in frames}
-    plant = scene.built.plant
+    """Return every shape of the environment but the floor, as furniture or person."""
+    plant, environment = scene.built.plant, scene.spec.environment
     found = []
     for part in scene.built.parts:
         if part.group is Group.ENVIRONMENT and part.name != FLOOR:
             instance = plant.get_body(part.body).model_instance()
-            is_person = plant.GetModelInstanceName(instance) in people
+            is_person = environment.is_person(plant.GetModelInstanceName(instance))
             found.append((part, Kind.PERSON if is_person else Kind.FURNITURE))
     return found
 

@@ -109,6 +109,7 @@ def test_unknown_name_gets_the_nearest():
             r"name 'a' is used twice",
         ),
         ({"obstacles": [{"name": "floor", "box": [1, 1, 1]}]}, r"'floor' is used twice or reserv"),
+        ({"person": "anna"}, "person: no model is named 'anna'; there are none"),
         ({"models": [{"name": "a", "file": "nowhere.sdf"}]}, r"models\[0\]\.file.*nowhere\.sdf"),
         ({"padding": {"a::b": -0.1}}, r"padding\.a::b.*greater than or equal to 0"),
         ({"contact_margin": float("nan")}, r"contact_margin"),
@@ -227,7 +228,7 @@ def test_a_key_that_comes_twice_is_refused(tmp_path):
 def test_a_fault_of_the_grid_names_the_field_once(tmp_path):
     axis = {"unit": "m", "start": 0.0, "step": 0.1, "count": 1}
     path = written(tmp_path, grid={"base_x": axis})
-    with pytest.raises(GridError, match=r"room\.yaml', field 'grid': needs axis base_y"):
+    with pytest.raises(GridError, match=r"own\.yaml', field 'grid': needs axis base_y"):
         load_environment(path)
 
 

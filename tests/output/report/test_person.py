@@ -1,0 +1,56 @@
+"""What pictures and the viewer show as the person: the model that the environment file names."""
+
+from __future__ import annotations
+
+import pytest
+
+from tcs.model.scene import Scene, SceneSpec, load_environment
+from tcs.output.draw import Kind
+from tcs.output.report.pictures import room_parts
+
+COUNTER = """
+<sdf version="1.9">
+  <model name="counter">
+    <link name="top">
+      <collision name="board"><geometry><box><size>1 0.6 0.04</size></box></geometry></collision>
+    </link>
+  </model>
+</sdf>
+"""
+
+
+def kinds(pr2, path) -> dict[str, set[Kind]]:
+    """Return what the shapes of each model are shown as."""
+    found: dict[str, set[Kind]] = {}
+    for part, kind in room_parts(Scene(SceneSpec(pr2, load_environment(path)))):
+        found.setdefault(part.name.split("::")[0], set()).add(kind)
+    return found
+
+
+@pytest.fixture
+def counter(tmp_path):
+    """An environment of a counter alone, whose top is a body frame that goals may be fixed to."""
+    (tmp_path / "counter.sdf").write_text(COUNTER)
+    path = tmp_path / "kitchen.yaml"
+    path.write_text(
+        "based_on: wheelchair\nname: kitchen\ntitle: A counter\nerrors: {}\npadding: {}\n"
+        "models: [{name: counter, file: counter.sdf, xyz: [1, 0, 0.9]}]\n"
+        "body_frames: {counter: 'counter::top'}\n"
+    )
+    return path
+
+
+def test_a_counter_with_a_body_frame_is_furniture(pr2, counter):
+    assert kinds(pr2, counter) == {"counter": {Kind.FURNITURE}}
+
+
+def test_the_person_of_the_wheelchair_is_the_person(pr2):
+    assert kinds(pr2, "wheelchair") == {
+        "wheelchair": {Kind.FURNITURE},
+        "person": {Kind.PERSON},
+    }
+
+
+def test_a_file_names_its_person(pr2, counter):
+    counter.write_text(counter.read_text() + "person: counter\n")
+    assert kinds(pr2, counter) == {"counter": {Kind.PERSON}}
