@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
-import zlib
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from tcs.capability.grid import MapGrid
@@ -18,7 +15,8 @@ from tcs.capability.map import FIXED, ITCM, CapabilityMap
 from tcs.capability.reach import Reach
 from tcs.capability.visibility import CORRECTED, visibility
 from tcs.errors import DataFileError, StoreFormatError, TcsError
-from tcs.files.compression import compress, decompress
+from tcs.files.compression import ascending_from, compress, decompress, differences
+from tcs.files.joblib_file import check_header, check_types, header, write_joblib
 from tcs.files.plain import plain
 from tcs.files.reader import explained, read_joblib
 from tcs.files.writing import whole_file
@@ -48,10 +46,7 @@ def save_map(path: str | os.PathLike[str], capability: CapabilityMap) -> None:
     Raises:
         OutputError: If it cannot be written there.
     """
-    buffer = io.BytesIO()
-    joblib.dump(_packed(capability), buffer)
-    with whole_file(Path(path), WHAT) as stream:
-        stream.write(zlib.compress(buffer.getbuffer(), 0))
+    write_joblib(Path(path), _encode(capability), WHAT)
 
 
 def load_map(path: str | os.PathLike[str]) -> CapabilityMap:
@@ -64,7 +59,7 @@ def load_map(path: str | os.PathLike[str]) -> CapabilityMap:
     """
     path = Path(path)
     content = read_joblib(path, WHAT, AGAIN)
-    return explained(path, lambda: _unpacked(content), WHAT, AGAIN)
+    return explained(path, lambda: _decode(content), WHAT, AGAIN)
 
 
 def export_text(
@@ -186,11 +181,10 @@ def _check_rows(path: Path, sound: Any, words: str) -> None:
         raise DataFileError(f"text file '{path}', line {bad[0] + 1} {words}{more}.")
 
 
-def _packed(capability: CapabilityMap) -> dict[str, Any]:
+def _encode(capability: CapabilityMap) -> dict[str, Any]:
     c = capability
     return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
+        **header(FORMAT, FORMAT_VERSION),
         "kind": c.kind,
         "step": c.grid.step,
         "turns": c.grid.turns,
@@ -198,7 +192,7 @@ def _packed(capability: CapabilityMap) -> dict[str, Any]:
         "lift": c.lift,
         "manipulability_scale": c.manipulability_scale,
         "metadata": plain("metadata", dict(c.metadata)),
-        "key_step": compress(np.diff(c.keys, prepend=0).astype(np.uint64)),
+        "key_step": compress(differences(c.keys).astype(np.uint64)),
         "lifts": compress(np.asarray(c.lifts, np.float64)),
         **{
             name: compress(getattr(c, name))
@@ -207,33 +201,22 @@ def _packed(capability: CapabilityMap) -> dict[str, Any]:
     }
 
 
-def _unpacked(content: object) -> CapabilityMap:
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise StoreFormatError("is no capability map of tcs")
-    if content.get("format_version") != FORMAT_VERSION:
-        raise StoreFormatError(
-            f"has format version {content.get('format_version')!r}, and this program reads "
-            f"{FORMAT_VERSION}"
-        )
-    kinds = {"kind": str, "step": float, "turns": int, "tilts": list, "lift": float}
-    for name, kind in {**kinds, "manipulability_scale": float, "metadata": dict}.items():
-        if type(content.get(name)) is not kind:
-            raise StoreFormatError(f"lacks a sound '{name}'")
+def _decode(content: object) -> CapabilityMap:
+    content = check_header(content, FORMAT, FORMAT_VERSION)
+    types = {"kind": str, "step": float, "turns": int, "tilts": list, "lift": float}
+    check_types(content, {**types, "manipulability_scale": float, "metadata": dict})
     tilts = content["tilts"]
     if not all(isinstance(t, list) and [type(n) for n in t] == [int, int] for t in tilts):
         raise StoreFormatError("lacks sound 'tilts'")
     grid = MapGrid(content["step"], content["turns"], tuple((p, r) for p, r in tilts))
-    step = decompress(content, "key_step", "u8", (None,))
-    count = (step.size,)
-    # Summed in floating point first: forged steps must not wrap round to valid ones.
-    if step.sum(dtype=np.float64) >= 2.0**62:
-        raise StoreFormatError("has cells that do not exist")
+    keys = ascending_from(decompress(content, "key_step", "u8", (None,)), 2**62, "cells")
+    count = (keys.size,)
     joints = decompress(content, "joints", "f4", (None, 7))
     try:
         return CapabilityMap(
             kind=content["kind"],
             grid=grid,
-            cells=grid.cells_of(np.cumsum(step.astype(np.int64))),
+            cells=grid.cells_of(keys),
             manipulability=decompress(content, "manipulability", "f4", count),
             visibility=decompress(content, "visibility", "f4", count),
             lifts=decompress(content, "lifts", "f8", (None,)),

@@ -94,3 +94,25 @@ def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
     if len(inflated) != size or not decompressor.eof or decompressor.unused_data:
         raise StoreFormatError(f"has a damaged array '{name}' (not {size} bytes)")
     return inflated
+
+
+def differences(ascending: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the differences of ascending numbers >= 0, from 0; they compress well."""
+    return np.asarray(np.diff(ascending, prepend=0), dtype=np.int64)
+
+
+def ascending_from(steps: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
+    """Return the numbers that have these differences.
+
+    Args:
+        steps: Unsigned differences, from 0.
+        end: The numbers must be less than this.
+        what: Name of the numbers in an error message.
+
+    Raises:
+        StoreFormatError: If a number is not less than `end`.
+    """
+    # Summed in floating point first: forged steps must not wrap around to valid ones.
+    if steps.sum(dtype=np.float64) >= float(end):
+        raise StoreFormatError(f"has {what} that do not exist")
+    return np.cumsum(steps.astype(np.int64))

@@ -49,6 +49,18 @@ class InitialConfiguration:
                     f"Allowed: {ENVIRONMENT_UNITS}."
                 )
 
+    def __repr__(self) -> str:
+        """Return the configuration with its values rounded to 12 decimals.
+
+        Grid values such as 0.8 + 2 x 0.05 then print as 0.9.
+        """
+        names = ("base_x", "base_y", "base_yaw", "torso")
+        values = [f"{name}={round(float(getattr(self, name)), 12)!r}" for name in names]
+        if self.environment:
+            rounded = tuple((name, round(float(value), 12)) for name, value in self.environment)
+            values += [f"environment={rounded}", f"environment_units={self.environment_units}"]
+        return f"{type(self).__name__}({', '.join(values)})"
+
     def to_json(self) -> dict[str, float]:
         """Return the configuration as plain numbers, angles in degrees under `..._deg` names.
 

@@ -1,40 +1,44 @@
-"""Turn a score file into plain containers and small arrays, and back."""
+"""Encode a score file as plain containers and compressed arrays, and decode it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tcs.errors import StoreFormatError
 from tcs.files.compression import compress, decompress, smallest_unsigned
-from tcs.placement.store.score_file import DESCRIPTIONS, ScoreFile, StateTables
+from tcs.files.joblib_file import check_header, header
+from tcs.files.reader import explained
+from tcs.placement.store.score_file import (
+    DESCRIPTIONS,
+    ScoreFile,
+    StateTables,
+    check_sets_of,
+)
 from tcs.placement.store.set_encoding import decode_sets, encode_sets
 from tcs.placement.store.success_encoding import decode_success, encode_success
 from tcs.placement.tables import Reason, ScoreTable, SetTable
 
 FORMAT = "tcs scores"
-"""What the file calls itself."""
+"""Name of the format."""
 
 FORMAT_VERSION = 3
-"""Grows when the form of the file changes; other versions are refused."""
-
-Explain = Callable[[Callable[[], ScoreTable]], ScoreTable]
-"""Calls a function and turns what it raises into one line about the file."""
+"""Version of the format; files of other versions are refused."""
 
 
 def encode(file: ScoreFile) -> dict[str, Any]:
     """Return the plain containers that `decode` takes."""
     return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
+        **header(FORMAT, FORMAT_VERSION),
         **{name: getattr(file, name) for name in DESCRIPTIONS},
         "observed": file.observed,
         "tables": [
             {
                 "sets": encode_sets(table.sets),
-                "scores": _packed_scores(table.scores, table.sets),
+                "scores": _encode_scores(table.scores, table.sets),
                 "success": encode_success(table.success),
             }
             for table in file.tables
@@ -42,57 +46,49 @@ def encode(file: ScoreFile) -> dict[str, Any]:
     }
 
 
-def decode(content: object, explain: Explain = lambda read: read()) -> ScoreFile:
-    """Return the score file that was packed.
+def decode(content: object, path: Path | None = None) -> ScoreFile:
+    """Return the score file that was encoded.
+
+    The scores of each table are decoded when they are first accessed.
 
     Args:
         content: What `encode` returned.
-        explain: Called around the unfolding of scores, which waits until they are asked for.
+        path: Where it was read from, for the messages of scores that turn out damaged.
 
     Raises:
-        StoreFormatError: If it is no score file, or of another version.
-        TcsError: If its content contradicts itself.
+        StoreFormatError: If it is not a score file, or of another version.
+        TcsError: If its content is inconsistent.
     """
-    content = _dict(content, "the file")
-    if content.get("format") != FORMAT:
-        raise StoreFormatError("is a joblib file, but not one of tcs")
-    version = content.get("format_version")
-    if type(version) is not int or version < 1:
-        raise StoreFormatError("has no format version")
-    if version > FORMAT_VERSION:
-        raise StoreFormatError(
-            f"has format version {version}, and this program reads version {FORMAT_VERSION}: "
-            "update tcs"
-        )
-    if version < FORMAT_VERSION:
-        raise StoreFormatError(
-            f"has format version {version}, written by an older tcs, and this program reads "
-            f"version {FORMAT_VERSION}: score the task again"
-        )
+    content = check_header(content, FORMAT, FORMAT_VERSION)
     return ScoreFile(
         **{name: _dict(content.get(name), name) for name in DESCRIPTIONS},
         observed=_list(content, "observed"),
         tables=tuple(
-            _unpacked_table(_dict(table, "table"), explain) for table in _list(content, "tables")
+            _decode_table(_dict(table, "table"), path) for table in _list(content, "tables")
         ),
     )
 
 
-def _unpacked_table(packed: dict[str, Any], explain: Explain) -> StateTables:
-    """Return a table whose scores are unfolded when they are first asked for."""
-    sets = decode_sets(_dict(packed.get("sets"), "sets"))
-    scores = _dict(packed.get("scores"), "scores")
-
-    def unfold() -> ScoreTable:
-        table = _unpacked_scores(scores, sets)
-        StateTables(sets, lambda: table).check(table)
-        return table
-
-    success = decode_success(packed.get("success"))
-    return StateTables(sets, lambda: explain(unfold), success)
+def _decode_table(encoded: dict[str, Any], path: Path | None) -> StateTables:
+    """Return the tables of one state, whose scores are decoded on first access."""
+    sets = decode_sets(_dict(encoded.get("sets"), "sets"))
+    scores = _dict(encoded.get("scores"), "scores")
+    success = decode_success(encoded.get("success"))
+    return StateTables(sets, partial(_read_scores, scores, sets, path), success)
 
 
-def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
+def _read_scores(encoded: dict[str, Any], sets: SetTable, path: Path | None) -> ScoreTable:
+    """Return decoded scores that belong to the sets; errors name the file."""
+
+    def read() -> ScoreTable:
+        scores = _decode_scores(encoded, sets)
+        check_sets_of(scores, sets)
+        return scores
+
+    return read() if path is None else explained(path, read)
+
+
+def _encode_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
     rest = scores.reached.copy()
     rest[sets.candidates] = False
     return {
@@ -105,23 +101,23 @@ def _packed_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
     }
 
 
-def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
+def _decode_scores(encoded: dict[str, Any], sets: SetTable) -> ScoreTable:
     goals = sets.weights.size
-    reason = decompress(packed, "reason", "u1", (None, goals))
+    reason = decompress(encoded, "reason", "u1", (None, goals))
     if len(sets.candidates) and sets.candidates[-1] >= len(reason):
         raise StoreFormatError("has sets of more configurations than scores")
     dexterity = np.zeros(reason.shape, dtype=np.float32)
     dexterity[sets.candidates] = sets.dexterity
     rest = reason == Reason.REACHED
     rest[sets.candidates] = False
-    dexterity[rest] = decompress(packed, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
-    pair = decompress(packed, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
-    names = packed.get("pair_names")
+    dexterity[rest] = decompress(encoded, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
+    pair = decompress(encoded, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
+    names = encoded.get("pair_names")
     if not isinstance(names, list) or not all(
         isinstance(n, list) and len(n) == 2 and all(isinstance(body, str) for body in n)
         for n in names
     ):
-        raise StoreFormatError("has pair_names that are no pairs of names")
+        raise StoreFormatError("has pair_names that are not pairs of names")
     if np.any(pair >= len(names)):
         raise StoreFormatError(f"has a pair of bodies beyond its {len(names)} pair_names")
     return ScoreTable(
@@ -129,14 +125,14 @@ def _unpacked_scores(packed: dict[str, Any], sets: SetTable) -> ScoreTable:
         reason=reason,
         pair=pair.astype(np.int32),
         pair_names=tuple((first, second) for first, second in names),
-        arm_joints=decompress(packed, "arm_joints", "f4", (None, 7)),
+        arm_joints=decompress(encoded, "arm_joints", "f4", (None, 7)),
         weights=sets.weights,
     )
 
 
 def _dict(value: object, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise StoreFormatError(f"has no {what}" if what != "the file" else "is not one of tcs")
+        raise StoreFormatError(f"has no {what}")
     return value
 
 

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import os
-import zlib
-from collections.abc import Callable
 from pathlib import Path
 
-import joblib
-
-from tcs.files.reader import explained, read_joblib
-from tcs.files.writing import whole_file
+from tcs.files.joblib_file import write_joblib
+from tcs.files.reader import SCORE_FILE, explained, read_joblib
 from tcs.placement.store.encoding import decode, encode
 from tcs.placement.store.score_file import ScoreFile
-from tcs.placement.tables import ScoreTable
 
 
 def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
@@ -27,31 +21,20 @@ def save_scores(path: str | os.PathLike[str], file: ScoreFile) -> None:
     Raises:
         OutputError: If it cannot be written there.
     """
-    path = Path(path)
-    plain = io.BytesIO()
-    joblib.dump(encode(file), plain)
-    # Its large parts are folded already: level 0 adds a checksum over everything, and no more.
-    checked = zlib.compress(plain.getbuffer(), 0)
-    with whole_file(path, "Score file") as stream:
-        stream.write(checked)
+    write_joblib(Path(path), encode(file), SCORE_FILE)
 
 
 def load_scores(path: str | os.PathLike[str]) -> ScoreFile:
-    """Read a score file, trusting nothing in it.
+    """Read a score file without trusting it: nothing in it is called or imported.
 
     Args:
         path: A file written by `save_scores`.
 
     Raises:
         StoreError: If it cannot be read.
-        StoreFormatError: If it is truncated, foreign, contradicts itself, or is of a version
-            from the future.
-        UnsafeStoreError: If it names anything outside the allow-list. Nothing is called.
+        StoreFormatError: If it is truncated, foreign, inconsistent, or of another format version.
+        UnsafeStoreError: If it names anything outside the allow-list.
     """
     path = Path(path)
     content = read_joblib(path)
-
-    def explain(read: Callable[[], ScoreTable]) -> ScoreTable:
-        return explained(path, read)
-
-    return explained(path, lambda: decode(content, explain))
+    return explained(path, lambda: decode(content, path))

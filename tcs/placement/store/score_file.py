@@ -1,12 +1,12 @@
-"""What a score file holds: one task, scored and ready to choose from."""
+"""The content of a score file: one task, scored, with the sets to choose from."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, fields
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -29,74 +29,82 @@ REQUIRED_METADATA: dict[str, type] = {
     "measure": str,
     "timings": dict,
 }
-"""Keys that the metadata must have, and the type of each; others may join."""
+"""Keys that the metadata must have, and the type of each; there may be others."""
 
 DESCRIPTIONS = ("metadata", "task", "robot", "environment", "grid", "body_frames")
 """Parts of a file that are plain containers."""
 
 MAX_TABLES = 1000
-"""Most observed states a file may have scores for; one is some megabytes."""
+"""Greatest number of observed states in a file; the tables of one take some megabytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class StateTables:
-    """Scores and sets for one observed state of the person, e.g. lying 5 cm to the left.
+    """Scores and sets of one observed state, e.g. of a person who lies 5 cm to the left.
 
-    Scores are large and choosing needs the sets alone, so a loaded file unfolds the scores of a
-    table when they are first asked for.
+    Scores are large and selection needs the sets alone, so a loaded file decodes the scores of a
+    state on first access.
     """
 
     sets: SetTable
     """The sets to choose from."""
-    unfold: Callable[[], ScoreTable]
+    read_scores: Callable[[], ScoreTable]
     """Returns the scores of every configuration at every goal."""
     success: SuccessTable | None = None
-    """Estimated success of some of the sets under error, where that was asked for."""
+    """Estimated success of some of the sets under error, if `tcs robustify` estimated it."""
 
     @classmethod
     def of(cls, scores: ScoreTable, sets: SetTable) -> Self:
-        """Return the table of scores that are at hand.
+        """Return the tables of scores in memory.
 
         Raises:
             StoreError: If the sets are not those of the scores.
         """
-        table = cls(sets, lambda: scores)
-        table.check(scores)
-        return table
+        check_sets_of(scores, sets)
+        return cls(sets, partial(_same, scores))
 
     @cached_property
     def scores(self) -> ScoreTable:
         """Scores of every configuration at every goal.
 
         Raises:
-            StoreFormatError: If they come from a file in which they are damaged, or do not
-                belong to the sets.
+            StoreFormatError: If the file they are read from is damaged there, or holds scores
+                that do not belong to the sets.
         """
-        return self.unfold()
+        return self.read_scores()
 
-    def check(self, scores: ScoreTable) -> None:
-        """Refuse scores that the sets are not sets of.
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: a copy decodes the scores itself if it needs them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
-        Raises:
-            StoreError: If they are not.
-        """
-        sets = self.sets
-        candidates = candidates_of(scores.reached, scores.weights, sets.rule)
-        if not (
-            np.array_equal(sets.weights, scores.weights)
-            and np.array_equal(sets.candidates, candidates)
-            and np.array_equal(sets.reached, scores.reached[candidates])
-            and np.array_equal(sets.dexterity, scores.dexterity[candidates])
-        ):
-            raise StoreError("sets do not belong to the scores.")
+
+def _same(scores: ScoreTable) -> ScoreTable:
+    """Return the scores; unlike a lambda, a partial of this can be pickled."""
+    return scores
+
+
+def check_sets_of(scores: ScoreTable, sets: SetTable) -> None:
+    """Check that sets are those of the scores.
+
+    Raises:
+        StoreError: If they are not.
+    """
+    candidates = candidates_of(scores.reached, scores.weights, sets.rule)
+    if not (
+        np.array_equal(sets.weights, scores.weights)
+        and np.array_equal(sets.candidates, candidates)
+        and np.array_equal(sets.reached, scores.reached[candidates])
+        and np.array_equal(sets.dexterity, scores.dexterity[candidates])
+    ):
+        raise StoreError("sets do not belong to the scores.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreFile:
-    """Scores and sets of one task, with everything needed to know what they are scores of."""
+    """Scores and sets of one task, with a description of what was scored."""
 
     metadata: dict[str, Any]
-    """What made the file: see `REQUIRED_METADATA`."""
+    """How the file was made: see `REQUIRED_METADATA`."""
     task: dict[str, Any]
     """The task as plain containers."""
     robot: dict[str, Any]
@@ -106,13 +114,13 @@ class ScoreFile:
     grid: dict[str, Any]
     """The grid as plain containers; `Grid.from_dict` reads it."""
     observed: list[dict[str, Any]]
-    """The axes that the robot finds and cannot set, e.g. the person's shift, as plain containers;
-    `Axis.from_dict` reads them. Empty where there are none."""
+    """The axes that can be observed and not set, e.g. the person's shift, as plain containers;
+    `Axis.from_dict` reads them. Empty if there are none."""
     body_frames: dict[str, list[float]]
-    """Where each body frame is in W [m] when scored: x, y, z for each state of the observed axes
-    and, within it, of the environment's axes, one after the other."""
+    """Position of each body frame in W [m]: x, y, z for each state of the observed axes and, within
+    it, of the environment's axes, one after the other."""
     tables: tuple[StateTables, ...]
-    """Scores and sets for each state of the observed axes, in C order; one where there are none."""
+    """Scores and sets of each state of the observed axes, in C order; one if there are none."""
 
     def __post_init__(self) -> None:
         """Check the parts against each other.
@@ -120,7 +128,7 @@ class ScoreFile:
         Raises:
             StoreError: If a part is not plain, a key of the metadata is missing, or grid, scores
                 and sets do not belong together.
-            GridError: If the grid or an observed axis is none.
+            GridError: If the grid or an observed axis is invalid.
         """
         for name in DESCRIPTIONS:
             copy = plain(name, getattr(self, name))
@@ -129,13 +137,13 @@ class ScoreFile:
             object.__setattr__(self, name, copy)
         object.__setattr__(self, "observed", plain("observed", self.observed))
         object.__setattr__(self, "tables", tuple(self.tables))
-        for key, kind in REQUIRED_METADATA.items():
-            if not isinstance(self.metadata.get(key), kind):
-                raise StoreError(f"metadata needs '{key}', of type {kind.__name__}.")
+        for key, expected in REQUIRED_METADATA.items():
+            if not isinstance(self.metadata.get(key), expected):
+                raise StoreError(f"metadata needs '{key}', of type {expected.__name__}.")
         self._check_tables()
 
     def _check_tables(self) -> None:
-        """Refuse sets of another grid, and more or fewer tables than there are observed states."""
+        """Check that there are tables for each observed state, with sets of this grid."""
         if len(self.tables) != len(self.observed_states):
             raise StoreError(
                 f"{len(self.tables)} tables for {len(self.observed_states)} observed states."
@@ -162,7 +170,7 @@ class ScoreFile:
 
     @cached_property
     def observed_axes(self) -> tuple[Axis, ...]:
-        """The axes that the robot finds and cannot set."""
+        """The axes that can be observed and not set."""
         if not isinstance(self.observed, list) or not all(
             isinstance(axis, dict) for axis in self.observed
         ):
@@ -181,23 +189,23 @@ class ScoreFile:
 
     @property
     def nominal(self) -> StateTables:
-        """The table whose observed state is nearest to zero: the person where they belong."""
+        """The tables of the nominal state: the observed state nearest to zero."""
         return self.tables[self.nominal_index]
 
     @cached_property
     def nominal_index(self) -> int:
-        """Number of the nominal table."""
+        """Number of the nominal state."""
         norms = [sum(value**2 for value in state.values()) for state in self.observed_states]
         return int(np.argmin(norms))
 
 
 def _check_success(success: SuccessTable | None, sets: SetTable) -> None:
-    """Refuse estimates of sets that the table cannot hold."""
+    """Check that the estimates are for sets of the table."""
     if success is None:
         return
     named = success.members[success.members != NO_MEMBER]
     if success.members.shape[1] > sets.max_members or not np.all(np.isin(named, sets.candidates)):
-        raise StoreError("estimates of success of sets that are not held.")
+        raise StoreError("estimates of success for sets that the table does not have.")
 
 
 def _are_numbers(values: object, count: int) -> bool:
@@ -224,11 +232,11 @@ def state_to_json(axes: tuple[Axis, ...], state: Mapping[str, float]) -> dict[st
 
 
 def check_scene(file: ScoreFile, digest: str) -> None:
-    """Refuse a file whose scores were computed from other models than today's.
+    """Check that the scores of a file were computed from the installed models.
 
     Args:
         file: A loaded score file.
-        digest: Digest of the scene as it is lowered now.
+        digest: Digest of the lowered scene of the installed models.
 
     Raises:
         StoreMismatchError: If the digests differ.

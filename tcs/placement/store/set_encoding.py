@@ -9,10 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
-from tcs.files.compression import MAX_BYTES, compress, decompress, smallest_unsigned
+from tcs.files.compression import (
+    MAX_BYTES,
+    ascending_from,
+    compress,
+    decompress,
+    differences,
+    smallest_unsigned,
+)
+from tcs.files.joblib_file import check_types
 from tcs.placement.tables import BaseLattice, SetTable
 from tcs.placement.tables.base_lattice import MOVES
-from tcs.placement.tables.groups import ARRAYS, Groups
+from tcs.placement.tables.groups import BOUNDS, Groups
 
 _PLAIN = {
     "rule": str,
@@ -21,14 +29,14 @@ _PLAIN = {
     "same_environment": bool,
     "state_size": int,
 }
-"""Fields of a set table that are single values, and the type of each."""
+"""Type of each field of a set table that is a single value."""
 
 
 def encode_sets(sets: SetTable) -> dict[str, Any]:
     """Return the plain containers that `decode_sets` takes."""
     cells = len(sets.cell_xy)
     numbers = sets.pair_cells[:, 0].astype(np.int64) * cells + sets.pair_cells[:, 1]
-    # There are few different values: one for each subset of the goals at most.
+    # There are few different values: at most one for each subset of the goals.
     values, code = np.unique(sets.pair_reachability, return_inverse=True)
     return {
         "rule": sets.rule,
@@ -37,13 +45,12 @@ def encode_sets(sets: SetTable) -> dict[str, Any]:
         "same_environment": bool(sets.same_environment),
         "state_size": int(sets.state_size),
         "weights": compress(sets.weights),
-        # Steps from one to the next are mostly small, and compress well.
-        "candidate_step": compress(_steps(sets.candidates.astype(np.int64))),
+        "candidate_step": _encode_ascending(sets.candidates.astype(np.int64)),
         "reached": compress(sets.reached.astype(np.uint8)),
         "dexterity": compress(sets.dexterity[sets.reached]),
         "cell": compress(smallest_unsigned(sets.cell.astype(np.int64))),
         "cell_xy": compress(sets.cell_xy),
-        "pair_step": compress(_steps(numbers)),
+        "pair_step": _encode_ascending(numbers),
         "pair_count": compress(smallest_unsigned(sets.pair_count)),
         "reachability_values": compress(values),
         "reachability_code": compress(smallest_unsigned(code.astype(np.int64))),
@@ -71,12 +78,10 @@ def decode_sets(encoded: dict[str, Any]) -> SetTable:
         StoreFormatError: If something is missing or out of range.
         TcsError: If the sets contradict themselves.
     """
-    for name, kind in _PLAIN.items():
-        if type(encoded.get(name)) is not kind:
-            raise StoreFormatError(f"has sets without '{name}'")
+    check_types(encoded, _PLAIN)
     weights = decompress(encoded, "weights", "f8", (None,))
     # A table has at most 20 million configurations: see `tcs.model.grid.MAX_CONFIGURATIONS`.
-    candidates = _ascending(
+    candidates = ascending_from(
         decompress(encoded, "candidate_step", "u", (None,)), 2**31, "candidates"
     )
     reached = decompress(encoded, "reached", "u1", (candidates.size, weights.size)) != 0
@@ -86,7 +91,7 @@ def decode_sets(encoded: dict[str, Any]) -> SetTable:
     values = decompress(encoded, "reachability_values", "f8", (None,))
     step = decompress(encoded, "pair_step", "u", (None,))
     kept = (step.size,)
-    numbers = _ascending(step, len(cell_xy) ** 2 + 1, "pairs of cells")
+    numbers = ascending_from(step, len(cell_xy) ** 2 + 1, "pairs of cells")
     code = decompress(encoded, "reachability_code", "u", kept).astype(np.int64)
     if np.any(code >= values.size):
         raise StoreFormatError(f"has a reachability code beyond its {values.size} values")
@@ -121,8 +126,8 @@ def _encode_groups(groups: Groups, cells: int) -> dict[str, Any]:
         number = number * cells + column
     return {
         "least": float(groups.least),
-        "step": compress(_steps(number)),
-        **{name: compress(getattr(groups, name)) for name in ARRAYS if name != "count"},
+        "step": _encode_ascending(number),
+        **{name: compress(getattr(groups, name)) for name in BOUNDS},
         "count": compress(smallest_unsigned(groups.count)),
     }
 
@@ -132,8 +137,9 @@ def _decode_groups(encoded: object, cells: int) -> Groups | None:
     if encoded is None:
         return None
     if not isinstance(encoded, dict) or type(encoded.get("least")) is not float:
-        raise StoreFormatError("has sets of three that are none")
-    number = _ascending(decompress(encoded, "step", "u", (None,)), cells**3 + 1, "triples of cells")
+        raise StoreFormatError("has invalid sets of three")
+    steps = decompress(encoded, "step", "u", (None,))
+    number = ascending_from(steps, cells**3 + 1, "triples of cells")
     wide = {"reachability": "f8", "member_reachability": "f8"}
     return Groups(
         least=encoded["least"],
@@ -144,22 +150,18 @@ def _decode_groups(encoded: object, cells: int) -> Groups | None:
             axis=1,
         ).astype(np.int32),
         count=decompress(encoded, "count", "u", number.shape).astype(np.int64),
-        **{
-            name: decompress(encoded, name, wide.get(name, "f4"), (None,))
-            for name in ARRAYS
-            if name != "count"
-        },
+        **{name: decompress(encoded, name, wide.get(name, "f4"), (None,)) for name in BOUNDS},
     )
 
 
 def _decode_lattice(encoded: object) -> BaseLattice:
-    """Return where the base can drive, checked."""
+    """Return the encoded base lattice, checked."""
     if not isinstance(encoded, dict):
         raise StoreFormatError("has sets without a base lattice")
     pairs = {}
-    for name, kind in (("start", float), ("step", float), ("shape", int)):
+    for name, number in (("start", float), ("step", float), ("shape", int)):
         values = encoded.get(name)
-        if not isinstance(values, list) or [type(value) for value in values] != [kind] * 2:
+        if not isinstance(values, list) or [type(value) for value in values] != [number] * 2:
             raise StoreFormatError(f"has a base lattice without '{name}'")
         pairs[name] = values
     shape = (len(MOVES), *pairs["shape"])
@@ -174,18 +176,10 @@ def _decode_lattice(encoded: object) -> BaseLattice:
     )
 
 
-def _ascending(step: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
-    """Return the sums of steps, all of them below `end`."""
-    # Summed in floating point first: forged steps must not wrap round to valid ones.
-    if step.sum(dtype=np.float64) >= float(end):
-        raise StoreFormatError(f"has {what} that do not exist")
-    return np.cumsum(step.astype(np.int64))
-
-
 def _indices(encoded: dict[str, Any], name: str) -> tuple[int, ...]:
     members = encoded.get(name)
     if not isinstance(members, list) or not all(type(h) is int and 0 <= h < 2**31 for h in members):
-        raise StoreFormatError(f"has a '{name}' that is no list of configurations")
+        raise StoreFormatError(f"has a '{name}' that is not a list of configurations")
     return tuple(members)
 
 
@@ -195,6 +189,5 @@ def _int32(values: NDArray[Any]) -> NDArray[np.int32]:
     return values.astype(np.int32)
 
 
-def _steps(ascending: NDArray[np.int64]) -> NDArray[Any]:
-    """Return the differences of ascending numbers, from 0."""
-    return smallest_unsigned(np.asarray(np.diff(ascending, prepend=0), dtype=np.int64))
+def _encode_ascending(numbers: NDArray[np.int64]) -> dict[str, Any]:
+    return compress(smallest_unsigned(differences(numbers)))

@@ -37,7 +37,7 @@ def decode_success(encoded: object) -> SuccessTable | None:
     if encoded is None:
         return None
     if not isinstance(encoded, dict):
-        raise StoreFormatError("has estimates of success that are none")
+        raise StoreFormatError("has invalid estimates of success")
     members = decompress(encoded, "members_plus_one", "u", (None, None))
     rows = (len(members),)
     samples = decompress(encoded, "samples", "u", rows)

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.checks import ArrayTable, require
 
 MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
 """Steps along x and y of the four kinds of moves; each also goes backward."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BaseLattice:
+class BaseLattice(ArrayTable):
     """Where the base can drive: X by Y places, and the straight moves between neighbours.
 
     The lattice reaches beyond the grid of base places. The area beyond the lattice is free.
@@ -34,8 +34,7 @@ class BaseLattice:
             TcsError: If a number is not finite, a step not positive, there are fewer than two
                 places along an axis, or a move leads out of the lattice.
         """
-        moves = read_only("base lattice: moves", self.moves, np.bool_, (len(MOVES), None, None))
-        object.__setattr__(self, "moves", moves)
+        self._check_arrays("base lattice", {"moves": (np.bool_, (len(MOVES), None, None))})
         numbers = (*self.start, *self.step)
         require(
             len(self.start) == len(self.step) == 2
@@ -44,7 +43,7 @@ class BaseLattice:
             "base lattice: start and step must be two finite numbers each, the steps positive.",
         )
         require(min(self.shape) >= 2, "base lattice: needs at least two places along each axis.")
-        for along, (dx, dy) in zip(moves, MOVES, strict=True):
+        for along, (dx, dy) in zip(self.moves, MOVES, strict=True):
             leaving = np.ones(self.shape, dtype=np.bool_)
             leaving[: self.shape[0] - dx, max(0, -dy) : self.shape[1] - max(0, dy)] = False
             require(not np.any(along & leaving), "base lattice: a move leads out of the lattice.")

@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Groups:
+class Groups(ArrayTable):
     """Kept sets of m members: K groups, each with the same m base cells; read-only.
 
     The score of any set follows from its members, so a group holds bounds only.
@@ -42,32 +42,21 @@ class Groups:
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        kept = len(self.cells) if isinstance(self.cells, np.ndarray) else None
-        of_members = self.member_reachability
-        members = of_members.size if isinstance(of_members, np.ndarray) else None
-        types = {
-            "count": np.int64,
-            "reachability": np.float64,
-            "manipulability": np.float32,
-            "total": np.float32,
-        }
-        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+        kept, members = length_of(self.cells), length_of(self.member_reachability)
+        bounds = {"reachability": np.float64, "manipulability": np.float32, "total": np.float32}
+        shapes: Shapes = {
             "cells": (np.int32, (kept, None)),
-            **{name: (dtype, (kept,)) for name, dtype in types.items()},
-            **{
-                f"member_{name}": (dtype, (members,))
-                for name, dtype in types.items()
-                if name != "count"
-            },
+            "count": (np.int64, (kept,)),
+            **{name: (dtype, (kept,)) for name, dtype in bounds.items()},
+            **{f"member_{name}": (dtype, (members,)) for name, dtype in bounds.items()},
         }
-        for name, (dtype, shape) in shapes.items():
-            view = read_only(f"groups of sets: {name}", getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, view)
-            if dtype in (np.float32, np.float64):
-                require(
-                    bool(np.all((view >= 0.0) & (view < np.inf))),
-                    f"groups of sets: {name} must be finite and >= 0.",
-                )
+        self._check_arrays("groups of sets", shapes)
+        for name in BOUNDS:
+            bound = getattr(self, name)
+            require(
+                bool(np.all((bound >= 0.0) & (bound < np.inf))),
+                f"groups of sets: {name} must be finite and >= 0.",
+            )
         require(0.0 <= self.least < np.inf, "groups of sets: least must be finite and >= 0.")
 
     def check(self, size: NDArray[np.int64]) -> None:
@@ -106,5 +95,6 @@ class Groups:
         return int(self.count.sum())
 
 
-ARRAYS = tuple(field.name for field in fields(Groups) if field.name not in ("least", "cells"))
-"""Names of the arrays that bound scores or count sets."""
+_NOT_BOUNDS = ("least", "cells", "count")
+BOUNDS = tuple(field.name for field in fields(Groups) if field.name not in _NOT_BOUNDS)
+"""Names of the arrays that bound scores."""

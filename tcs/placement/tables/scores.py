@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 WEIGHT_SUM_TOLERANCE = 1e-9
@@ -32,7 +32,7 @@ class Reason(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ScoreTable:
+class ScoreTable(ArrayTable):
     """Scores of H initial configurations at G goals; arrays are read-only.
 
     Rows follow the flat order of the grid: C order over (environment state, base x,
@@ -58,18 +58,16 @@ class ScoreTable:
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        goals = self.weights.size if isinstance(self.weights, np.ndarray) else None
-        rows = len(self.dexterity) if isinstance(self.dexterity, np.ndarray) else None
-        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+        goals = length_of(self.weights)
+        rows = length_of(self.dexterity)
+        shapes: Shapes = {
             "weights": (np.float64, (goals,)),
             "dexterity": (np.float32, (rows, goals)),
             "reason": (np.uint8, (rows, goals)),
             "pair": (np.int32, (rows, goals)),
             "arm_joints": (np.float32, (None, 7)),
         }
-        for name, (dtype, shape) in shapes.items():
-            view = read_only(f"score table: {name}", getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, view)
+        self._check_arrays("score table", shapes)
         self._check_ranges()
 
     def _check_ranges(self) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.placement.tables.base_lattice import BaseLattice
-from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.groups import Groups
 from tcs.placement.tables.rules import RULES, PairLimits, pair_limits
@@ -36,7 +36,7 @@ or 1e-15 far from the origin. Places that differ by a nanometre are the same pla
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SetTable:
+class SetTable(ArrayTable):
     """All kept sets (tau in the TCS paper) of C candidates in N base cells; read-only.
 
     Order of the sets, which also breaks ties: the singles by configuration index, then the
@@ -98,10 +98,10 @@ class SetTable:
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count = self.candidates.size if isinstance(self.candidates, np.ndarray) else None
-        goals = self.weights.size if isinstance(self.weights, np.ndarray) else None
-        kept = len(self.pair_cells) if isinstance(self.pair_cells, np.ndarray) else None
-        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+        count = length_of(self.candidates)
+        goals = length_of(self.weights)
+        kept = length_of(self.pair_cells)
+        shapes: Shapes = {
             "weights": (np.float64, (goals,)),
             "candidates": (np.int32, (count,)),
             "reached": (np.bool_, (count, goals)),
@@ -117,9 +117,7 @@ class SetTable:
             "member_manipulability": (np.float32, (count,)),
             "member_sum": (np.float32, (count,)),
         }
-        for name, (dtype, shape) in shapes.items():
-            view = read_only(f"set table: {name}", getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, view)
+        self._check_arrays("set table", shapes)
         require(
             self.rule in RULES, f"set table: unknown rule '{self.rule}'. Known: {', '.join(RULES)}."
         )

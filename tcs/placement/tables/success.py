@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.tables.checks import read_only, require
+from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.sets import MOST_MEMBERS, SetTable
 
 NO_MEMBER = -1
@@ -15,7 +15,7 @@ NO_MEMBER = -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SuccessTable:
+class SuccessTable(ArrayTable):
     """Estimated success of K sets under error; read-only.
 
     The success of a set is the probability that a goal, drawn by its weight, is reached by any
@@ -43,17 +43,15 @@ class SuccessTable:
         Raises:
             TcsError: If an array has the wrong type, shape or range.
         """
-        count = len(self.members) if isinstance(self.members, np.ndarray) else None
-        shapes: dict[str, tuple[type, tuple[int | None, ...]]] = {
+        count = length_of(self.members)
+        shapes: Shapes = {
             "members": (np.int32, (count, None)),
             "success": (np.float64, (count,)),
             "low": (np.float64, (count,)),
             "high": (np.float64, (count,)),
             "samples": (np.int32, (count,)),
         }
-        for name, (dtype, shape) in shapes.items():
-            view = read_only(f"success table: {name}", getattr(self, name), dtype, shape)
-            object.__setattr__(self, name, view)
+        self._check_arrays("success table", shapes)
         require(
             1 <= self.members.shape[1] <= MOST_MEMBERS,
             f"success table: sets must have 1 to {MOST_MEMBERS} members.",

@@ -45,3 +45,16 @@ def test_is_a_value():
     assert len({InitialConfiguration(**PLACE), InitialConfiguration(**PLACE)}) == 1
     with pytest.raises(dataclasses.FrozenInstanceError):
         InitialConfiguration(**PLACE).torso = 0.0
+
+
+def test_grid_values_print_without_rounding_errors():
+    values = {"base_x": 0.8 + 2 * 0.05, "base_y": 29 * 0.05, "base_yaw": 0.1 + 0.2, "torso": 0.3}
+    configuration = InitialConfiguration(
+        **values, environment=(("bed_height", 3 * 0.1),), environment_units=("m",)
+    )
+    assert repr(configuration) == (
+        "InitialConfiguration(base_x=0.9, base_y=1.45, base_yaw=0.3, torso=0.3, "
+        "environment=(('bed_height', 0.3),), environment_units=('m',))"
+    )
+    # Printing changes no value.
+    assert configuration.base_y == 29 * 0.05

@@ -235,7 +235,8 @@ def test_a_longer_file_is_told(path, file):
 
 def test_a_file_from_the_future_is_told(path, file):
     joblib.dump(encode(file) | {"format_version": FORMAT_VERSION + 1}, path)
-    with pytest.raises(StoreFormatError, match="reads version 3: update tcs"):
+    message = "written by a newer tcs, and this program reads version 3: update tcs"
+    with pytest.raises(StoreFormatError, match=message):
         load_scores(path)
 
 

@@ -1,11 +1,14 @@
+import copy
 import dataclasses
+import pickle
 
+import joblib
 import numpy as np
 import pytest
 
 from tcs.errors import GridError, StoreError, StoreMismatchError
-from tcs.placement.store import StateTables, check_scene
-from tests.placement.store.example import METADATA, score_file
+from tcs.placement.store import StateTables, check_scene, load_scores, save_scores
+from tests.placement.store.example import METADATA, SHIFT, score_file
 from tests.placement.tables.small import random_scores, small_grid
 
 
@@ -43,3 +46,48 @@ def test_other_models_are_told():
     check_scene(file, METADATA["scene_digest"])
     with pytest.raises(StoreMismatchError, match=r"'shaving' were made by tcs 0\.1\.0 from other"):
         check_scene(file, "00" * 32)
+
+
+@pytest.fixture(params=["built", "loaded"])
+def file(request, tmp_path):
+    built = score_file(tables=2, observed=[SHIFT | {"count": 2}], options={"max_members": 3})
+    if request.param == "built":
+        return built
+    save_scores(tmp_path / "scores.tcs", built)
+    return load_scores(tmp_path / "scores.tcs")
+
+
+def assert_same(one, other):
+    assert one.metadata == other.metadata
+    assert one.observed_states == other.observed_states
+    for ours, theirs in zip(one.tables, other.tables, strict=True):
+        for of in ("scores", "sets"):
+            table, copied = getattr(ours, of), getattr(theirs, of)
+            for field in dataclasses.fields(table):
+                value = getattr(copied, field.name)
+                if isinstance(value, np.ndarray):
+                    np.testing.assert_array_equal(getattr(table, field.name), value)
+                    assert not value.flags.writeable
+
+
+COPIES = {
+    "pickle": lambda file: pickle.loads(pickle.dumps(file)),
+    "copy": copy.copy,
+    "deep copy": copy.deepcopy,
+}
+
+
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+def test_a_file_can_be_pickled_and_copied(file, copied):
+    assert_same(file, copied(file))
+
+
+def best_of(file):
+    scores = file.nominal.scores
+    return file.nominal.sets.best, int(scores.reached.sum()), scores.reason.flags.writeable
+
+
+def test_a_file_can_be_sent_to_another_process(file):
+    (found,) = joblib.Parallel(n_jobs=2, backend="loky")([joblib.delayed(best_of)(file)])
+    assert found == best_of(file)
+    assert found[-1] is False

@@ -48,7 +48,7 @@ def test_files_without_estimates_load():
 
 def test_estimates_of_sets_that_are_not_held_are_refused():
     nobody = np.setdiff1d(np.arange(500), score_file().tables[0].sets.candidates)[0]
-    with pytest.raises(StoreError, match="not held"):
+    with pytest.raises(StoreError, match="the table does not have"):
         with_estimates(members=np.array([[nobody, -1], [nobody, 10**6]], dtype=np.int32))
 
 
