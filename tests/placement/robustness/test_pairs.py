@@ -87,7 +87,7 @@ def test_sets_are_drawn_evenly_from_all_that_reach_as_much(members):
 def test_where_no_pair_was_kept_none_is_drawn():
     sets = table(max_members=1)
     assert Pairs.joined(kept_pairs(sets)).first.size == 0
-    with pytest.raises(SelectionError, match="no set of 2"):
+    with pytest.raises(SelectionError, match="No set of 2"):
         uniform_sets(sets, 2, 10, 0)
     with pytest.raises(TcsError, match="members is 3"):
         uniform_sets(sets, 3, 10, 0)

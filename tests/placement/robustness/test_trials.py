@@ -11,7 +11,7 @@ import pytest
 from tcs.errors import GridError, SelectionError, StoreMismatchError, TcsError
 from tcs.kernel.arrays import GridArrays
 from tcs.model.scene import ErrorDistribution, environment_at, goal_poses
-from tcs.placement.robustness import Trials
+from tcs.placement.robustness import Trials, perturbed_scenes
 from tcs.placement.robustness import trials as trials_module
 from tcs.placement.scoring.verify import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
 from tcs.placement.tables import Reason
@@ -70,8 +70,9 @@ def test_neither_threads_nor_batches_change_anything(trials, rng, monkeypatch):
     members, offsets = some(rng, trials, 30), trials.errors.draw(25, 0)
     found = trials.reached(members, offsets, jobs=1)
     assert np.array_equal(trials.reached(members, offsets, jobs=3), found)
-    monkeypatch.setattr(trials_module, "AT_ONCE", 7)
+    monkeypatch.setattr(trials_module, "CHUNK", 7)
     monkeypatch.setattr(trials_module, "BATCH", 3)
+    monkeypatch.setattr(perturbed_scenes, "BATCH", 3)
     assert np.array_equal(trials.reached(members, offsets), found)
     assert np.array_equal(trials.reached(members[::-1], offsets)[::-1], found)
 
@@ -219,7 +220,7 @@ def test_what_is_not_there_is_refused(bed_file, bed_trials):
         bed_trials.reached([10_000_000], offsets)
     with pytest.raises(SelectionError, match="no table 7; the file has 2"):
         Trials.of(bed_file, table=7)
-    with pytest.raises(TcsError, match="as many for each joint"):
+    with pytest.raises(TcsError, match="the same number of samples for each"):
         bed_trials.reached([0], {"person_x": np.zeros(2), "person_y": np.zeros(3)})
 
 
