@@ -1,8 +1,8 @@
-"""Choose for a person who lies where they lie.
+"""Select a set for the observed position of a person on the bed.
 
-Where the person lies across the bed is found, not chosen. A file of the bed holds scores for
-several such shifts, and the nearest one is used. It may be told by a joint's value, or by where a
-part of the body is seen.
+The position of the person across the bed is observed, not chosen. A score file of the bed holds
+scores for several shifts, and the nearest one is used. The observation is the value of a joint, or
+the position of a body frame.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from pathlib import Path
 
 import tcs
 
-HERE = Path(__file__).resolve().parent
+FOLDER = Path(__file__).resolve().parent
 
 
 def main() -> None:
-    """Score scratching on the bed for three shifts of the person, and choose for what is seen."""
-    file = tcs.score("scratching_upper_arm_left", environment=HERE / "small_bed.yaml")
+    """Score scratching on the bed for three shifts of the person, and select for observed ones."""
+    file = tcs.score("scratching_upper_arm_left", environment=FOLDER / "small_bed.yaml")
     here = tcs.InitialConfiguration(base_x=1.0, base_y=1.4, base_yaw=-math.pi / 2, torso=0.0)
 
-    for told in ({"person_y": 0.0}, {"person_y": 0.08}):
-        choice = tcs.select(file, here, observed=told)
-        # Which of the scored shifts was used, and how far what was told is off it.
-        assert choice.match is not None  # Chosen from a file, there is always one.
-        print(f"told {told}, used {choice.match.state}: {choice.members[0].to_json()}")
+    for observed in ({"person_y": 0.0}, {"person_y": 0.08}):
+        choice = tcs.select(file, here, observed=observed)
+        # The table that was used; selection from a file always has one.
+        assert choice.match is not None
+        print(f"observed {observed}, used {choice.match.state}: {choice.members[0].to_json()}")
 
-    # The same from a camera: the head's place in the room's frame [m], with the bed low and flat.
+    # The same with the head's position from a camera [m], with the bed low and flat.
     choice = tcs.select(file, here, frames={"head": (0.294, -0.09, 0.682)})
     match = choice.match
     assert match is not None
-    print(f"seen {match.frame_error:.3f} m from where it is at the shift {match.state}")
+    print(f"the head is {match.frame_error:.3f} m from its position at the shift {match.state}")
 
 
 if __name__ == "__main__":

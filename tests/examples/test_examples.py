@@ -15,7 +15,7 @@ PRINTED = {
     "02_own_environment": r"wheelchair:\n  4,717 pairs.*kitchen:\n  [1-4],\d{3} pairs",
     "03_own_task": r"3 goals, weights \[0.25, 0.25, 0.5\].*\[True, True, True\]",
     "04_another_robot": r"pr2: 75%.*pr2_spoon: \d+%.*panda: \d+%",
-    "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*seen 0.010 m from "
+    "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*is 0.010 m from "
     r"where it is at the shift \{'person_y': -0.1\}",
     "06_robustness": r"single: [67]\d\.\d%.*best: 9\d\.\d%.*: (9\d\.\d|100\.0)% estimated",
     "07_explain": r"goal 0: arm_blocked, l_upper_arm_link would touch .* Raise the torso 15 cm"

@@ -81,8 +81,9 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     offsets = evaluation.offsets
     outcomes = [trials.outcome(int(h), offsets) for h in evaluation.sets[0]]
     reached = np.array([found.reason == Reason.REACHED for found in outcomes])
-    gripper = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
-    hopeless = np.all([found.reason == gripper for found in outcomes], axis=0)
+    # A gripper blocked by the robot may be free from another base pose.
+    blocked = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
+    hopeless = np.all([found.reason == blocked for found in outcomes], axis=0)
     robot = trials.lowered.robot_bodies
     others = (*trials.lowered.room_bodies, *robot)
     found = []
