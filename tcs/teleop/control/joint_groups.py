@@ -144,17 +144,30 @@ def bounded_group_motion(
     return bounded_minimum(hessian, slope, lower, upper)
 
 
-def null_space_basis(jacobian: FloatArray, groups: tuple[tuple[int, ...], ...]) -> FloatArray:
-    """Return N_Jp of eq. (11), one column for each joint group, its lead joint at rate 1.
+def holding_rates(
+    jacobian: FloatArray,
+    rates: FloatArray,
+    velocity: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> FloatArray:
+    """Return the rates closest to given ones that move the tool as required, between bounds.
 
     Args:
-        jacobian: J_p, shape (3, 7) [m/rad].
-        groups: The joint groups, lead joints first.
+        jacobian: Rows that are held, shape (3, 7) or (6, 7).
+        rates: Joint rates to stay close to [rad/s], shape (7,).
+        velocity: Required velocity of the tool, shape (3,) or (6,).
+        lower: Lowest rates [rad/s], shape (7,).
+        upper: Highest rates [rad/s], shape (7,).
 
     Returns:
-        Shape (7, groups).
+        Joint rates [rad/s], shape (7,); where the bounds leave no exact solution, the least
+        squares one.
     """
-    return np.stack([group_motion(jacobian, group, 1.0).rates for group in groups], axis=1)
+    hessian = _HOLDING * (jacobian.T @ jacobian)
+    hessian.flat[:: JOINTS + 1] += 1.0
+    slope = _HOLDING * (velocity @ jacobian) + rates
+    return bounded_minimum(hessian, slope, np.minimum(lower, upper), upper)[0]
 
 
 def elbow_direction(jacobian: FloatArray) -> FloatArray:

@@ -39,7 +39,7 @@ def null_space(asked: Command, now: ControlState) -> RateCommand:
     with that joint held, if the rest of the arm can hold the tool.
     """
     settings, jacobian = now.settings, now.jacobian[3:]
-    back = _back(jacobian, now.error[3:], now)
+    back = _drift_feedback(jacobian, now.error[3:], now)
     if asked.group is None or (asked.sign == 0 and now.speed == 0.0):
         return RateCommand(back)
     group = settings.groups[asked.group]
@@ -65,7 +65,7 @@ def null_space(asked: Command, now: ControlState) -> RateCommand:
 def pose(asked: Command, now: ControlState) -> RateCommand:
     """Turn the elbow, the tool's pose held: the one degree of freedom that is left."""
     settings = now.settings
-    back = _back(now.jacobian, now.error, now)
+    back = _drift_feedback(now.jacobian, now.error, now)
     if asked.sign == 0 and now.speed == 0.0:
         return RateCommand(back)
     if smallest_singular_value(now.jacobian, settings.length) < 1e-3 * settings.singular:
@@ -83,35 +83,29 @@ def elbow_sign(jacobian: FloatArray) -> float:
     return -1.0 if elbow_direction(jacobian)[0] < 0.0 else 1.0
 
 
-def _back(jacobian: FloatArray, error: FloatArray, now: ControlState) -> FloatArray:
-    """Return the rates that undo the tool's drift, by all joints that can still move.
+def _drift_feedback(jacobian: FloatArray, error: FloatArray, now: ControlState) -> FloatArray:
+    """Return the joint rates that undo the tool's drift [rad/s], shape (7,).
 
-    The group alone would have to race for it where it is nearly locked.
+    All joints take part: a nearly locked group would need unbounded rates for it. In `clamped`
+    behaviour joints at their limits stay there if the others can do without them; feedback that
+    moved them off would make the group release and hold them in turns.
     """
     settings = now.settings
     velocity = settings.gain * error
-    rates, _ = resolved_rates(
-        jacobian,
-        velocity,
-        length=settings.length,
-        damping=settings.damping,
-        singular=settings.singular,
-    )
-    if _within(rates, now):
+    options = {"length": settings.length, "damping": settings.damping}
+    rates, _ = resolved_rates(jacobian, velocity, singular=settings.singular, **options)
+    if settings.limits == "clamped":
+        distance = np.minimum(now.joints - now.arm.lower, now.arm.upper - now.joints)
+        at_limit = distance <= _AT_LIMIT
+        if rates[at_limit].any():
+            lower, upper = (np.where(at_limit, 0.0, bound) for bound in (now.lower, now.upper))
+            others, _ = clamped_rates(jacobian, velocity, lower, upper, **options)
+            left = velocity - jacobian @ others
+            if left @ left < 0.25 * (velocity @ velocity):
+                return others
+    if ((rates >= now.lower) & (rates <= now.upper)).all():
         return rates
-    return clamped_rates(
-        jacobian,
-        velocity,
-        now.lower,
-        now.upper,
-        length=settings.length,
-        damping=settings.damping,
-    )[0]
-
-
-def _within(rates: FloatArray, now: ControlState) -> bool:
-    """Return whether joint rates are within limits of position and velocity."""
-    return bool(((rates >= now.lower) & (rates <= now.upper)).all())
+    return clamped_rates(jacobian, velocity, now.lower, now.upper, **options)[0]
 
 
 def _next_speed(sign: float, full: FloatArray, now: ControlState) -> float:

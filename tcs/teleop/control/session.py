@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS, Arm
 from tcs.teleop.control.bounds import approach, rate_bounds, stops_in_time
+from tcs.teleop.control.joint_groups import holding_rates
 from tcs.teleop.control.modes import rate_command
 from tcs.teleop.control.null_space_modes import elbow_sign
 from tcs.teleop.control.resolved_rate import pose_error, rotated
@@ -106,6 +107,7 @@ class Teleoperation:
         self._speed = 0.0
         self._turning: FloatArray | None = None
         self._way: float | None = None
+        self._held_rows: FloatArray | None = None
         self._beyond = self.arm.limit_violation(self._joints)
 
     @property
@@ -130,6 +132,7 @@ class Teleoperation:
         held = bool(why) or self._command.clutch
         asked = self._admitted(self._command, held)
         rates, reason = np.zeros(JOINTS), why
+        self._held_rows = None
         if not held or self._speed:
             rates, reason, self._speed, self._turning = self._rate_command(asked)
             reason = why or reason
@@ -190,6 +193,10 @@ class Teleoperation:
         if self._way is None or not (self._speed or asked.sign):
             # The way of the elbow that turns joint 1 up when it begins to turn.
             self._way = elbow_sign(middle.jacobian) if self._mode is Mode.POSE else None
+        if self._mode in NULL_SPACE_MODES:
+            # Rows of the Jacobian that the mode holds: position, or position and orientation.
+            rows = 3 if self._mode is Mode.NULL_SPACE else 0
+            self._held_rows = middle.jacobian[rows:]
         lower, upper = mode_rate_bounds(self.arm, self._joints, settings)
         state = ControlState(
             arm=self.arm,
@@ -211,11 +218,27 @@ class Teleoperation:
         if self._beyond:
             return True
         period, acceleration = settings.period, settings.acceleration
-        self._rates, arrived = approach(self._rates, wanted, acceleration * period)
-        if not stops_in_time(arm, self._joints, self._rates, period, acceleration):
+        change = acceleration * period
+        before = self._rates
+        rates, arrived = approach(before, wanted, change)
+        in_time = stops_in_time(arm, self._joints, rates, period, acceleration)
+        if not (in_time and arrived):
             # A joint that has to brake for its limit does so even where the others take longer.
-            bounds = rate_bounds(arm, self._joints, period, acceleration)
-            self._rates = np.clip(self._rates, *bounds)
+            lower, upper = rate_bounds(arm, self._joints, period, acceleration)
+            held = self._held_rows
+            if held is None or self._switching:
+                rates = np.clip(rates, lower, upper)
+            else:
+                # The null space turns with the arm: rates that keep their direction while they
+                # change would let the tool slip.
+                rates = holding_rates(
+                    held,
+                    rates,
+                    held @ wanted,
+                    np.maximum(lower, before - change),
+                    np.minimum(upper, before + change),
+                )
+        self._rates = rates
         # The bounds end at the limits; rounding may go past them by a hair.
         joints = self._joints + settings.period * self._rates
         self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)

@@ -11,7 +11,7 @@ from tcs.teleop.control.joint_groups import (
     bounded_group_motion,
     elbow_direction,
     group_motion,
-    null_space_basis,
+    holding_rates,
 )
 
 GROUPS = Settings().groups
@@ -170,11 +170,27 @@ def test_the_border_of_the_eased_postures_is_no_step(iiwa):
 
 def test_the_basis_is_seven_by_four_and_spans_the_null_space(iiwa, ready):
     J = iiwa.kinematics(ready + 0.2).jacobian[3:]
-    N = null_space_basis(J, GROUPS)
+    N = np.stack([group_motion(J, group, 1.0).rates for group in GROUPS], axis=1)
     assert N.shape == (7, 4)
     assert np.linalg.matrix_rank(N) == 4
     np.testing.assert_allclose(J @ N, 0.0, atol=1e-12)
     np.testing.assert_array_equal([N[g[0], i] for i, g in enumerate(GROUPS)], np.ones(4))
+
+
+def test_rates_that_hold_the_tool_are_the_closest_ones_between_the_bounds(iiwa, ready, rng):
+    J = iiwa.kinematics(ready + 0.2).jacobian[3:]
+    desired = rng.normal(size=7)
+    bounds = np.full(7, 0.4)
+    rates = holding_rates(J, desired, np.zeros(3), desired - bounds, desired + bounds)
+    np.testing.assert_allclose(J @ rates, 0.0, atol=1e-5)
+    assert (np.abs(rates - desired) <= bounds).all()
+    closest = minimize(
+        lambda x: ((x - desired) ** 2).sum(),
+        desired,
+        bounds=np.transpose([desired - bounds, desired + bounds]),
+        constraints={"type": "eq", "fun": lambda x: J @ x},
+    )
+    np.testing.assert_allclose(rates, closest.x, atol=1e-4)
 
 
 class TestElbow:

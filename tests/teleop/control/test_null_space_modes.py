@@ -99,3 +99,30 @@ class TestPose:
         steps += drive(session, Command(sign=-1), 5.0)
         assert not steps[-1].stopped
         assert off(steps, start.p) < 1e-4
+
+
+def start_at_a_limit(arm, seed):
+    """Return random joints of which one or two are at a limit, a group and a sign."""
+    rng = np.random.default_rng(seed)
+    joints = arm.random_joints(rng, 1)[0]
+    bounded = np.flatnonzero(arm.bounded)
+    for joint in rng.choice(bounded, size=rng.integers(1, 3), replace=False):
+        joints[joint] = (arm.lower, arm.upper)[rng.integers(2)][joint]
+    return joints, int(rng.integers(3)), int(rng.choice([-1, 1]))
+
+
+@pytest.mark.parametrize(
+    ("robot", "seeds"),
+    [("iiwa7", (18, 31))],
+)
+def test_the_tool_holds_from_starts_with_a_joint_at_its_limit(robot, seeds):
+    arm = load_arm(robot)
+    for seed in seeds:
+        joints, group, sign = start_at_a_limit(arm, seed)
+        session = Teleoperation(arm, joints, mode=Mode.NULL_SPACE)
+        start = session.step(Command())
+        steps = drive(session, Command(group=group, sign=sign), 1.5)
+        steps += drive(session, Command(group=group, sign=-sign), 1.5)
+        # Over 60 seeds of each arm it is 0.005 mm at most, and was 0.17 mm where braking joints
+        # kept the direction of their rates while the null space turned with the arm.
+        assert off(steps, start.p) < 6e-6, seed
