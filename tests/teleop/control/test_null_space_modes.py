@@ -113,7 +113,7 @@ def start_at_a_limit(arm, seed):
 
 @pytest.mark.parametrize(
     ("robot", "seeds"),
-    [("iiwa7", (18, 31))],
+    [("iiwa7", (18, 31)), ("pr2", (30, 50)), ("tiago", (17, 53)), ("panda", (9, 42))],
 )
 def test_the_tool_holds_from_starts_with_a_joint_at_its_limit(robot, seeds):
     arm = load_arm(robot)
@@ -123,6 +123,6 @@ def test_the_tool_holds_from_starts_with_a_joint_at_its_limit(robot, seeds):
         start = session.step(Command())
         steps = drive(session, Command(group=group, sign=sign), 1.5)
         steps += drive(session, Command(group=group, sign=-sign), 1.5)
-        # Over 60 seeds of each arm it is 0.005 mm at most, and was 0.17 mm where braking joints
+        # Over 60 seeds of each arm it is 0.005 mm at most, and was 0.25 mm where braking joints
         # kept the direction of their rates while the null space turned with the arm.
         assert off(steps, start.p) < 6e-6, seed
