@@ -63,10 +63,20 @@ def _remembering_interrupts() -> Iterator[None]:
     if not in_charge or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
+    report_unraisable = sys.unraisablehook
+
+    def report_other(unraisable: sys.UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            report_unraisable(unraisable)
+
     signal.signal(signal.SIGINT, remember)
+    # Python cannot raise through a callback of compiled code, such as llvmlite's: it would print
+    # the interrupt and carry on. The event has it.
+    sys.unraisablehook = report_other
     try:
         yield
     finally:
+        sys.unraisablehook = report_unraisable
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -86,6 +86,21 @@ def test_interrupt_while_scoring(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_interrupt_in_a_callback_of_compiled_code_is_one_line(process, tmp_path):
+    """Python prints such an interrupt and carries on, as llvmlite's callbacks cannot raise."""
+    before = """
+import ctypes, signal, tcs
+callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+def score(*arguments, on_progress, **options):
+    callback()
+    on_progress(1, 2)
+tcs.score = score
+"""
+    ran = process("score", "shaving", "--out", tmp_path / "o.tcs", before=before)
+    assert ran.code == 130
+    assert ran.err == "tcs: interrupted; no half-written file is left.\n"
+
+
 def test_interrupt_that_compiled_code_swallows_still_counts(tcs_command, tmp_path, monkeypatch):
     def score(*_arguments, on_progress, **_options):
         with pytest.raises(KeyboardInterrupt):
