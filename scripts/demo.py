@@ -17,7 +17,8 @@ from tcs.cli.places import place
 from tcs.cli.reports import choice_as_json, report_choice, report_scores, report_verification
 from tcs.cli.talk import progress_bar
 from tcs.output.draw import save_figure
-from tcs.output.report.pictures import Shown, map_figure, scene_figure
+from tcs.output.report.pictures import map_figure, scene_figure
+from tcs.output.report.shown_set import ShownSet
 from tcs.placement.scoring import load_job
 
 TASK, ENVIRONMENT, ROBOT = "shaving", "wheelchair", "pr2"
@@ -85,7 +86,7 @@ def run(folder: Path) -> int:
     report_verification(found.to_json())
 
     step("5  Draw")
-    shown = Shown.of(file, place(PLACES[0]))
+    shown = ShownSet.of(file, place(PLACES[0]))
     save_figure(folder / "map.png", map_figure(file, shown))
     save_figure(folder / "scene.png", scene_figure(file, shown))
     results = {"scores": summary, "choices": choices, "verification": found.to_json()}

@@ -22,7 +22,8 @@ from tcs.cli.places import place
 from tcs.cli.rows import default_path, score_one
 from tcs.files.writing import make_folder, whole_file
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import Shown, map_figure, member_figure, scene_figure
+from tcs.output.report.pictures import map_figure, member_figure, scene_figure
+from tcs.output.report.shown_set import ShownSet
 from tcs.output.report.states import states_figure
 from tcs.output.words import member_text
 from tcs.placement.robustness import check_row
@@ -142,7 +143,7 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
 def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
     """Return the paper's Figure 1: shaving in a bed without a wall, from one place."""
     free, walled = files["shaving", "bed-no-wall"], files["shaving", "bed"]
-    shown = Shown.of(free, None, max_members=1)
+    shown = ShownSet.of(free, None, max_members=1)
     alone = free.nominal.sets.scores_of(shown.indices)
     behind = walled.nominal.sets.scores_of(walled.nominal.sets.best_single)
     at = shown.members[0]
@@ -168,7 +169,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
 
 def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
     """Return a row of Figure 6: the robot at each place of the set with the best scores."""
-    shown = Shown.of(file, None)
+    shown = ShownSet.of(file, None)
     sets = file.nominal.sets
     reachability, manipulability = sets.scores_of(tuple(sorted(shown.indices)))
     title = row[0].replace("_", " ").capitalize()
@@ -198,7 +199,7 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
 def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
     """Return the pictures from above: the README's map, and one for each state of the bed."""
     chair, bed = files["shaving", "wheelchair"], files["bathing", "bed"]
-    chosen = Shown.of(chair, place(HERE))
+    chosen = ShownSet.of(chair, place(HERE))
     command = "tcs map shaving-wheelchair-pr2.tcs --out map.png --here 1.4 -1.2 180"
     return [
         Drawn(
@@ -215,7 +216,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
         ),
         Drawn(
             "states",
-            states_figure(bed, Shown.of(bed, None)),
+            states_figure(bed, ShownSet.of(bed, None)),
             _MAP_DPI,
             "For each state of the bed",
             "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed height "
@@ -230,7 +231,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
 
 
 def _want_one_state(file: ScoreFile) -> bool:
-    return len({at.environment for at in Shown.of(file, None).members}) == 1
+    return len({at.environment for at in ShownSet.of(file, None).members}) == 1
 
 
 def write(path: Path, content: bytes) -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     # `tcs list` gets by without drawing.
     from matplotlib.figure import Figure
 
-    from tcs.output.report.pictures import Shown
+    from tcs.output.report.shown_set import ShownSet
     from tcs.placement.store import ScoreFile
 
 _SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
@@ -54,7 +54,7 @@ def draw_map(
     if score not in (None, *SCORES):
         raise typer.BadParameter(f"must be one of {', '.join(SCORES)}.", param_hint="--score")
 
-    def figure(loaded: ScoreFile, shown: Shown) -> Figure:
+    def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         if states:
             from tcs.output.report.states import states_figure
 
@@ -80,7 +80,7 @@ def draw_picture(
 ) -> None:
     """Draw the robot where it is to stand, its arm at a goal, from its collision shapes."""
 
-    def figure(loaded: ScoreFile, shown: Shown) -> Figure:
+    def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         from tcs.output.report.pictures import scene_figure
 
         return scene_figure(loaded, shown)
@@ -93,7 +93,7 @@ for _command in (draw_map, draw_picture):
 
 
 def _draw(
-    figure: Callable[[ScoreFile, Shown], Figure],
+    figure: Callable[[ScoreFile, ShownSet], Figure],
     file: Path,
     out: Path,
     here: tuple[float, float, float] | None,
@@ -113,10 +113,10 @@ def _draw(
     check_writable(out)
     loaded = tcs.load(file)
 
-    from tcs.output.report.pictures import Shown
+    from tcs.output.report.shown_set import ShownSet
 
     found = observed_settings(observed or (), loaded.observed_axes)
-    shown = Shown.of(loaded, chosen_from, max_members, found)
+    shown = ShownSet.of(loaded, chosen_from, max_members, found)
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
     talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

@@ -55,19 +55,19 @@ def report(
         check_writable(path)
 
     import tcs
-    from tcs.output.report import Check, answer_of, answer_page
+    from tcs.output.report import CheckSizes, score_page, score_report
 
     found = observed_settings(observed or (), tcs.load(file).observed_axes)
     with talk.progress_bar("pairs re-checked") as on_progress:
-        answer = answer_of(
+        answer = score_report(
             file,
             here=chosen_from,
             max_members=max_members,
             observed=found,
-            check=Check(pairs=pairs, dense=dense, seed=seed),
+            check=CheckSizes(pairs=pairs, dense=dense, seed=seed),
             on_progress=on_progress,
         )
-    page = answer_page(answer, command=shlex.join(["tcs", *sys.argv[1:]]))
+    page = score_page(answer, command=shlex.join(["tcs", *sys.argv[1:]]))
     sizes = [_write(path, page) for path in paths]
     reachability, manipulability = answer.scores
     result = {

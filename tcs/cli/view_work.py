@@ -16,18 +16,18 @@ from tcs.cli import talk
 from tcs.cli.places import observed_settings
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
-from tcs.output.report.pictures import Shown, title_of
-from tcs.output.view import Answers, Props, Viewer, open_meshcat, page
+from tcs.output.report.pictures import scored_scene, title_of
+from tcs.output.report.shown_set import ShownSet
+from tcs.output.view import SceneObjects, ViewedSet, Viewer, export_page, open_meshcat
 from tcs.output.words import colour_legend
-from tcs.placement.scoring import rebuild_scene
 
 
 @dataclass(frozen=True, eq=False)
 class Staged:
     """A score file, ready to be shown."""
 
-    answers: Answers
-    props: Props
+    answers: ViewedSet
+    props: SceneObjects
     title: str
     """Task, environment, robot."""
     subtitle: str
@@ -58,14 +58,12 @@ def stage(
         SelectionError: If no such set can be chosen.
     """
     file = tcs.load(path)
-    shown = Shown.of(file, here, max_members, observed_settings(observed, file.observed_axes))
-    job, scene, _ = rebuild_scene(file, meshes=meshes)
-    for name, value in file.observed_states[shown.table].items():
-        scene.set_joint(name, value)
-    answers = Answers.of(file, shown.table, shown.indices)
+    shown = ShownSet.of(file, here, max_members, observed_settings(observed, file.observed_axes))
+    job, scene = scored_scene(file, shown, meshes=meshes)
+    answers = ViewedSet.of(file, shown.table, shown.indices)
     return Staged(
         answers,
-        Props(scene, job.task, answers, meshes=meshes),
+        SceneObjects(scene, job.task, answers, meshes=meshes),
         title_of(job),
         shown.subtitle,
         job.spec.robot.source,
@@ -89,7 +87,7 @@ def export(staged: Staged, path: Path, *, meshes: bool) -> dict[str, Any]:
             "This page holds the robot's meshes in another format: every triangle in its place, no "
             f"textures. Its robot file says of them: {staged.source}"
         )
-    text = page(
+    text = export_page(
         open_meshcat(), staged.props, staged.answers, title=staged.title, notes=notes
     ).encode()
     with whole_file(path, "Page") as stream:

@@ -23,7 +23,7 @@ _GAP = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class BoxPlot:
     """The samples of one method."""
 
     series: int
@@ -35,15 +35,15 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class BoxGroup:
     """Boxes that belong together, one below the other."""
 
     name: str
-    boxes: Sequence[Box]
+    boxes: Sequence[BoxPlot]
 
 
 def draw_boxes(
-    groups: Sequence[Group], series: Sequence[str], *, label: str, reference: str = ""
+    groups: Sequence[BoxGroup], series: Sequence[str], *, label: str, reference: str = ""
 ) -> Figure:
     """Return box plots of groups of samples, lying, the first group on top.
 
@@ -83,7 +83,7 @@ def draw_boxes(
     return figure
 
 
-def _draw(axes: Axes, y: float, box: Box) -> None:
+def _draw(axes: Axes, y: float, box: BoxPlot) -> None:
     low, first, median, third, high = np.percentile(box.samples, (5, 25, 50, 75, 95))
     outer = np.unique(box.samples[(box.samples < low) | (box.samples > high)])
     spread = {"med": median, "q1": first, "q3": third, "whislo": low, "whishi": high}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tcs.model.grid import InitialConfiguration
 from tcs.output.draw.colours import BLOCKED, CASING, EMPTY, HERE, MEMBER, SCALE
-from tcs.output.draw.solids import Kind, Solid
+from tcs.output.draw.solids import Category, Solid
 from tcs.output.words import member_text
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
@@ -31,7 +31,7 @@ _EDGE = "#00000066"
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class BaseFootprint:
     """A robot standing somewhere, as seen from above."""
 
     configuration: InitialConfiguration
@@ -70,7 +70,7 @@ def draw_room(axes: Axes, room: Sequence[Solid]) -> None:
     axes.add_collection(
         PolyCollection(
             [solid.footprint for solid in ordered],
-            facecolors=[solid.kind.colour for solid in ordered],
+            facecolors=[solid.category.colour for solid in ordered],
             edgecolors=_EDGE,
             linewidths=0.6,
             zorder=3,
@@ -79,8 +79,8 @@ def draw_room(axes: Axes, room: Sequence[Solid]) -> None:
     )
 
 
-def draw_stand(
-    axes: Axes, stand: Stand, *, label: str = "", is_here: bool = False, size: float = 1.0
+def draw_base(
+    axes: Axes, stand: BaseFootprint, *, label: str = "", is_here: bool = False, size: float = 1.0
 ) -> None:
     """Draw the base of a robot to scale, and which way it faces.
 
@@ -177,9 +177,9 @@ def cell_edges(centres: FloatArray) -> FloatArray:
     return np.append(centres - step / 2.0, centres[-1] + step / 2.0)
 
 
-def what_is_what(room: Sequence[Solid], *, robot: bool) -> list[Artist]:
+def legend_handles(room: Sequence[Solid], *, robot: bool) -> list[Artist]:
     """Return what goes into a legend: the room, places without a colour, and robots."""
-    kinds = [kind for kind in Kind if any(solid.kind is kind for solid in room)]
+    kinds = [kind for kind in Category if any(solid.category is kind for solid in room)]
     handles: list[Artist] = [Patch(facecolor=kind.colour, label=kind.label) for kind in kinds]
     handles.append(Patch(facecolor=BLOCKED, label="robot cannot stand here"))
     handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="no goal in reach"))
@@ -189,7 +189,7 @@ def what_is_what(room: Sequence[Solid], *, robot: bool) -> list[Artist]:
     return handles
 
 
-def stops(members: Sequence[Stand], here: Stand | None) -> list[Artist]:
+def stops(members: Sequence[BaseFootprint], here: BaseFootprint | None) -> list[Artist]:
     """Return where robot and members stand in numbers, for a legend."""
     handles: list[Artist] = []
     if here is not None:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.output.draw import floor_plan
 from tcs.output.draw.colours import HERE
-from tcs.output.draw.floor_plan import Stand
+from tcs.output.draw.floor_plan import BaseFootprint
 from tcs.output.draw.solids import Solid
 from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
@@ -29,9 +29,9 @@ _BEYOND = 0.5
 def draw_map(
     places: PlaceMap,
     room: Sequence[Solid],
-    members: Sequence[Stand],
+    members: Sequence[BaseFootprint],
     *,
-    here: Stand | None = None,
+    here: BaseFootprint | None = None,
     title: str,
     subtitle: str = "",
     measure: str = DEFAULT_MEASURE,
@@ -69,7 +69,7 @@ def draw_map(
     left.set_ylabel(axis_title("base_y"))
     lines = [*textwrap.wrap(title, _TITLE_WIDTH), *textwrap.wrap(subtitle, _TITLE_WIDTH)]
     figure.suptitle("\n".join(lines), fontsize=13)
-    handles = floor_plan.what_is_what(room, robot=bool(members))
+    handles = floor_plan.legend_handles(room, robot=bool(members))
     if here is not None:
         handles.append(Line2D([], [], ls=":", color=HERE, label="way, as the travel cost has it"))
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=10)
@@ -86,13 +86,13 @@ def _grid_and_room(places: PlaceMap, room: Sequence[Solid]) -> FloatArray:
     return np.concatenate([np.stack([low, high]), *around])
 
 
-def _draw_tour(axes: Axes, members: Sequence[Stand], here: Stand | None) -> None:
+def _draw_tour(axes: Axes, members: Sequence[BaseFootprint], here: BaseFootprint | None) -> None:
     """Draw where the robot is, where it is to go, and the straight lines between."""
     stops = [stand for stand in (here, *members) if stand is not None]
     line = np.array([[s.configuration.base_x, s.configuration.base_y] for s in stops])
     if here is not None:
         if len(stops) > 1:
             axes.plot(line[:, 0], line[:, 1], ":", color=HERE, linewidth=1.4, zorder=4)
-        floor_plan.draw_stand(axes, here, is_here=True)
+        floor_plan.draw_base(axes, here, is_here=True)
     for number, stand in enumerate(members, start=1):
-        floor_plan.draw_stand(axes, stand, label=str(number))
+        floor_plan.draw_base(axes, stand, label=str(number))

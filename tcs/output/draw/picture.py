@@ -15,19 +15,19 @@ from tcs.output.draw import camera as cameras
 from tcs.output.draw.camera import Camera, nearest_camera
 from tcs.output.draw.raster import Mesh, Raster, rasterise_scene
 from tcs.output.draw.shading import shade
-from tcs.output.draw.solids import FloatArray, Kind, Solid
+from tcs.output.draw.solids import Category, FloatArray, Solid
 
 _LETTERS = 56
 """Letters of the title that fit above a view."""
 _UNHIDDEN = 0.6
 """Fraction of the robot and person that a view has to show, of what the best view shows."""
-_GOALS = {Kind.GOAL: 1.0, Kind.CURRENT_GOAL: 5.0}
+_GOALS = {Category.GOAL: 1.0, Category.CURRENT_GOAL: 5.0}
 """Weight of each visible pixel of a goal; the tool hides most of the goal it is at."""
 _LEFT_OUT = "walls near the camera are left out"
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ScenePanel:
     """One panel of the picture."""
 
     solids: Sequence[Solid]
@@ -53,7 +53,7 @@ class _Candidate(NamedTuple):
     raster: Raster
 
 
-def draw_scene(views: Sequence[View], *, title: str) -> Figure:
+def draw_scene(views: Sequence[ScenePanel], *, title: str) -> Figure:
     """Return a picture with one panel for each view.
 
     Args:
@@ -72,10 +72,10 @@ def draw_scene(views: Sequence[View], *, title: str) -> Figure:
         width = _LETTERS * len(views)
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, width)]
         figure.suptitle("\n".join(lines), fontsize=13)
-    shown = {solid.kind for view in views for solid in view.solids}
+    shown = {solid.category for view in views for solid in view.solids}
     handles = [
         Patch(facecolor=kind.colour, edgecolor="#555555", lw=0.5, label=kind.label)
-        for kind in Kind
+        for kind in Category
         if kind in shown
     ]
     columns = min(3 * len(views), 6)
@@ -83,11 +83,13 @@ def draw_scene(views: Sequence[View], *, title: str) -> Figure:
     return figure
 
 
-def _render(view: View) -> tuple[FloatArray, bool]:
+def _render(view: ScenePanel) -> tuple[FloatArray, bool]:
     """Return the picture from the best direction, shape (h, w, 3), and whether it is whole."""
     mesh = Mesh.of(view.solids)
-    weight = np.array([_GOALS.get(solid.kind, 0.0) for solid in view.solids])[mesh.owner]
-    is_subject = np.array([solid.kind is not Kind.FURNITURE for solid in view.solids])[mesh.owner]
+    weight = np.array([_GOALS.get(solid.category, 0.0) for solid in view.solids])[mesh.owner]
+    is_subject = np.array([solid.category is not Category.FURNITURE for solid in view.solids])[
+        mesh.owner
+    ]
     candidates = []
     for azimuth in view.azimuths:
         camera = nearest_camera(view.subject, azimuth)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tcs.output.draw import camera as cameras
 from tcs.output.draw.camera import FOCAL, Camera, IntArray
-from tcs.output.draw.solids import FloatArray, Kind, Solid
+from tcs.output.draw.solids import Category, FloatArray, Solid
 
 _WALL_TOP = 1.5
 """Height from which on furniture may be left out [m]: walls and cupboards, not beds and chairs."""
@@ -49,6 +49,10 @@ class Mesh(NamedTuple):
         triangles = np.concatenate([solid.triangles for solid in solids])
         return cls(triangles, np.repeat(np.arange(len(solids)), counts))
 
+    def is_subject(self, solids: Sequence[Solid]) -> NDArray[np.bool_]:
+        """Return which triangles are of robot, person and goals, shape (m,)."""
+        return np.array([solid.category is not Category.FURNITURE for solid in solids])[self.owner]
+
 
 def rasterise_scene(
     solids: Sequence[Solid], mesh: Mesh, camera: Camera
@@ -63,11 +67,13 @@ def rasterise_scene(
         mesh: Their surfaces.
         camera: The camera.
     """
-    is_subject = np.array([solid.kind is not Kind.FURNITURE for solid in solids])[mesh.owner]
+    is_subject = np.array([solid.category is not Category.FURNITURE for solid in solids])[
+        mesh.owner
+    ]
     walls = [
         number
         for number, solid in enumerate(solids)
-        if solid.kind is Kind.FURNITURE and float(solid.corners[:, 2].max()) >= _WALL_TOP
+        if solid.category is Category.FURNITURE and float(solid.corners[:, 2].max()) >= _WALL_TOP
     ]
     raster = _rasterise(mesh, camera, ~np.isin(mesh.owner, walls))
     shows_subject = (raster.triangle >= 0) & is_subject[raster.triangle]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tcs.output.draw import camera as cameras
 from tcs.output.draw.camera import FOCAL, Camera, IntArray, rays
 from tcs.output.draw.raster import Mesh, Raster
-from tcs.output.draw.solids import FloatArray, Kind, Solid
+from tcs.output.draw.solids import Category, FloatArray, Solid
 
 _FLOOR = np.array([0.95, 0.95, 0.94])
 _LINE = np.array([0.86, 0.86, 0.86])
@@ -24,7 +24,7 @@ _SAME_PLANE = 0.004
 _SAME_NORMAL = 0.9
 """Least cosine of the angle between the normals of one surface: neighbouring facets of a round
 shape with sixteen corners are 22.5 deg apart."""
-_SIGNS = (Kind.GOAL, Kind.CURRENT_GOAL)
+_SIGNS = (Category.GOAL, Category.CURRENT_GOAL)
 
 
 def shade(solids: Sequence[Solid], mesh: Mesh, camera: Camera, raster: Raster) -> FloatArray:
@@ -41,9 +41,9 @@ def shade(solids: Sequence[Solid], mesh: Mesh, camera: Camera, raster: Raster) -
     for direction, strength in _LIGHTS:
         light += strength * np.maximum(in_view @ (direction / np.linalg.norm(direction)), 0.0)
     # Goals are signs, not things: their colours are those of the legend, whatever way they face.
-    is_sign = np.array([solid.kind in _SIGNS for solid in solids])
+    is_sign = np.array([solid.category in _SIGNS for solid in solids])
     light[is_sign[owner]] = 1.0
-    base = np.array([to_rgb(solid.kind.colour) for solid in solids])
+    base = np.array([to_rgb(solid.category.colour) for solid in solids])
     image[hit] = np.clip(base[owner[number]] * light[number][:, None], 0.0, 1.0)
     image[_edges(owner, in_view, raster)] *= 0.45
     return image

@@ -20,7 +20,7 @@ _ROUND = 16
 """Corners around a round shape: no visible edges at the size of a limb."""
 
 
-class Kind(Enum):
+class Category(Enum):
     """What a solid is of: how a legend calls it, and its colour."""
 
     FURNITURE = ("furniture", colours.FURNITURE)
@@ -45,21 +45,21 @@ class Kind(Enum):
 class Solid:
     """The convex hull of some corners."""
 
-    kind: Kind
+    category: Category
     corners: FloatArray
     """Corners in the frame of the picture [m], shape (n, 3), not all in one plane."""
 
     @classmethod
-    def placed(cls, kind: Kind, corners: FloatArray, R: FloatArray, p: FloatArray) -> Solid:
+    def placed(cls, category: Category, corners: FloatArray, R: FloatArray, p: FloatArray) -> Solid:
         """Return the solid of corners given in a frame of their own.
 
         Args:
-            kind: What it is of.
+            category: What it is of.
             corners: Corners in their own frame S [m], shape (n, 3).
             R: R_WS, orientation of S in the frame of the picture, shape (3, 3).
             p: p_WoSo_W, origin of S there [m], shape (3,).
         """
-        return cls(kind, corners @ np.asarray(R).T + np.asarray(p))
+        return cls(category, corners @ np.asarray(R).T + np.asarray(p))
 
     @cached_property
     def triangles(self) -> FloatArray:

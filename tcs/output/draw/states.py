@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.output.draw import floor_plan
-from tcs.output.draw.floor_plan import Stand
-from tcs.output.draw.solids import Kind, Solid
+from tcs.output.draw.floor_plan import BaseFootprint
+from tcs.output.draw.solids import Category, Solid
 from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
@@ -35,7 +35,7 @@ class StatePanel:
     """What each place is worth in this state."""
     room: Sequence[Solid]
     """Furniture, person and obstacles as they are then."""
-    members: Sequence[tuple[int, Stand]]
+    members: Sequence[tuple[int, BaseFootprint]]
     """Members of the chosen set that want this state, each with its number in the tour."""
 
 
@@ -44,7 +44,7 @@ def draw_states(
     rows: Sequence[str],
     columns: Sequence[str],
     *,
-    members: Sequence[Stand],
+    members: Sequence[BaseFootprint],
     title: str,
     subtitle: str = "",
     score: Score = "reachability",
@@ -101,7 +101,7 @@ def draw_states(
     lines.append(f"Each place: best of all {panels[0][0].places.over_words}.")
     figure.suptitle("\n".join(lines), fontsize=11)
     room = [solid for row in panels for panel in row for solid in panel.room]
-    handles = floor_plan.what_is_what(room, robot=bool(members))
+    handles = floor_plan.legend_handles(room, robot=bool(members))
     handles += floor_plan.stops(members, None)
     figure.legend(handles=handles, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
     return figure
@@ -110,7 +110,7 @@ def draw_states(
 def _draw_panel(axes: Axes, panel: StatePanel, said: str) -> None:
     floor_plan.draw_room(axes, panel.room)
     for number, stand in panel.members:
-        floor_plan.draw_stand(axes, stand, label=str(number), size=_LINES)
+        floor_plan.draw_base(axes, stand, label=str(number), size=_LINES)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=8)
     axes.set_title(said, fontsize=9, pad=4)
@@ -131,7 +131,7 @@ def _part_of_the_floor(panels: Sequence[Sequence[StatePanel]]) -> FloatArray:
         grid = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
         found.append(grid[places.reachability > 0.0])
         found += [stand.polygon for _, stand in panel.members]
-        found += [solid.footprint for solid in panel.room if solid.kind is Kind.PERSON]
+        found += [solid.footprint for solid in panel.room if solid.category is Category.PERSON]
     points = np.concatenate(found) if found else np.empty((0, 2))
     if len(points):
         return points

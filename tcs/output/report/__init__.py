@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from tcs.output.report.answer import Answer, Check, answer_of
-from tcs.output.report.answer_page import answer_page
 from tcs.output.report.blocks import Page, Section
 from tcs.output.report.html import as_html
 from tcs.output.report.markdown import as_markdown
 from tcs.output.report.paper import Paper, load_paper
 from tcs.output.report.robustness import robustness_page
 from tcs.output.report.row_pictures import RowPictures, draw_row, draw_rows
+from tcs.output.report.score_page import score_page
+from tcs.output.report.score_report import CheckSizes, ScoreReport, score_report
 from tcs.output.report.write import write_report
 
 __all__ = [
-    "Answer",
-    "Check",
+    "CheckSizes",
     "Page",
     "Paper",
     "RowPictures",
+    "ScoreReport",
     "Section",
-    "answer_of",
-    "answer_page",
     "as_html",
     "as_markdown",
     "draw_row",
     "draw_rows",
     "load_paper",
     "robustness_page",
+    "score_page",
+    "score_report",
     "write_report",
 ]

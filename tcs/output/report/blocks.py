@@ -83,7 +83,7 @@ class Picture:
 
     content: bytes
     """The file: SVG or PNG."""
-    kind: Literal["svg", "png"]
+    format: Literal["svg", "png"]
     description: str
     """What is to be seen, for who cannot see it."""
     caption: str

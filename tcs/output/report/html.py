@@ -110,7 +110,7 @@ def _(block: Table) -> str:
 @_written.register
 def _(block: Picture) -> str:
     said = escape(block.description)
-    if block.kind == "svg":
+    if block.format == "svg":
         # From its root element on: an XML declaration has no place within HTML.
         drawing = block.content.decode("utf-8")
         drawing = drawing[drawing.index("<svg") :]

@@ -7,37 +7,37 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from tcs.output.report.answer import Answer
+from tcs.output.report.score_report import ScoreReport
 from tcs.placement.store import ScoreFile, state_to_json
 
 PAPER_DISTANCE = 0.40
 """Least distance of two members where nobody asks for another [m], as in the TCS paper."""
 
 
-def commands(answer: Answer, report: str) -> str:
+def commands(report: ScoreReport, command: str) -> str:
     """Return the commands that make the file and the report, one a line.
 
     Args:
-        answer: What the report is about.
-        report: The command that made the report.
+        report: What the report is about.
+        command: The command that made the report.
     """
     return "\n".join(
-        part for part in (score_command(answer), robustify_command(answer), report) if part
+        part for part in (score_command(report), robustify_command(report), command) if part
     )
 
 
-def score_command(answer: Answer) -> str:
+def score_command(report: ScoreReport) -> str:
     """Return the command that scores the same again; today's models are those of the file."""
-    file, sets = answer.file, answer.scored.sets
+    file, sets = report.file, report.scored.sets
     words = ["tcs", "score", as_given(file, "task")]
     words += ["--environment", as_given(file, "environment"), "--robot", as_given(file, "robot")]
-    words += ["--measure", answer.measure, "--rules", sets.rule]
+    words += ["--measure", report.measure, "--rules", sets.rule]
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
         words.append("--same-environment")
     if "observation" in file.metadata:
-        words += _observed(answer)
-    line = shlex.join([*words, "--out", str(answer.path)])
+        words += _observed(report)
+    line = shlex.join([*words, "--out", str(report.path)])
     if abs(sets.min_distance - PAPER_DISTANCE) > 1e-9:
         line += f"  # in Python, with min_distance={sets.min_distance:g}"
     return line
@@ -57,35 +57,35 @@ def as_given(file: ScoreFile, key: str) -> str:
     return given if str(Path(os.path.expanduser(given)).absolute()) == located else located
 
 
-def robustify_command(answer: Answer) -> str:
+def robustify_command(report: ScoreReport) -> str:
     """Return the command that estimates success again; "" where nothing is estimated."""
-    made = estimated(answer)
+    made = estimated(report)
     if made is None:
         return ""
-    words = ["tcs", "robustify", str(answer.path)]
+    words = ["tcs", "robustify", str(report.path)]
     words += ["--sets", str(made["sets"]), "--samples", str(made["samples"])]
     words += ["--seed", str(made["seed"])]
     if made["check_base"]:
         words.append("--check-base")
     if not made["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
-    records = answer.file.metadata["robustness"]
+    records = report.file.metadata["robustness"]
     if any(record != made for record in records):
-        words += _observed(answer)
+        words += _observed(report)
     return shlex.join(words)
 
 
-def estimated(answer: Answer) -> dict[str, Any] | None:
+def estimated(report: ScoreReport) -> dict[str, Any] | None:
     """Return how the success of this table's sets was estimated; None where it was not."""
-    records = answer.file.metadata.get("robustness")
-    if not isinstance(records, list) or answer.success is None:
+    records = report.file.metadata.get("robustness")
+    if not isinstance(records, list) or report.success is None:
         return None
-    record = records[answer.shown.table]
+    record = records[report.shown.table]
     return record if isinstance(record, dict) else None
 
 
-def _observed(answer: Answer) -> list[str]:
+def _observed(report: ScoreReport) -> list[str]:
     """Return the options that name the observed state of the table."""
-    state = answer.file.observed_states[answer.shown.table]
-    shown = state_to_json(answer.file.observed_axes, state)
+    state = report.file.observed_states[report.shown.table]
+    shown = state_to_json(report.file.observed_axes, state)
     return [word for name, value in shown.items() for word in ("--observed", f"{name}={value:.9g}")]

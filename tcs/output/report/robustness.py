@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tcs.output.draw import Box, Cloud, Group, as_svg, draw_boxes, draw_clouds
+from tcs.output.draw import BoxGroup, BoxPlot, Cloud, as_svg, draw_boxes, draw_clouds
 from tcs.output.report.blocks import (
     Block,
     Bullets,
@@ -210,12 +210,12 @@ def _table_1(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
         published = paper.published(row.task, row.environment)
         theirs = (published.mean, published.std) if published else None
         boxes = [
-            Box(1, 100.0 * row.single.fractions),
-            Box(0, 100.0 * row.best.fractions, theirs),
+            BoxPlot(1, 100.0 * row.single.fractions),
+            BoxPlot(0, 100.0 * row.best.fractions, theirs),
         ]
         if row.gain is not None:
-            boxes.append(Box(2, 100.0 * row.gain.robust.fractions))
-        groups.append(Group(row.name, boxes))
+            boxes.append(BoxPlot(2, 100.0 * row.gain.robust.fractions))
+        groups.append(BoxGroup(row.name, boxes))
     figure = draw_boxes(groups, SERIES, label="goals reached [%]", reference="paper, Table I")
     return [
         table_1(rows, paper),
@@ -238,7 +238,7 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
             published = paper.compared(row.task, row.environment, members)
             cells = row.methods.paired if row.methods else {}
             boxes = [
-                Box(series, 100.0 * cells[members, is_with].fractions, theirs)
+                BoxPlot(series, 100.0 * cells[members, is_with].fractions, theirs)
                 for series, is_with, theirs in (
                     (2, False, published.without if published else None),
                     (0, True, published.with_ if published else None),
@@ -246,7 +246,7 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
                 if (members, is_with) in cells
             ]
             if boxes:
-                groups.append(Group(f"{row.name}\n{_configurations(members)}", boxes))
+                groups.append(BoxGroup(f"{row.name}\n{_configurations(members)}", boxes))
     figure = draw_boxes(groups, METHODS, label="goals reached [%]", reference="paper, Table III")
     return [
         table_3(rows, paper),

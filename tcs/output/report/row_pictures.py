@@ -9,7 +9,8 @@ from pathlib import Path
 from joblib import Parallel, delayed
 
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import Shown, map_figure, scene_figure
+from tcs.output.report.pictures import map_figure, scene_figure
+from tcs.output.report.shown_set import ShownSet
 from tcs.placement.store import load_scores
 
 
@@ -33,7 +34,7 @@ def draw_row(path: Path) -> RowPictures:
         StoreError: If the file cannot be used, or was made from other models.
     """
     file = load_scores(path)
-    shown = Shown.of(file, None)
+    shown = ShownSet.of(file, None)
     return RowPictures(as_png(map_figure(file, shown)), as_png(scene_figure(file, shown)))
 
 

@@ -9,9 +9,11 @@ from matplotlib.figure import Figure
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, Grid
-from tcs.output.draw import PlaceMap, Stand, StatePanel, draw_states
+from tcs.output.draw import BaseFootprint, PlaceMap, StatePanel, draw_states
 from tcs.output.draw.states import Score
-from tcs.output.report.pictures import Shown, Stage, base_outline, room_solids, stage, title_of
+from tcs.output.report.pictures import ScoredScene, scored_scene, title_of
+from tcs.output.report.scene_solids import base_outline, environment_solids
+from tcs.output.report.shown_set import ShownSet
 from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
 
@@ -25,7 +27,10 @@ def has_states(file: ScoreFile) -> bool:
 
 
 def states_figure(
-    file: ScoreFile, shown: Shown, score: Score = "reachability", staged: Stage | None = None
+    file: ScoreFile,
+    shown: ShownSet,
+    score: Score = "reachability",
+    scored: ScoredScene | None = None,
 ) -> Figure:
     """Return the map of each state of the environment, rows by columns, in one scale.
 
@@ -36,7 +41,7 @@ def states_figure(
         file: A score file.
         shown: The set to mark, each member in the panel of the state it wants.
         score: What to colour the places by.
-        staged: `stage` of both, where there is one already; its scene is moved about.
+        scored: Its `scored_scene`, which is moved; built if it is not given.
 
     Raises:
         SelectionError: If the environment has one state only, or too many to draw.
@@ -55,10 +60,10 @@ def states_figure(
             f"the environment has {states} states, of which {MOST_PANELS} at most can be drawn on "
             "one page. Draw the map without --states."
         )
-    job, scene = staged or stage(file, shown)
+    job, scene = scored or scored_scene(file, shown)
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
-    stands = [Stand(member, base) for member in shown.members]
+    stands = [BaseFootprint(member, base) for member in shown.members]
     size = grid.size // states
 
     def panel(state: int) -> StatePanel:
@@ -70,7 +75,7 @@ def states_figure(
             for number, (h, stand) in enumerate(zip(shown.indices, stands, strict=True), start=1)
             if h // size == state
         ]
-        return StatePanel(PlaceMap.of_state(scores, grid, state), room_solids(scene), chosen)
+        return StatePanel(PlaceMap.of_state(scores, grid, state), environment_solids(scene), chosen)
 
     columns = axes[-1]
     numbers = range(states)

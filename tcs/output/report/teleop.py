@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from tcs.output.draw import Box, Group, as_svg, draw_boxes
+from tcs.output.draw import BoxGroup, BoxPlot, as_svg, draw_boxes
 from tcs.output.draw.tool_paths import PathGroup, draw_tool_paths
 from tcs.output.report.blocks import (
     Block,
@@ -110,10 +110,10 @@ def _compared(experiment: Experiment) -> list[Block]:
     titles = [condition.title for condition in experiment.plan.conditions]
     for name in HYPOTHESES:
         boxes = [
-            Box(i, SCALE.get(name, 1.0) * experiment.sample(condition, name))
+            BoxPlot(i, SCALE.get(name, 1.0) * experiment.sample(condition, name))
             for i, condition in enumerate(experiment.drives)
         ]
-        figure = draw_boxes([Group("", boxes)], titles, label=NAMES[name])
+        figure = draw_boxes([BoxGroup("", boxes)], titles, label=NAMES[name])
         figures.append(
             Picture(
                 as_svg(figure, f"teleop-{name}"),

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from tcs.output.view.answers import Answers, Verdict
-from tcs.output.view.controls import Controls, Slider, State
-from tcs.output.view.export import Step, page, script
-from tcs.output.view.floor import Floor, floor_of
+from tcs.output.view.controls import Controls, Slider, ViewState
+from tcs.output.view.export import PlayStep, export_page, play_steps
+from tcs.output.view.floor import FloorMap, floor_map
 from tcs.output.view.live import Viewer, open_meshcat
-from tcs.output.view.props import Props
+from tcs.output.view.scene_objects import SceneObjects
+from tcs.output.view.viewed_set import ConfigurationResult, ViewedSet
 
 __all__ = [
-    "Answers",
+    "ConfigurationResult",
     "Controls",
-    "Floor",
-    "Props",
+    "FloorMap",
+    "PlayStep",
+    "SceneObjects",
     "Slider",
-    "State",
-    "Step",
-    "Verdict",
+    "ViewState",
+    "ViewedSet",
     "Viewer",
-    "floor_of",
+    "export_page",
+    "floor_map",
     "open_meshcat",
-    "page",
-    "script",
+    "play_steps",
 ]

@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 
 from tcs.model.grid import Axis
-from tcs.output.view.answers import Answers
-from tcs.output.view.floor import kinds
+from tcs.output.view.floor import colourings
+from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import axis_title
 
 MEMBER, GOAL, COLOUR = "set member", "goal", "floor colour"
@@ -26,14 +26,14 @@ _PARTS = 1_000_000
 
 
 @dataclasses.dataclass(frozen=True)
-class State:
+class ViewState:
     """What is looked at."""
 
     along: tuple[int, ...]
     """Where the configuration lies along each axis of the grid."""
     goal: int
     """Number of the goal."""
-    kind: str
+    colouring: str
     """What the floor is coloured by."""
     member: int
     """Number of the member of the set that was looked at last."""
@@ -62,18 +62,18 @@ class Slider:
 class Controls:
     """The controls of one file: names and ranges, and what they do to the state."""
 
-    def __init__(self, answers: Answers) -> None:
+    def __init__(self, viewed: ViewedSet) -> None:
         """Lay the controls out.
 
         Args:
-            answers: What there is to look at.
+            viewed: What there is to look at.
         """
-        self._answers = answers
-        self._kinds = kinds(answers)
+        self._viewed = viewed
+        self._colourings = colourings(viewed)
         # An axis of one value leaves nothing to move.
         self._axes = {
             label_of(axis): (number, axis)
-            for number, axis in enumerate(answers.grid.axes)
+            for number, axis in enumerate(viewed.grid.axes)
             if axis.count > 1
         }
 
@@ -81,9 +81,9 @@ class Controls:
     def sliders(self) -> tuple[Slider, ...]:
         """Every slider that has something to move, in the order in which they are shown."""
         counted = (
-            Slider(MEMBER, 1.0, float(len(self._answers.members)), 1.0),
-            Slider(GOAL, 0.0, float(self._answers.goals - 1), 1.0),
-            Slider(COLOUR, 0.0, float(len(self._kinds) - 1), 1.0),
+            Slider(MEMBER, 1.0, float(len(self._viewed.members)), 1.0),
+            Slider(GOAL, 0.0, float(self._viewed.goals - 1), 1.0),
+            Slider(COLOUR, 0.0, float(len(self._colourings) - 1), 1.0),
         )
         moving = (
             Slider(label, axis.start, axis.start + (axis.count - 1) * axis.step, axis.step)
@@ -91,17 +91,17 @@ class Controls:
         )
         return tuple(slider for slider in (*counted, *moving) if slider.high > slider.low)
 
-    def first(self) -> State:
+    def first(self) -> ViewState:
         """Return what is looked at first: the first member of the set at a goal it serves."""
-        state = State((0,) * len(self._answers.grid.axes), 0, self._kinds[0], 0)
-        return self._at_member(state, 0) if self._answers.members else state
+        state = ViewState((0,) * len(self._viewed.grid.axes), 0, self._colourings[0], 0)
+        return self._at_member(state, 0) if self._viewed.members else state
 
-    def values(self, state: State) -> dict[str, float]:
+    def values(self, state: ViewState) -> dict[str, float]:
         """Return where every slider stands in a state, by name [m or deg]."""
         counted = {
             MEMBER: state.member + 1.0,
             GOAL: float(state.goal),
-            COLOUR: float(self._kinds.index(state.kind)),
+            COLOUR: float(self._colourings.index(state.colouring)),
         }
         moving = {
             label: axis.start + state.along[number] * axis.step
@@ -109,7 +109,7 @@ class Controls:
         }
         return {slider.name: {**counted, **moving}[slider.name] for slider in self.sliders}
 
-    def moved(self, state: State, name: str, value: float) -> State:
+    def moved(self, state: ViewState, name: str, value: float) -> ViewState:
         """Return the state after a slider was moved.
 
         Args:
@@ -125,12 +125,12 @@ class Controls:
         if name == GOAL:
             return dataclasses.replace(state, goal=step)
         if name == COLOUR:
-            return dataclasses.replace(state, kind=self._kinds[step])
+            return dataclasses.replace(state, colouring=self._colourings[step])
         along = list(state.along)
         along[self._axes[name][0]] = step
         return dataclasses.replace(state, along=tuple(along))
 
-    def clicked(self, state: State, name: str) -> State:
+    def clicked(self, state: ViewState, name: str) -> ViewState:
         """Return the state after a button was clicked.
 
         Args:
@@ -138,38 +138,38 @@ class Controls:
             name: One of `KEYS`.
         """
         if name == NEXT_GOAL:
-            return dataclasses.replace(state, goal=(state.goal + 1) % self._answers.goals)
+            return dataclasses.replace(state, goal=(state.goal + 1) % self._viewed.goals)
         if name == NEXT_COLOUR:
-            after = (self._kinds.index(state.kind) + 1) % len(self._kinds)
-            return dataclasses.replace(state, kind=self._kinds[after])
-        if not self._answers.members:
+            after = (self._colourings.index(state.colouring) + 1) % len(self._colourings)
+            return dataclasses.replace(state, colouring=self._colourings[after])
+        if not self._viewed.members:
             return state
         ahead = 1 if name == NEXT_MEMBER else 0
-        return self._at_member(state, (state.member + ahead) % len(self._answers.members))
+        return self._at_member(state, (state.member + ahead) % len(self._viewed.members))
 
-    def index(self, state: State) -> int:
+    def index(self, state: ViewState) -> int:
         """Return the flat index of the configuration."""
-        return int(self._answers.grid.flat(state.along))
+        return int(self._viewed.grid.flat(state.along))
 
-    def environment_state(self, state: State) -> int:
+    def environment_state(self, state: ViewState) -> int:
         """Return the number of the environment's state, in C order over its axes."""
-        return self._answers.environment_state(self.index(state))
+        return self._viewed.environment_state(self.index(state))
 
-    def heading(self, state: State) -> str:
+    def heading(self, state: ViewState) -> str:
         """Return where the configuration comes from, as words."""
-        members = self._answers.members
+        members = self._viewed.members
         if members and members[state.member] == self.index(state):
             return f"member {state.member + 1} of {len(members)}"
         return "stand here"
 
-    def _at_member(self, state: State, number: int) -> State:
+    def _at_member(self, state: ViewState, number: int) -> ViewState:
         """Return the state at a member; a goal it cannot reach gives way to one it serves best."""
-        index = self._answers.members[number]
-        along = tuple(self._answers.grid.indices(index).tolist())
+        index = self._viewed.members[number]
+        along = tuple(self._viewed.grid.indices(index).tolist())
         goal = state.goal
-        if not self._answers.scores.reached[index, goal]:
-            reached = self._answers.verdict(index).reached
-            goal = (*self._answers.served(number), *reached, goal)[0]
+        if not self._viewed.scores.reached[index, goal]:
+            reached = self._viewed.result(index).reached
+            goal = (*self._viewed.served(number), *reached, goal)[0]
         return dataclasses.replace(state, along=along, member=number, goal=goal)
 
 

@@ -9,9 +9,16 @@ from dataclasses import dataclass
 from pydrake.geometry import Meshcat, MeshcatAnimation
 from pydrake.math import RigidTransform
 
-from tcs.output.view.answers import Answers
-from tcs.output.view.floor import REACHABILITY, floor_of
-from tcs.output.view.props import FLOOR, SHOWN, Props, Snapshot, arrow_path, draw_floor
+from tcs.output.view.floor import REACHABILITY, floor_map
+from tcs.output.view.scene_objects import (
+    FLOOR,
+    SHOWN,
+    SceneObjects,
+    Snapshot,
+    arrow_path,
+    draw_floor,
+)
+from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS, REASON_NAMES, goals_text
 from tcs.placement.tables import Reason
 
@@ -22,7 +29,7 @@ _HOLD = 15
 
 
 @dataclass(frozen=True)
-class Step:
+class PlayStep:
     """What is shown for a while."""
 
     member: int
@@ -33,21 +40,26 @@ class Step:
     """The goal that is shown."""
 
 
-def script(answers: Answers) -> tuple[Step, ...]:
+def play_steps(viewed: ViewedSet) -> tuple[PlayStep, ...]:
     """Return what the animation goes through: each member, at each goal it serves best.
 
     A set without members, where no goal is reached from anywhere, shows the first configuration.
     """
     steps = [
-        Step(number, index, goal)
-        for number, index in enumerate(answers.members)
-        for goal in answers.served(number)
+        PlayStep(number, index, goal)
+        for number, index in enumerate(viewed.members)
+        for goal in viewed.served(number)
     ]
-    return tuple(steps) or (Step(0, 0, 0),)
+    return tuple(steps) or (PlayStep(0, 0, 0),)
 
 
-def page(
-    meshcat: Meshcat, props: Props, answers: Answers, *, title: str, notes: Sequence[str] = ()
+def export_page(
+    meshcat: Meshcat,
+    objects: SceneObjects,
+    viewed: ViewedSet,
+    *,
+    title: str,
+    notes: Sequence[str] = (),
 ) -> str:
     """Return the page.
 
@@ -55,20 +67,20 @@ def page(
 
     Args:
         meshcat: An empty one.
-        props: The things to show.
-        answers: What came of each configuration.
+        objects: The things to show.
+        viewed: What came of each configuration.
         title: First line, for a person.
         notes: Further lines, such as where the meshes come from and under which licence.
     """
-    steps = script(answers)
-    shots = [props.snapshot(step.index, step.goal) for step in steps]
+    steps = play_steps(viewed)
+    shots = [objects.snapshot(step.index, step.goal) for step in steps]
     arrows = sorted(set().union(*(shot.arrows for shot in shots)))
-    props.set_up(meshcat, arrows, compact=True)
+    objects.set_up(meshcat, arrows, compact=True)
     for path, pose in shots[0].poses.items():
         meshcat.SetTransform(path, RigidTransform(pose))
-    environments = [answers.environment_state(step.index) for step in steps]
+    environments = [viewed.environment_state(step.index) for step in steps]
     for number in sorted(set(environments)):
-        floor = floor_of(answers, number, steps[0].goal, REACHABILITY)
+        floor = floor_map(viewed, number, steps[0].goal, REACHABILITY)
         draw_floor(meshcat, floor, f"{FLOOR}/{number}")
     seen = [
         {f"{FLOOR}/{number}", *(arrow_path(arrow) for arrow in shot.arrows)}
@@ -78,7 +90,7 @@ def page(
         meshcat.SetProperty(path, "visible", path in seen[0])
     if len(shots) > 1:
         meshcat.SetAnimation(_animation(shots, seen))
-    panel = _panel(title, [*_captions(answers, steps), *notes])
+    panel = _panel(title, [*_captions(viewed, steps), *notes])
     return str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1)
 
 
@@ -108,15 +120,15 @@ def _animation(shots: list[Snapshot], seen: list[set[str]]) -> MeshcatAnimation:
     return animation
 
 
-def _captions(answers: Answers, steps: tuple[Step, ...]) -> list[str]:
+def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
     """Return a line for each member: when it is shown, and what it reaches."""
     lines = []
-    for number, index in enumerate(answers.members):
+    for number, index in enumerate(viewed.members):
         times = [at * _HOLD / _RATE for at, one in enumerate(steps) if one.member == number]
         goals = [one.goal for one in steps if one.member == number]
         if times:
             until = times[-1] + _HOLD / _RATE
-            line = answers.verdict(index).summary
+            line = viewed.result(index).summary
             shown = f"member {number + 1} at {goals_text(goals)}"
             lines.append(f"{times[0]:g} to {until:g} s: {shown}. It reaches {line}.")
     return lines or ["No goal is reached from anywhere."]

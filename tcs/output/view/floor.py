@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from tcs.output.draw.colours import SCALE
-from tcs.output.view.answers import Answers
+from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.reasons.distribution import CHECKS
 from tcs.placement.tables import Reason
@@ -30,7 +30,7 @@ _NEAREST = (*CHECKS, Reason.REACHED)
 
 
 @dataclass(frozen=True, eq=False)
-class Floor:
+class FloorMap:
     """Places that have a colour; at the others nothing is reached, or nothing known."""
 
     places: FloatArray
@@ -41,56 +41,56 @@ class Floor:
     """Red, green, blue of each, 0 to 1, shape (n, 3)."""
 
 
-def kinds(answers: Answers) -> tuple[str, ...]:
+def colourings(viewed: ViewedSet) -> tuple[str, ...]:
     """Return what the floor can be coloured by: success only where it has been estimated."""
     known = (REACHABILITY, MANIPULABILITY, REASON)
-    return known if answers.success is None else (*known, SUCCESS)
+    return known if viewed.success is None else (*known, SUCCESS)
 
 
-def floor_of(answers: Answers, state: int, goal: int, kind: str) -> Floor:
+def floor_map(viewed: ViewedSet, state: int, goal: int, colouring: str) -> FloorMap:
     """Return the map for one state of the environment.
 
     Args:
-        answers: The scores.
+        viewed: The scores.
         state: Number of the environment's state, in C order over its axes.
         goal: The goal that is shown; only the reasons depend on it.
-        kind: One of `kinds`.
+        colouring: One of `colourings`.
 
     Returns:
         The best P_R, P_M, estimated success of one configuration, or the reason that came nearest
         to reaching the goal, over all headings and torso heights at each place. P_R and P_M are
         coloured up to the best place of this state.
     """
-    grid, scores = answers.grid, answers.scores
+    grid, scores = viewed.grid, viewed.scores
     places = PlaceMap.of_state(scores, grid, state)
-    if kind == REASON:
+    if colouring == REASON:
         rank = np.argsort([int(reason) for reason in _NEAREST])
         codes = scores.reason[rows_of_state(grid, state), goal]
         best = best_per_place(grid, rank[codes], state)
         table = np.array([to_rgb(REASON_COLOURS[reason]) for reason in _NEAREST])
         colours, shown = table[best], np.ones(best.shape, dtype=np.bool_)
     else:
-        values = _values(answers, places, state, kind)
+        values = _values(viewed, places, state, colouring)
         shown = values > 0.0
-        top = 1.0 if kind == SUCCESS else float(values.max(initial=0.0)) or 1.0
+        top = 1.0 if colouring == SUCCESS else float(values.max(initial=0.0)) or 1.0
         colours = matplotlib.colormaps[SCALE](values / top)[..., :3]
     middles = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
     half = (grid.axis("base_x").step / 2.0, grid.axis("base_y").step / 2.0)
-    return Floor(places=middles[shown], half=half, colours=np.asarray(colours[shown]))
+    return FloorMap(places=middles[shown], half=half, colours=np.asarray(colours[shown]))
 
 
-def _values(answers: Answers, places: PlaceMap, state: int, kind: str) -> FloatArray:
+def _values(viewed: ViewedSet, places: PlaceMap, state: int, colouring: str) -> FloatArray:
     """Return the best P_R, P_M or success of one configuration at each place, shape (X, Y)."""
-    if kind == REACHABILITY:
+    if colouring == REACHABILITY:
         return places.reachability
-    if kind == MANIPULABILITY:
+    if colouring == MANIPULABILITY:
         return places.manipulability
-    rows = rows_of_state(answers.grid, state)
+    rows = rows_of_state(viewed.grid, state)
     values = np.zeros(rows.stop - rows.start)
-    success = answers.success
+    success = viewed.success
     if success is not None:
         single = success.of_size(1)
         at = success.members[single, 0] - rows.start
         here = (at >= 0) & (at < values.size)
         values[at[here]] = success.success[single][here]
-    return np.asarray(best_per_place(answers.grid, values, state))
+    return np.asarray(best_per_place(viewed.grid, values, state))

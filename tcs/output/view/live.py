@@ -10,10 +10,10 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.math import RigidTransform
 
 from tcs.errors import OutputError
-from tcs.output.view.answers import Answers
-from tcs.output.view.controls import KEYS, Controls, State
-from tcs.output.view.floor import floor_of
-from tcs.output.view.props import Props, Snapshot, arrow_path, draw_floor
+from tcs.output.view.controls import KEYS, Controls, ViewState
+from tcs.output.view.floor import floor_map
+from tcs.output.view.scene_objects import SceneObjects, Snapshot, arrow_path, draw_floor
+from tcs.output.view.viewed_set import ViewedSet
 from tcs.placement.tables import Reason
 
 _PAUSE = 0.01
@@ -46,20 +46,24 @@ class Viewer:
     """Answers on show in a Meshcat."""
 
     def __init__(
-        self, meshcat: Meshcat, props: Props, answers: Answers, tell: Callable[[str], None]
+        self,
+        meshcat: Meshcat,
+        objects: SceneObjects,
+        viewed: ViewedSet,
+        tell: Callable[[str], None],
     ) -> None:
         """Show the set's first member, and lay out the controls.
 
         Args:
             meshcat: An empty one.
-            props: The things to show.
-            answers: What came of each configuration.
+            objects: The things to show.
+            viewed: What came of each configuration.
             tell: Called with a line of text for each state that is shown.
         """
-        self._meshcat, self._props, self._answers, self._tell = meshcat, props, answers, tell
-        self._controls = Controls(answers)
-        arrows = ((g, reason) for g in range(answers.goals) for reason in Reason)
-        props.set_up(meshcat, arrows)
+        self._meshcat, self._objects, self._viewed, self._tell = meshcat, objects, viewed, tell
+        self._controls = Controls(viewed)
+        arrows = ((g, reason) for g in range(viewed.goals) for reason in Reason)
+        objects.set_up(meshcat, arrows)
         self._floor: tuple[int, int, str] | None = None
         self._shown: Snapshot | None = None
         self._state = self._controls.first()
@@ -73,7 +77,7 @@ class Viewer:
         self._show()
 
     @property
-    def state(self) -> State:
+    def state(self) -> ViewState:
         """What is looked at now."""
         return self._state
 
@@ -110,14 +114,14 @@ class Viewer:
     def _show(self) -> None:
         state, controls = self._state, self._controls
         index, environment = controls.index(state), controls.environment_state(state)
-        after = self._props.snapshot(index, state.goal)
+        after = self._objects.snapshot(index, state.goal)
         show_change(self._meshcat, self._shown, after)
         self._shown = after
-        floor = (environment, state.goal if state.kind == "reason" else 0, state.kind)
+        floor = (environment, state.goal if state.colouring == "reason" else 0, state.colouring)
         if floor != self._floor:
-            draw_floor(self._meshcat, floor_of(self._answers, *floor))
+            draw_floor(self._meshcat, floor_map(self._viewed, *floor))
             self._floor = floor
-        line = self._answers.verdict(index).line(state.goal)
+        line = self._viewed.result(index).line(state.goal)
         self._tell(f"{controls.heading(state)}: {line}")
 
 

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import BodyIndex
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.scene import Scene
 from tcs.model.scene.contacts import Group
-from tcs.output.draw import Kind
+from tcs.output.draw import Category
 
 FloatArray = NDArray[np.float64]
 _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
@@ -61,11 +61,11 @@ def robot_shapes(scene: Scene, meshes: bool) -> list[Drawn]:
             shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
             shapes.append(Drawn(body.index(), shape, X_LS, colour))
     drawn = {one.body for one in shapes}
-    kinds = {Group.ARM: Kind.ARM, Group.BODY: Kind.ROBOT}
+    colourings = {Group.ARM: Category.ARM, Group.BODY: Category.ROBOT}
     for part in parts:
         if part.body not in drawn:
             shape, X_LS = inspector.GetShape(part.geometry), inspector.GetPoseInFrame(part.geometry)
-            shapes.append(Drawn(part.body, shape, X_LS, rgba(kinds[part.group].colour)))
+            shapes.append(Drawn(part.body, shape, X_LS, rgba(colourings[part.group].colour)))
     return shapes
 
 

@@ -9,8 +9,10 @@ REASON_TEXTS = {
     Reason.TOO_FAR: "too far for the arm",
     Reason.JOINT_LIMITS: "no arm posture within the joint limits",
     Reason.BODY_BLOCKED: "the robot's body would touch something",
-    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "the gripper would touch the environment at the goal",
-    Reason.GRIPPER_BLOCKED_BY_ROBOT: "the gripper would touch the robot at the goal",
+    Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: (
+        "the gripper at the goal would touch the environment or the person, wherever the robot is"
+    ),
+    Reason.GRIPPER_BLOCKED_BY_ROBOT: "the gripper at the goal would touch the robot's own body",
     Reason.ARM_BLOCKED: "every arm posture would touch something",
 }
 """Each reason as part of a sentence."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.output.draw import Box, Cloud, Group, as_png, as_svg, draw_boxes, draw_clouds
+from tcs.output.draw import BoxGroup, BoxPlot, Cloud, as_png, as_svg, draw_boxes, draw_clouds
 
 SERIES = ("ours", "theirs")
 
@@ -14,8 +14,8 @@ SERIES = ("ours", "theirs")
 def groups(rng):
     samples = rng.uniform(20.0, 80.0, 500)
     return [
-        Group("first", [Box(0, samples, (60.0, 45.0)), Box(1, samples - 10.0)]),
-        Group("second", [Box(0, np.full(100, 100.0))]),
+        BoxGroup("first", [BoxPlot(0, samples, (60.0, 45.0)), BoxPlot(1, samples - 10.0)]),
+        BoxGroup("second", [BoxPlot(0, np.full(100, 100.0))]),
     ]
 
 

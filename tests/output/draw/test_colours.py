@@ -8,14 +8,14 @@ import matplotlib
 import numpy as np
 import pytest
 
-from tcs.output.draw import Kind, colours
+from tcs.output.draw import Category, colours
 from tests.output.draw.vision import VISION, as_seen, difference
 
 CLEAR = 15.0
 """A difference seen at a glance: 2.3 is just noticeable (Mahy, Van Eycken and Oosterlinck, 1994),
 this is six times as much."""
 SCALE = [tuple(c) for c in matplotlib.colormaps[colours.SCALE](np.linspace(0.0, 1.0, 65))[:, :3]]
-IN_SPACE = {kind.label: kind.colour for kind in Kind}
+IN_SPACE = {kind.label: kind.colour for kind in Category}
 FROM_ABOVE = {
     "furniture": colours.FURNITURE,
     "person": colours.PERSON,

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from tcs.output.draw.floor_plan import draw_scale_bar, draw_stand, frame
+from tcs.output.draw.floor_plan import draw_base, draw_scale_bar, frame
 from tests.output.draw.test_map import SQUARE, stand
 
 
@@ -31,7 +31,7 @@ def test_the_scale_bar_is_as_long_as_it_says(axes, width, said):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi])
 def test_the_base_is_drawn_to_scale_and_headed(axes, yaw):
-    draw_stand(axes, stand(x=1.0, y=2.0, yaw=yaw), label="1")
+    draw_base(axes, stand(x=1.0, y=2.0, yaw=yaw), label="1")
     outline = [patch for patch in axes.patches if isinstance(patch, Polygon)][-1].get_xy()[:-1]
     sides = np.linalg.norm(np.diff(outline, axis=0), axis=1)
     np.testing.assert_allclose(sides, [0.6, 0.4, 0.6], atol=1e-12)

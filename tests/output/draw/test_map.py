@@ -5,7 +5,15 @@ import pytest
 
 from tcs.kernel.arrays import BOX
 from tcs.model.grid import InitialConfiguration
-from tcs.output.draw import Kind, PlaceMap, Solid, Stand, draw_map, primitive_corners, save_figure
+from tcs.output.draw import (
+    BaseFootprint,
+    Category,
+    PlaceMap,
+    Solid,
+    draw_map,
+    primitive_corners,
+    save_figure,
+)
 from tests.placement.tables.small import random_scores, small_grid
 
 SQUARE = np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]])
@@ -13,7 +21,7 @@ SQUARE = np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]])
 
 def stand(x=1.0, y=2.0, yaw=0.0, **more):
     at = InitialConfiguration(base_x=x, base_y=y, base_yaw=yaw, torso=0.15, **more)
-    return Stand(at, SQUARE)
+    return BaseFootprint(at, SQUARE)
 
 
 @pytest.fixture
@@ -25,7 +33,7 @@ def places():
 @pytest.fixture
 def chair():
     corners = primitive_corners(BOX, (0.2, 0.1, 0.3))
-    return Solid.placed(Kind.FURNITURE, corners, np.eye(3), [0.0, 0.3, 0.3])
+    return Solid.placed(Category.FURNITURE, corners, np.eye(3), [0.0, 0.3, 0.3])
 
 
 def words(figure):

@@ -3,7 +3,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from tcs.kernel.arrays import BOX, SPHERE
-from tcs.output.draw import Kind, Solid, View, draw_scene, primitive_corners
+from tcs.output.draw import Category, ScenePanel, Solid, draw_scene, primitive_corners
 
 
 @pytest.fixture(autouse=True)
@@ -20,7 +20,7 @@ SUBJECT = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 1.8]])
 
 
 def view(*solids, azimuths=(0.0,), subject=SUBJECT):
-    return View(solids, subject, azimuths, "caption")
+    return ScenePanel(solids, subject, azimuths, "caption")
 
 
 def picture(figure, panel=0):
@@ -38,7 +38,7 @@ def share(image, kind):
 def test_what_is_nearer_hides_what_is_behind():
     # The camera looks from +x.
     near, far = [1.0, 0.0, 1.3], [-1.0, 0.0, 0.6]
-    for kinds in ((Kind.ARM, Kind.PERSON), (Kind.PERSON, Kind.ARM)):
+    for kinds in ((Category.ARM, Category.PERSON), (Category.PERSON, Category.ARM)):
         image = picture(
             draw_scene([view(ball(kinds[0], near), ball(kinds[1], far, 0.1))], title="")
         )
@@ -47,9 +47,9 @@ def test_what_is_nearer_hides_what_is_behind():
 
 
 def test_solids_that_pass_through_one_another_are_both_seen():
-    both = (ball(Kind.ARM, [0.0, -0.1, 1.0]), ball(Kind.PERSON, [0.0, 0.1, 1.0]))
+    both = (ball(Category.ARM, [0.0, -0.1, 1.0]), ball(Category.PERSON, [0.0, 0.1, 1.0]))
     image = picture(draw_scene([view(*both)], title=""))
-    arm, person = share(image, Kind.ARM), share(image, Kind.PERSON)
+    arm, person = share(image, Category.ARM), share(image, Category.PERSON)
     # Mirror images of one another but for the light.
     assert arm == pytest.approx(person, rel=0.15)
     assert arm > 0.01
@@ -59,12 +59,12 @@ def test_solids_that_pass_through_one_another_are_both_seen():
 def test_the_side_that_shows_the_goals_is_taken(order):
     wall = primitive_corners(BOX, (0.05, 2.0, 2.0))
     solids = (
-        Solid.placed(Kind.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
-        ball(Kind.GOAL, [0.0, 0.0, 1.0], 0.2),
+        Solid.placed(Category.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
+        ball(Category.GOAL, [0.0, 0.0, 1.0], 0.2),
     )
     # From +x the wall is in the way.
     image = picture(draw_scene([view(*solids, azimuths=order)], title=""))
-    assert share(image, Kind.GOAL) > 0.002
+    assert share(image, Category.GOAL) > 0.002
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 1.0, -2.5])
@@ -72,10 +72,10 @@ def test_the_side_that_shows_the_goals_is_taken(order):
 def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     ends = {"high": [[0, 0, 0.1], [0, 0, 1.9]], "wide": [1.3 * across, -1.3 * across]}[subject]
-    solids = [ball(Kind.ARM, end, 0.1) for end in ends]
+    solids = [ball(Category.ARM, end, 0.1) for end in ends]
     points = np.concatenate([solid.corners for solid in solids])
     image = picture(draw_scene([view(*solids, azimuths=(azimuth,), subject=points)], title=""))
-    hit = np.abs(image - np.array(to_rgb(Kind.ARM.colour))).max(axis=-1) < 0.5
+    hit = np.abs(image - np.array(to_rgb(Category.ARM.colour))).max(axis=-1) < 0.5
     blue = hit & (image[..., 2] > image[..., 0] + 0.1)
     rows, columns = np.flatnonzero(blue.any(axis=1)), np.flatnonzero(blue.any(axis=0))
     found = rows if subject == "high" else columns
@@ -87,11 +87,11 @@ def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
 
 def test_the_other_side_of_the_subject_is_in_the_picture_too():
     corners = np.array(np.meshgrid([-1.0, 1.0], [-0.7, 0.7], [0.0, 1.5])).reshape(3, -1).T
-    marks = [ball(Kind.CURRENT_GOAL, corner, 0.06) for corner in corners]
+    marks = [ball(Category.CURRENT_GOAL, corner, 0.06) for corner in corners]
     for azimuth in np.linspace(0.0, 2 * np.pi, 7):
         points = np.concatenate([mark.corners for mark in marks])
         image = picture(draw_scene([view(*marks, azimuths=(azimuth,), subject=points)], title=""))
-        red = np.array(to_rgb(Kind.CURRENT_GOAL.colour))
+        red = np.array(to_rgb(Category.CURRENT_GOAL.colour))
         assert np.all(np.abs(image[[0, -1]] - red).max(axis=-1) > 0.2)
         assert np.all(np.abs(image[:, [0, -1]] - red).max(axis=-1) > 0.2)
 
@@ -101,7 +101,7 @@ def test_no_edge_within_a_surface_that_two_solids_share():
     turned = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     # One cube twice, cut into other triangles: which is nearer is up to rounding, pixel by pixel.
-    cubes = [Solid.placed(Kind.ARM, corners, R, [0, 0, 1]) for R in (turned, turned @ quarter)]
+    cubes = [Solid.placed(Category.ARM, corners, R, [0, 0, 1]) for R in (turned, turned @ quarter)]
     one, both = (picture(draw_scene([view(*some)], title="")) for some in (cubes[:1], cubes))
     # Within a face: away from where it ends, and from the floor.
     from scipy.ndimage import maximum_filter, minimum_filter
@@ -113,22 +113,22 @@ def test_no_edge_within_a_surface_that_two_solids_share():
 
 
 def test_goals_have_the_colour_of_the_legend():
-    image = picture(draw_scene([view(ball(Kind.GOAL, [0.0, 0.0, 1.0]))], title=""))
+    image = picture(draw_scene([view(ball(Category.GOAL, [0.0, 0.0, 1.0]))], title=""))
     middle = image[image.shape[0] // 2, image.shape[1] // 2]
-    np.testing.assert_allclose(middle, to_rgb(Kind.GOAL.colour), atol=1e-6)
+    np.testing.assert_allclose(middle, to_rgb(Category.GOAL.colour), atol=1e-6)
 
 
 def test_one_panel_for_each_view_and_a_legend():
-    views = [view(ball(Kind.ARM, [0, 0, 1])), view(ball(Kind.CURRENT_GOAL, [0, 0, 1]))]
+    views = [view(ball(Category.ARM, [0, 0, 1])), view(ball(Category.CURRENT_GOAL, [0, 0, 1]))]
     figure = draw_scene(views, title="both stops")
     assert len(figure.axes) == 2
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == [Kind.ARM.label, Kind.CURRENT_GOAL.label]
+    assert labels == [Category.ARM.label, Category.CURRENT_GOAL.label]
 
 
 def test_what_is_behind_the_camera_is_left_out():
-    image = picture(draw_scene([view(ball(Kind.ARM, [18.0, 0.0, 7.0]))], title=""))
-    assert share(image, Kind.ARM) == 0.0
+    image = picture(draw_scene([view(ball(Category.ARM, [18.0, 0.0, 7.0]))], title=""))
+    assert share(image, Category.ARM) == 0.0
 
 
 WALL = primitive_corners(BOX, (0.05, 2.0, 1.2))
@@ -139,16 +139,16 @@ def walls(*angles, distance=1.5, height=1.2):
     for angle in angles:
         c, s = np.cos(angle), np.sin(angle)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        yield Solid.placed(Kind.FURNITURE, WALL, R, [distance * c, distance * s, height])
+        yield Solid.placed(Category.FURNITURE, WALL, R, [distance * c, distance * s, height])
 
 
 @pytest.mark.parametrize("azimuths", [(0.0,), (0.5, -2.2), (0.8, 2.4, -0.8, -2.4)])
 def test_the_walls_of_a_room_do_not_hide_what_is_inside(azimuths):
-    inside = (ball(Kind.PERSON, [0.0, -0.4, 1.0]), ball(Kind.ARM, [0.0, 0.4, 1.0]))
+    inside = (ball(Category.PERSON, [0.0, -0.4, 1.0]), ball(Category.ARM, [0.0, 0.4, 1.0]))
     around = walls(0.0, np.pi / 2, np.pi, -np.pi / 2)
     open_figure = draw_scene([view(*inside, azimuths=azimuths)], title="")
     figure = draw_scene([view(*inside, *around, azimuths=azimuths)], title="")
-    for kind in (Kind.PERSON, Kind.ARM):
+    for kind in (Category.PERSON, Category.ARM):
         expected = share(picture(open_figure), kind)
         assert expected > 0.01
         assert share(picture(figure), kind) == pytest.approx(expected, rel=0.1)
@@ -157,21 +157,21 @@ def test_the_walls_of_a_room_do_not_hide_what_is_inside(azimuths):
 
 
 def test_the_wall_behind_stays():
-    person = ball(Kind.PERSON, [0.0, 0.0, 1.0])
+    person = ball(Category.PERSON, [0.0, 0.0, 1.0])
     image = picture(draw_scene([view(person, *walls(0.0, np.pi))], title=""))
-    assert share(image, Kind.FURNITURE) > 0.1
+    assert share(image, Category.FURNITURE) > 0.1
 
 
 def test_a_side_without_a_wall_is_preferred():
-    inside = (ball(Kind.PERSON, [0.0, 0.0, 1.0]), ball(Kind.GOAL, [0.25, 0.0, 1.0], 0.15))
+    inside = (ball(Category.PERSON, [0.0, 0.0, 1.0]), ball(Category.GOAL, [0.25, 0.0, 1.0], 0.15))
     # The goal is on the side of the wall.
     figure = draw_scene([view(*inside, *walls(0.0), azimuths=(0.0, np.pi / 2))], title="")
-    assert share(picture(figure), Kind.PERSON) > 0.01
+    assert share(picture(figure), Category.PERSON) > 0.01
     assert "left out" not in figure.axes[0].get_title()
 
 
 def test_low_furniture_is_never_left_out():
-    low = Solid.placed(Kind.FURNITURE, WALL * [1.0, 1.0, 0.6], np.eye(3), [0.6, 0.0, 0.72])
-    figure = draw_scene([view(ball(Kind.PERSON, [0.0, 0.0, 0.5]), low)], title="")
-    assert share(picture(figure), Kind.FURNITURE) > 0.1
+    low = Solid.placed(Category.FURNITURE, WALL * [1.0, 1.0, 0.6], np.eye(3), [0.6, 0.0, 0.72])
+    figure = draw_scene([view(ball(Category.PERSON, [0.0, 0.0, 0.5]), low)], title="")
+    assert share(picture(figure), Category.FURNITURE) > 0.1
     assert "left out" not in figure.axes[0].get_title()

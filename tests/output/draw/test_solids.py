@@ -3,7 +3,7 @@ import pytest
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
-from tcs.output.draw import Kind, Solid, primitive_corners
+from tcs.output.draw import Category, Solid, primitive_corners
 from tcs.output.draw.solids import outline
 
 EYE, ORIGIN = np.eye(3), np.zeros(3)
@@ -31,7 +31,9 @@ def area(polygon):
     ],
 )
 def test_surface_is_closed_and_faces_outward(kind, size, exact, rel):
-    got = volume(Solid.placed(Kind.PERSON, primitive_corners(kind, size), EYE, ORIGIN).triangles)
+    got = volume(
+        Solid.placed(Category.PERSON, primitive_corners(kind, size), EYE, ORIGIN).triangles
+    )
     assert got == pytest.approx(exact, rel=rel)
     assert got <= exact * (1 + 1e-12)
 
@@ -50,14 +52,14 @@ def test_unknown_shape():
 def test_placed_solid_turns_then_moves():
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     corners = primitive_corners(BOX, (0.5, 0.1, 0.1))
-    solid = Solid.placed(Kind.ROBOT, corners, quarter, [1.0, 2.0, 0.0])
+    solid = Solid.placed(Category.ROBOT, corners, quarter, [1.0, 2.0, 0.0])
     np.testing.assert_allclose(solid.corners.max(axis=0), [1.1, 2.5, 0.1], atol=1e-15)
 
 
 def test_footprint_of_a_tilted_box_is_its_shadow():
     c = s = np.sqrt(0.5)
     tilt = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    solid = Solid.placed(Kind.FURNITURE, primitive_corners(BOX, (0.5, 0.5, 0.5)), tilt, ORIGIN)
+    solid = Solid.placed(Category.FURNITURE, primitive_corners(BOX, (0.5, 0.5, 0.5)), tilt, ORIGIN)
     # A unit cube on its edge casts a shadow sqrt(2) wide.
     assert area(solid.footprint) == pytest.approx(np.sqrt(2.0), rel=1e-12)
 

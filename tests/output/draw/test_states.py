@@ -7,7 +7,7 @@ import pytest
 
 from tcs.errors import GridError
 from tcs.kernel.arrays import BOX
-from tcs.output.draw import Kind, PlaceMap, Solid, StatePanel, draw_states, primitive_corners
+from tcs.output.draw import Category, PlaceMap, Solid, StatePanel, draw_states, primitive_corners
 from tests.output.draw.test_map import stand, words
 from tests.placement.tables.small import random_scores, small_grid
 
@@ -19,7 +19,7 @@ SCORES = random_scores(GRID, 3, seed=4, share=0.3)
 def panels():
     """Two heights by three head rests; the second member wants the state at the top right."""
     corners = primitive_corners(BOX, (0.2, 0.1, 0.3))
-    person = Solid.placed(Kind.PERSON, corners, np.eye(3), [0.0, 0.3, 0.3])
+    person = Solid.placed(Category.PERSON, corners, np.eye(3), [0.0, 0.3, 0.3])
     members = {5: [(2, stand(x=-0.5, y=0.3))], 0: [(1, stand(x=0.1, y=0.5))]}
     found = [
         StatePanel(PlaceMap.of_state(SCORES, GRID, state), [person], members.get(state, []))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tcs.model.scene import Scene, SceneSpec, load_environment
-from tcs.output.draw import Kind
-from tcs.output.report.pictures import room_parts
+from tcs.output.draw import Category
+from tcs.output.report.scene_solids import environment_parts
 
 COUNTER = """
 <sdf version="1.9">
@@ -19,10 +19,10 @@ COUNTER = """
 """
 
 
-def kinds(pr2, path) -> dict[str, set[Kind]]:
+def kinds(pr2, path) -> dict[str, set[Category]]:
     """Return what the shapes of each model are shown as."""
-    found: dict[str, set[Kind]] = {}
-    for part, kind in room_parts(Scene(SceneSpec(pr2, load_environment(path)))):
+    found: dict[str, set[Category]] = {}
+    for part, kind in environment_parts(Scene(SceneSpec(pr2, load_environment(path)))):
         found.setdefault(part.name.split("::")[0], set()).add(kind)
     return found
 
@@ -41,16 +41,16 @@ def counter(tmp_path):
 
 
 def test_a_counter_with_a_body_frame_is_furniture(pr2, counter):
-    assert kinds(pr2, counter) == {"counter": {Kind.FURNITURE}}
+    assert kinds(pr2, counter) == {"counter": {Category.FURNITURE}}
 
 
 def test_the_person_of_the_wheelchair_is_the_person(pr2):
     assert kinds(pr2, "wheelchair") == {
-        "wheelchair": {Kind.FURNITURE},
-        "person": {Kind.PERSON},
+        "wheelchair": {Category.FURNITURE},
+        "person": {Category.PERSON},
     }
 
 
 def test_a_file_names_its_person(pr2, counter):
     counter.write_text(counter.read_text() + "person: counter\n")
-    assert kinds(pr2, counter) == {"counter": {Kind.PERSON}}
+    assert kinds(pr2, counter) == {"counter": {Category.PERSON}}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import SelectionError
-from tcs.output.report.pictures import Shown
+from tcs.output.report.shown_set import ShownSet
 from tcs.output.report.states import has_states, states_figure
 from tcs.placement.scoring import score
 from tests.environments import write_environment
@@ -32,7 +32,7 @@ def file(tmp_path_factory):
 
 
 def test_each_panel_shows_its_own_state(file):
-    shown = Shown.of(file, None)
+    shown = ShownSet.of(file, None)
     figure = states_figure(file, shown)
     panels = figure.axes[:6]
     scores = file.nominal.scores
@@ -48,7 +48,7 @@ def test_each_panel_shows_its_own_state(file):
 
 
 def test_members_stand_in_the_panel_of_the_state_they_want(file):
-    shown = Shown.of(file, None)
+    shown = ShownSet.of(file, None)
     figure = states_figure(file, shown, "manipulability")
     for number, member in enumerate(shown.members, start=1):
         wanted = dict(member.environment)
@@ -63,7 +63,7 @@ def test_members_stand_in_the_panel_of_the_state_they_want(file):
 
 
 def test_the_person_is_drawn_as_the_head_rest_has_them(file):
-    figure = states_figure(file, Shown.of(file, None))
+    figure = states_figure(file, ShownSet.of(file, None))
     flat, raised = (
         [p.vertices for p in axes.collections[2].get_paths()] for axes in figure.axes[:2]
     )
@@ -75,7 +75,7 @@ def test_a_room_without_states_has_one_map():
     file = score_file(grid=small_grid(nx=3, ny=2))
     assert not has_states(file)
     with pytest.raises(SelectionError, match=r"has nothing to set.*without --states"):
-        states_figure(file, Shown.of(file, None))
+        states_figure(file, ShownSet.of(file, None))
 
 
 def test_too_many_states_are_refused():
@@ -84,10 +84,10 @@ def test_too_many_states_are_refused():
     file = score_file(grid=small_grid(nx=2, ny=2, yaws=1, torsos=1, bed=21, head=3))
     assert not has_states(file)
     with pytest.raises(SelectionError, match="63 states, of which 60 at most"):
-        states_figure(file, Shown.of(file, None))
+        states_figure(file, ShownSet.of(file, None))
 
 
 def test_words_of_a_panel(file):
-    said = words(states_figure(file, Shown.of(file, None)))
+    said = words(states_figure(file, ShownSet.of(file, None)))
     for word in ("best place", "head rest 70°", "person", "Each place: best of all headings."):
         assert word in said

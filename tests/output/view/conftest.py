@@ -3,24 +3,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.output.view import Answers, Props
+from tcs.output.view import SceneObjects, ViewedSet
 from tcs.placement.tables import ScoreTable, SuccessTable
 from tests.placement.tables.small import random_scores, small_grid
 
 
-def made(grid, goals, members, *, share=0.5, success=None) -> Answers:
-    """Random answers."""
-    return Answers(grid, random_scores(grid, goals, seed=3, share=share), members, success)
+def made(grid, goals, members, *, share=0.5, success=None) -> ViewedSet:
+    """Random viewed."""
+    return ViewedSet(grid, random_scores(grid, goals, seed=3, share=share), members, success)
 
 
 @pytest.fixture
-def bed() -> Answers:
+def bed() -> ViewedSet:
     """Answers for a bed of three heights and a head rest of two angles."""
     return made(small_grid(bed=3, head=2), 4, (50, 200))
 
 
 @pytest.fixture
-def estimated(bed) -> Answers:
+def estimated(bed) -> ViewedSet:
     """The same, with estimates of success of two singles and a pair."""
     nobody = -1
     table = SuccessTable(
@@ -30,19 +30,19 @@ def estimated(bed) -> Answers:
         high=np.array([0.3, 0.8, 0.95]),
         samples=np.full(3, 100, np.int32),
     )
-    return Answers(bed.grid, bed.scores, bed.members, table)
+    return ViewedSet(bed.grid, bed.scores, bed.members, table)
 
 
 @pytest.fixture
-def shaving_answers(shaving) -> Answers:
+def shaving_set(shaving) -> ViewedSet:
     """Random answers for shaving in the wheelchair: what is shown, not what is true."""
     return made(small_grid(), len(shaving.goals), (5, 30))
 
 
 @pytest.fixture
-def props(scene, shaving, shaving_answers) -> Props:
+def objects(scene, shaving, shaving_set) -> SceneObjects:
     """Their things, the robot as its collision shapes."""
-    return Props(scene, shaving, shaving_answers, meshes=False)
+    return SceneObjects(scene, shaving, shaving_set, meshes=False)
 
 
 def one_configuration(reason, pair=None) -> ScoreTable:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tcs.model.scene import Scene
-from tcs.output.view import Props, Viewer, open_meshcat
+from tcs.output.view import SceneObjects, Viewer, open_meshcat
 from tests.output.view.browser import chromium
 
 pytestmark = pytest.mark.slow
@@ -16,10 +16,10 @@ def page():
 
 
 @pytest.fixture
-def viewer(spec, shaving, shaving_answers):
-    props = Props(Scene(spec, meshes=True), shaving, shaving_answers, meshes=True)
+def viewer(spec, shaving, shaving_set):
+    objects = SceneObjects(Scene(spec, meshes=True), shaving, shaving_set, meshes=True)
     meshcat = open_meshcat()
-    found = Viewer(meshcat, props, shaving_answers, lambda _: None)
+    found = Viewer(meshcat, objects, shaving_set, lambda _: None)
     found.url = meshcat.web_url()
     return found
 
@@ -32,9 +32,9 @@ def live(page, viewer):
     return page
 
 
-def expected(answers, index):
+def expected(viewed, index):
     """The arrows that should be seen."""
-    return {g: [one.name.lower()] for g, one in enumerate(answers.verdict(index).reasons)}
+    return {g: [one.name.lower()] for g, one in enumerate(viewed.result(index).reasons)}
 
 
 def changed(before, after):
@@ -52,21 +52,21 @@ def controller(page, name):
     )
 
 
-def test_viewer_shows_and_answers(live, viewer, shaving_answers):
+def test_viewer_shows_and_answers(live, viewer, shaving_set):
     assert changed(live.picture(), live.picture("robot")) > 3000
     assert changed(live.picture(), live.picture("room")) > 3000
     assert changed(live.picture(), live.picture("goals")) > 50
     # The map lies under both.
     bare = live.picture("robot", "room")
     assert changed(bare, live.picture("robot", "room", "floor")) > 300
-    here = int(shaving_answers.grid.flat(viewer.state.along))
-    assert live.arrows() == expected(shaving_answers, here)
+    here = int(shaving_set.grid.flat(viewer.state.along))
+    assert live.arrows() == expected(shaving_set, here)
     assert live.complaints() == []
     ours = (viewer.url, "data:", "blob:")
     assert [name for name in live.fetched() if not name.startswith(ours)] == []
 
 
-def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_answers):
+def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_set):
     from selenium.webdriver import ActionChains
 
     live.driver.execute_script("viewer.gui.open()")
@@ -78,12 +78,12 @@ def test_sliders_and_keys_change_what_the_arrows_show(live, viewer, shaving_answ
     right = slider.size["width"] // 2 - 3
     ActionChains(live.driver).move_to_element_with_offset(slider, right, 0).click().perform()
     live.wait(viewer.look)
-    there = int(shaving_answers.grid.flat(viewer.state.along))
-    assert shaving_answers.grid.configuration(there).base_x == pytest.approx(-0.1)
-    live.wait(lambda: live.arrows() == expected(shaving_answers, there))
+    there = int(shaving_set.grid.flat(viewer.state.along))
+    assert shaving_set.grid.configuration(there).base_x == pytest.approx(-0.1)
+    live.wait(lambda: live.arrows() == expected(shaving_set, there))
     assert live.arrows() != before
     goal = viewer.state.goal
     ActionChains(live.driver).send_keys("g").perform()
     live.wait(viewer.look)
-    assert viewer.state.goal == (goal + 1) % shaving_answers.goals
+    assert viewer.state.goal == (goal + 1) % shaving_set.goals
     assert live.complaints() == []

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from tcs.output.view import Answers, Controls
+from tcs.output.view import Controls, ViewedSet
 from tcs.output.view.controls import BACK, NEXT_COLOUR, NEXT_GOAL, NEXT_MEMBER
 from tests.output.view.conftest import made
 from tests.placement.tables.small import small_grid
@@ -88,20 +88,20 @@ def test_a_member_shows_a_goal_it_reaches(bed):
 
 def test_goals_and_colours_are_stepped_through_in_rings(estimated):
     controls = Controls(estimated)
-    state, goals, kinds = controls.first(), [], []
+    state, goals, colourings = controls.first(), [], []
     for _ in range(estimated.goals):
         goals.append(state.goal)
         state = controls.clicked(state, NEXT_GOAL)
     for _ in range(4):
-        kinds.append(state.kind)
+        colourings.append(state.colouring)
         state = controls.clicked(state, NEXT_COLOUR)
     assert sorted(goals) == list(range(estimated.goals))
-    assert kinds == ["reachability", "manipulability", "reason", "success"]
+    assert colourings == ["reachability", "manipulability", "reason", "success"]
     assert state == controls.first()
 
 
 def test_without_a_set_one_can_still_stand_somewhere(bed):
-    nothing = Answers(bed.grid, bed.scores, (), None)
+    nothing = ViewedSet(bed.grid, bed.scores, (), None)
     controls = Controls(nothing)
     state = controls.first()
     assert "set member" not in controls.values(state)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tcs.model.scene import Scene
-from tcs.output.view import Answers, Props, export, open_meshcat, page, script
+from tcs.output.view import SceneObjects, ViewedSet, export, export_page, open_meshcat, play_steps
 from tests.output.view.browser import chromium
 
 
 def test_every_goal_of_the_set_is_shown_once_at_the_member_that_serves_it_best(bed):
-    steps = script(bed)
+    steps = play_steps(bed)
     reached = bed.scores.reached[list(bed.members)].any(axis=0)
     assert sorted(step.goal for step in steps) == list(reached.nonzero()[0])
     for step in steps:
@@ -19,15 +19,15 @@ def test_every_goal_of_the_set_is_shown_once_at_the_member_that_serves_it_best(b
         assert bed.joints(step.index, step.goal) is not None
 
 
-def test_without_a_set_something_is_shown_all_the_same(props, shaving_answers):
-    nothing = Answers(shaving_answers.grid, shaving_answers.scores, (), None)
-    assert len(script(nothing)) == 1
-    assert "No goal is reached" in page(open_meshcat(), props, nothing, title="Nothing")
+def test_without_a_set_something_is_shown_all_the_same(objects, shaving_set):
+    nothing = ViewedSet(shaving_set.grid, shaving_set.scores, (), None)
+    assert len(play_steps(nothing)) == 1
+    assert "No goal is reached" in export_page(open_meshcat(), objects, nothing, title="Nothing")
 
 
-def test_page_tells_what_it_is_and_fits_into_three_megabytes(props, shaving_answers):
-    text = page(
-        open_meshcat(), props, shaving_answers, title="Shaving & more", notes=["By <nobody>."]
+def test_page_tells_what_it_is_and_fits_into_three_megabytes(objects, shaving_set):
+    text = export_page(
+        open_meshcat(), objects, shaving_set, title="Shaving & more", notes=["By <nobody>."]
     )
     assert "Shaving &amp; more" in text
     assert "By &lt;nobody&gt;." in text
@@ -49,10 +49,10 @@ class Recorder:
         self.shown.setdefault(path, {})[frame] = visible
 
 
-def test_whatever_is_shown_stands_still_until_the_next_goal(props, shaving_answers, monkeypatch):
+def test_whatever_is_shown_stands_still_until_the_next_goal(objects, shaving_set, monkeypatch):
     """The browser moves things in straight lines between keys: there must be none to move along."""
     monkeypatch.setattr(export, "MeshcatAnimation", Recorder)
-    shots = [props.snapshot(step.index, step.goal) for step in script(shaving_answers)]
+    shots = [objects.snapshot(step.index, step.goal) for step in play_steps(shaving_set)]
     seen = [set(map(str, shot.arrows)) for shot in shots]
     assert len({frozenset(one) for one in seen}) > 1
     found = export._animation(shots, seen)
@@ -73,9 +73,9 @@ def test_whatever_is_shown_stands_still_until_the_next_goal(props, shaving_answe
             assert keys[max(key for key in keys if key <= number * hold)] == (path in one)
 
 
-def test_captions_tell_when_each_member_is_shown(shaving_answers):
-    steps = script(shaving_answers)
-    lines = export._captions(shaving_answers, steps)
+def test_captions_tell_when_each_member_is_shown(shaving_set):
+    steps = play_steps(shaving_set)
+    lines = export._captions(shaving_set, steps)
     times = [tuple(map(float, line.split(" s:")[0].split(" to "))) for line in lines]
     assert times[0][0] == 0.0
     assert [start for start, _ in times[1:]] == [end for _, end in times[:-1]]
@@ -84,14 +84,12 @@ def test_captions_tell_when_each_member_is_shown(shaving_answers):
 
 @pytest.mark.parametrize("name", ["pr2", "tiago"])
 @pytest.mark.slow
-def test_page_with_meshes_fits_into_fifteen_megabytes(
-    spec, shaving, shaving_answers, name, request
-):
+def test_page_with_meshes_fits_into_fifteen_megabytes(spec, shaving, shaving_set, name, request):
     from tcs.model.robots import load_robot
 
     scene = Scene(dataclasses.replace(spec, robot=load_robot(name)), meshes=True)
-    props = Props(scene, shaving, shaving_answers, meshes=True)
-    text = page(open_meshcat(), props, shaving_answers, title="Meshes")
+    objects = SceneObjects(scene, shaving, shaving_set, meshes=True)
+    text = export_page(open_meshcat(), objects, shaving_set, title="Meshes")
     assert 3e6 < len(text.encode()) < 15e6
 
 
@@ -101,13 +99,13 @@ def browser():
 
 
 @pytest.mark.slow
-def test_page_plays_through_the_set_without_a_server(browser, props, shaving_answers, tmp_path):
+def test_page_plays_through_the_set_without_a_server(browser, objects, shaving_set, tmp_path):
     meshcat = open_meshcat()
     path = tmp_path / "scene.html"
-    path.write_text(page(meshcat, props, shaving_answers, title="Shaving"))
+    path.write_text(export_page(meshcat, objects, shaving_set, title="Shaving"))
     del meshcat
     browser.open(path.as_uri(), "robot")
-    steps = script(shaving_answers)
+    steps = play_steps(shaving_set)
     seek = "viewer.animator.pause(); viewer.animator.seek(arguments[0]);"
     where = """
     const p = viewer.scene_tree.find(["drake", "robot"]).object.position; return [p.x, p.y, p.z];
@@ -115,10 +113,10 @@ def test_page_plays_through_the_set_without_a_server(browser, props, shaving_ans
     for number, step in enumerate(steps):
         # In the middle of its second and a half.
         browser.driver.execute_script(seek, 1.5 * number + 0.75)
-        verdict = shaving_answers.verdict(step.index)
-        shown = {g: [one.name.lower()] for g, one in enumerate(verdict.reasons)}
+        result = shaving_set.result(step.index)
+        shown = {g: [one.name.lower()] for g, one in enumerate(result.reasons)}
         assert browser.arrows() == shown
-        at = verdict.configuration
+        at = result.configuration
         x, y, z = browser.driver.execute_script(where)
         assert (x, y, z) == pytest.approx((at.base_x, at.base_y, 0.0), abs=1e-6)
     assert {step.member for step in steps} == {0, 1}

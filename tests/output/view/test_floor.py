@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tcs.output.view import floor_of
-from tcs.output.view.floor import kinds
+from tcs.output.view import floor_map
+from tcs.output.view.floor import colourings
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason, SuccessTable
 
@@ -20,20 +20,20 @@ ORDER = [
 ]  # fmt: skip
 
 
-def configurations_at(answers, state, x, y):
+def configurations_at(viewed, state, x, y):
     """Flat indices of every way to stand at a place."""
     found = []
-    heights, heads = answers.grid.environment_shape
+    heights, heads = viewed.grid.environment_shape
     at = np.unravel_index(state, (heights, heads))
-    *_, yaws, torsos = answers.grid.shape
+    *_, yaws, torsos = viewed.grid.shape
     for yaw, torso in itertools.product(range(yaws), range(torsos)):
-        found.append(int(answers.grid.flat([*at, x, y, yaw, torso])))
+        found.append(int(viewed.grid.flat([*at, x, y, yaw, torso])))
     return found
 
 
 @pytest.mark.parametrize("state", [0, 4])
 def test_reason_is_the_one_that_came_nearest(bed, state):
-    floor = floor_of(bed, state, 2, "reason")
+    floor = floor_map(bed, state, 2, "reason")
     nx, ny = bed.grid.axis("base_x").count, bed.grid.axis("base_y").count
     assert len(floor.places) == nx * ny
     for k, (x, y) in enumerate(itertools.product(range(nx), range(ny))):
@@ -42,10 +42,10 @@ def test_reason_is_the_one_that_came_nearest(bed, state):
 
 
 @pytest.mark.parametrize("kind", ["reachability", "manipulability"])
-def test_colours_rise_with_the_best_score_of_a_place(bed, kind):
+def test_colours_rise_with_the_best_score_of_a_place(bed, colouring):
     state = 3
-    floor = floor_of(bed, state, 0, kind)
-    scores = getattr(bed.scores, kind)()
+    floor = floor_map(bed, state, 0, colouring)
+    scores = getattr(bed.scores, colouring)()
     x, y = bed.grid.axis("base_x").values, bed.grid.axis("base_y").values
     best = []
     for place in floor.places:
@@ -61,17 +61,17 @@ def test_colours_rise_with_the_best_score_of_a_place(bed, kind):
 def test_success_lies_where_a_single_place_has_an_estimate(estimated):
     per_state = estimated.grid.size // 6
     for h in (50, 98):
-        floor = floor_of(estimated, h // per_state, 0, "success")
+        floor = floor_map(estimated, h // per_state, 0, "success")
         at = estimated.grid.configuration(h)
         gap = abs(floor.places - [at.base_x, at.base_y]).max(axis=1)
         assert gap.min() < 1e-12
-    assert not len(floor_of(estimated, 5, 0, "success").places)
+    assert not len(floor_map(estimated, 5, 0, "success").places)
 
 
 @pytest.mark.parametrize("kind", ["reason", "manipulability"])
-def test_a_place_is_as_wide_as_the_step_of_the_grid(bed, kind):
+def test_a_place_is_as_wide_as_the_step_of_the_grid(bed, colouring):
     steps = [bed.grid.axis(name).step for name in ("base_x", "base_y")]
-    assert floor_of(bed, 0, 0, kind).half == tuple(step / 2 for step in steps)
+    assert floor_map(bed, 0, 0, colouring).half == tuple(step / 2 for step in steps)
 
 
 def test_success_belongs_to_its_own_state_and_has_the_colour_of_its_value(bed):
@@ -83,14 +83,14 @@ def test_success_belongs_to_its_own_state_and_has_the_colour_of_its_value(bed):
         members=members, success=success, low=success, high=success,
         samples=np.full(2, 100, np.int32),
     )  # fmt: skip
-    answers = dataclasses.replace(bed, success=table)
+    viewed = dataclasses.replace(bed, success=table)
     for state, member, value in ((0, per_state - 1, 0.25), (1, per_state, 0.75)):
-        floor = floor_of(answers, state, 0, "success")
+        floor = floor_map(viewed, state, 0, "success")
         at = bed.grid.configuration(member)
         np.testing.assert_allclose(floor.places, [[at.base_x, at.base_y]], atol=1e-12)
         np.testing.assert_allclose(floor.colours, [matplotlib.colormaps["viridis"](value)[:3]])
 
 
 def test_success_can_be_asked_for_only_where_it_is_stored(bed, estimated):
-    assert kinds(bed) == ("reachability", "manipulability", "reason")
-    assert kinds(estimated) == (*kinds(bed), "success")
+    assert colourings(bed) == ("reachability", "manipulability", "reason")
+    assert colourings(estimated) == (*colourings(bed), "success")

@@ -12,11 +12,11 @@ from pydrake.math import RigidTransform
 
 from tcs.model.scene import Scene, goal_poses
 from tcs.model.tasks import Task
-from tcs.output.draw import Kind, Stand
-from tcs.output.report.pictures import base_outline, room_parts
-from tcs.output.view.answers import Answers
-from tcs.output.view.floor import Floor
+from tcs.output.draw import BaseFootprint, Category
+from tcs.output.report.scene_solids import base_outline, environment_parts
+from tcs.output.view.floor import FloorMap
 from tcs.output.view.shapes import Drawn, draw_ground, draw_shapes, rgba, robot_shapes
+from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason
 
@@ -47,19 +47,19 @@ class Snapshot:
     """The arrows that are seen, one for each goal."""
 
 
-class Props:
+class SceneObjects:
     """The things of one scene."""
 
-    def __init__(self, scene: Scene, task: Task, answers: Answers, *, meshes: bool) -> None:
+    def __init__(self, scene: Scene, task: Task, viewed: ViewedSet, *, meshes: bool) -> None:
         """Look at a scene.
 
         Args:
             scene: A scene of the file; it is moved about. Built with meshes if they are shown.
             task: Its task.
-            answers: What came of its configurations.
+            viewed: What came of its configurations.
             meshes: Whether the robot is shown as its meshes, or as its collision shapes.
         """
-        self._scene, self._task, self._answers = scene, task, answers
+        self._scene, self._task, self._viewed = scene, task, viewed
         # Moves the base, which every snapshot places anew.
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
@@ -73,13 +73,13 @@ class Props:
             index: Flat index of the configuration.
             goal: The goal that is shown. Where it is not reached, the arm rests.
         """
-        verdict = self._answers.verdict(index)
-        scene, at = self._scene, verdict.configuration
+        result = self._viewed.result(index)
+        scene, at = self._scene, result.configuration
         for name, value in at.environment:
             scene.set_joint(name, value)
         scene.place_base(at.base_x, at.base_y, at.base_yaw)
         scene.set_torso(at.torso)
-        joints = self._answers.joints(index, goal)
+        joints = self._viewed.joints(index, goal)
         scene.set_arm(self._rest if joints is None else joints)
         plant, context = scene.built.plant, scene.plant_context
         X_WB = scene.base_pose()
@@ -95,7 +95,7 @@ class Props:
         poses[SHOWN] = RigidTransform(goals[goal].translation())
         return Snapshot(
             {path: X.GetAsMatrix34() for path, X in poses.items()},
-            frozenset(enumerate(verdict.reasons)),
+            frozenset(enumerate(result.reasons)),
         )
 
     def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
@@ -115,16 +115,16 @@ class Props:
             path = arrow_path((goal, reason))
             meshcat.SetTriangleMesh(path, corners, faces, rgba(REASON_COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
-        meshcat.SetObject(SHOWN, Sphere(_BALL), rgba(Kind.CURRENT_GOAL.colour))
+        meshcat.SetObject(SHOWN, Sphere(_BALL), rgba(Category.CURRENT_GOAL.colour))
         self._draw_members(meshcat)
         middle = np.mean([X.translation() for X in goal_poses(self._scene, self._task)], axis=0)
         meshcat.SetCameraPose(middle + _CAMERA, middle)
 
     def _draw_members(self, meshcat: Meshcat) -> None:
         """Draw the outline of the base at each member of the set, and which way it faces."""
-        for number, index in enumerate(self._answers.members):
-            at = self._answers.grid.configuration(index)
-            stand = Stand(at, self._outline)
+        for number, index in enumerate(self._viewed.members):
+            at = self._viewed.grid.configuration(index)
+            stand = BaseFootprint(at, self._outline)
             middle = np.array([at.base_x, at.base_y])
             ahead = 0.45 * np.array([np.cos(at.base_yaw), np.sin(at.base_yaw)])
             around = np.vstack([stand.polygon, stand.polygon[:1]])
@@ -139,7 +139,7 @@ def arrow_path(arrow: Arrow) -> str:
     return f"{GOALS}/{goal}/{reason.name.lower()}"
 
 
-def draw_floor(meshcat: Meshcat, floor: Floor, path: str = FLOOR) -> None:
+def draw_floor(meshcat: Meshcat, floor: FloorMap, path: str = FLOOR) -> None:
     """Lay a score map on the floor, in place of an older one at that path."""
     if not len(floor.places):
         meshcat.Delete(path)
@@ -168,7 +168,7 @@ def _room_shapes(scene: Scene) -> list[Drawn]:
             inspector.GetPoseInFrame(part.geometry),
             rgba(kind.colour),
         )
-        for part, kind in room_parts(scene)
+        for part, kind in environment_parts(scene)
     ]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from tcs.output.report.answer import Answer, Verdict
 from tcs.output.report.blocks import Cell, Column, Table, Tone
+from tcs.output.report.score_report import GoalResult, ScoreReport
 from tcs.output.words import (
     REASON_NAMES,
     REASON_TEXTS,
@@ -27,31 +27,31 @@ MOST_PAIRS = 4
 """Pairs of bodies that are told for each reason."""
 
 
-def stops_table(answer: Answer) -> Table:
+def stops_table(report: ScoreReport) -> Table:
     """Return where the robot is to stand, stop by stop."""
-    members = [member.to_json() for member in answer.shown.members]
+    members = [member.to_json() for member in report.shown.members]
     names = list(members[0])
     rows = [
         [
             str(number),
             *(axis_value(name, member[name]) for name in names),
-            _listed(answer, number - 1),
+            _listed(report, number - 1),
         ]
         for number, member in enumerate(members, start=1)
     ]
     return Table(
         "Where to stand, in the order of the tour. x, y and heading are those of the robot's base "
-        f"in the frame of the environment: {answer.job.spec.environment.origin}",
+        f"in the frame of the environment: {report.job.spec.environment.origin}",
         [Column("Stop"), *(Column(axis_title(name)) for name in names), Column("Best at goals")],
         rows,
     )
 
 
-def goals_table(answer: Answer) -> Table:
+def goals_table(report: ScoreReport) -> Table:
     """Return what came of each goal at each stop."""
-    goals = answer.job.task.goals
+    goals = report.job.task.goals
     weighted = len({goal.weight for goal in goals}) > 1
-    stops = range(len(answer.shown.members))
+    stops = range(len(report.shown.members))
     columns = [
         Column("Goal"),
         Column("On the", is_number=False),
@@ -61,25 +61,25 @@ def goals_table(answer: Answer) -> Table:
         Column("Drake", is_number=False),
         Column("Of the grid"),
     ]
-    weights = answer.scored.scores.weights
+    weights = report.scored.scores.weights
     rows: list[list[Cell | str]] = []
     for g, goal in enumerate(goals):
-        number = answer.assignment[g]
+        number = report.assignment[g]
         where = Cell("nowhere", "bad") if number is None else Cell(f"stop {number + 1}", "good")
-        spread = answer.distributions[g]
+        spread = report.distributions[g]
         rows.append(
             [
                 str(g),
                 frame_name(goal.body_frame),
                 *([f"{weights[g]:.3f}"] if weighted else []),
                 where,
-                *(_verdict(answer.verdicts[stop][g], is_used=number == stop) for stop in stops),
-                _confirmed(answer, g),
+                *(_verdict(report.results[stop][g], is_used=number == stop) for stop in stops),
+                _confirmed(report, g),
                 f"{percent(spread.reached / spread.configurations, 2)} %",
             ]
         )
     return Table(
-        f"What came of each goal at each stop: {answer.measure} of the best arm posture free of "
+        f"What came of each goal at each stop: {report.measure} of the best arm posture free of "
         "contact, or what keeps the arm from it. Drake: whether it confirms that posture. Of the "
         "grid: share of all configurations that reach the goal.",
         columns,
@@ -87,13 +87,13 @@ def goals_table(answer: Answer) -> Table:
     )
 
 
-def joints_table(answer: Answer) -> Table:
+def joints_table(report: ScoreReport) -> Table:
     """Return the stored arm posture for each goal that is reached."""
-    names = answer.job.spec.robot.arm_joints
+    names = report.job.spec.robot.arm_joints
     rows = []
-    for goal, number in enumerate(answer.assignment):
+    for goal, number in enumerate(report.assignment):
         joints = (
-            answer.scored.scores.joints_of(answer.shown.indices[number], goal)
+            report.scored.scores.joints_of(report.shown.indices[number], goal)
             if number is not None
             else None
         )
@@ -112,20 +112,20 @@ def joints_table(answer: Answer) -> Table:
     )
 
 
-def reasons_table(answer: Answer) -> Table:
+def reasons_table(report: ScoreReport) -> Table:
     """Return how the reasons of each goal are spread over the grid."""
     kinds = (*CHECKS, Reason.REACHED)
     rows: list[list[Cell | str]] = []
-    for goal, spread in enumerate(answer.distributions):
+    for goal, spread in enumerate(report.distributions):
         shares = [spread.reasons[kind] / spread.configurations for kind in kinds]
         rows.append(
             [
                 str(goal),
-                frame_name(answer.job.task.goals[goal].body_frame),
+                frame_name(report.job.task.goals[goal].body_frame),
                 *(percent(share, 2) if share else "0" for share in shares),
             ]
         )
-    configurations = answer.distributions[0].configurations
+    configurations = report.distributions[0].configurations
     return Table(
         f"What becomes of all {configurations:,} configurations of the grid, goal by goal "
         "[% of them]. Each counts for the first check it fails, in the order of the columns.",
@@ -138,10 +138,10 @@ def reasons_table(answer: Answer) -> Table:
     )
 
 
-def pairs_table(answer: Answer) -> Table:
+def pairs_table(report: ScoreReport) -> Table:
     """Return which bodies block most often, over all goals."""
     counts: Counter[tuple[Reason, tuple[str, str]]] = Counter()
-    for spread in answer.distributions:
+    for spread in report.distributions:
         for one in spread.blocking_pairs:
             counts[one.reason, one.pair] += one.count
     rows = []
@@ -172,9 +172,9 @@ def pairs_table(answer: Answer) -> Table:
     )
 
 
-def verification_table(answer: Answer) -> Table:
+def verification_table(report: ScoreReport) -> Table:
     """Return what re-checking found."""
-    found = answer.verification
+    found = report.verification
     samples = {"analytic": "11,520 arm angles", "numeric": "400 starts"}[found.ik]
     recall = found.recall_note or ""
     if found.recall is not None and found.recall_ci95 is not None:
@@ -202,24 +202,24 @@ def verification_table(answer: Answer) -> Table:
     verdict = found.verdict
     if not found.is_sound:
         verdict = f"SOME ANSWERS ARE FALSE ({wrong})"
-    elif not answer.is_sound:
+    elif not report.is_sound:
         verdict = "THESE HOLD, BUT NOT ALL THAT ARE SHOWN UNDER GOAL BY GOAL"
-    rows.append(["Verdict", Cell(verdict, _tone(answer.is_sound))])
+    rows.append(["Verdict", Cell(verdict, _tone(report.is_sound))])
     return Table(
         f"Re-checked when this report was made, of all tables of the file, seed "
-        f"{answer.check.seed}.",
+        f"{report.check.seed}.",
         [Column("Check", is_number=False), Column("Found")],
         rows,
     )
 
 
-def success_table(answer: Answer) -> Table | None:
+def success_table(report: ScoreReport) -> Table | None:
     """Return the estimates of success under error; None where the file holds none."""
-    success = answer.success
+    success = report.success
     if success is None:
         return None
-    sets = answer.scored.sets
-    named = [("the set shown here", tuple(sorted(answer.shown.indices)))]
+    sets = report.scored.sets
+    named = [("the set shown here", tuple(sorted(report.shown.indices)))]
     named += [
         (f"the surest set of {'one' if most == 1 else f'up to {most}'}", found)
         for most in range(1, success.members.shape[1] + 1)
@@ -233,7 +233,7 @@ def success_table(answer: Answer) -> Table | None:
             [
                 name,
                 " and ".join(
-                    member_text(answer.job.grid.configuration(h).to_json()) for h in members
+                    member_text(report.job.grid.configuration(h).to_json()) for h in members
                 )
                 or "none",
                 f"{percent(reachability)} %",
@@ -260,7 +260,7 @@ def success_table(answer: Answer) -> Table | None:
     )
 
 
-def _verdict(verdict: Verdict, *, is_used: bool) -> Cell:
+def _verdict(verdict: GoalResult, *, is_used: bool) -> Cell:
     """Return what came of a goal at a stop."""
     if verdict.reason == Reason.REACHED:
         return Cell(f"{verdict.measure:.3f}", "good" if is_used else "plain")
@@ -270,15 +270,15 @@ def _verdict(verdict: Verdict, *, is_used: bool) -> Cell:
     return Cell(said, "quiet")
 
 
-def _confirmed(answer: Answer, goal: int) -> Cell:
+def _confirmed(report: ScoreReport, goal: int) -> Cell:
     """Return what Drake says of the posture at a goal that the report shows."""
-    if goal not in answer.findings:
+    if goal not in report.findings:
         return Cell("–", "quiet")
-    return Cell("confirms it") if answer.is_confirmed(goal) else Cell("REFUSES IT", "bad")
+    return Cell("confirms it") if report.is_confirmed(goal) else Cell("REFUSES IT", "bad")
 
 
-def _listed(answer: Answer, stop: int) -> str:
-    return goal_list(assigned_goals(answer.assignment, stop)) or "none"
+def _listed(report: ScoreReport, stop: int) -> str:
+    return goal_list(assigned_goals(report.assignment, stop)) or "none"
 
 
 def _tone(is_good: bool) -> Tone:

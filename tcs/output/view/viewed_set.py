@@ -25,7 +25,7 @@ from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class ConfigurationResult:
     """What came of one configuration at every goal."""
 
     index: int
@@ -47,7 +47,7 @@ class Verdict:
         return tuple(g for g, one in enumerate(self.reasons) if one == Reason.REACHED)
 
     def line(self, goal: int) -> str:
-        """Return the verdict as a line of text.
+        """Return the result as a line of text.
 
         Args:
             goal: The goal that is shown: it is told first.
@@ -74,7 +74,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, eq=False)
-class Answers:
+class ViewedSet:
     """One table of a score file, and the set of it that is looked at."""
 
     grid: Grid
@@ -87,7 +87,7 @@ class Answers:
     """Estimated success under error, where the file holds any."""
 
     @classmethod
-    def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> Answers:
+    def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> ViewedSet:
         """Return the answers of one table of a file."""
         found = file.tables[table]
         return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
@@ -97,7 +97,7 @@ class Answers:
         """How many goals there are."""
         return self.scores.goals
 
-    def verdict(self, index: int) -> Verdict:
+    def result(self, index: int) -> ConfigurationResult:
         """Return what came of a configuration.
 
         Args:
@@ -108,7 +108,7 @@ class Answers:
         """
         scores, configuration = self.scores, self.grid.configuration(index)
         names = scores.pair_names
-        return Verdict(
+        return ConfigurationResult(
             index=index,
             configuration=configuration,
             reasons=tuple(Reason(code) for code in scores.reason[index]),

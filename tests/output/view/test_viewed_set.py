@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import GridError
-from tcs.output.view import Answers
+from tcs.output.view import ViewedSet
 from tcs.placement.tables import Reason
 from tests.output.view.conftest import made, one_configuration
 from tests.placement.tables.small import small_grid
@@ -15,19 +15,19 @@ from tests.placement.tables.small import small_grid
 def test_verdict_is_what_the_table_holds(bed):
     scores = bed.scores
     for index in (0, 17, bed.grid.size - 1):
-        verdict = bed.verdict(index)
-        assert verdict.configuration == bed.grid.configuration(index)
-        assert verdict.reasons == tuple(Reason(code) for code in scores.reason[index])
-        assert verdict.reached == tuple(np.flatnonzero(scores.reached[index]))
-        assert verdict.reachability == pytest.approx(scores.reachability()[index])
-        assert verdict.manipulability == pytest.approx(scores.manipulability()[index])
-        for pair, named in zip(scores.pair[index], verdict.pairs, strict=True):
+        result = bed.result(index)
+        assert result.configuration == bed.grid.configuration(index)
+        assert result.reasons == tuple(Reason(code) for code in scores.reason[index])
+        assert result.reached == tuple(np.flatnonzero(scores.reached[index]))
+        assert result.reachability == pytest.approx(scores.reachability()[index])
+        assert result.manipulability == pytest.approx(scores.manipulability()[index])
+        for pair, named in zip(scores.pair[index], result.pairs, strict=True):
             assert named == (None if pair < 0 else scores.pair_names[pair])
 
 
 def test_verdict_of_no_configuration_is_refused(bed):
     with pytest.raises(GridError, match="no configuration"):
-        bed.verdict(bed.grid.size)
+        bed.result(bed.grid.size)
 
 
 def test_line_tells_each_goal_that_is_missed():
@@ -35,11 +35,11 @@ def test_line_tells_each_goal_that_is_missed():
     scores = one_configuration(
         [Reason.REACHED, Reason.TOO_FAR, Reason.ARM_BLOCKED, Reason.TOO_FAR], [-1, -1, 0, -1]
     )
-    verdict = Answers(grid, scores, (0,), None).verdict(0)
-    assert verdict.line(0) == (
+    result = ViewedSet(grid, scores, (0,), None).result(0)
+    assert result.line(0) == (
         "goal 0 reached; 1 of 4 goals, P_R 25%, P_M 0.125; too far: 1, 3; arm blocked: 2"
     )
-    assert verdict.line(2).startswith(
+    assert result.line(2).startswith(
         "goal 2 not reached: every arm posture would touch something (forearm against head); "
     )
 
@@ -56,11 +56,11 @@ def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
 
 
 def test_a_goal_that_nobody_reaches_is_served_by_nobody():
-    answers = made(small_grid(), 4, (), share=0.3)
-    reached = answers.scores.reached
+    viewed = made(small_grid(), 4, (), share=0.3)
+    reached = viewed.scores.reached
     first = int(np.flatnonzero(reached.sum(axis=1) == 1)[0])
-    answers = dataclasses.replace(answers, members=(first,))
-    assert answers.served(0) == tuple(np.flatnonzero(reached[first]))
+    viewed = dataclasses.replace(viewed, members=(first,))
+    assert viewed.served(0) == tuple(np.flatnonzero(reached[first]))
 
 
 def test_joints_are_those_of_the_table(bed):

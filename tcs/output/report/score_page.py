@@ -5,16 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from tcs.output.report.answer import Answer
-from tcs.output.report.answer_tables import (
-    goals_table,
-    joints_table,
-    pairs_table,
-    reasons_table,
-    stops_table,
-    success_table,
-    verification_table,
-)
 from tcs.output.report.blocks import (
     Block,
     Bullets,
@@ -28,6 +18,16 @@ from tcs.output.report.blocks import (
 )
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.reproduce import as_given, commands, estimated
+from tcs.output.report.score_report import ScoreReport
+from tcs.output.report.score_tables import (
+    goals_table,
+    joints_table,
+    pairs_table,
+    reasons_table,
+    stops_table,
+    success_table,
+    verification_table,
+)
 from tcs.output.words import (
     REASON_TEXTS,
     assigned_goals,
@@ -48,77 +48,77 @@ LIMITS = (
 )
 
 
-def answer_page(answer: Answer, *, command: str) -> Page:
+def score_page(report: ScoreReport, *, command: str) -> Page:
     """Return the report as a page.
 
     Args:
-        answer: What a score file answers.
+        report: What a score file answers.
         command: What made this report.
     """
-    spec = answer.job.spec
-    sections = [Section("In short", _summary(answer)), Section("From above", _map(answer))]
-    if answer.states is not None:
-        sections.append(Section("For each state of the room", _states(answer)))
-    if answer.views:
-        sections.append(Section("Each stop", _views(answer)))
+    spec = report.job.spec
+    sections = [Section("In short", _summary(report)), Section("From above", _map(report))]
+    if report.states is not None:
+        sections.append(Section("For each state of the room", _states(report)))
+    if report.views:
+        sections.append(Section("Each stop", _views(report)))
     sections += [
-        Section("Goal by goal", _goals(answer)),
-        Section("Why not elsewhere", _reasons(answer)),
-        Section("Checked again", _verification(answer)),
-        Section("When the room is a little off", _success(answer)),
-        Section("How to make it again", _made(answer, command)),
+        Section("Goal by goal", _goals(report)),
+        Section("Why not elsewhere", _reasons(report)),
+        Section("Checked again", _verification(report)),
+        Section("When the room is a little off", _success(report)),
+        Section("How to make it again", _made(report, command)),
     ]
     return Page(
-        title=answer.job.task.title,
+        title=report.job.task.title,
         lead=f"Where should the robot stand? {spec.environment.title}. {spec.robot.title}.",
         sections=sections,
         foot=f"tcs {versions()[0][1]}, {today()}.",
     )
 
 
-def _summary(answer: Answer) -> list[Block]:
+def _summary(report: ScoreReport) -> list[Block]:
     """Return the answer in a few sentences, and the stops."""
-    reachability, manipulability = answer.scores
-    members, goals = len(answer.shown.members), answer.goals
+    reachability, manipulability = report.scores
+    members, goals = len(report.shown.members), report.goals
     if not members:
         said = [f"None of the {goals} goals is reached from anywhere on the grid."]
-        return [Bullets([*said, *_hopeless(answer), _soundness(answer), LIMITS])]
-    reached = goals - len(answer.unreached)
+        return [Bullets([*said, *_hopeless(report), _soundness(report), LIMITS])]
+    reached = goals - len(report.unreached)
     places = ("one place", "two places together", "three places together")[members - 1]
     said = [
         f"From {places} the robot reaches {reached} of {goals} goals (P_R "
-        f"{percent(reachability)} %); P_M is {manipulability:.3f} ({answer.measure})."
+        f"{percent(reachability)} %); P_M is {manipulability:.3f} ({report.measure})."
     ]
-    if answer.unreached:
+    if report.unreached:
         said.append(
-            f"Not reached: {goal_list(answer.unreached)}. "
+            f"Not reached: {goal_list(report.unreached)}. "
             "Goal by goal says why, and what would help."
         )
-    if answer.shown.here is not None:
-        here = base_pose_text(answer.shown.here.to_json())
+    if report.shown.here is not None:
+        here = base_pose_text(report.shown.here.to_json())
         said.append(f"At the default weights it is the set to choose for a robot at {here}.")
     else:
-        of_all = "" if answer.max_members is None else f" of at most {answer.max_members}"
+        of_all = "" if report.max_members is None else f" of at most {report.max_members}"
         said.append(
             f"Of the sets{of_all} that the file keeps, it is the one with the greatest P_R + P_M, "
             "wherever the robot is now."
         )
-    state = answer.file.observed_states[answer.shown.table]
+    state = report.file.observed_states[report.shown.table]
     if state:
-        shown = state_to_json(answer.file.observed_axes, state)
-        tables = len(answer.file.tables)
+        shown = state_to_json(report.file.observed_axes, state)
+        tables = len(report.file.tables)
         said.append(
             f"It holds where this is found: {settings_text(shown)}"
             + (f"; the file answers for {tables} such states." if tables > 1 else ".")
         )
-    said += _success_in_short(answer)
-    return [Bullets([*said, _soundness(answer), LIMITS]), stops_table(answer)]
+    said += _success_in_short(report)
+    return [Bullets([*said, _soundness(report), LIMITS]), stops_table(report)]
 
 
-def _hopeless(answer: Answer) -> list[str]:
+def _hopeless(report: ScoreReport) -> list[str]:
     """Return what stopped the configurations that came nearest to reaching a goal."""
     found: dict[str, list[int]] = {}
-    for goal, spread in enumerate(answer.distributions):
+    for goal, spread in enumerate(report.distributions):
         if spread.reached == 0 and spread.farthest is not None:
             found.setdefault(REASON_TEXTS[spread.farthest.reason], []).append(goal)
     return [
@@ -128,22 +128,22 @@ def _hopeless(answer: Answer) -> list[str]:
     ]
 
 
-def _soundness(answer: Answer) -> str:
-    found = answer.verification
-    if not answer.is_sound:
+def _soundness(report: ScoreReport) -> str:
+    found = report.verification
+    if not report.is_sound:
         return (
             "SOME ANSWERS OF THE FILE ARE FALSE: do not use it. What is wrong is told under Goal "
             "by goal and Checked again."
         )
     said = []
     if found.checked:
-        shown = f"each of the {len(answer.findings)} postures shown here and "
+        shown = f"each of the {len(report.findings)} postures shown here and "
         said.append(
-            f"Drake confirms {shown if answer.findings else ''}all of {found.checked:,} stored "
+            f"Drake confirms {shown if report.findings else ''}all of {found.checked:,} stored "
             "answers drawn at random"
         )
-    elif answer.findings:
-        said.append(f"Drake confirms each of the {len(answer.findings)} postures shown here")
+    elif report.findings:
+        said.append(f"Drake confirms each of the {len(report.findings)} postures shown here")
     if found.dense_checked:
         said.append(
             f"of {found.dense_checked:,} unreached pairs drawn at random {found.missed:,} turned "
@@ -152,24 +152,24 @@ def _soundness(answer: Answer) -> str:
     return f"{'; '.join(said) or 'Nothing was re-checked with Drake'}."
 
 
-def _success_in_short(answer: Answer) -> list[str]:
-    if answer.success is None:
+def _success_in_short(report: ScoreReport) -> list[str]:
+    if report.success is None:
         return []
-    row = answer.success.row_of(tuple(sorted(answer.shown.indices)))
+    row = report.success.row_of(tuple(sorted(report.shown.indices)))
     if row is None:
         return []
-    low, high = float(answer.success.low[row]), float(answer.success.high[row])
+    low, high = float(report.success.low[row]), float(report.success.high[row])
     return [
         "With the room off at random it is estimated to reach "
-        f"{percent(float(answer.success.success[row]))} % (95 % between {percent(low)} and "
+        f"{percent(float(report.success.success[row]))} % (95 % between {percent(low)} and "
         f"{percent(high)} %)."
     ]
 
 
-def _map(answer: Answer) -> list[Block]:
+def _map(report: ScoreReport) -> list[Block]:
     return [
         Picture(
-            answer.map,
+            report.map,
             "png",
             "The room from above, twice: every place coloured by the share of the goals reached "
             "from it, and by manipulability, with the bases of the robot at the chosen places.",
@@ -179,11 +179,11 @@ def _map(answer: Answer) -> list[Block]:
     ]
 
 
-def _states(answer: Answer) -> list[Block]:
-    assert answer.states is not None
+def _states(report: ScoreReport) -> list[Block]:
+    assert report.states is not None
     return [
         Picture(
-            answer.states,
+            report.states,
             "png",
             "The same map once for each state of the room that can be set, in rows and columns.",
             "One colour scale for all. Each stop is marked in the panel of the state it wants.",
@@ -191,10 +191,10 @@ def _states(answer: Answer) -> list[Block]:
     ]
 
 
-def _views(answer: Answer) -> list[Block]:
+def _views(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = []
-    for number, view in enumerate(answer.views, start=1):
-        goals = assigned_goals(answer.assignment, number - 1)
+    for number, view in enumerate(report.views, start=1):
+        goals = assigned_goals(report.assignment, number - 1)
         served = goals_text(goals) if goals else "no goal"
         blocks.append(
             Picture(
@@ -208,35 +208,35 @@ def _views(answer: Answer) -> list[Block]:
     return blocks
 
 
-def _goals(answer: Answer) -> list[Block]:
-    blocks: list[Block] = [goals_table(answer)]
-    blocks += [Text(said) for said in _hopeless(answer)]
-    for goal in answer.unreached if answer.shown.members else ():
-        fix = answer.explanation(goal).fix
+def _goals(report: ScoreReport) -> list[Block]:
+    blocks: list[Block] = [goals_table(report)]
+    blocks += [Text(said) for said in _hopeless(report)]
+    for goal in report.unreached if report.shown.members else ():
+        fix = report.explanation(goal).fix
         if fix is not None:
             blocks.append(Text(f"Goal {goal} would be reached from stop 1 so: {fix.sentence}"))
-    if answer.shown.members:
-        blocks.append(Folded("Arm joints", [joints_table(answer)]))
+    if report.shown.members:
+        blocks.append(Folded("Arm joints", [joints_table(report)]))
     return blocks
 
 
-def _reasons(answer: Answer) -> list[Block]:
+def _reasons(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Checked in this order: does the body of the robot touch anything; does the gripper at "
             "the goal; is the goal within reach; is there a posture within the joint limits; is "
             "there one in which the arm touches nothing."
         ),
-        reasons_table(answer),
+        reasons_table(report),
     ]
-    pairs = pairs_table(answer)
+    pairs = pairs_table(report)
     if pairs.rows:
         blocks.append(pairs)
     return blocks
 
 
-def _verification(answer: Answer) -> list[Block]:
-    if not answer.check.pairs and not answer.check.dense:
+def _verification(report: ScoreReport) -> list[Block]:
+    if not report.check.pairs and not report.check.dense:
         return [Text("Nothing was re-checked when this report was made: no pairs were asked for.")]
     return [
         Text(
@@ -244,17 +244,17 @@ def _verification(answer: Answer) -> list[Block]:
             "tool at the goal, are the joints within their limits, is everything as far apart as "
             "it has to be, and is the measure that of Drake's Jacobian?"
         ),
-        verification_table(answer),
+        verification_table(report),
     ]
 
 
-def _success(answer: Answer) -> list[Block]:
-    table = success_table(answer)
-    made = estimated(answer)
+def _success(report: ScoreReport) -> list[Block]:
+    table = success_table(report)
+    made = estimated(report)
     if table is None or made is None:
         return [
             Text("Nothing is estimated in this file. This estimates it, for the best sets:"),
-            Code(shlex.join(["tcs", "robustify", str(answer.path)])),
+            Code(shlex.join(["tcs", "robustify", str(report.path)])),
         ]
     widths = "; ".join(
         f"{frame_name(joint)} ({error_width(error)})" for joint, error in made["errors"].items()
@@ -268,8 +268,8 @@ def _success(answer: Answer) -> list[Block]:
         ),
         table,
     ]
-    if len(answer.shown.indices) and answer.success is not None:
-        if answer.success.row_of(tuple(sorted(answer.shown.indices))) is None:
+    if len(report.shown.indices) and report.success is not None:
+        if report.success.row_of(tuple(sorted(report.shown.indices))) is None:
             blocks.append(
                 Text(
                     "The set shown here was none of those that raced; tcs evaluate tries the best "
@@ -285,36 +285,36 @@ def _kept(sets: SetTable) -> str:
     return f"rule {sets.rule}{apart}, {sets.sets:,} in this table"
 
 
-def _configurations(answer: Answer) -> str:
-    size, tables = answer.job.grid.size, len(answer.file.tables)
+def _configurations(report: ScoreReport) -> str:
+    size, tables = report.job.grid.size, len(report.file.tables)
     return f"{size:,}" if tables == 1 else f"{size:,} in each of {tables} tables"
 
 
-def _made(answer: Answer, command: str) -> list[Block]:
-    file = answer.file
+def _made(report: ScoreReport, command: str) -> list[Block]:
+    file = report.file
     timings, metadata = file.metadata["timings"], file.metadata
     seconds = timings["total_seconds"] - timings["compile_seconds"]
     scored: Sequence[tuple[str, str]] = (
-        ("Score file", f"{answer.path.name}, SHA-256 {answer.sha256}"),
+        ("Score file", f"{report.path.name}, SHA-256 {report.sha256}"),
         ("Scored by", f"tcs {metadata['program_version']}, {metadata['created']}"),
         ("Task", as_given(file, "task")),
         ("Environment", as_given(file, "environment")),
         ("Robot", as_given(file, "robot")),
         ("Scene", f"SHA-256 {metadata['scene_digest']}; the models of today are the same"),
-        ("Inverse kinematics", answer.verification.ik),
-        ("Configurations", _configurations(answer)),
-        ("Sets kept", _kept(answer.scored.sets)),
+        ("Inverse kinematics", report.verification.ik),
+        ("Configurations", _configurations(report)),
+        ("Sets kept", _kept(report.scored.sets)),
         ("Time to score", f"{seconds:.1f} s when the file was made, compiling aside"),
     )
     return [
-        Code(commands(answer, command)),
+        Code(commands(report, command)),
         Facts(scored),
         Facts(
             [
                 *versions(),
                 *machine(),
-                ("Re-checked", f"{answer.check.pairs:,} pairs, {answer.check.dense:,} scanned"),
-                ("Time of this report", f"{answer.seconds:.1f} s"),
+                ("Re-checked", f"{report.check.pairs:,} pairs, {report.check.dense:,} scanned"),
+                ("Time of this report", f"{report.seconds:.1f} s"),
             ]
         ),
     ]

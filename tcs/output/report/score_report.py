@@ -11,7 +11,8 @@ from pathlib import Path
 
 from tcs.model.grid import InitialConfiguration
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import Shown, map_figure, member_figure, stage
+from tcs.output.report.pictures import map_figure, member_figure, scored_scene
+from tcs.output.report.shown_set import ShownSet
 from tcs.output.report.states import has_states, states_figure
 from tcs.output.words import assign_goals
 from tcs.placement.reasons import Distribution, Explanation, explain
@@ -25,7 +26,7 @@ _DPI = 110
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class CheckSizes:
     """How much of a file is re-checked."""
 
     pairs: int = 500
@@ -36,7 +37,7 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class GoalResult:
     """What came of one member of the set at one goal."""
 
     reason: Reason
@@ -47,8 +48,8 @@ class Verdict:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
-    """A score file's answer, and everything the report tells about it."""
+class ScoreReport:
+    """A score file's report, and everything the report tells about it."""
 
     path: Path
     """Where the file is."""
@@ -57,7 +58,7 @@ class Answer:
     file: ScoreFile
     job: Job
     """What it was scored from."""
-    shown: Shown
+    shown: ShownSet
     """The set that the report is about."""
     max_members: int | None
     """Most members that it was to have, if that was asked for."""
@@ -65,7 +66,7 @@ class Answer:
     """What re-checking random pairs of the file found."""
     findings: Mapping[int, Finding]
     """What Drake says of the very postures that the report shows, by goal."""
-    check: Check
+    check: CheckSizes
     map: bytes
     """From above, PNG."""
     states: bytes | None
@@ -103,12 +104,12 @@ class Answer:
         return self.scored.success
 
     @cached_property
-    def verdicts(self) -> tuple[tuple[Verdict, ...], ...]:
+    def results(self) -> tuple[tuple[GoalResult, ...], ...]:
         """What came of each member, at each goal."""
         scores = self.scored.scores
         return tuple(
             tuple(
-                Verdict(
+                GoalResult(
                     reason=Reason(scores.reason[h, g]),
                     pair=scores.pair_names[scores.pair[h, g]] if scores.pair[h, g] >= 0 else None,
                     measure=float(scores.dexterity[h, g]),
@@ -150,16 +151,16 @@ class Answer:
         return explain(self.file, goal, from_where, observed=observed or None)
 
 
-def answer_of(
+def score_report(
     path: Path,
     *,
     here: InitialConfiguration | None = None,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
-    check: Check | None = None,
+    check: CheckSizes | None = None,
     on_progress: Callable[[int, int], None] | None = None,
-) -> Answer:
-    """Return a score file's answer, re-checked with Drake and drawn.
+) -> ScoreReport:
+    """Return a score file's report, re-checked with Drake and drawn.
 
     Args:
         path: A score file.
@@ -173,21 +174,21 @@ def answer_of(
         StoreError: If the file cannot be used, or is not of today's models.
         SelectionError: If no such set can be chosen.
     """
-    begun, check = time.perf_counter(), check or Check()
+    begun, check = time.perf_counter(), check or CheckSizes()
     file = load_scores(path)
-    shown = Shown.of(file, here, max_members, observed)
-    staged = stage(file, shown)
+    shown = ShownSet.of(file, here, max_members, observed)
+    scored = scored_scene(file, shown)
     served = {
         goal: shown.indices[number]
         for goal, number in enumerate(assign_goals(file.tables[shown.table].scores, shown.indices))
         if number is not None
     }
     findings = check_pairs(file, shown.table, [(h, goal) for goal, h in served.items()])
-    return Answer(
+    return ScoreReport(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         file=file,
-        job=staged[0],
+        job=scored.job,
         shown=shown,
         max_members=max_members,
         verification=verify(
@@ -195,12 +196,12 @@ def answer_of(
         ),
         findings=dict(zip(served, findings, strict=True)),
         check=check,
-        map=as_png(map_figure(file, shown, staged), _DPI, colours=None),
-        states=as_png(states_figure(file, shown, staged=staged), _DPI, colours=None)
+        map=as_png(map_figure(file, shown, scored), _DPI, colours=None),
+        states=as_png(states_figure(file, shown, scored=scored), _DPI, colours=None)
         if has_states(file)
         else None,
         views=tuple(
-            as_png(member_figure(file, shown, number, staged), _DPI)
+            as_png(member_figure(file, shown, number, scored), _DPI)
             for number in range(len(shown.members))
         ),
         seconds=time.perf_counter() - begun,

@@ -14,8 +14,9 @@ from typer.testing import CliRunner
 
 from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
-from tcs.output.report import Check, answer_of, answer_page, as_html, as_markdown
-from tcs.output.report.answer_tables import (
+from tcs.output.report import CheckSizes, as_html, as_markdown, score_page, score_report
+from tcs.output.report.reproduce import as_given, robustify_command, score_command
+from tcs.output.report.score_tables import (
     goals_table,
     joints_table,
     pairs_table,
@@ -24,7 +25,6 @@ from tcs.output.report.answer_tables import (
     success_table,
     verification_table,
 )
-from tcs.output.report.reproduce import as_given, robustify_command, score_command
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
@@ -39,7 +39,7 @@ FAR = {
     "torso": (0.15, 0.15, 1),
 }
 """Where nothing is in reach."""
-CHECK = Check(pairs=12, dense=6, seed=3)
+CHECK = CheckSizes(pairs=12, dense=6, seed=3)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -47,24 +47,24 @@ def _small_pictures():
     """Pictures that take a tenth of the time; what is on them is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tcs.output.draw.camera.SIZE", (300, 260))
-        patch.setattr("tcs.output.report.answer._DPI", 30)
+        patch.setattr("tcs.output.report.score_report._DPI", 30)
         yield
 
 
 @pytest.fixture(scope="module")
 def answer(score_path, _small_pictures):
-    return answer_of(score_path, check=CHECK)
+    return score_report(score_path, check=CHECK)
 
 
 @pytest.fixture(scope="module")
 def single(score_path, _small_pictures):
     """About one place only, which does not reach every goal."""
-    return answer_of(score_path, max_members=1, check=Check(pairs=0, dense=0))
+    return score_report(score_path, max_members=1, check=CheckSizes(pairs=0, dense=0))
 
 
 @pytest.fixture(scope="module")
 def page(answer):
-    return answer_page(answer, command="tcs report f.tcs --out r.html")
+    return score_page(answer, command="tcs report f.tcs --out r.html")
 
 
 def test_the_page_has_every_part_and_needs_nothing_else(page):
@@ -134,7 +134,7 @@ def test_every_configuration_counts_once_for_each_goal(answer):
 
 def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
     assert single.unreached
-    said = as_markdown(answer_page(single, command="c"))
+    said = as_markdown(score_page(single, command="c"))
     for goal in single.unreached:
         assert f"Goal {goal} would be reached from stop 1 so: " in said
     assert f"Not reached: {', '.join(map(str, single.unreached))}." in said
@@ -146,8 +146,8 @@ def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
 
 def test_the_set_is_the_one_to_choose_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
-    found = answer_of(score_path, here=here, check=Check(pairs=0, dense=0))
-    said = as_markdown(answer_page(found, command="c"))
+    found = score_report(score_path, here=here, check=CheckSizes(pairs=0, dense=0))
+    said = as_markdown(score_page(found, command="c"))
     assert "the set to choose for a robot at x 0.6 m, y 0.7 m, heading 0 deg" in said
 
 
@@ -165,11 +165,11 @@ def false_path(score_path, tmp_path_factory):
 
 
 def test_a_false_answer_is_told(false_path):
-    found = answer_of(false_path, check=CHECK)
+    found = score_report(false_path, check=CHECK)
     assert not found.is_sound
     assert set(column(goals_table(found), "Drake")) == {"REFUSES IT"}
     assert column(verification_table(found), "Found")[1] == "12"
-    said = as_markdown(answer_page(found, command="c"))
+    said = as_markdown(score_page(found, command="c"))
     assert "SOME ANSWERS OF THE FILE ARE FALSE" in said
     assert "every answer holds" not in said
 
@@ -186,7 +186,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     table = StateTables.of(dataclasses.replace(scores, arm_joints=joints), file.nominal.sets)
     save_scores(path, dataclasses.replace(file, tables=(table,)))
     # Nothing is drawn at random.
-    found = answer_of(path, check=Check(pairs=0, dense=0))
+    found = score_report(path, check=CheckSizes(pairs=0, dense=0))
     assert found.verification.is_sound
     assert not found.is_sound
     assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
@@ -221,7 +221,7 @@ def test_estimates_of_success_are_those_of_the_file(answer):
     )
     plain = dataclasses.replace(answer, file=file)
     assert success_table(plain) is None
-    assert "tcs robustify" in as_markdown(answer_page(plain, command="c"))
+    assert "tcs robustify" in as_markdown(score_page(plain, command="c"))
 
 
 def test_data_files_are_named_as_they_were_given(answer, tmp_path, monkeypatch):
@@ -251,7 +251,7 @@ def test_commands_make_the_same_again(answer, score_path):
     said = robustify_command(answer)
     assert said == f"tcs robustify {score_path} --sets 12 --samples 32 --seed 0"
     digest = hashlib.sha256(score_path.read_bytes()).hexdigest()
-    made = as_markdown(answer_page(answer, command="c"))
+    made = as_markdown(score_page(answer, command="c"))
     assert digest in made
     assert answer.file.metadata["scene_digest"] in made
 
@@ -273,9 +273,9 @@ def test_on_the_command_line(score_path, tmp_path):
 def test_nothing_in_reach_is_a_page_too(tmp_path):
     path = tmp_path / "far.tcs"
     save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR)))
-    found = answer_of(path, check=CHECK)
+    found = score_report(path, check=CHECK)
     assert found.is_sound
-    said = as_markdown(answer_page(found, command="c"))
+    said = as_markdown(score_page(found, command="c"))
     assert "None of the 8 goals is reached from anywhere" in said
     assert said.count("what came nearest was stopped by this: too far for the arm.") == 2
     assert "Nothing was re-checked with Drake." in said
@@ -308,6 +308,6 @@ def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path
     )
     path = tmp_path / "better.tcs"
     save_scores(path, dataclasses.replace(file, tables=(table,)))
-    found = answer_of(path, check=Check(pairs=0, dense=0))
+    found = score_report(path, check=CheckSizes(pairs=0, dense=0))
     assert all(one.is_true for one in found.findings.values())
     assert not found.is_sound
