@@ -8,6 +8,7 @@ Score files are taken from the folder named by --scores; rows that are not there
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import sys
 import textwrap
@@ -17,22 +18,20 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tcs
-from tcs.cli import talk
-from tcs.cli.places import place
-from tcs.cli.rows import default_path, score_one
 from tcs.files.writing import make_folder, whole_file
+from tcs.output import terminal
 from tcs.output.draw import as_png
 from tcs.output.report.pictures import map_figure, member_figure, scene_figure
 from tcs.output.report.shown_set import ShownSet
 from tcs.output.report.states import states_figure
 from tcs.output.words import member_text
 from tcs.placement.robustness import check_row
-from tcs.placement.scoring import task_environment_pairs
+from tcs.placement.scoring import default_path, task_environment_pairs
 from tcs.placement.store import ScoreFile
 
 ROBOT = "pr2"
-HERE = (1.4, -1.2, 180.0)
-"""Where the robot comes from in the README's map (x [m], y [m], heading [deg])."""
+HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=math.pi, torso=0.0)
+"""Current state of the robot in the map of the README."""
 _DPI = 76
 """Of pictures in space: as wide as a page of text."""
 _MAP_DPI = 110
@@ -87,7 +86,7 @@ class Drawn:
 def main() -> int:
     """Make the gallery; return the exit code."""
     options = parse()
-    return talk.exit_code_of(lambda: run(options))
+    return terminal.exit_code_of(lambda: run(options))
 
 
 def parse() -> argparse.Namespace:
@@ -134,7 +133,15 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
     """Return the score file of a row, scored now if it is not there."""
     path = options.scores / default_path(*row, ROBOT)
     if not path.exists():
-        score_one(*row, ROBOT, path, jobs=options.jobs)
+        with terminal.progress_bar(f"configurations, {path.stem}") as on_progress:
+            scored = tcs.score(
+                *row,
+                ROBOT,
+                jobs=options.jobs,
+                on_progress=on_progress,
+                on_compile=terminal.say_compiling,
+            )
+        tcs.save(path, scored)
     file = tcs.load(path)
     check_row(path, file, *row, ROBOT)
     return file
@@ -199,7 +206,7 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
 def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
     """Return the pictures from above: the README's map, and one for each state of the bed."""
     chair, bed = files["shaving", "wheelchair"], files["bathing", "bed"]
-    chosen = ShownSet.of(chair, place(HERE))
+    chosen = ShownSet.of(chair, HERE)
     command = "tcs map shaving-wheelchair-pr2.tcs --out map.png --here 1.4 -1.2 180"
     return [
         Drawn(

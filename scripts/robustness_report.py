@@ -1,9 +1,9 @@
-"""Tables I and III of the TCS paper on our scenes, as a page, as Markdown and sample by sample.
+"""Write the robustness report: Tables I and III of the TCS paper as HTML, Markdown and CSV.
 
     python scripts/robustness_report.py --out out/robustness
 
-Score files are taken from the folder named by --scores. Rows that are not there are scored first,
-and those without estimates of success get them (`tcs robustify` makes more thorough ones).
+Score files are read from the folder --scores. Missing rows are scored first, and rows without
+estimates of success get them (`tcs robustify` makes estimates with more samples).
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ import time
 from pathlib import Path
 
 import tcs
-from tcs.cli import talk
-from tcs.cli.rows import default_path, score_one
 from tcs.errors import UnknownNameError
 from tcs.files.writing import make_folder
+from tcs.output import terminal
 from tcs.output.report import draw_rows, load_paper, write_report
 from tcs.placement.robustness import StudyPlan, check_row, robustify, study_rows
 from tcs.placement.robustness.error_model import check_draws
+from tcs.placement.scoring import default_path
 
 ROBOT = "pr2"
-RACED_SETS, RACE_SAMPLES = 200, 256
-"""How many sets of each size race for the greatest success, and how far, where nobody has let them
-yet: a quarter of a minute for a row, and within a percent of the full race."""
+SETS, SAMPLES = 200, 256
+"""Pairs and samples of the estimates for rows that have none: a quarter of a minute for a row, and
+within a percent of the default estimates of `tcs robustify`."""
 
 
 def main() -> int:
     """Run the study and write the report; return the exit code."""
     options = parse()
-    return talk.exit_code_of(lambda: run(options))
+    return terminal.exit_code_of(lambda: run(options))
 
 
 def parse() -> argparse.Namespace:
@@ -40,7 +40,9 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out/robustness"), help="folder to write")
     parser.add_argument("--scores", type=Path, default=Path("out/scores"), help="score files")
-    parser.add_argument("--rows", nargs="+", metavar="TASK/ROOM", help="only these rows of Table I")
+    parser.add_argument(
+        "--rows", nargs="+", metavar="TASK/ENVIRONMENT", help="only these rows of Table I"
+    )
     parser.add_argument("--samples", type=int, default=1000, help="samples of each method")
     parser.add_argument("--seed", type=int, default=0, help="seed of all samples")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
@@ -48,7 +50,7 @@ def parse() -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Score what is missing, try every row, write the report."""
+    """Score missing rows, study every row, write the report."""
     rows = chosen(options.rows)
     check_draws(options.samples, options.seed)
     if options.jobs < 1:
@@ -58,14 +60,18 @@ def run(options: argparse.Namespace) -> int:
     paths = [options.scores / default_path(*row, ROBOT) for row in rows]
     for (task, environment), path in zip(rows, paths, strict=True):
         if not path.exists():
-            score_one(task, environment, ROBOT, path, jobs=options.jobs)
+            score(path, (task, environment), options.jobs)
         estimate(path, (task, environment), options)
     compared = tuple(load_paper().compared_rows())
     plan = StudyPlan(samples=options.samples, seed=options.seed, compared=compared)
     begun = time.perf_counter()
-    with talk.progress_bar("rows tried") as on_progress:
+    with terminal.progress_bar("rows studied") as on_progress:
         found = study_rows(
-            paths, plan, jobs=options.jobs, on_progress=on_progress, on_compile=compiling
+            paths,
+            plan,
+            jobs=options.jobs,
+            on_progress=on_progress,
+            on_compile=terminal.say_compiling,
         )
     pictures = draw_rows(paths, jobs=options.jobs)
     seconds = time.perf_counter() - begun
@@ -75,36 +81,40 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> None:
-    """Have the success of the best sets of a row estimated, with the person where they belong."""
-    file = tcs.load(path)
-    check_row(path, file, *row, ROBOT)
-    made = file.metadata.get("robustness", [None] * len(file.tables))[file.nominal_index]
-    if made is not None and made["environment_errors"] and not made["check_base"]:
-        # Whoever has estimated more thoroughly is believed.
-        if made["samples"] >= RACE_SAMPLES and made["sets"] >= RACED_SETS:
-            return
-    with talk.progress_bar(f"rounds of the race, {path.stem}") as on_progress:
-        file = robustify(
-            file,
-            sets=RACED_SETS,
-            samples=RACE_SAMPLES,
-            seed=options.seed,
-            tables=[file.nominal_index],
-            jobs=options.jobs,
-            on_progress=on_progress,
-            on_compile=compiling,
+def score(path: Path, row: tuple[str, str], jobs: int) -> None:
+    """Score a row and save it."""
+    with terminal.progress_bar(f"configurations, {path.stem}") as on_progress:
+        file = tcs.score(
+            *row, ROBOT, jobs=jobs, on_progress=on_progress, on_compile=terminal.say_compiling
         )
     tcs.save(path, file)
 
 
-def compiling() -> None:
-    """Say why nothing moves for a while."""
-    talk.say("compiling for this machine, up to a minute; later runs do without.")
+def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> None:
+    """Estimate the success of the best sets of a row for the nominal person, if necessary."""
+    file = tcs.load(path)
+    check_row(path, file, *row, ROBOT)
+    settings = file.metadata.get("robustness", [None] * len(file.tables))[file.nominal_index]
+    if settings is not None and settings["environment_errors"] and not settings["check_base"]:
+        # Estimates with more samples are kept.
+        if settings["samples"] >= SAMPLES and settings["sets"] >= SETS:
+            return
+    with terminal.progress_bar(f"rounds of estimation, {path.stem}") as on_progress:
+        file = robustify(
+            file,
+            sets=SETS,
+            samples=SAMPLES,
+            seed=options.seed,
+            tables=[file.nominal_index],
+            jobs=options.jobs,
+            on_progress=on_progress,
+            on_compile=terminal.say_compiling,
+        )
+    tcs.save(path, file)
 
 
 def chosen(names: list[str] | None) -> list[tuple[str, str]]:
-    """Return task and room of the rows that are asked for, in the paper's order."""
+    """Return task and environment of the rows named by --rows, in the paper's order."""
     rows = list(load_paper().rows())
     known = {f"{task}/{environment}": (task, environment) for task, environment in rows}
     for name in names or ():

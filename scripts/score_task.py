@@ -1,14 +1,13 @@
 """Score a task: `python scripts/score_task.py shaving --environment wheelchair`.
 
-The same as `tcs score`, with the same options.
+The same as `tcs score`, with the same options: it runs the installed entry point.
 """
 
 from __future__ import annotations
 
+import runpy
 import sys
-
-from tcs.cli import main
 
 if __name__ == "__main__":
     sys.argv[:1] = ["tcs", "score"]
-    main()
+    runpy.run_module("tcs", run_name="__main__", alter_sys=False)

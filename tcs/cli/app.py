@@ -127,6 +127,7 @@ def score(
         raise typer.BadParameter("tells how the room was set for --seen.", param_hint="--at")
 
     from tcs.cli import live, rows
+    from tcs.placement.scoring import default_path
 
     kept: dict[str, Any] = {
         "measure": measure,
@@ -145,7 +146,7 @@ def score(
         result = live.score_found(task, environment, robot, path, jobs=jobs, **found, **kept)
         talk.print_result(result, live.report_found, as_json=as_json)
         return
-    path = out or rows.default_path(task, environment, robot)
+    path = out or default_path(task, environment, robot)
     result = rows.score_one(task, environment, robot, path, jobs=jobs, **kept)
     talk.print_result(result, reports.report_scores, as_json=as_json)
 
@@ -210,7 +211,7 @@ def select(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_places(seen or ()),
     )
-    result = reports.choice_as_json(choice, loaded.metadata["measure"])
+    result = choice.to_json(loaded.metadata["measure"])
     talk.print_result(result, reports.report_choice, as_json=as_json)
 
 

@@ -10,11 +10,12 @@ from typing import Any
 import tcs
 from tcs.cli import reports, talk
 from tcs.cli.places import check_writable, frame_places, observed_settings, settings
-from tcs.cli.rows import default_path, saved_summary
+from tcs.cli.rows import saved_summary
 from tcs.cli.talk import paper
 from tcs.model.grid import Axis
 from tcs.model.scene import EnvironmentFile, load_environment
 from tcs.output.words import settings_text
+from tcs.placement.scoring import default_path
 
 
 def live_path(task: str, environment: str, robot: str) -> Path:

@@ -19,11 +19,10 @@ from tcs.output.words import (
     scores_text,
     settings_text,
 )
-from tcs.placement.store import state_to_json
 
 if TYPE_CHECKING:
     # Listing what ships has no use for the arrays of a choice.
-    from tcs.placement.selection import Choice, Match
+    pass
 
 _DENSE = {"analytic": "11,520 angles each", "numeric": "400 starts each"}
 NUMERIC_NOTE = (
@@ -96,46 +95,6 @@ def report_rows(result: Mapping[str, Any]) -> None:
             f"{row['file_bytes'] / 1e6:.2f}",
         )
     paper(_ROWS_WIDTH).print(table)
-
-
-def choice_as_json(choice: Choice, measure: str) -> dict[str, Any]:
-    """Return a choice as plain containers, its members in the order of the tour.
-
-    Args:
-        choice: What was chosen.
-        measure: Name of the dexterity measure behind its manipulability.
-    """
-    return {
-        "measure": measure,
-        "members": [choice.members[i].to_json() for i in choice.order],
-        # Seven sevenths add up to 1 only after rounding.
-        "reachability": round(choice.reachability, 12),
-        "manipulability": round(choice.manipulability, 12),
-        "cost": choice.cost,
-        "utility": choice.utility,
-        "unreachable": choice.unreachable,
-        "seconds": choice.seconds,
-        **_success_as_json(choice),
-        **_match_as_json(choice.match),
-    }
-
-
-def _success_as_json(choice: Choice) -> dict[str, Any]:
-    """Return the estimated success under error, where there is an estimate."""
-    if choice.success is None or choice.success_ci95 is None:
-        return {}
-    return {"success": choice.success, "success_ci95": list(choice.success_ci95)}
-
-
-def _match_as_json(match: Match | None) -> dict[str, Any]:
-    """Return which observed state was chosen for, and how far off it is."""
-    if match is None or not match.state:
-        return {}
-    return {
-        "observed": state_to_json(match.axes, match.state),
-        "observed_error": state_to_json(match.axes, match.observed_error),
-        "frame_error": match.frame_error,
-    }
 
 
 def report_choice(result: Mapping[str, Any]) -> None:

@@ -9,12 +9,7 @@ import tcs
 from tcs.cli import talk
 from tcs.cli.places import check_writable
 from tcs.files.writing import make_folder
-from tcs.placement.scoring import task_environment_pairs
-
-
-def default_path(task: str, environment: str, robot: str) -> Path:
-    """Return the name of a score file, in the current folder."""
-    return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")
+from tcs.placement.scoring import default_path, task_environment_pairs
 
 
 def score_one(

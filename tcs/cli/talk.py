@@ -16,13 +16,19 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from tcs.errors import TcsError
+from tcs.output.terminal import interrupted, progress_bar, say, say_compiling
+
+__all__ = [
+    "Commands",
+    "paper",
+    "print_result",
+    "progress_bar",
+    "say",
+    "say_compiling",
+]
 
 _PIPE_WIDTH = 110
 """Columns where nobody says how wide the paper is: no row of ours is wider."""
-
-
-_interrupted = threading.Event()
-"""Set by Ctrl-C: compiled libraries may swallow the exception, or turn it into another."""
 
 
 class Commands(TyperGroup):
@@ -43,7 +49,7 @@ class Commands(TyperGroup):
             except typer.Exit:
                 raise
             except (Exception, KeyboardInterrupt) as error:
-                if not isinstance(error, KeyboardInterrupt) and not _interrupted.is_set():
+                if not isinstance(error, KeyboardInterrupt) and not interrupted.is_set():
                     raise
                 say("interrupted; no half-written file is left.")
                 raise typer.Exit(130) from None
@@ -54,10 +60,10 @@ def _remembering_interrupts() -> Iterator[None]:
     """Remember Ctrl-C besides raising `KeyboardInterrupt`."""
 
     def remember(_number: int, _frame: FrameType | None) -> None:
-        _interrupted.set()
+        interrupted.set()
         raise KeyboardInterrupt
 
-    _interrupted.clear()
+    interrupted.clear()
     in_charge = threading.current_thread() is threading.main_thread()
     # Somebody who has set another handler, or ignores the signal, wants it so.
     if not in_charge or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -80,28 +86,6 @@ def _remembering_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def say(text: str) -> None:
-    """Tell the user something that is not the result."""
-    typer.echo(f"tcs: {text}", err=True)
-
-
-def exit_code_of(work: Callable[[], int]) -> int:
-    """Do a script's work and return its exit code: 1 or 130 and a line where it goes wrong."""
-    try:
-        return work()
-    except TcsError as error:
-        say(str(error))
-    except KeyboardInterrupt:
-        say("interrupted; no half-written file is left.")
-        return 130
-    return 1
-
-
-def say_compiling() -> None:
-    """Tell the user why nothing happens for a while."""
-    say("compiling for this machine, up to a minute; later runs do without.")
-
-
 def print_result(
     result: dict[str, Any], report: Callable[[dict[str, Any]], None], *, as_json: bool
 ) -> None:
@@ -122,34 +106,3 @@ def paper(pipe_width: int = _PIPE_WIDTH) -> Console:
     """Return where results for a person go; `pipe_width` columns wide where it is no terminal."""
     width = None if sys.stdout.isatty() else pipe_width
     return Console(width=width, highlight=False, markup=False)
-
-
-@contextmanager
-def progress_bar(text: str) -> Iterator[Callable[[int, int], None]]:
-    """Give a function that moves a bar on stderr, and no bar where that is no terminal.
-
-    Args:
-        text: What is being done.
-
-    Raises:
-        KeyboardInterrupt: From the function, after a Ctrl-C that got lost on the way.
-    """
-    if not sys.stderr.isatty():
-        yield _heed_interrupt
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("", total=None)
-
-        def advance(done: int, total: int) -> None:
-            _heed_interrupt(done, total)
-            progress.update(bar, completed=done, total=total)
-
-        yield advance
-
-
-def _heed_interrupt(_done: int, _total: int) -> None:
-    if _interrupted.is_set():
-        raise KeyboardInterrupt

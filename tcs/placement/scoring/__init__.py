@@ -6,7 +6,7 @@ Out: a score file, and its verification.
 
 from __future__ import annotations
 
-from tcs.placement.scoring.catalogue import task_environment_pairs
+from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
 from tcs.placement.scoring.job import Job, data_reference, load_job
 from tcs.placement.scoring.live import LiveScorer, score_observed
 from tcs.placement.scoring.offline import score
@@ -24,6 +24,7 @@ __all__ = [
     "Verification",
     "build_sets",
     "data_reference",
+    "default_path",
     "load_job",
     "rebuild_scene",
     "score",

@@ -1,6 +1,8 @@
-"""Every row of Table I of the TCS paper: each task in each environment it was written for."""
+"""Rows of Table I of the TCS paper, each task in each of its environments, and their file names."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from tcs.errors import TaskError
 from tcs.model.scene import environment_names, load_environment
@@ -31,3 +33,17 @@ def task_environment_pairs(environment: str | None = None) -> tuple[tuple[str, s
             f"There are tasks for: {', '.join(sorted({r for rooms, _ in rows for r in rooms}))}."
         )
     return found
+
+
+def default_path(task: str, environment: str, robot: str) -> Path:
+    """Return the default path of a score file, in the current folder.
+
+    Args:
+        task: Name or path of a task.
+        environment: Name or path of an environment.
+        robot: Name or path of a robot.
+
+    >>> str(default_path("shaving", "rooms/kitchen.yaml", "pr2"))
+    'shaving-kitchen-pr2.tcs'
+    """
+    return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")

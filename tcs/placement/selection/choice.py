@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +82,32 @@ class Choice:
     """Duration of the selection [s]."""
     match: Match | None = None
     """The table of the file that was used, and its distance from the observation."""
+
+    def to_json(self, measure: str) -> dict[str, Any]:
+        """Return the choice as plain containers, as printed by `tcs select --json`.
+
+        Members are in the order of the tour. Keys of success and observation are there only if
+        success was estimated, or the file has observed axes.
+
+        Args:
+            measure: Name of the dexterity measure behind the manipulability.
+        """
+        plain: dict[str, Any] = {
+            "measure": measure,
+            "members": [self.members[i].to_json() for i in self.order],
+            # The sum of seven sevenths is 1 only after rounding.
+            "reachability": round(self.reachability, 12),
+            "manipulability": round(self.manipulability, 12),
+            "cost": self.cost,
+            "utility": self.utility,
+            "unreachable": self.unreachable,
+            "seconds": self.seconds,
+        }
+        if self.success is not None and self.success_ci95 is not None:
+            plain |= {"success": self.success, "success_ci95": list(self.success_ci95)}
+        if self.match is not None and self.match.state:
+            plain |= self.match.to_json()
+        return plain
 
 
 def select(

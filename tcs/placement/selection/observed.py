@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Axis, Grid, InitialConfiguration
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import ScoreFile, state_to_json
 
 MAX_FRAME_ERROR = 0.10
 """Greatest root mean square distance [m] of the observed frames from their scored positions: two
@@ -41,6 +42,14 @@ class Match:
     without frames."""
     axes: tuple[Axis, ...]
     """The observed axes."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the match as plain containers, angles in degrees under `..._deg` names."""
+        return {
+            "observed": state_to_json(self.axes, self.state),
+            "observed_error": state_to_json(self.axes, self.observed_error),
+            "frame_error": self.frame_error,
+        }
 
 
 def nearest_table(
