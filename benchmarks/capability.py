@@ -38,7 +38,7 @@ from tcs.output.draw import save_figure
 from tcs.output.draw.capability_maps import task_figure
 from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
-LIFT = 0.1725
+TORSO_HEIGHT = 0.1725
 """Brings TIAGo's shoulder to 0.91 m."""
 HEIGHT = 0.41
 # Table 1 of the ITCM thesis: the task in the robot's frame, x, y [m] and rotation [deg].
@@ -55,7 +55,7 @@ def main() -> None:
     command_line.add_argument("--pictures", type=Path)
     options = command_line.parse_args()
     header()
-    reach = Reach(load_robot("tiago"), lift=LIFT)
+    reach = Reach(load_robot("tiago"), torso_height=TORSO_HEIGHT)
     compile_first(reach)
     ihcm = making(reach, options.jobs)
     merging(ihcm, options.repeats)
@@ -67,7 +67,7 @@ def main() -> None:
 
 def compile_first(reach: Reach) -> None:
     """Run everything compiled once, for no time below is to hold compiling."""
-    reach.free_lifts(np.zeros((1, 7)))
+    reach.free_torso_heights(np.zeros((1, 7)))
     reach.manipulability(np.zeros((1, 7)))
     simulate_recording(reach, HandMotion(seconds=1.0))
 
@@ -93,12 +93,17 @@ def making(reach: Reach, jobs: int) -> CapabilityMap:
 
 
 def merging(ihcm: CapabilityMap, repeats: int) -> None:
-    """Measure the merge of twelve tool poses, all lifts and one."""
+    """Measure the merge of twelve tool poses, all torso heights and one."""
     task = the_task(1)
     volume = MapVolume(ihcm)
     row("merge, first task of a map", spread_ms([timed(lambda: merge(MapVolume(ihcm), task))[0]]))
-    for lift, name in ((None, "any lift"), (LIFT, "one lift")):
-        wall = [timed(lambda lift=lift: merge(volume, task, lift=lift))[0] for _ in range(repeats)]
+    for torso_height, name in ((None, "any torso height"), (TORSO_HEIGHT, "one torso height")):
+        wall = [
+            timed(lambda torso_height=torso_height: merge(volume, task, torso_height=torso_height))[
+                0
+            ]
+            for _ in range(repeats)
+        ]
         row(f"merge, {name}", spread_ms(wall))
         cell(
             "times",
@@ -128,21 +133,21 @@ def accuracy(reach: Reach, queries: int, jobs: int) -> None:
     """Measure how often maps of two grids are right."""
     print("\nmap beside inverse kinematics, shares of all queries [%]")
     print(f"{'grasps':<7} {'grid':<16} radius  true   right  false+ false-  recall precision")
-    for step, turns, radius in (
+    for step, yaw_bins, radius in (
         (0.05, 16, 0.9),
         (0.05, 16, None),
         (0.025, 32, 0.9),
         (0.025, 32, None),
     ):
         for grasps in ("side", "top", "all"):
-            grid = MapGrid.of(step, turns, grasps)
+            grid = MapGrid.of(step, yaw_bins, grasps)
             found = check_map(reach, grid, grasps, radius=radius, queries=queries, jobs=jobs)
             shares = (
                 found.reachable, found.accuracy, found.false_positives, found.false_negatives,
                 found.recall, found.precision,
             )  # fmt: skip
             shown = " ".join(f"{100 * share:6.2f}" for share in shares)
-            grid_said = f"{step:g} m, {360 / turns:g} deg  {radius or reach.length:.2f}"
+            grid_said = f"{step:g} m, {360 / yaw_bins:g} deg  {radius or reach.length:.2f}"
             print(f"{grasps:<7} {grid_said}  {shown}")
             names = (
                 "reachable",
@@ -181,12 +186,17 @@ def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | 
         print("far from ITCM-high and expert | share that scores less than ITCM-high, expert,")
         print("ITCM-low (---- where not in the map) | best score at yaw 0 | worst")
         for name, capability in maps:
-            found = merge(capability, the_task(direction), scale="thesis", lift=LIFT)
+            found = merge(
+                capability, the_task(direction), scale="thesis", torso_height=TORSO_HEIGHT
+            )
             print(f"  {name:<13} {described(found, around)}")
     if pictures is not None:
         pair = (maps[-1][1], maps[0][1])
         for direction in (1, 3):
-            merged = [merge(m, the_task(direction), scale="thesis", lift=LIFT) for m in pair]
+            merged = [
+                merge(m, the_task(direction), scale="thesis", torso_height=TORSO_HEIGHT)
+                for m in pair
+            ]
             save_figure(pictures / f"pick_and_place_{direction}.png", task_figure(*merged))
 
 
@@ -240,7 +250,7 @@ def placed(base: BasePose) -> str:
 
 def quantile(poses: np.ndarray, base: tuple[float, float, float], found: TaskMap) -> str:
     """Return the share of base poses that score less than the cell nearest to one."""
-    step, turn = found.grid.step, found.grid.turn
+    step, turn = found.grid.step, found.grid.yaw_step
     near = (np.abs(poses[:, 0] - base[0]) <= step / 2 + 1e-9) & (
         np.abs(poses[:, 1] - base[1]) <= step / 2 + 1e-9
     )

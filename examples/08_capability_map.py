@@ -25,9 +25,9 @@ def main(folder: Path = Path("out/examples")) -> None:
     """Make a map of TIAGo, keep it, and merge it for picking a cup and putting it down."""
     folder.mkdir(parents=True, exist_ok=True)
     # Steps of 10 cm and 45 deg are coarse, so that this is quick; 5 cm and 22.5 deg are usual.
-    grid = MapGrid.of(step=0.1, turns=8, grasps="side")
-    # Robot and grid have the same step, for the map counts lifts in it too.
-    reach = Reach(load_robot("tiago"), lift=0.15, step=0.1)
+    grid = MapGrid.of(step=0.1, yaw_bins=8, grasps="side")
+    # Robot and grid have the same step, for the map counts torso heights in it too.
+    reach = Reach(load_robot("tiago"), torso_height=0.15, step=0.1)
     path = folder / "tiago.tcm"
     save_map(path, map_from_ik(reach, grid))
 
@@ -37,7 +37,7 @@ def main(folder: Path = Path("out/examples")) -> None:
     best = found.best()
     print(f"{len(found.base_poses)} base poses reach both positions; the best one is")
     print(f"  x {best.x:.2f} m, y {best.y:.2f} m, heading {math.degrees(best.yaw):.0f} deg,")
-    print(f"  lift {best.lift:.2f} m, score {best.score:.2f}")
+    print(f"  torso height {best.torso_height:.2f} m, score {best.score:.2f}")
 
 
 if __name__ == "__main__":

@@ -1,35 +1,37 @@
-"""Capability maps: from which base poses an end-effector pose is reached, and how well.
+"""Capability maps: the base poses from which an end-effector pose is reached, and their scores.
 
-Made from inverse kinematics (ICM, IHCM) or from recorded arm configurations (ITCM), and merged into
-the map of a task.
+In: a robot and a grid, and for an ITCM recorded arm configurations; tasks as tool poses. Out: maps
+(ICM, IHCM, ITCM), their files and accuracy, and task maps with the best base pose.
 """
 
 from __future__ import annotations
 
-from tcs.capability.check import MapCheck, check_map, check_stored
-from tcs.capability.files import export_text, import_text, load_map, save_map
+from tcs.capability.check import MapCheck, check_file, check_map, check_stored
+from tcs.capability.files import load_map, save_map
 from tcs.capability.from_ik import map_from_ik
-from tcs.capability.from_recording import Recorded, map_from_recording
+from tcs.capability.from_recording import RecordedMap, map_from_recording
 from tcs.capability.grid import MapGrid
 from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import BasePose, TaskMap, merge
 from tcs.capability.reach import Reach
 from tcs.capability.recording import Recording, read_csv, recording_of, write_csv
 from tcs.capability.sequence import Stop, split
-from tcs.capability.tasks import (
-    Grasp,
-    GraspPosition,
-    GraspTask,
+from tcs.capability.surroundings import Feasibility, Surroundings
+from tcs.capability.task_shapes import (
+    TaskShape,
     curved_task,
     linear_task,
     pick_and_place_task,
 )
+from tcs.capability.tasks import Grasp, GraspPosition, GraspTask
+from tcs.capability.text import export_text, import_text, write_base_poses
 from tcs.capability.visibility import visibility
 from tcs.capability.volume import MapVolume
 
 __all__ = [
     "BasePose",
     "CapabilityMap",
+    "Feasibility",
     "Grasp",
     "GraspPosition",
     "GraspTask",
@@ -37,10 +39,13 @@ __all__ = [
     "MapGrid",
     "MapVolume",
     "Reach",
-    "Recorded",
+    "RecordedMap",
     "Recording",
     "Stop",
+    "Surroundings",
     "TaskMap",
+    "TaskShape",
+    "check_file",
     "check_map",
     "check_stored",
     "curved_task",
@@ -57,5 +62,6 @@ __all__ = [
     "save_map",
     "split",
     "visibility",
+    "write_base_poses",
     "write_csv",
 ]

@@ -1,4 +1,4 @@
-"""Joint states out of ROS bags, both generations; needs the extra `bags`."""
+"""Joint states from ROS 1 and ROS 2 bags; requires the extra `bags`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_bags(
         drop_bad: As in `recording_of`.
 
     Raises:
-        DataFileError: If the package `rosbags` is not installed, a bag cannot be read, or holds no
+        DataFileError: If the package `rosbags` is not installed, a bag cannot be read, or it has no
             joint states of the arm.
     """
     try:
@@ -38,30 +38,30 @@ def read_bags(
         ) from None
     wanted = list(robot.arm_joints)
     torso = robot.torso_joint
-    samples, lifts, seen = [], [], set[str]()
+    samples, torso_heights, found = [], [], set[str]()
     where = f"bag '{paths[0]}'" + (f" and {len(paths) - 1} more" if len(paths) > 1 else "")
     for path in paths:
         if not path.exists():
-            raise DataFileError(f"bag '{path}' is not there.")
+            raise DataFileError(f"bag '{path}' does not exist.")
         try:
-            # ROS 2 bags without message definitions are read by those of a release with long
-            # support; joint states have not changed since.
+            # ROS 2 bags without message definitions use those of a long-term release; joint states
+            # have not changed since.
             with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
                 states = [c for c in reader.connections if c.msgtype == JOINT_STATE]
                 connections = [c for c in states if topic is None or c.topic == topic]
                 if not connections:
-                    there = ", ".join(
+                    topics = ", ".join(
                         sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
                     )
-                    asked = f" on topic '{topic}'" if topic else ""
+                    which = f" on topic '{topic}'" if topic else ""
                     raise DataFileError(
-                        f"bag '{path}' holds no joint states{asked}. It holds: {there or 'none'}."
+                        f"bag '{path}' has no joint states{which}. It has: {topics or 'none'}."
                     )
                 for connection, _, raw in reader.messages(connections):
                     message: Any = reader.deserialize(raw, connection.msgtype)
                     names = list(message.name)
-                    seen.update(names)
-                    # Grippers and heads may publish states of their own on the same topic.
+                    found.update(names)
+                    # Grippers and heads may publish on the same topic.
                     if not set(wanted) <= set(names):
                         continue
                     if len(message.position) != len(names):
@@ -69,20 +69,20 @@ def read_bags(
                             f"bag '{path}', topic '{connection.topic}': a message has "
                             f"{len(names)} names and {len(message.position)} positions."
                         )
-                    place = dict(zip(names, message.position, strict=True))
-                    samples.append([float(place[name]) for name in wanted])
-                    lifts.append(float(place.get(torso, np.nan)) if torso else np.nan)
+                    position = dict(zip(names, message.position, strict=True))
+                    samples.append([float(position[name]) for name in wanted])
+                    torso_heights.append(float(position.get(torso, np.nan)) if torso else np.nan)
         except AnyReaderError as error:
-            said = " ".join(str(error).split())
-            raise DataFileError(f"bag '{path}' cannot be read: {said}.") from None
+            cause = " ".join(str(error).split())
+            raise DataFileError(f"bag '{path}' cannot be read: {cause}.") from None
     if not samples:
-        missing = [name for name in wanted if name not in seen]
-        said = f"{', '.join(missing)} missing" if missing else "never all in one message"
+        missing = [name for name in wanted if name not in found]
+        cause = f"{', '.join(missing)} missing" if missing else "never all in one message"
         raise DataFileError(
-            f"{where}: joint names do not match robot '{robot.name}': {said}. "
-            f"It holds: {', '.join(sorted(seen)) or 'none'}."
+            f"{where}: joint names do not match robot '{robot.name}': {cause}. "
+            f"It has: {', '.join(sorted(found)) or 'none'}."
         )
     columns, table = wanted, np.array(samples)
-    if torso is not None and np.isfinite(lifts).all():
-        columns, table = [*wanted, torso], np.column_stack([table, lifts])
+    if torso is not None and np.isfinite(torso_heights).all():
+        columns, table = [*wanted, torso], np.column_stack([table, torso_heights])
     return recording_of(columns, table, robot, where=where, drop_bad=drop_bad)

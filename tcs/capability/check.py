@@ -1,57 +1,60 @@
-"""How often a map is right: its answers beside those of inverse kinematics itself."""
+"""Accuracy of maps, compared with inverse kinematics at random tool poses."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tcs.capability.grid import GRASPS, MapGrid, yaw_rotation
-from tcs.capability.map import CapabilityMap
+from tcs.capability.files import load_map, robot_reference
+from tcs.capability.grid import GRASPS, SIDE, TOP, MapGrid, yaw_rotation
+from tcs.capability.map import ITCM, CapabilityMap
 from tcs.capability.reach import Reach
-from tcs.errors import UnknownNameError
+from tcs.errors import StoreError, UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
 
 HALF_WIDTH = 1.0
-"""Half the side of the cube about the shoulder that queries come from [m]: 2 m, as the thesis's."""
+"""Half the side of the cube about the shoulder, from which queries are drawn [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class MapCheck:
-    """A map's verdicts on random tool poses, in shares of all of them."""
+    """Agreement of a map with inverse kinematics; fractions of all queries unless stated."""
 
     queries: int
     reachable: float
-    """Truly reachable: inverse kinematics at the very pose finds a collision-free posture."""
+    """Reachable: inverse kinematics at the exact pose finds a collision-free posture."""
     accuracy: float
-    """Judged right."""
+    """Classified correctly."""
     false_positives: float
-    """Called reachable, and not."""
+    """Unreachable, in the map."""
     false_negatives: float
-    """Reachable, and not called so."""
+    """Reachable, not in the map."""
     recall: float
-    """Of the truly reachable, the share called so."""
+    """Fraction of the reachable queries that are in the map."""
     precision: float
-    """Of those called so, the share truly reachable."""
+    """Fraction of the queries in the map that are reachable."""
 
     @classmethod
-    def of(cls, says: BoolArray, true: BoolArray) -> MapCheck:
-        """Return the shares of verdicts beside the truth, both of shape (n,)."""
-        both, n = int((says & true).sum()), len(true)
+    def of(cls, predicted: BoolArray, true: BoolArray) -> MapCheck:
+        """Return the agreement of predictions with the truth, both of shape (n,)."""
+        both, n = int((predicted & true).sum()), len(true)
         return cls(
             queries=n,
             reachable=float(true.mean()),
-            accuracy=float((says == true).mean()),
-            false_positives=float((says & ~true).mean()),
-            false_negatives=float((~says & true).mean()),
+            accuracy=float((predicted == true).mean()),
+            false_positives=float((predicted & ~true).mean()),
+            false_negatives=float((~predicted & true).mean()),
             recall=both / max(int(true.sum()), 1),
-            precision=both / max(int(says.sum()), 1),
+            precision=both / max(int(predicted.sum()), 1),
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the fractions as plain numbers."""
         return {name: getattr(self, name) for name in self.__slots__}
 
 
@@ -59,22 +62,21 @@ def check_map(
     reach: Reach, grid: MapGrid, grasps: str, *, radius: float | None = None, queries: int = 20_000,
     seed: int = 0, jobs: int = 2,
 ) -> MapCheck:  # fmt: skip
-    """Return how often a whole map of this grid would be right, without making all of it.
+    """Return the accuracy that a map of a grid would have, without making the map.
 
-    Only the cells that queries fall into are solved for; a map that holds all cells gives the same
-    answers.
+    Only the cells nearest to the queries are solved; a complete map gives the same result.
 
     Args:
         reach: The robot.
         grid: The cells.
-        grasps: Which tool poses are asked for: "side", "top", or "all" orientations.
-        radius: That of the map [m]; None is the arm's length.
-        queries: How many poses.
-        seed: Of the poses.
+        grasps: Orientations of the queries: "side", "top" or "all".
+        radius: Radius of the map [m]; None is the arm's length.
+        queries: Number of poses.
+        seed: Seed of the poses.
         jobs: Number of threads.
 
     Raises:
-        UnknownNameError: If there is no such choice of grasps.
+        UnknownNameError: If there is no such set of grasps.
     """
     R_BT, p_BT = random_poses(reach, grasps, queries, seed)
     cells, of_query = np.unique(grid.nearest(R_BT, p_BT).cells, axis=0, return_inverse=True)
@@ -89,39 +91,82 @@ def check_stored(
     reach: Reach, capability: CapabilityMap, grasps: str, *, queries: int = 20_000, seed: int = 0,
     jobs: int = 2,
 ) -> MapCheck:  # fmt: skip
-    """Return how often a map is right.
+    """Return the accuracy of a map.
 
     Args:
-        reach: The robot, at the map's lift.
+        reach: The robot, at the map's torso height.
         capability: The map.
-        grasps: Which tool poses are asked for: "side", "top", or "all" orientations.
-        queries: How many poses.
-        seed: Of the poses.
+        grasps: Orientations of the queries: "side", "top" or "all".
+        queries: Number of poses.
+        seed: Seed of the poses.
         jobs: Number of threads.
 
     Raises:
-        UnknownNameError: If there is no such choice of grasps.
+        UnknownNameError: If there is no such set of grasps.
     """
     R_BT, p_BT = random_poses(reach, grasps, queries, seed)
-    says = capability.look_up(R_BT, p_BT) >= 0
-    return MapCheck.of(says, reach.solve(R_BT, p_BT, jobs=jobs).reached)
+    predicted = capability.look_up(R_BT, p_BT) >= 0
+    return MapCheck.of(predicted, reach.solve(R_BT, p_BT, jobs=jobs).reached)
+
+
+def check_file(
+    path: Path, *, robot: str | None = None, grasps: Sequence[str] = (), queries: int = 20_000,
+    seed: int = 0, jobs: int = 2,
+) -> tuple[MapGrid, dict[str, MapCheck]]:  # fmt: skip
+    """Return the grid and the accuracy of a map file, by orientation of the queries.
+
+    Args:
+        path: File of a map made by inverse kinematics.
+        robot: Name or file of the robot; None is the one stored in the map.
+        grasps: "side", "top" or "all"; by default the tilts of the map among the first two.
+        queries: Number of poses for each.
+        seed: Seed of the poses.
+        jobs: Number of threads.
+
+    Raises:
+        StoreError: If the map was not made by inverse kinematics, or not with this robot.
+        UnknownNameError: If there is no such set of grasps.
+    """
+    capability = load_map(path)
+    if capability.map_type == ITCM or "measure" not in capability.metadata:
+        raise StoreError(
+            f"Capability map '{path}' was recorded or imported, so it need not hold every pose "
+            "that inverse kinematics reaches. Check a map made by `tcs capability from-ik`."
+        )
+    name = robot_reference(path, capability, robot)
+    grid = capability.grid
+    reach = Reach.load(
+        name, tool=str(capability.metadata["tool"]), torso_height=capability.torso_height,
+        step=grid.step, measure=str(capability.metadata["measure"]),
+    )  # fmt: skip
+    if capability.metadata.get("scene_digest") != reach.lowered.digest():
+        raise StoreError(
+            f"Capability map '{path}' was made with another model of robot '{name}' than the "
+            "installed one. Make the map again."
+        )
+    tilts = {SIDE: (0, 0), TOP: (grid.yaw_bins // 4, 0)}
+    names = grasps or [name for name, tilt in tilts.items() if tilt in grid.tilts]
+    return grid, {
+        name: check_stored(reach, capability, name, queries=queries, seed=seed, jobs=jobs)
+        for name in names
+    }
 
 
 def random_poses(reach: Reach, grasps: str, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return tool poses in B, uniform in a cube about the shoulder and over their orientations.
+    """Return tool poses in B, uniform in a cube about the shoulder and in orientation.
 
     Args:
         reach: The robot.
-        grasps: "side" and "top" turn about the vertical alone, "all" every way.
-        count: How many.
-        seed: Of the draws.
+        grasps: "side" and "top" have random yaw only, "all" random orientation.
+        count: Number of poses.
+        seed: Seed of the poses.
 
     Raises:
-        UnknownNameError: If there is no such choice.
+        UnknownNameError: If there is no such set of grasps.
     """
     known = tuple(name for name in GRASPS if "+" not in name)
     if grasps not in known:
-        raise UnknownNameError("choice of grasps", grasps, known)
+        raise UnknownNameError("set of grasps", grasps, known)
     rng = np.random.default_rng(seed)
     p_BT = reach.shoulder + rng.uniform(-HALF_WIDTH, HALF_WIDTH, (count, 3))
     if grasps == "all":

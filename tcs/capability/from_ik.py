@@ -1,4 +1,4 @@
-"""Maps from inverse kinematics: every cell around the tool is solved for (ICM and IHCM)."""
+"""Maps from inverse kinematics of every cell around the tool (ICM and IHCM)."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 
 from tcs.capability.grid import CellArray, MapGrid, yaw_rotation
 from tcs.capability.head import View, head_names, head_view
-from tcs.capability.map import ICM, IHCM, MAX_LIFTS, CapabilityMap
+from tcs.capability.map import ICM, IHCM, MAX_TORSO_HEIGHTS, CapabilityMap
 from tcs.capability.reach import OnProgress, Reach
 from tcs.capability.visibility import CORRECTED, VISIBILITIES, visibility
 from tcs.errors import GridError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
 
 MAX_CELLS = 60_000_000
-"""More would take hours and more memory than a common machine has."""
+"""Greatest number of cells: more would take hours and too much memory."""
 
 _SCALE_POSTURES = 1 << 15
-"""Random postures among which the arm's best is looked for."""
+"""Number of random postures from which the greatest manipulability is taken."""
 
 
 def map_from_ik(
     reach: Reach,
     grid: MapGrid,
     *,
-    kind: str = IHCM,
+    map_type: str = IHCM,
     radius: float | None = None,
     view_rule: str = CORRECTED,
     jobs: int = 2,
@@ -38,23 +38,25 @@ def map_from_ik(
     Args:
         reach: The robot.
         grid: The cells.
-        kind: "ICM", or "IHCM" to count visibility as well.
-        radius: Farthest that the tool may be from the shoulder [m]; None is the arm's length. The
-            thesis takes 0.9 m for an arm of 0.87 m.
-        view_rule: How visibility is scored.
+        map_type: "ICM", or "IHCM" to include visibility.
+        radius: Greatest distance of the tool from the shoulder [m]; None is the arm's length. The
+            thesis uses 0.9 m for an arm of 0.87 m.
+        view_rule: Visibility rule.
         jobs: Number of threads.
-        on_progress: Called with cells done and in all.
+        on_progress: Called with the number of cells done and of all.
 
     Raises:
-        RobotError: If the robot has no head file and an IHCM is asked for.
-        UnknownNameError: If there is no such rule.
-        GridError: If there are far too many cells or lifts.
+        RobotError: If an IHCM is requested and the robot has no head file.
+        UnknownNameError: If there is no such map type or rule.
+        GridError: If the radius is not positive, or there are too many cells or torso heights.
 
     Source:
-        ITCM thesis, Appendix B. There TRAC-IK solves for the cells; here it is the closed form,
-        which does not miss solutions at random.
+        ITCM thesis, Appendix B. The thesis solves with TRAC-IK; the solver here does not miss
+        solutions at random.
     """
-    seen_from(reach, grid, kind, view_rule)
+    if map_type not in (ICM, IHCM):
+        raise UnknownNameError("map type", map_type, (ICM, IHCM))
+    camera_view(reach, grid, map_type, view_rule)
     radius = reach.length if radius is None else radius
     cells = cells_around(grid, reach.shoulder, radius)
     R_BT, p_BT = grid.tool_in_base(cells)
@@ -62,15 +64,15 @@ def map_from_ik(
     rows = np.flatnonzero(solved.reached)
     joints = solved.joints[rows]
     return finished_map(
-        reach, grid, kind, cells[rows], p_BT[rows], solved.manipulability[rows], joints,
-        view_rule, {"radius": float(radius), "cells_asked": len(cells)},
+        reach, grid, map_type, cells[rows], p_BT[rows], solved.manipulability[rows], joints,
+        view_rule, {"radius": float(radius), "cells_considered": len(cells)},
     )  # fmt: skip
 
 
 def finished_map(
     reach: Reach,
     grid: MapGrid,
-    kind: str,
+    map_type: str,
     cells: CellArray,
     p_BT: FloatArray,
     manipulability: NDArray[np.float32] | FloatArray,
@@ -78,39 +80,39 @@ def finished_map(
     view_rule: str,
     metadata: dict[str, Any],
 ) -> CapabilityMap:
-    """Return a map of cells whose postures are known, in any order.
+    """Return a map of cells with known postures, in any order.
 
     Args:
         reach: The robot.
         grid: The cells' grid.
-        kind: Kind of map.
+        map_type: Map type.
         cells: Each once, shape (n, 5).
-        p_BT: Tool positions in B at the map's lift [m], shape (n, 3).
+        p_BT: Tool positions in B at the map's torso height [m], shape (n, 3).
         manipulability: Shape (n,).
         joints: Arm joints [rad], shape (n, 7).
-        view_rule: How visibility is scored.
-        metadata: What else is to be remembered.
+        view_rule: Visibility rule.
+        metadata: Further metadata.
 
     Raises:
-        RobotError: If the robot has no head file and the kind counts visibility.
+        RobotError: If the map type includes visibility and the robot has no head file.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more lifts than a map holds.
+        GridError: If there are more torso heights than a map holds.
     """
     order = np.argsort(grid.keys(cells))
-    view = seen_from(reach, grid, kind, view_rule)
-    seen = np.zeros(len(cells)) if view is None else visibility(view, p_BT, view_rule)
+    view = camera_view(reach, grid, map_type, view_rule)
+    visible = np.zeros(len(cells)) if view is None else visibility(view, p_BT, view_rule)
     return CapabilityMap(
-        kind=kind,
+        map_type=map_type,
         grid=grid,
         cells=cells[order],
         manipulability=manipulability[order].astype(np.float32),
-        visibility=seen[order].astype(np.float32),
-        lifts=np.array(reach.lifts, dtype=np.float64),
-        lift=float(reach.lift),
-        free_lifts=reach.free_lifts(np.asarray(joints[order], dtype=np.float64)),
+        visibility=visible[order].astype(np.float32),
+        torso_heights=np.array(reach.torso_heights, dtype=np.float64),
+        torso_height=float(reach.torso_height),
+        free_torso_heights=reach.free_torso_heights(np.asarray(joints[order], dtype=np.float64)),
         manipulability_scale=manipulability_scale(reach),
         metadata={
-            "robot": reach.found_as,
+            "robot": reach.robot_reference,
             "tool": reach.robot.tool_frame,
             "arm_joints": list(reach.robot.arm_joints),
             "measure": reach.measure,
@@ -123,30 +125,30 @@ def finished_map(
     )
 
 
-def seen_from(reach: Reach, grid: MapGrid, kind: str, view_rule: str) -> View | None:
-    """Return what the robot's camera sees, None for an ICM of a robot without a head file.
+def camera_view(reach: Reach, grid: MapGrid, map_type: str, view_rule: str) -> View | None:
+    """Return the view of the head camera, None for an ICM of a robot without a head file.
 
-    Also refuses what no map can be made of, before the work.
+    Called before the work, it also validates the arguments of a map.
 
     Raises:
-        RobotError: If there is no head file where one is needed.
+        RobotError: If a head file is needed and there is none.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more lifts than a map holds.
+        GridError: If there are more torso heights than a map holds.
     """
     if view_rule not in VISIBILITIES:
         raise UnknownNameError("visibility", view_rule, VISIBILITIES)
-    if len(reach.lifts) > MAX_LIFTS:
+    if len(reach.torso_heights) > MAX_TORSO_HEIGHTS:
         raise GridError(
-            f"the lift has {len(reach.lifts)} levels of {grid.step:g} m; a map holds {MAX_LIFTS} "
-            "at most. Take a larger step."
+            f"the torso has {len(reach.torso_heights)} heights {grid.step:g} m apart; a map holds "
+            f"{MAX_TORSO_HEIGHTS} at most. Use a larger step."
         )
-    if kind == ICM and reach.head is None and reach.robot.name not in head_names():
+    if map_type == ICM and reach.head is None and reach.robot.name not in head_names():
         return None
-    return head_view(reach.scene, reach.lift, reach.head)
+    return head_view(reach.scene, reach.torso_height, reach.head)
 
 
 def manipulability_scale(reach: Reach) -> float:
-    """Return the best measure among random postures of the arm, the same in every run."""
+    """Return the greatest measure of random postures of the arm, with a fixed seed."""
     lower, upper = reach.limits
     first = np.where(np.isfinite(lower), lower, -np.pi)
     last = np.where(np.isfinite(upper), upper, np.pi)
@@ -155,29 +157,29 @@ def manipulability_scale(reach: Reach) -> float:
 
 
 def cells_around(grid: MapGrid, shoulder: FloatArray, radius: float) -> CellArray:
-    """Return the cells whose base has its shoulder within a radius of the tool, shape (n, 5).
+    """Return the cells with the shoulder within a radius of the tool, shape (n, 5).
 
     Args:
         grid: The grid.
         shoulder: The shoulder in B [m], shape (3,).
-        radius: [m].
+        radius: Radius [m].
 
     Raises:
-        GridError: If there are none, or far too many.
+        GridError: If there are no cells, or too many.
     """
-    ball = 4.0 / 3.0 * np.pi * (radius / grid.step) ** 3 * grid.turns * len(grid.tilts)
-    if not 1.0 <= ball <= MAX_CELLS:
+    count = 4.0 / 3.0 * np.pi * (radius / grid.step) ** 3 * grid.yaw_bins * len(grid.tilts)
+    if not 1.0 <= count <= MAX_CELLS:
         raise GridError(
-            f"a radius of {radius:g} m at steps of {grid.step:g} m, {grid.turns} headings and "
-            f"{len(grid.tilts)} tilts has {ball:.3g} cells; must be 1 to {MAX_CELLS:,}."
+            f"a radius of {radius:g} m at steps of {grid.step:g} m, {grid.yaw_bins} yaw bins and "
+            f"{len(grid.tilts)} tilts has {count:.3g} cells; must be 1 to {MAX_CELLS:,}."
         )
     far = int(np.ceil((radius + np.linalg.norm(shoulder)) / grid.step))
     line = np.arange(-far, far + 1, dtype=np.int32)
     x, y = np.meshgrid(line, line, indexing="ij")
     z = line * grid.step + shoulder[2]
     found = []
-    for yaw in range(grid.turns):
-        across = yaw_rotation(np.array([yaw * grid.turn]))[0] @ shoulder
+    for yaw in range(grid.yaw_bins):
+        across = yaw_rotation(np.array([yaw * grid.yaw_step]))[0] @ shoulder
         square = (x * grid.step + across[0]) ** 2 + (y * grid.step + across[1]) ** 2
         inside = square[..., None] + z**2 <= radius**2
         i, j, k = np.nonzero(inside)

@@ -1,4 +1,4 @@
-"""Maps from recorded arm configurations (ITCM): every cell is one that the operator did reach."""
+"""Maps from recorded arm configurations (ITCM): cells that the operator reached."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tcs.capability.from_ik import finished_map, seen_from
+from tcs.capability.from_ik import camera_view, finished_map
 from tcs.capability.grid import MapGrid, NearestCells
 from tcs.capability.map import ITCM, CapabilityMap
 from tcs.capability.reach import Reach
@@ -18,23 +18,23 @@ from tcs.kernel.arrays import FloatArray
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _EDGE = 1e-9
-"""Poses this much past half a cell [m or rad] still belong to it: rounding, no more."""
+"""Tolerance of half a cell [m or rad], for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
-    """A map, and how the recording became it."""
+class RecordedMap:
+    """A map of a recording, with statistics of the discretisation."""
 
     capability: CapabilityMap
     samples: int
     """Samples in the recording."""
-    off_height: int
-    """Samples left out as higher or lower than asked for."""
-    off_grid: int
-    """Samples left out as tilted by more than half a cell from every tilt of the grid."""
+    wrong_height: int
+    """Samples left out because of the height of the tool."""
+    wrong_tilt: int
+    """Samples left out because no tilt of the grid is within half a cell."""
     offsets: FloatArray
-    """Of the sample chosen for each cell, distance from the cell along x, y, z [m], and about
-    roll, pitch, yaw [rad], shape (cells, 6)."""
+    """Distances of the chosen sample from its cell: x, y, z [m], roll, pitch, yaw [rad], shape
+    (cells, 6)."""
 
     def error_table(self) -> dict[str, dict[str, float]]:
         """Return mean and standard deviation of `offsets` by axis: ITCM thesis, Table 3."""
@@ -44,11 +44,11 @@ class Recorded:
         }
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers, without the map."""
+        """Return the statistics as plain containers, without the map."""
         return {
             "samples": self.samples,
-            "off_height": self.off_height,
-            "off_grid": self.off_grid,
+            "wrong_height": self.wrong_height,
+            "wrong_tilt": self.wrong_tilt,
             "cells": len(self.capability.cells),
             "discretisation_error": self.error_table(),
         }
@@ -62,49 +62,52 @@ def map_from_recording(
     height: float | None = None,
     height_margin: float | None = None,
     view_rule: str = CORRECTED,
-) -> Recorded:
-    """Return the map of what was recorded.
+) -> RecordedMap:
+    """Return the map of a recording.
 
     Args:
-        reach: The robot, at the lift the map is for.
+        reach: The robot, at the torso height of the map.
         grid: The cells.
-        recording: Arm configurations; where no lift was recorded, it was that of `reach`.
-        height: Height of the tool above the floor that counts [m]; None is any.
-        height_margin: How far off it may be [m]; None is half a step.
-        view_rule: How visibility is scored.
+        recording: Arm configurations; without torso heights, that of `reach` is assumed.
+        height: Height of the tool above the floor [m]; samples at other heights are left out.
+            None takes all samples.
+        height_margin: Greatest difference from `height` [m]; None is half a step.
+        view_rule: Visibility rule.
 
     Raises:
-        DataFileError: If no sample is left.
+        DataFileError: If the height is not finite, or no sample is left.
         RobotError: If the robot has no head file.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more lifts than a map holds.
+        GridError: If there are more torso heights than a map holds.
 
     Source:
-        ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). Of the samples in a cell the
-        one nearest to its centre counts: both distances, of position and of orientation, are
-        stretched to 0 to 1 over all samples and multiplied.
+        ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). The sample of a cell is
+        the one nearest to its centre: the distances in position and in orientation are each
+        stretched to 0 to 1 over all samples, and multiplied.
     """
-    seen_from(reach, grid, ITCM, view_rule)
+    camera_view(reach, grid, ITCM, view_rule)
     R_AT, p_AT = reach.tool_poses(recording.joints)
     R_BT = reach.R_BA @ R_AT
     p_BT = p_AT @ reach.R_BA.T + reach.p_BA
     kept = np.arange(len(recording))
     if height is not None:
-        raised = 0.0 if recording.lift is None else recording.lift - reach.lift
+        raised = (
+            0.0 if recording.torso_height is None else recording.torso_height - reach.torso_height
+        )
         margin = 0.5 * grid.step if height_margin is None else height_margin
         kept = np.flatnonzero(np.abs(p_BT[:, 2] + raised - height) <= margin + _EDGE)
-    off_height = len(recording) - len(kept)
+    wrong_height = len(recording) - len(kept)
     near = grid.nearest(R_BT[kept], p_BT[kept])
     angles = _roll_pitch_yaw(near.R_CT)
-    on_grid = (np.abs(angles) <= 0.5 * grid.turn + _EDGE).all(axis=1)
+    on_grid = (np.abs(angles) <= 0.5 * grid.yaw_step + _EDGE).all(axis=1)
     kept, near, angles = kept[on_grid], _rows(near, on_grid), angles[on_grid]
     if not len(kept):
         at = "" if height is None else f" at a height of {height:g} m"
         raise DataFileError(
-            f"none of the {len(recording)} samples holds the tool{at} within half a cell of the "
-            "grid's tilts. Check height, lift, tool frame and grasps."
+            f"none of the {len(recording)} samples has the tool{at} within half a cell of the "
+            "tilts of the grid. Check height, torso height, tool frame and grasps."
         )
-    distance = _stretched(np.linalg.norm(near.offset, axis=1)) * _stretched(near.turn)
+    distance = _stretched(np.linalg.norm(near.offset, axis=1)) * _stretched(near.angle)
     keys = grid.keys(near.cells)
     order = np.lexsort((np.arange(len(keys)), distance, keys))
     _, first = np.unique(keys[order], return_index=True)
@@ -115,12 +118,12 @@ def map_from_recording(
         reach, grid, ITCM, near.cells[rows], p_BT[chosen], reach.manipulability(joints), joints,
         view_rule, {"samples": len(recording), "height": height},
     )  # fmt: skip
-    # It was held there, whatever our enclosing shapes say.
+    # The arm was at this torso height, even where the enclosing shapes overlap.
     here = np.uint32(1) << np.uint32(reach.level)
-    capability = replace(capability, free_lifts=capability.free_lifts | here)
+    capability = replace(capability, free_torso_heights=capability.free_torso_heights | here)
     offsets = np.abs(np.hstack([near.offset[rows], angles[rows]]))
-    return Recorded(
-        capability, len(recording), off_height, len(recording) - off_height - len(kept), offsets
+    return RecordedMap(
+        capability, len(recording), wrong_height, len(recording) - wrong_height - len(kept), offsets
     )
 
 
@@ -129,7 +132,7 @@ def _rows(near: NearestCells, rows: Any) -> NearestCells:
 
 
 def _stretched(values: FloatArray) -> FloatArray:
-    """Return distances divided by the largest; the thesis stretches them to 0 to 1."""
+    """Return values stretched to 0 to 1; all 0 if they are equal."""
     low, high = float(values.min()), float(values.max())
     return (values - low) / (high - low) if high > low else np.zeros_like(values)
 

@@ -1,4 +1,4 @@
-"""Head files: the camera an operator looks through, and where it can look."""
+"""Head files: the camera of the operator and its directions of view."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from tcs.model.scene import Scene
 
 
 class HeadFile(Document):
-    """A head as its file says it."""
+    """Content of a head file."""
 
     camera_frame: str = Field(min_length=1)
-    """Frame of the URDF at the camera, x along its view while the head is at zero."""
+    """Frame of the URDF at the camera, x along its view with the head at zero."""
     pan_joint: str
     tilt_joint: str
     horizontal_fov_deg: PositiveNumber
@@ -31,14 +31,14 @@ class HeadFile(Document):
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Where a head camera is and which directions it can see.
+    """Position of a head camera and its directions of view.
 
-    Directions are seen from the camera with the head at zero: that turning the head also moves
-    the camera is left out, as in the ITCM thesis, Appendix B.2.
+    Directions are relative to the camera with the head at zero; the translation of the camera by
+    the head joints is neglected, as in the ITCM thesis, Appendix B.2.
     """
 
     p_BoCo_B: tuple[float, float, float]
-    """The camera in the base at the lift in hand [m]."""
+    """Position of the camera in the base, at one torso height [m]."""
     yaw: tuple[float, float]
     """Lowest and highest yaw in view, left positive [rad]."""
     pitch: tuple[float, float]
@@ -61,38 +61,38 @@ def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
         head: Name of a head that ships, or path of a head file; None is the robot's name.
 
     Raises:
-        UnknownNameError: If no head of that name ships, or its file names an unknown key.
-        RobotError: If no head is named and none ships for the robot, the file cannot be used, or
-            it names what the robot does not have.
+        UnknownNameError: If no head of that name ships, or its file names an unknown key, link or
+            joint.
+        RobotError: If no head is named and none ships for the robot, or the file cannot be used.
     """
     names = HEADS.names()
-    asked = robot.name if head is None else head
+    name = robot.name if head is None else head
     if head is None and robot.name not in names:
         raise RobotError(
-            f"robot '{robot.name}': no head camera of it is known, only of {', '.join(names)}. "
-            "Name one of these heads, or a head file of your own (--head), or make an ICM, which "
-            "needs none (--kind ICM)."
+            f"robot '{robot.name}': no head file ships for it, only for {', '.join(names)}. Name "
+            "one of these or a head file of your own (--head), or make an ICM, which needs none "
+            "(--type ICM)."
         )
-    path = HEADS.path(asked, where=f"robot '{robot.name}'")
+    path = HEADS.path(name, where=f"robot '{robot.name}'")
     where = f"head file '{path}'"
     found = read_document(path, HeadFile, where, RobotError)
     model = robot.model()
-    for kind, name, known in (
+    for kind, value, known in (
         ("link", found.camera_frame, model.links),
         ("joint", found.pan_joint, model.joints),
         ("joint", found.tilt_joint, model.joints),
     ):
-        if name not in known:
-            raise UnknownNameError(kind, name, known, where=where)
+        if value not in known:
+            raise UnknownNameError(kind, value, known, where=where)
     return found
 
 
-def head_view(scene: Scene, lift: float, head_file: str | Path | None = None) -> View:
-    """Return what the head camera of a scene's robot sees.
+def head_view(scene: Scene, torso_height: float, head_file: str | Path | None = None) -> View:
+    """Return the view of the head camera of the robot in a scene.
 
     Args:
-        scene: The robot; its state is left as it was.
-        lift: Height of the torso [m].
+        scene: The scene; its state is restored.
+        torso_height: Height of the torso [m].
         head_file: Name or path of the head; None is the robot's name.
 
     Raises:
@@ -100,17 +100,17 @@ def head_view(scene: Scene, lift: float, head_file: str | Path | None = None) ->
         RobotError: If the head file cannot be used.
 
     Source:
-        ITCM thesis eqs. (10) and (11): limits of the joints, hard ones as there, and half the field
-        of view beyond.
+        ITCM thesis eqs. (10) and (11): the hard limits of the joints, as there, plus half the field
+        of view.
     """
     robot = scene.spec.robot
     head = load_head(robot, head_file)
     joints = robot.model().joints
     before = scene.positions()
     try:
-        scene.set_torso(lift)
+        scene.set_torso(torso_height)
         p_BC, _ = _camera(scene, head, 0.0, 0.0)
-        # Which way a joint turns the view is read off the model, in a tenth of a radian.
+        # The sign of each joint is read off the model, from a rotation of 0.1 rad.
         pan_sign = np.sign(_angles(_camera(scene, head, 0.1, 0.0)[1])[0])
         tilt_sign = np.sign(_angles(_camera(scene, head, 0.0, 0.1)[1])[1])
     finally:
@@ -124,7 +124,7 @@ def head_view(scene: Scene, lift: float, head_file: str | Path | None = None) ->
 
 
 def _camera(scene: Scene, head: HeadFile, pan: float, tilt: float) -> tuple[FloatArray, FloatArray]:
-    """Return where the camera is and which way it looks, in B."""
+    """Return position and view direction of the camera in B."""
     plant, state = scene.built.plant, scene.plant_context
     plant.GetJointByName(head.pan_joint).set_angle(state, pan)
     plant.GetJointByName(head.tilt_joint).set_angle(state, tilt)

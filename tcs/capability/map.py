@@ -1,4 +1,4 @@
-"""A capability map: the base poses from which one end-effector pose is reached, and how well."""
+"""Capability maps: the base poses from which one end-effector pose is reached, and their scores."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tcs.errors import StoreError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
 
 ICM, IHCM, ITCM = "ICM", "IHCM", "ITCM"
-KINDS = (ICM, IHCM, ITCM)
-"""From inverse kinematics; the same with visibility; from what was recorded."""
+MAP_TYPES = (ICM, IHCM, ITCM)
+"""From inverse kinematics; from inverse kinematics, with visibility; from recordings."""
 
-MAX_LIFTS = 32
-"""Lifts are told apart by the bits of one number."""
+MAX_TORSO_HEIGHTS = 32
+"""Greatest number of torso heights: each has a bit of a 32-bit integer."""
 
 FIXED, SPREAD = "fixed", "thesis"
 SCALES = (FIXED, SPREAD)
@@ -27,13 +27,13 @@ SCALES = (FIXED, SPREAD)
 
 @dataclass(frozen=True, eq=False)
 class CapabilityMap:
-    """Cells of a grid, with what makes a base pose a good one.
+    """Cells of a grid with manipulability and visibility.
 
-    A map is made at one lift. A cell's z says how high the base would stand at that lift; with the
-    lift raised by as much, it stands on the floor.
+    A map is made at one torso height. The z of a cell is the height of the base above the floor at
+    that torso height; with the torso raised by z, the base stands on the floor.
     """
 
-    kind: str
+    map_type: str
     """ "ICM", "IHCM" or "ITCM"."""
     grid: MapGrid
     cells: CellArray
@@ -42,31 +42,31 @@ class CapabilityMap:
     """Shape (n,)."""
     visibility: NDArray[np.float32]
     """Shape (n,)."""
-    lifts: FloatArray
-    """Lifts that were looked at [m], `grid.step` apart, one of them `lift`, shape (levels,)."""
-    lift: float
-    """The lift the map was made at [m]."""
-    free_lifts: NDArray[np.uint32]
-    """Bit i is set where the posture touches nothing at `lifts[i]`, shape (n,)."""
+    torso_heights: FloatArray
+    """Checked torso heights [m], `grid.step` apart, one of them `torso_height`, shape (levels,)."""
+    torso_height: float
+    """Torso height at which the map was made [m]."""
+    free_torso_heights: NDArray[np.uint32]
+    """Bit i is set where the posture is free of contact at `torso_heights[i]`, shape (n,)."""
     manipulability_scale: float
-    """What counts as full manipulability: the best of the arm, the same for all its maps."""
+    """Greatest manipulability of the arm, which scales the scores of all its maps."""
     metadata: Mapping[str, Any]
-    """Robot, tool, measure and so on, as plain containers."""
+    """Robot, tool, measure and so on; plain containers."""
     joints: NDArray[np.float32]
-    """Arm joints behind each cell [rad], shape (n, 7), or (0, 7) where they are not known."""
+    """Posture of each cell [rad], shape (n, 7), or (0, 7) if unknown."""
 
     def __post_init__(self) -> None:
-        """Check the parts against each other, and make the arrays read-only.
+        """Check that the parts agree, and make the arrays read-only.
 
         Raises:
-            UnknownNameError: If there is no such kind of map.
+            UnknownNameError: If there is no such map type.
             StoreError: If arrays contradict each other.
         """
-        if self.kind not in KINDS:
-            raise UnknownNameError("kind of map", self.kind, KINDS)
+        if self.map_type not in MAP_TYPES:
+            raise UnknownNameError("map type", self.map_type, MAP_TYPES)
         n = len(self.cells)
         shapes = {
-            "cells": (n, 5), "manipulability": (n,), "visibility": (n,), "free_lifts": (n,),
+            "cells": (n, 5), "manipulability": (n,), "visibility": (n,), "free_torso_heights": (n,),
             "joints": (n if len(self.joints) else 0, 7),
         }  # fmt: skip
         for name, shape in shapes.items():
@@ -74,7 +74,7 @@ class CapabilityMap:
                 raise StoreError(f"capability map: {name} has a shape other than {shape}.")
         if n:
             tilt, yaw = self.cells[:, 0], self.cells[:, 4]
-            if min(tilt.min(), yaw.min()) < 0 or yaw.max() >= self.grid.turns:
+            if min(tilt.min(), yaw.min()) < 0 or yaw.max() >= self.grid.yaw_bins:
                 raise StoreError("capability map: a cell is outside the grid.")
             if tilt.max() >= len(self.grid.tilts) or np.any(np.diff(self.keys) <= 0):
                 raise StoreError("capability map: cells are not sorted, or outside the grid.")
@@ -82,65 +82,71 @@ class CapabilityMap:
             values = getattr(self, name)
             if not np.all((values >= 0.0) & (values <= 1.0)):
                 raise StoreError(f"capability map: {name} is not within 0 to 1 everywhere.")
-        if not 1 <= len(self.lifts) <= MAX_LIFTS or self.lift not in self.lifts:
-            raise StoreError("capability map: its lift is none of those looked at.")
+        if (
+            not 1 <= len(self.torso_heights) <= MAX_TORSO_HEIGHTS
+            or self.torso_height not in self.torso_heights
+        ):
+            raise StoreError("capability map: its torso height is not one of those checked.")
         if not self.manipulability_scale > 0.0:
-            raise StoreError("capability map: the scale of manipulability must be positive.")
-        for name in (*shapes, "lifts"):
+            raise StoreError("capability map: the manipulability scale must be positive.")
+        for name in (*shapes, "torso_heights"):
             getattr(self, name).flags.writeable = False
 
     @cached_property
     def keys(self) -> NDArray[np.int64]:
-        """One number for each cell, ascending, shape (n,)."""
+        """Key of each cell, ascending, shape (n,)."""
         return self.grid.keys(self.cells)
 
     def score(self, scale: str = FIXED) -> FloatArray:
-        """Return what cells are ranked by, shape (n,).
+        """Return the scores of the cells, shape (n,).
 
-        An ICM counts manipulability alone, the others the mean of it and visibility.
+        Manipulability for an ICM, the mean of manipulability and visibility for other types.
 
         Args:
-            scale: "fixed": manipulability by the arm's best, so that maps compare. "thesis": both
-                stretched to fill 0 to 1 within this map, ITCM thesis section II.B and eq. (18).
+            scale: "fixed": manipulability divided by the greatest of the arm, so that maps are
+                comparable. "thesis": both stretched to 0 to 1 within this map, ITCM thesis
+                section II.B and eq. (18).
 
         Raises:
             UnknownNameError: If there is no such scale.
         """
         if scale not in SCALES:
             raise UnknownNameError("scale", scale, SCALES)
-        seen = self.visibility.astype(np.float64)
+        visible = self.visibility.astype(np.float64)
         if scale == FIXED:
-            able = np.minimum(self.manipulability / self.manipulability_scale, 1.0)
+            dexterity = np.minimum(self.manipulability / self.manipulability_scale, 1.0)
         else:
-            able, seen = _stretched(self.manipulability), _stretched(self.visibility)
-        return np.asarray(able if self.kind == ICM else 0.5 * (able + seen), dtype=np.float64)
+            dexterity, visible = _stretched(self.manipulability), _stretched(self.visibility)
+        return np.asarray(
+            dexterity if self.map_type == ICM else 0.5 * (dexterity + visible), dtype=np.float64
+        )
 
     def rows_of(self, cells: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Return the row of each cell, -1 where the map does not hold it, shape (n,)."""
-        asked = self.grid.keys(cells)
+        """Return the row of each cell, -1 for cells that are not in the map, shape (n,)."""
+        keys = self.grid.keys(cells)
         if not len(self.cells):
-            return np.full(len(asked), -1)
-        row = np.minimum(np.searchsorted(self.keys, asked), len(self.keys) - 1)
-        return np.where(self.keys[row] == asked, row, -1)
+            return np.full(len(keys), -1)
+        row = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[row] == keys, row, -1)
 
     def look_up(self, R_BT: FloatArray, p_BT: FloatArray) -> NDArray[np.int64]:
-        """Return the row of the nearest cell of tool poses in the base, -1 where there is none.
+        """Return the rows of the cells nearest to tool poses in the base, -1 where there is none.
 
-        "How well can this pose be reached from here?", as forward reachability maps are asked.
+        The query of a forward reachability map: how well is this pose reached from here?
 
         Args:
             R_BT: Tool orientations in B, shape (n, 3, 3).
-            p_BT: Tool positions in B at the map's lift [m], shape (n, 3).
+            p_BT: Tool positions in B at the map's torso height [m], shape (n, 3).
         """
         return self.rows_of(self.grid.nearest(R_BT, p_BT).cells)
 
-    def of_kind(self, kind: str) -> CapabilityMap:
-        """Return the same map under another kind; an IHCM is an ICM that counts visibility."""
-        return replace(self, kind=kind)
+    def of_type(self, map_type: str) -> CapabilityMap:
+        """Return the same map as another type; an IHCM is an ICM with visibility."""
+        return replace(self, map_type=map_type)
 
 
 def _stretched(values: NDArray[np.float32]) -> FloatArray:
-    """Return values stretched to fill 0 to 1; all 1 where they are equal."""
+    """Return values stretched to 0 to 1; all 1 if they are equal."""
     if not values.size or values.max() == values.min():
         return np.ones(values.shape)
     low, high = float(values.min()), float(values.max())

@@ -1,4 +1,4 @@
-"""Maps of the tool poses of a task merged into one: where to stand for all of it."""
+"""Task maps: the maps of the tool poses of a task merged into one."""
 
 from __future__ import annotations
 
@@ -18,65 +18,68 @@ from tcs.errors import SelectionError
 from tcs.kernel.arrays import FloatArray
 
 _SAME = 1e-6
-"""Lifts this close are one, in steps."""
+"""Torso heights this close are equal, in steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class BasePose:
-    """Where to stand for a task."""
+    """A base pose, its torso height and its score."""
 
     x: float
     y: float
     yaw: float
-    """Of the base in F [rad], in (-pi, pi]."""
-    lift: float
+    """Yaw of the base in F [rad], in (-pi, pi]."""
+    torso_height: float
     """[m]."""
     score: float
 
     def to_json(self) -> dict[str, float]:
-        """Return it as plain numbers."""
+        """Return the pose as plain numbers."""
         return {
             "x": round(self.x, 9),
             "y": round(self.y, 9),
             "yaw_deg": round(math.degrees(self.yaw), 9),
-            "lift": round(self.lift, 9),
+            "torso_height": round(self.torso_height, 9),
             "score": self.score,
         }
 
 
 @dataclass(frozen=True, eq=False)
 class TaskMap:
-    """The base poses from which a whole task can be done: TS-ICM, TS-IHCM or TS-ITCM."""
+    """The base poses from which a whole task is feasible: TS-ICM, TS-IHCM or TS-ITCM."""
 
     name: str
     """E.g. "TS-ITCM"."""
     task: GraspTask
     grid: MapGrid
     box: Box
-    lifts: FloatArray
-    """Lifts that were considered [m], shape (levels,)."""
+    torso_heights: FloatArray
+    """Torso heights that were considered [m], shape (levels,)."""
     score: NDArray[np.float32]
-    """NaN where the task cannot be done, shape (levels, x, y, yaws)."""
+    """NaN where the task is infeasible, shape (levels, x, y, yaws)."""
     nearness: Nearness
-    """How far tool poses were from cells: 0 on the grid."""
+    """Distance of the tool poses from their cells: 0 on the grid."""
 
     @cached_property
     def base_poses(self) -> FloatArray:
-        """x, y [m], yaw [rad], lift [m] and score of every base pose at its best lift, (n, 5)."""
-        able = np.where(np.isnan(self.score), -1.0, self.score)
-        level = able.argmax(axis=0)
-        best = np.take_along_axis(able, level[None], axis=0)[0]
+        """Every base pose at its best torso height, shape (n, 5).
+
+        x, y [m], yaw [rad], torso height [m] and score.
+        """
+        score = np.where(np.isnan(self.score), -1.0, self.score)
+        level = score.argmax(axis=0)
+        best = np.take_along_axis(score, level[None], axis=0)[0]
         i, j, k = np.nonzero(best >= 0.0)
         x, y = (i + self.box.x) * self.grid.step, (j + self.box.y) * self.grid.step
-        yaw = _upright(k.astype(np.float64) * self.grid.turn)
-        return np.column_stack([x, y, yaw, self.lifts[level[i, j, k]], best[i, j, k]])
+        yaw = _wrapped(k.astype(np.float64) * self.grid.yaw_step)
+        return np.column_stack([x, y, yaw, self.torso_heights[level[i, j, k]], best[i, j, k]])
 
     def best(self) -> BasePose:
-        """Return the base pose of the highest score, the first of equals."""
+        """Return the base pose of the highest score, the first of equal ones."""
         return BasePose(*map(float, self.base_poses[np.argmax(self.base_poses[:, 4])]))
 
     def worst(self) -> BasePose:
-        """Return the base pose of the lowest score, each at its best lift; the first of equals."""
+        """Return the base pose of the lowest score, each at its best torso height."""
         return BasePose(*map(float, self.base_poses[np.argmin(self.base_poses[:, 4])]))
 
 
@@ -85,19 +88,20 @@ def merge(
     task: GraspTask,
     *,
     scale: str = FIXED,
-    lift: float | None = None,
+    torso_height: float | None = None,
 ) -> TaskMap:
     """Return the task-specific map.
 
-    Grasp AND pre-grasp, the lower score; OR over the grasps at a position, the higher one; AND over
-    the positions, the lower one. Tool poses on the grid at quarter turns meet cell on cell; others
-    take the nearest cell, and `TaskMap.nearness` says how far that is.
+    The score of a grasp and its pre-grasps is the lowest of them, that of a position the highest of
+    its grasps, that of the task the lowest of its positions. Tool poses on the grid with headings
+    in multiples of 90 deg coincide with cells; others take the nearest cell, and
+    `TaskMap.nearness` reports the distance.
 
     Args:
-        capability: The map; a `MapVolume` of it saves time from the second task on.
+        capability: The map; a `MapVolume` of it saves time if several tasks are merged.
         task: The tool poses.
-        scale: How scores are scaled, see `CapabilityMap.score`; a `MapVolume` keeps its own.
-        lift: The only lift that counts [m], to half a step; None is the whole range.
+        scale: Scale of the scores, see `CapabilityMap.score`; a `MapVolume` keeps its own.
+        torso_height: Consider this torso height only [m], to half a step; None is the whole range.
 
     Raises:
         SelectionError: If no base pose reaches all positions; the message names the best subset.
@@ -106,104 +110,109 @@ def merge(
         ITCM thesis eqs. (7) to (9) and Appendix A.2.
     """
     volume = capability if isinstance(capability, MapVolume) else MapVolume(capability, scale)
-    lifts = usable_lifts(volume.capability, task.positions[0].height, lift)
+    torso_heights = usable_torso_heights(volume.capability, task.positions[0].height, torso_height)
     box = Box.shared([volume.box_about(p.x, p.y) for p in task.positions])
-    if box is None or not len(lifts):
-        raise SelectionError(_best_subset(volume, task, lifts))
-    parts = [position_scores(volume, position, box, lifts) for position in task.positions]
+    if box is None or not len(torso_heights):
+        raise SelectionError(_best_subset(volume, task, torso_heights))
+    parts = [position_scores(volume, position, box, torso_heights) for position in task.positions]
     score = parts[0][0]
     for part, _ in parts[1:]:
-        # NaN stands for "not there" and wins over every number: the intersection.
+        # NaN, "not reached", wins over every number: the intersection.
         score = np.minimum(score, part)
     if np.isnan(score).all():
-        raise SelectionError(_best_subset(volume, task, lifts))
+        raise SelectionError(_best_subset(volume, task, torso_heights))
     nearness = Nearness.worst([near for _, near in parts])
-    name = f"TS-{volume.capability.kind}"
-    return TaskMap(name, task, volume.capability.grid, box, lifts, score, nearness)
+    name = f"TS-{volume.capability.map_type}"
+    return TaskMap(name, task, volume.capability.grid, box, torso_heights, score, nearness)
 
 
-def usable_lifts(capability: CapabilityMap, height: float, lift: float | None = None) -> FloatArray:
-    """Return the lifts at which the base stands on the floor with the tool at a height.
+def usable_torso_heights(
+    capability: CapabilityMap, height: float, torso_height: float | None = None
+) -> FloatArray:
+    """Return the torso heights that bring the tool to a height with the base on the floor.
 
-    Cells are whole steps apart, so these are too; with a lift to move they fit the height exactly.
-    A robot without one takes the nearest cell.
+    Cells are whole steps apart, and so are these heights; with a movable torso they fit the tool
+    height exactly. A robot without one takes the nearest cell.
 
     Args:
         capability: The map.
-        height: Of the tool above the floor [m].
-        lift: The only lift that counts, to half a step [m].
+        height: Height of the tool above the floor [m].
+        torso_height: Consider this torso height only, to half a step [m].
     """
     step = capability.grid.step
-    if len(capability.lifts) == 1:
-        return np.array([capability.lift])
-    # A cell whose base is z above the floor at the map's lift needs the lift raised by z.
+    if len(capability.torso_heights) == 1:
+        return np.array([capability.torso_height])
+    # A cell with its base at z above the floor needs the torso raised by z.
     first, last = (
-        (float(end) - capability.lift - height) / step for end in capability.lifts[[0, -1]]
+        (float(end) - capability.torso_height - height) / step
+        for end in capability.torso_heights[[0, -1]]
     )
     cells = np.arange(math.ceil(first - _SAME), math.floor(last + _SAME) + 1)
-    lifts = capability.lift + height + step * cells
-    if lift is not None:
-        lifts = lifts[np.abs(lifts - lift) <= (0.5 + _SAME) * step]
-    return np.asarray(lifts)
+    torso_heights = capability.torso_height + height + step * cells
+    if torso_height is not None:
+        torso_heights = torso_heights[np.abs(torso_heights - torso_height) <= (0.5 + _SAME) * step]
+    return np.asarray(torso_heights)
 
 
 def position_scores(
-    volume: MapVolume, position: GraspPosition, box: Box, lifts: FloatArray
+    volume: MapVolume, position: GraspPosition, box: Box, torso_heights: FloatArray
 ) -> tuple[NDArray[np.float32], Nearness]:
-    """Return the scores of base poses for one position, shape (lifts, x, y, yaws).
+    """Return the scores of base poses for one position, shape (torso heights, x, y, yaws).
 
     Args:
         volume: The map.
-        position: Place and grasps.
-        box: Base places to look at.
-        lifts: Lifts to look at [m].
+        position: Position and grasps.
+        box: Base positions.
+        torso_heights: Torso heights [m].
     """
-    best = np.full((len(lifts), box.width, box.depth, volume.capability.grid.turns), np.nan)
+    best = np.full(
+        (len(torso_heights), box.width, box.depth, volume.capability.grid.yaw_bins), np.nan
+    )
     best = best.astype(np.float32)
     nearness = []
     for grasp in position.grasps:
         R_FT = grasp.R_FT
         p_FT = np.array([position.x, position.y, position.height])
-        score, near = volume.scores(R_FT, p_FT, box, lifts)
+        score, near = volume.scores(R_FT, p_FT, box, torso_heights)
         nearness.append(near)
         for back in grasp.pre_grasps:
-            before, near = volume.scores(R_FT, p_FT - back * R_FT[:, 0], box, lifts)
+            before, near = volume.scores(R_FT, p_FT - back * R_FT[:, 0], box, torso_heights)
             score = np.minimum(score, before)
             nearness.append(near)
-        # fmax takes the number where the other is NaN: the union.
+        # fmax prefers a number to NaN: the union.
         best = np.fmax(best, score)
     return best, Nearness.worst(nearness)
 
 
-def _best_subset(volume: MapVolume, task: GraspTask, lifts: FloatArray) -> str:
-    """Return one line that says which positions can be reached from one place."""
+def _best_subset(volume: MapVolume, task: GraspTask, torso_heights: FloatArray) -> str:
+    """Return a message that names the most positions reached from one base pose."""
     count, grid = len(task.positions), volume.capability.grid
-    said = f"task '{task.name}': no base pose reaches all {count} positions"
-    if not len(lifts):
-        low, high = volume.capability.lifts[[0, -1]]
+    failure = f"task '{task.name}': no base pose reaches all {count} positions"
+    if not len(torso_heights):
+        low, high = volume.capability.torso_heights[[0, -1]]
         return (
-            f"{said}: no lift that was asked for is within {low:g} to {high:g} m, the range the "
-            "map was made for."
+            f"{failure}: no torso height of this map, {low:g} to {high:g} m, puts the base on the "
+            "floor at this tool height. Change the tool height or the torso height."
         )
     box = Box.union([volume.box_about(p.x, p.y) for p in task.positions])
-    parts = [position_scores(volume, p, box, lifts)[0] for p in task.positions]
+    parts = [position_scores(volume, p, box, torso_heights)[0] for p in task.positions]
     reached: Any = sum((~np.isnan(part)).astype(np.int32) for part in parts)
     most = int(reached.max())
     if not most:
-        return f"{said}, nor any one of them. Check heights, grasps and the map's tilts."
+        return f"{failure}, nor any one of them. Check heights, grasps and the tilts of the map."
     lowest = np.fmin.reduce(parts)
     at = np.unravel_index(np.argmax(np.where(reached == most, lowest, -1.0)), reached.shape)
     subset = ", ".join(str(i) for i, part in enumerate(parts) if not np.isnan(part[at]))
     x, y = (int(at[1]) + box.x) * grid.step, (int(at[2]) + box.y) * grid.step
-    yaw = math.degrees(float(_upright(np.array([at[3] * grid.turn]))[0]))
+    yaw = math.degrees(float(_wrapped(np.array([at[3] * grid.yaw_step]))[0]))
     return (
-        f"{said}; best subset: {most} of {count} (number {subset}) from x {x:.2f}, y {y:.2f}, "
-        f"yaw {yaw:g} deg, lift {lifts[at[0]]:.3f} m. Move them closer together, allow more "
-        "grasps, or split the task."
+        f"{failure}; best subset: {most} of {count} (number {subset}) from x {x:.2f}, y {y:.2f}, "
+        f"yaw {yaw:g} deg, torso height {torso_heights[at[0]]:.3f} m. Move the positions closer "
+        "together, allow more grasps, or split the task."
     )
 
 
-def _upright(yaw: FloatArray) -> FloatArray:
-    """Return angles in (-pi, pi]; half a turn is pi whichever way rounding has it."""
-    turned = (yaw + math.pi - _SAME) % (2.0 * math.pi) - math.pi + _SAME
-    return np.where(np.abs(turned) < _SAME, 0.0, turned)
+def _wrapped(yaw: FloatArray) -> FloatArray:
+    """Return angles in (-pi, pi]; rounding does not turn pi into -pi."""
+    wrapped = (yaw + math.pi - _SAME) % (2.0 * math.pi) - math.pi + _SAME
+    return np.where(np.abs(wrapped) < _SAME, 0.0, wrapped)

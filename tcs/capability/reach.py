@@ -1,16 +1,19 @@
-"""One robot standing on an empty floor: which tool poses its arm reaches, and how well."""
+"""A robot on an empty floor: which tool poses its arm reaches, and how well."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from tcs.errors import GridError
+from tcs.errors import GridError, UnknownNameError
+from tcs.files.paths import data_reference
 from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.contacts import new_workspace
@@ -18,85 +21,119 @@ from tcs.kernel.postures import free_postures, measures, tool_poses
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tcs.model.grid import Axis, Grid
-from tcs.model.robots import RobotFile
+from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, lower
 
 MEASURE = "inverse-condition-limited-thesis"
 """The thesis's manipulability: sigma_min / sigma_max, eq. (20), times the penalty, eq. (21)."""
 
 _SLICE = 2048
-"""Poses solved at once: tens of milliseconds of work, so that threads end together."""
-_SAME_LIFT = 1e-9
-"""Lifts closer than this are one [m]."""
+"""Poses per task of a thread: tens of milliseconds of work, so that threads end together."""
+_SAME_HEIGHT = 1e-9
+"""Torso heights closer than this are equal [m]."""
 
 OnProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What became of tool poses."""
+    """Best posture for each tool pose."""
 
     reached: BoolArray
     """Shape (n,)."""
     manipulability: NDArray[np.float32]
     """The measure of the best posture, 0 where not reached, shape (n,)."""
     joints: NDArray[np.float32]
-    """That posture [rad], 0 where not reached, shape (n, 7)."""
+    """The best posture [rad], 0 where not reached, shape (n, 7)."""
 
 
 class Reach:
-    """A robot on an empty floor, lowered once for a range of lifts.
+    """Reachability of tool poses for a robot on an empty floor, at a range of torso heights.
 
-    The base B stands at the origin. Nothing but the floor and the robot itself is in the way.
+    The base B is at the origin. Obstacles are the floor and the robot itself.
     """
 
     def __init__(
-        self, robot: RobotFile, *, lift: float | None = None, step: float = 0.05,
-        measure: str = MEASURE, found_as: str | None = None, head: str | None = None,
+        self, robot: RobotFile, *, torso_height: float | None = None, step: float = 0.05,
+        measure: str = MEASURE, robot_reference: str | None = None, head: str | None = None,
     ) -> None:  # fmt: skip
-        """Lower the robot at `lift` and at all lifts that are whole steps away from it.
+        """Lower the robot at `torso_height` and at all heights that are whole steps away from it.
 
         Args:
             robot: The robot.
-            lift: The lift that maps are made at [m]; None is the middle of its range.
-            step: Distance of the lifts looked at [m].
+            torso_height: Torso height of the maps [m]; None is the middle of the torso's range.
+            step: Distance between torso heights [m].
             measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
-            found_as: Name or path by which maps remember the robot; None is its name.
-            head: Name or path of the head that looks on; None is the robot's name.
+            robot_reference: Name or path that maps store to find the robot again; None is its
+                name.
+            head: Name or path of the head file; None is the robot's name.
 
         Raises:
-            RobotError: If the robot's model cannot be used.
-            ArmClassError: If the closed form cannot solve the arm.
-            GridError: If the lift is out of range.
+            RobotError: If the model of the robot cannot be used.
+            GridError: If the torso height is out of range or not finite, or the step is not
+                positive.
             UnknownNameError: If there is no measure of that name.
         """
         self.robot, self.measure = robot, measure
         self.head = head
-        """Name or path of the head that looks on; None is the robot's name."""
-        self.found_as = robot.name if found_as is None else found_as
-        """How to find the robot again: its name, or the path of its file."""
+        """Name or path of the head file; None is the robot's name."""
+        self.robot_reference = robot.name if robot_reference is None else robot_reference
+        """Name of the robot, or path of its file."""
+        if not (math.isfinite(step) and step > 0.0):
+            raise GridError(f"the step of the torso heights is {step!r} m; must be positive.")
         self.scene = Scene(SceneSpec(robot, _empty_floor()))
         low, high = self.scene.built.torso_limits
-        self.lift = 0.5 * (low + high) if lift is None else lift
-        if not low - _SAME_LIFT <= self.lift <= high + _SAME_LIFT:
+        self.torso_height = 0.5 * (low + high) if torso_height is None else torso_height
+        if not low - _SAME_HEIGHT <= self.torso_height <= high + _SAME_HEIGHT:
             raise GridError(
-                f"robot '{robot.name}': lift {self.lift:g} m is out of range; its torso goes from "
-                f"{low:g} to {high:g} m."
+                f"robot '{robot.name}': torso height {self.torso_height:g} m is out of range; must "
+                f"be {low:g} to {high:g} m."
             )
-        below = int(np.floor((self.lift - low) / step + _SAME_LIFT))
-        above = int(np.floor((high - self.lift) / step + _SAME_LIFT))
+        below = int(np.floor((self.torso_height - low) / step + _SAME_HEIGHT))
+        above = int(np.floor((high - self.torso_height) / step + _SAME_HEIGHT))
         self.level = below
-        """Index of `lift` among `lifts`."""
-        self.lifts = self.lift + step * np.arange(-below, above + 1)
-        """Lifts that are looked at [m], shape (levels,)."""
-        axis = Axis("torso", "m", float(self.lifts[0]), step, len(self.lifts))
-        still = (Axis(name, unit, 0.0, 0.0, 1) for name, unit in _STILL)
-        self.lowered: LoweredScene = lower(self.scene, None, Grid((*still, axis)))
+        """Index of `torso_height` among `torso_heights`."""
+        self.torso_heights = self.torso_height + step * np.arange(-below, above + 1)
+        """Torso heights [m], shape (levels,)."""
+        axis = Axis("torso", "m", float(self.torso_heights[0]), step, len(self.torso_heights))
+        fixed = (Axis(name, unit, 0.0, 0.0, 1) for name, unit in _FIXED_AXES)
+        self.lowered: LoweredScene = lower(self.scene, None, Grid((*fixed, axis)))
         self._problem = build_problem(self.lowered.arrays, self.lowered.grid, measure)
         self.R_BA = self.lowered.arrays.arm_base_R[below]
-        """Orientation of the arm base at `lift`, shape (3, 3)."""
+        """Orientation of the arm base at `torso_height`, shape (3, 3)."""
         self.p_BA = self.lowered.arrays.arm_base_p[below]
         """Its origin [m], shape (3,)."""
+
+    @classmethod
+    def load(
+        cls, robot: str | Path, *, tool: str | None = None, torso_height: float | None = None,
+        step: float = 0.05, measure: str = MEASURE, head: str | None = None,
+    ) -> Reach:  # fmt: skip
+        """Return the reachability of a robot by its name or file.
+
+        Args:
+            robot: Name of a robot that ships with tcs, or path of a robot file.
+            tool: Frame of the robot to use as the tool; None is that of the robot file.
+            torso_height: As in the constructor.
+            step: As in the constructor.
+            measure: As in the constructor.
+            head: As in the constructor.
+
+        Raises:
+            UnknownNameError: If there is no such robot, tool frame or measure.
+            RobotError: If the robot cannot be used.
+            GridError: If the torso height is out of range.
+        """
+        file = load_robot(robot)
+        if tool is not None:
+            known = {*file.model().links, *(one.name for one in (*file.frames, *file.bodies))}
+            if tool not in known:
+                raise UnknownNameError("tool frame", tool, known, where=f"robot '{file.name}'")
+        return cls(
+            file if tool is None else file.model_copy(update={"tool_frame": tool}),
+            torso_height=torso_height, step=step, measure=measure,
+            robot_reference=data_reference(robot, file.name), head=head,
+        )  # fmt: skip
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
@@ -106,12 +143,12 @@ class Reach:
 
     @property
     def shoulder(self) -> FloatArray:
-        """Origin of the arm's first moving link in B at `lift` [m], shape (3,)."""
+        """Origin of the arm's first moving link in B at `torso_height` [m], shape (3,)."""
         return np.asarray(self.p_BA + self.R_BA @ self.lowered.arrays.chain.p[0])
 
     @property
     def length(self) -> float:
-        """Farthest that the tool can be from the shoulder, the arm stretched out [m]."""
+        """Greatest distance of the tool from the shoulder, the arm stretched out [m]."""
         return float(np.linalg.norm(self.lowered.arrays.chain.p[1:], axis=1).sum())
 
     def solve(
@@ -123,9 +160,9 @@ class Reach:
         Args:
             R_BT: Tool orientations in B, shape (n, 3, 3).
             p_BT: Tool positions in B [m], shape (n, 3).
-            level: Index of the lift; None is `lift` itself.
+            level: Index of the torso height; None is that of `torso_height`.
             jobs: Number of threads; the answers do not depend on it.
-            on_progress: Called with poses done and in all.
+            on_progress: Called with the number of poses done and of all.
         """
         problem = self._at(self.level if level is None else level)
         count = len(p_BT)
@@ -135,7 +172,7 @@ class Reach:
         parts = [slice(i, min(i + _SLICE, count)) for i in range(0, count, _SLICE)]
         done = 0
         runs = (delayed(_solve_part)(problem, R_BT, p_BT, part, solved) for part in parts)
-        # Threads: the kernel lets go of the interpreter.
+        # Threads suffice, as the kernel releases the interpreter lock.
         for size in Parallel(jobs, "threading", return_as="generator_unordered")(runs):
             done += size
             if on_progress is not None:
@@ -149,34 +186,34 @@ class Reach:
             joints: Arm joints [rad], shape (n, 7).
         """
         R, p = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
-        tool_poses(self._problem.chain_R, self._problem.chain_p, _own(joints), R, p)
+        tool_poses(self._problem.chain_R, self._problem.chain_p, _writable(joints), R, p)
         return R, p
 
     def manipulability(self, joints: FloatArray) -> FloatArray:
         """Return the measure of postures, shape (n,)."""
         value = np.empty(len(joints))
-        measures(self._problem, _own(joints), value)
+        measures(self._problem, _writable(joints), value)
         return value
 
     def free(self, joints: FloatArray, level: int) -> BoolArray:
-        """Return whether postures touch neither the robot nor the floor at a lift, shape (n,).
+        """Return whether postures are free of contact with robot and floor, shape (n,).
 
         Args:
             joints: Arm joints [rad], shape (n, 7).
-            level: Index of the lift.
+            level: Index of the torso height.
         """
         problem = self._at(level)
         R_AT, p_AT = self.tool_poses(joints)
         R_BA, p_BA = problem.base_R[0], problem.base_p[0]
         problem = _with_goals(problem, R_BA @ R_AT, p_AT @ R_BA.T + p_BA)
         free = np.zeros(len(joints), np.bool_)
-        free_postures(problem, new_workspace(problem), 0, _own(joints), free)
+        free_postures(problem, new_workspace(problem), 0, _writable(joints), free)
         return free
 
-    def free_lifts(self, joints: FloatArray) -> NDArray[np.uint32]:
-        """Return for each posture the lifts at which it is free, bit i for `lifts[i]`."""
+    def free_torso_heights(self, joints: FloatArray) -> NDArray[np.uint32]:
+        """Return the torso heights free of contact, bit i for `torso_heights[i]`, shape (n,)."""
         bits = np.zeros(len(joints), np.uint32)
-        for level in range(len(self.lifts)):
+        for level in range(len(self.torso_heights)):
             bits |= self.free(joints, level).astype(np.uint32) << np.uint32(level)
         return bits
 
@@ -194,7 +231,7 @@ class Reach:
 def _solve_part(
     problem: Problem, R_BT: FloatArray, p_BT: FloatArray, part: slice, solved: Solved
 ) -> int:
-    """Solve a slice of the poses, into its rows of `solved`; return how many they are."""
+    """Solve a slice of the poses into its rows of `solved`; return their number."""
     problem = _with_goals(problem, R_BT[part], p_BT[part])
     count: int = part.stop - part.start
     scores = Scores(
@@ -211,26 +248,26 @@ def _solve_part(
 
 
 def _with_goals(problem: Problem, R_BT: FloatArray, p_BT: FloatArray) -> Problem:
-    return problem._replace(goal_R=_own(R_BT)[None], goal_p=_own(p_BT)[None])
+    return problem._replace(goal_R=_writable(R_BT)[None], goal_p=_writable(p_BT)[None])
 
 
-def _own(array: NDArray[Any]) -> FloatArray:
-    """Return a writable copy: to numba, read-only arrays are another type to compile for."""
+def _writable(array: NDArray[Any]) -> FloatArray:
+    """Return a writable copy: numba would compile once more for read-only arrays."""
     return np.array(array, dtype=np.float64, order="C")
 
 
-_STILL = (("base_x", "m"), ("base_y", "m"), ("base_yaw", "deg"))
+_FIXED_AXES = (("base_x", "m"), ("base_y", "m"), ("base_yaw", "deg"))
 
 
 def _empty_floor() -> EnvironmentFile:
-    """Return an environment that holds nothing but a floor."""
+    """Return an environment without furniture."""
     axes = {
         name: {"unit": unit, "start": 0.0, "step": 0.0, "count": 1}
-        for name, unit in (*_STILL, ("torso", "m"))
+        for name, unit in (*_FIXED_AXES, ("torso", "m"))
     }
     return EnvironmentFile(
         name="empty floor",
-        title="Nothing but a floor",
+        title="Empty floor",
         origin="On the floor, under the robot",
         source="none",
         grid=axes,

@@ -1,4 +1,4 @@
-"""Recorded arm configurations: joint states by name, matched to the robot's arm and checked."""
+"""Recorded arm configurations: joint states matched to the arm by name, and validated."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.robots import RobotFile
 
 LIMIT_SLACK = 2e-3
-"""How far past a limit an encoder may read [rad or m]: some times the resolution of a cheap one."""
+"""Tolerance of joint limits [rad or m]: a few times the resolution of a coarse encoder."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Joint states in the order of the robot's arm."""
+    """Joint states in the order of the joints of the arm."""
 
     joints: FloatArray
     """Arm joints [rad], within the limits in force, shape (n, 7)."""
-    lift: FloatArray | None
-    """Torso lift [m], shape (n,); None where it was not recorded."""
+    torso_height: FloatArray | None
+    """Torso height [m], shape (n,); None where it was not recorded."""
     dropped: int = 0
-    """Samples that were left out as unusable."""
+    """Number of invalid samples that were left out."""
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (self.joints, self.lift):
+        for array in (self.joints, self.torso_height):
             if array is not None:
                 array.flags.writeable = False
 
@@ -48,18 +48,18 @@ def recording_of(
     where: str = "recording",
     drop_bad: bool = False,
 ) -> Recording:
-    """Return joint states, checked, in the order of a robot's arm.
+    """Return valid joint states in the order of the joints of an arm.
 
     Args:
-        names: Names of the columns, in any order; those that are no joint of arm or torso do not
-            count.
+        names: Names of the columns, in any order; joints other than those of arm and torso are
+            ignored.
         positions: Joint positions [rad or m], shape (samples, names).
         robot: The robot.
-        where: What to call it in a message.
-        drop_bad: Leave samples out that are not finite or beyond the limits; else refuse them.
+        where: Name of the recording in messages.
+        drop_bad: Leave out samples that are not finite or beyond the limits, instead of raising.
 
     Raises:
-        DataFileError: If a joint of the arm is missing or there twice, or a sample is not usable.
+        DataFileError: If a joint of the arm is missing or occurs twice, or a sample is invalid.
     """
     array = np.asarray(positions, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != len(names):
@@ -76,36 +76,36 @@ def recording_of(
     bad = _first_bad(values, wanted, robot, where, drop_bad)
     kept = values[~bad]
     if not len(kept):
-        raise DataFileError(f"{where} has no usable sample.")
+        raise DataFileError(f"{where} has no valid sample.")
     limits = np.array([robot.joint_limits()[name] for name in wanted])
     kept = np.clip(kept, limits[:, 0], limits[:, 1])
     arm = len(robot.arm_joints)
-    lift = kept[:, arm].copy() if len(wanted) > arm else None
-    return Recording(kept[:, :arm].copy(), lift, int(bad.sum()))
+    torso_height = kept[:, arm].copy() if len(wanted) > arm else None
+    return Recording(kept[:, :arm].copy(), torso_height, int(bad.sum()))
 
 
 def check_names(names: Sequence[str], robot: RobotFile, where: str) -> None:
-    """Refuse names among which a joint of the arm is missing or there twice.
+    """Check that each joint of the arm occurs once.
 
     Raises:
-        DataFileError: As said.
+        DataFileError: If a joint is missing or occurs twice.
     """
     missing = [name for name in robot.arm_joints if name not in names]
     if missing:
-        held = ", ".join(names[:20]) or "none"
+        found = ", ".join(names[:20]) or "none"
         raise DataFileError(
             f"{where}: joint names do not match robot '{robot.name}': {', '.join(missing)} "
-            f"missing. It holds: {held}."
+            f"missing. It has: {found}."
         )
     for name in robot.arm_joints:
         if list(names).count(name) > 1:
-            raise DataFileError(f"{where}: joint '{name}' is there twice.")
+            raise DataFileError(f"{where}: joint '{name}' occurs twice.")
 
 
 def _first_bad(
     values: FloatArray, names: Sequence[str], robot: RobotFile, where: str, drop_bad: bool
 ) -> BoolArray:
-    """Return which samples cannot be used; refuse the first one unless they may be dropped."""
+    """Return which samples are invalid; raise for the first one unless they may be dropped."""
     limits = robot.joint_limits()
     low, high = (np.array([limits[name][side] for name in names]) for side in (0, 1))
     finite = np.isfinite(values)
@@ -115,12 +115,12 @@ def _first_bad(
         return bad
     i = int(np.argmax(bad))
     j = int(np.argmax(~(finite[i] & inside[i])))
-    others = f" {int(bad.sum()) - 1} more samples are like it." if bad.sum() > 1 else ""
-    place = f"{where}, sample {i}, joint '{names[j]}'"
+    others = f" {int(bad.sum()) - 1} more samples are invalid." if bad.sum() > 1 else ""
+    location = f"{where}, sample {i}, joint '{names[j]}'"
     if not finite[i, j]:
-        raise DataFileError(f"{place} is {values[i, j]}.{others} Drop them with --drop-bad.")
+        raise DataFileError(f"{location} is {values[i, j]}.{others} Drop them with --drop-bad.")
     raise DataFileError(
-        f"{place} is {values[i, j]:.4f}, out of its {robot.limits} limits {low[j]:.4f} to "
+        f"{location} is {values[i, j]:.4f}, outside its {robot.limits} limits {low[j]:.4f} to "
         f"{high[j]:.4f}.{others} Angles must be radians; drop such samples with --drop-bad."
     )
 
@@ -129,12 +129,12 @@ def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recordi
     """Return the recording in a CSV file: a row of names, then a row per sample.
 
     Args:
-        path: The file; columns that are no joint of arm or torso, such as time, do not count.
+        path: The file; columns other than joints of arm and torso, such as time, are ignored.
         robot: The robot.
         drop_bad: As in `recording_of`.
 
     Raises:
-        DataFileError: If it cannot be read or used.
+        DataFileError: If the file cannot be read, or is not a recording of the robot.
     """
     where = f"recording '{path}'"
     try:
@@ -143,7 +143,7 @@ def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recordi
     except OSError as error:
         raise DataFileError(f"{where} cannot be read: {error.strerror}.") from None
     except (UnicodeDecodeError, csv.Error):
-        raise DataFileError(f"{where} is no CSV file in UTF-8.") from None
+        raise DataFileError(f"{where} is not a CSV file in UTF-8.") from None
     if not rows:
         raise DataFileError(f"{where} is empty; its first row must name the joints.")
     names = [name.strip() for name in rows[0]]
@@ -158,7 +158,7 @@ def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recordi
             numbers[i] = [float(row[column]) for column in columns]
         except ValueError:
             raise DataFileError(
-                f"{where}, line {i + 2}: must be {len(names)} numbers, as there are names."
+                f"{where}, line {i + 2}: must be {len(names)} numbers, one for each name."
             ) from None
     chosen = [names[column] for column in columns]
     return recording_of(chosen, numbers, robot, where=where, drop_bad=drop_bad)
@@ -168,14 +168,14 @@ def write_csv(path: Path, robot: RobotFile, recording: Recording) -> None:
     """Write a recording as `read_csv` reads it.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the file cannot be written.
     """
     names, columns = list(robot.arm_joints), [recording.joints]
-    if recording.lift is not None and robot.torso_joint is not None:
+    if recording.torso_height is not None and robot.torso_joint is not None:
         names.append(robot.torso_joint)
-        columns.append(recording.lift[:, None])
+        columns.append(recording.torso_height[:, None])
     table: NDArray[np.float64] = np.hstack(columns)
     with whole_file(path, "Recording") as stream:
-        # Eight decimals: 1e-8 rad is far below any encoder.
+        # 1e-8 rad is far below the resolution of an encoder.
         header = ",".join(names)
         np.savetxt(stream, table, fmt="%.8f", delimiter=",", header=header, comments="")

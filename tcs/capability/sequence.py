@@ -1,4 +1,4 @@
-"""Several base poses for a task that no single one reaches, in the order of its positions."""
+"""Sequences of base poses for a task that no single base pose reaches."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tcs.errors import SelectionError
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """One base pose of a sequence: positions first .. last are reached from there."""
+    """One base pose of a sequence, which reaches the positions first .. last."""
 
     first: int
     last: int
     base: BasePose
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the stop as plain containers."""
         return {"positions": list(range(self.first, self.last + 1)), **self.base.to_json()}
 
 
@@ -31,35 +31,35 @@ def split(
     task: GraspTask,
     *,
     scale: str = FIXED,
-    lift: float | None = None,
+    torso_height: float | None = None,
 ) -> tuple[Stop, ...]:
-    """Return base poses that reach the positions in their order, one after the other.
+    """Return the fewest base poses that reach the positions in their order.
 
-    As few stops as there can be, and of those sequences the one whose lowest score is highest.
+    Of the sequences with the fewest stops, the one with the greatest lowest score is returned.
 
     Args:
         capability: As in `merge`.
         task: The positions, in order.
         scale: As in `merge`.
-        lift: As in `merge`.
+        torso_height: As in `merge`.
 
     Raises:
-        SelectionError: If a position is reached from nowhere.
+        SelectionError: If no base pose reaches a position.
     """
     volume = capability if isinstance(capability, MapVolume) else MapVolume(capability, scale)
     count = len(task.positions)
-    # Best sequence up to each position: stops, minus the lowest score, the stops themselves.
+    # Best sequence up to each position: number of stops, negated lowest score, stops.
     best: list[tuple[int, float, tuple[Stop, ...]]] = [(0, -math.inf, ())]
     for last in range(count):
         options = []
         for first in range(last, -1, -1):
             part = GraspTask(task.name, task.positions[first : last + 1])
             try:
-                base = merge(volume, part, lift=lift).best()
+                base = merge(volume, part, torso_height=torso_height).best()
             except SelectionError:
                 if first == last:
                     raise
-                # What a stretch cannot do, a longer one cannot do either.
+                # A longer stretch is infeasible too.
                 break
             stops, cost, before = best[first]
             options.append((stops + 1, max(cost, -base.score), (*before, Stop(first, last, base))))

@@ -1,13 +1,16 @@
-"""A task map's base poses among furniture: which of them the room leaves possible."""
+"""Task maps in an environment: which base poses stay feasible among its obstacles."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tcs.capability.files import robot_reference
+from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import BasePose, TaskMap
 from tcs.capability.tasks import GraspTask
 from tcs.errors import SelectionError
@@ -16,53 +19,80 @@ from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
 from tcs.model.grid import Axis, Grid
-from tcs.model.robots import RobotFile
-from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, lower
+from tcs.model.robots import RobotFile, load_robot
+from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, load_environment, lower
 
 MOST_TRIED = 2000
-"""Base poses that are looked at, best first, before the search gives up."""
+"""Greatest number of base poses that are checked, best first."""
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
-    """What the room leaves of one base pose."""
+class Feasibility:
+    """What a base pose reaches in an environment."""
 
     body_blocked: bool
-    """Whether the robot cannot stand there at all."""
+    """Whether the body of the robot is in contact."""
     reached: tuple[bool, ...]
-    """For each position whether a grasp with all its pre-grasps is reached, touching nothing."""
+    """For each position whether a grasp and all its pre-grasps are reached without contact."""
 
     @property
-    def possible(self) -> bool:
-        """Whether the whole task can be done."""
+    def feasible(self) -> bool:
+        """Whether the whole task is feasible."""
         return not self.body_blocked and all(self.reached)
 
 
 class Surroundings:
-    """A room with a task in it."""
+    """An environment with a task in it."""
 
     def __init__(
         self,
         robot: RobotFile,
         environment: EnvironmentFile,
-        at: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        task_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         """Build the scene.
 
         Args:
             robot: The robot.
-            environment: What surrounds it, in the state that its file says.
-            at: Where the task frame F is in W: x, y [m] and heading [rad].
+            environment: The environment, in the state of its file.
+            task_pose: Pose of the task frame F in W: x, y [m] and heading [rad].
 
         Raises:
-            RobotError: If the robot's model cannot be used.
+            RobotError: If the model of the robot cannot be used.
             EnvironmentFileError: If a model of the environment cannot be used.
         """
         self._scene = Scene(SceneSpec(robot, environment))
-        self._at = at
+        self._task_pose = task_pose
 
-    def judge(self, task: GraspTask, base: BasePose) -> Judged:
-        """Return what a base pose is good for, by the kernel, at the very poses of the tool.
+    @classmethod
+    def load(
+        cls,
+        path: Path,
+        capability: CapabilityMap,
+        environment: str | Path,
+        task_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        *,
+        robot: str | None = None,
+    ) -> Surroundings:
+        """Return the environment for the robot of a map.
+
+        Args:
+            path: File of the map, for messages.
+            capability: The map.
+            environment: Name or file of the environment.
+            task_pose: As in the constructor.
+            robot: Name or file of the robot; None is the one stored in the map.
+
+        Raises:
+            StoreError: If the file of the robot is missing.
+            UnknownNameError: If there is no such environment or robot.
+        """
+        file = load_robot(robot_reference(path, capability, robot))
+        file = file.model_copy(update={"tool_frame": str(capability.metadata["tool"])})
+        return cls(file, load_environment(environment), task_pose)
+
+    def feasibility(self, task: GraspTask, base: BasePose) -> Feasibility:
+        """Return what a base pose reaches, solved by the kernel at the exact tool poses.
 
         Args:
             task: The tool poses, in F.
@@ -74,49 +104,55 @@ class Surroundings:
             for k, grasp in enumerate(p.grasps)
             for back in (0.0, *grasp.pre_grasps)
         ]
-        x, y, yaw = self._at
+        x, y, yaw = self._task_pose
         c, s = math.cos(yaw), math.sin(yaw)
         R_WF = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         R_WT = np.stack([R_WF @ R for _, _, R, _ in poses])
         p_WT = np.stack([R_WF @ p + [x, y, 0.0] for _, _, _, p in poses])
-        place = (x + c * base.x - s * base.y, y + s * base.x + c * base.y, yaw + base.yaw)
-        blocked, free = self._solve(place, base.lift, R_WT, p_WT)
+        base_pose = (x + c * base.x - s * base.y, y + s * base.x + c * base.y, yaw + base.yaw)
+        blocked, free = self._solve(base_pose, base.torso_height, R_WT, p_WT)
         grasped: dict[tuple[int, int], bool] = {}
         for (i, k, _, _), reached in zip(poses, free, strict=True):
             grasped[i, k] = grasped.get((i, k), True) and bool(reached)
         positions = range(len(task.positions))
-        return Judged(
+        return Feasibility(
             blocked, tuple(any(v for (i, _), v in grasped.items() if i == n) for n in positions)
         )
 
     def best(self, found: TaskMap) -> tuple[BasePose, int]:
-        """Return the best base pose that the room leaves, and how many better ones it takes away.
+        """Return the best feasible base pose, and the number of better ones that are infeasible.
 
         Args:
             found: The task map.
 
         Raises:
-            SelectionError: If none of the best `MOST_TRIED` is left.
+            SelectionError: If none of the best `MOST_TRIED` is feasible.
         """
         order = np.argsort(-found.base_poses[:, 4], kind="stable")[:MOST_TRIED]
-        for tried, row in enumerate(order):
+        for rejected, row in enumerate(order):
             base = BasePose(*map(float, found.base_poses[row]))
-            if self.judge(found.task, base).possible:
-                return base, tried
+            if self.feasibility(found.task, base).feasible:
+                return base, rejected
         raise SelectionError(
-            f"task '{found.task.name}': the room leaves none of the best {len(order)} base poses. "
-            "Move the task, or what stands around it."
+            f"task '{found.task.name}': none of the best {len(order)} base poses is feasible in "
+            "the environment. Move the task or the obstacles."
         )
 
     def _solve(
-        self, place: tuple[float, float, float], lift: float, R_WT: FloatArray, p_WT: FloatArray
+        self,
+        base_pose: tuple[float, float, float],
+        torso_height: float,
+        R_WT: FloatArray,
+        p_WT: FloatArray,
     ) -> tuple[bool, BoolArray]:
-        """Return whether the body is blocked at a place in W, and which tool poses are reached."""
-        x, y, yaw = place
+        """Return whether the body is in contact at a base pose in W, and the reached tool poses."""
+        x, y, yaw = base_pose
         axes = (
-            Axis("base_x", "m", x, 0.0, 1), Axis("base_y", "m", y, 0.0, 1),
-            Axis("base_yaw", "deg", math.degrees(yaw), 0.0, 1), Axis("torso", "m", lift, 0.0, 1),
-        )  # fmt: skip
+            Axis("base_x", "m", x, 0.0, 1),
+            Axis("base_y", "m", y, 0.0, 1),
+            Axis("base_yaw", "deg", math.degrees(yaw), 0.0, 1),
+            Axis("torso", "m", torso_height, 0.0, 1),
+        )
         lowered = lower(self._scene, None, Grid(axes))
         arrays = lowered.arrays._replace(goal_R=R_WT[None], goal_p=p_WT[None])
         problem = build_problem(arrays, lowered.grid)

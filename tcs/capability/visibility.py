@@ -1,4 +1,4 @@
-"""The visibility score: how well the head camera sees the tool, for a person who steers by it."""
+"""The visibility score: how well the operator sees the tool through the head camera."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
 
 YAW_GOAL = 0.0
-"""Straight ahead: what a hand at the master device does is then what the picture shows."""
+"""Straight ahead: hand motions at the master then agree with motions in the image."""
 PITCH_GOAL = -math.pi / 4.0
-"""Half way down: shadows and heights both tell how far away things are."""
+"""45 deg down: shadows and heights both indicate distance."""
 
 CORRECTED, THESIS = "corrected", "thesis"
 VISIBILITIES = (CORRECTED, THESIS)
 
 
 def visibility(view: View, p_BT: FloatArray, rule: str = CORRECTED) -> FloatArray:
-    """Return how well tools are seen.
+    """Return the visibility of tools.
 
     Args:
         view: The camera.
@@ -34,11 +34,11 @@ def visibility(view: View, p_BT: FloatArray, rule: str = CORRECTED) -> FloatArra
         UnknownNameError: If there is no such rule.
 
     Source:
-        ITCM thesis eqs. (12) to (17). "thesis" is as printed: atan takes what lies behind for what
-        lies ahead; an axis out of view leaves the other one's half of the score; and the distance
-        from the goal is measured by that of the upper bound alone, so that a pitch 37.5 deg below
-        the goal, at the lower bound, still scores 2/3. "corrected" uses atan2, gives nothing to
-        what is out of view on either axis, and falls to 0 at the bound on either side.
+        ITCM thesis eqs. (12) to (17). "thesis" is as printed: atan maps directions behind the
+        camera to directions ahead; an axis out of view leaves half the score of the other axis;
+        and the difference from the goal is divided by that of the upper bound on both sides, so a
+        pitch 37.5 deg below the goal, at the lower bound, still scores 2/3. "corrected" uses atan2,
+        is 0 if either axis is out of view, and falls to 0 at both bounds.
 
     >>> view = View((0.0, 0.0, 1.0), (-1.8, 1.8), (-1.4, 1.2))
     >>> points = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -50,14 +50,14 @@ def visibility(view: View, p_BT: FloatArray, rule: str = CORRECTED) -> FloatArra
     x, y, z = (np.asarray(p_BT) - view.p_BoCo_B).T
     pitch = np.arctan2(z, np.hypot(x, y))
     if rule == THESIS:
-        # Straight to the side, y / 0 is infinite and atan of it the right angle.
+        # For a tool to the side, y / 0 is infinite and its atan the right angle.
         with np.errstate(divide="ignore", invalid="ignore"):
             yaw = np.nan_to_num(np.arctan(y / x))
         return 0.5 * (_printed(yaw, YAW_GOAL, view.yaw) + _printed(pitch, PITCH_GOAL, view.pitch))
     yaw = np.arctan2(y, x)
     score = 0.5 * (_two_sided(yaw, YAW_GOAL, view.yaw) + _two_sided(pitch, PITCH_GOAL, view.pitch))
-    seen = _within(yaw, view.yaw) & _within(pitch, view.pitch)
-    return np.asarray(np.where(seen, score, 0.0))
+    visible = _within(yaw, view.yaw) & _within(pitch, view.pitch)
+    return np.asarray(np.where(visible, score, 0.0))
 
 
 def _printed(angle: FloatArray, goal: float, bounds: tuple[float, float]) -> FloatArray:
@@ -66,8 +66,8 @@ def _printed(angle: FloatArray, goal: float, bounds: tuple[float, float]) -> Flo
 
 
 def _two_sided(angle: FloatArray, goal: float, bounds: tuple[float, float]) -> FloatArray:
-    room = np.where(angle < goal, goal - bounds[0], bounds[1] - goal)
-    return np.asarray(1.0 - np.abs(angle - goal) / room)
+    width = np.where(angle < goal, goal - bounds[0], bounds[1] - goal)
+    return np.asarray(1.0 - np.abs(angle - goal) / width)
 
 
 def _within(angle: FloatArray, bounds: tuple[float, float]) -> BoolArray:

@@ -1,282 +1,440 @@
-"""The commands `tcs capability ...` and `tcs map-check`: make maps, merge them, look at them."""
+"""The commands `tcs capability ...` and `tcs map-check`: make, merge, draw and check maps."""
 
 from __future__ import annotations
 
 import math
+import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tcs.cli import capability_reports as reports
-from tcs.cli import capability_work as work
 from tcs.cli import options, talk
-from tcs.cli.capability_setup import Setup
+from tcs.cli.option_groups import expand_options
+from tcs.cli.places import check_writable
+
+if TYPE_CHECKING:
+    from tcs.capability import CapabilityMap, MapGrid, Reach, Recording, TaskShape
 
 app = typer.Typer(
-    help="Capability maps: from which base poses an end-effector pose is reached.",
+    help="Capability maps: the base poses from which an end-effector pose is reached.",
     no_args_is_help=True,
 )
 
 _Map = Annotated[Path, typer.Argument(metavar="MAP", help="A capability map.")]
-_Out = Annotated[Path, typer.Option(help="Map to write.")]
-_Text = Annotated[
-    Path | None, typer.Option(help="Also write it as text: score x y z R11 .. R33, a line each.")
-]
-_MapsRobot = Annotated[
-    str | None,
-    typer.Option(help="Name or YAML file of the robot.", show_default="the map's own"),
-]
 _Radius = Annotated[
     float | None,
     typer.Option(
-        help="Farthest the tool may be from the shoulder, in metres; the thesis takes 0.9.",
+        help="Greatest distance of the tool from the shoulder, in metres; the thesis uses 0.9.",
         show_default="the arm's length",
     ),
 ]
-_Tool = Annotated[
-    str | None, typer.Option(help="Another frame of the robot as the tool.", show_default="its own")
-]
-_Head = Annotated[
-    str | None,
-    typer.Option(
-        help="Name or YAML file of the head that looks on.", show_default="the robot's own"
-    ),
-]
-_Lift = Annotated[
-    float | None,
-    typer.Option(help="Torso lift of the map, in metres.", show_default="the middle of its range"),
-]
-_Step = Annotated[float, typer.Option(help="Grid step along x, y, z, in metres.")]
-_Turns = Annotated[int, typer.Option(help="Headings in a full turn; 16 are 22.5 deg apart.")]
-_Grasps = Annotated[str, typer.Option(help="Tilts of the tool: side, top, side+top or all.")]
-_Measure = Annotated[
-    str, typer.Option(help="Dexterity measure; the default is the thesis's manipulability.")
-]
-_View = Annotated[
-    str, typer.Option("--visibility", help="corrected, or thesis for the equations as printed.")
-]
-_Height = Annotated[
-    float | None,
-    typer.Option(
-        help="Only samples whose tool is this high above the floor, to half a step, in metres."
-    ),
-]
-_DropBad = Annotated[
-    bool, typer.Option("--drop-bad", help="Leave unusable samples out instead of refusing them.")
-]
+_PICTURE = "File to draw: .png, .pdf, .svg, or interactive .html."
+_TORSO = ("--torso-height", "--lift")
 _MEASURE = "inverse-condition-limited-thesis"
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Grid:
+    """Robot, torso height and grid of a map."""
+
+    torso_height: Annotated[
+        float | None,
+        typer.Option(
+            *_TORSO, help="Torso height of the map, in metres.",
+            show_default="the middle of its range",
+        ),
+    ] = None  # fmt: skip
+    step: Annotated[float, typer.Option(help="Grid step along x, y, z, in metres.")] = 0.05
+    yaw_bins: Annotated[
+        int,
+        typer.Option(
+            "--yaw-bins", "--turns", help="Number of base yaws in 360 deg; 16 are 22.5 deg apart."
+        ),
+    ] = 16
+    tool: Annotated[
+        str | None,
+        typer.Option(help="Another frame of the robot as the tool.", show_default="its own"),
+    ] = None
+
+    def grid(self, grasps: str) -> MapGrid:
+        """Return the grid with the tilts of named grasps."""
+        from tcs.capability import MapGrid
+
+        return MapGrid.of(self.step, self.yaw_bins, grasps)
+
+    def reach(self, robot: str, measure: str = _MEASURE, head: str | None = None) -> Reach:
+        """Return the reachability of a robot."""
+        from tcs.capability import Reach
+
+        return Reach.load(
+            robot, tool=self.tool, torso_height=self.torso_height, step=self.step,
+            measure=measure, head=head,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Scores:
+    """Robot of a map and scores of its cells."""
+
+    robot: options.Robot = "tiago"
+    measure: Annotated[
+        str,
+        typer.Option(help="Dexterity measure; by default the thesis's manipulability."),
+    ] = _MEASURE
+    visibility: Annotated[
+        str, typer.Option(help="corrected, or thesis for the equations as printed.")
+    ] = "corrected"
+    head: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of the head camera.", show_default="the robot's own"),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Samples:
+    """Samples of a recording that a map uses."""
+
+    height: Annotated[
+        float | None,
+        typer.Option(
+            help="Use only samples with the tool at this height above the floor, to half a step, "
+            "in metres."
+        ),
+    ] = None
+    grasps: Annotated[str, typer.Option(help="Tilts of the tool: side, top, side+top or all.")] = (
+        "side"
+    )
+    drop_bad: Annotated[
+        bool, typer.Option("--drop-bad", help="Leave out invalid samples instead of stopping.")
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Files:
+    """Files of a map."""
+
+    out: Annotated[Path, typer.Option(help="Map to write.")]
+    text: Annotated[
+        Path | None,
+        typer.Option(help="Also write the map as text: score x y z R11 .. R33, a line each."),
+    ] = None
+
+    def check(self, *others: Path | None) -> None:
+        """Check before the work that the files can be written."""
+        for path in (self.out, self.text, *others):
+            if path is not None:
+                check_writable(path)
+
+    def write(self, capability: CapabilityMap) -> None:
+        """Write the map."""
+        from tcs.capability import export_text, save_map
+
+        save_map(self.out, capability)
+        if self.text is not None:
+            export_text(self.text, capability)
+
+
 @app.command("from-ik")
+@expand_options
 def from_ik(
-    out: _Out,
-    robot: options.Robot = "tiago",
-    kind: Annotated[str, typer.Option(help="IHCM, or ICM without visibility.")] = "IHCM",
-    lift: _Lift = None,
-    grasps: _Grasps = "side+top",
-    step: _Step = 0.05,
-    turns: _Turns = 16,
+    files: _Files,
+    scores: _Scores,
+    grid: _Grid,
+    map_type: Annotated[
+        str, typer.Option("--type", "--kind", help="IHCM, or ICM without visibility.")
+    ] = "IHCM",
+    grasps: Annotated[
+        str, typer.Option(help="Tilts of the tool: side, top, side+top or all.")
+    ] = "side+top",
     radius: _Radius = None,
-    tool: _Tool = None,
-    measure: _Measure = _MEASURE,
-    view: _View = "corrected",
-    head: _Head = None,
     jobs: options.Jobs = 2,
-    text: _Text = None,
     as_json: options.Json = False,
 ) -> None:
     """Make a map by inverse kinematics of every cell around the tool."""
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
+    from tcs.capability import map_from_ik
+
+    files.check()
+    cells = grid.grid(grasps)
+    reach = grid.reach(scores.robot, scores.measure, scores.head)
+    begun = time.perf_counter()
     with talk.progress_bar("cells") as on_progress:
-        result = work.from_ik(
-            robot_setup, out, text, kind=kind, radius=radius, view=view, jobs=jobs,
+        capability = map_from_ik(
+            reach, cells, map_type=map_type, radius=radius, view_rule=scores.visibility, jobs=jobs,
             on_progress=on_progress,
         )  # fmt: skip
+    seconds = time.perf_counter() - begun
+    files.write(capability)
+    result = {**reports.map_result(files.out, capability), "seconds": round(seconds, 3)}
     talk.print_result(result, reports.report_map, as_json=as_json)
 
 
 @app.command()
+@expand_options
 def record(
-    out: _Out,
+    files: _Files,
+    scores: _Scores,
+    grid: _Grid,
+    samples: _Samples,
     csv: Annotated[
         Path | None,
         typer.Argument(
             metavar="CSV",
             help="Recorded joint states: a row of joint names, then a row per sample, in radians.",
-            show_default="a simulated operator records",
+            show_default="a simulated recording",
         ),
     ] = None,
-    robot: options.Robot = "tiago",
-    lift: _Lift = None,
-    height: _Height = None,
-    grasps: _Grasps = "side",
-    step: _Step = 0.05,
-    turns: _Turns = 16,
-    tool: _Tool = None,
-    measure: _Measure = _MEASURE,
-    view: _View = "corrected",
-    head: _Head = None,
-    drop_bad: _DropBad = False,
-    seconds: Annotated[float, typer.Option(help="Simulated: how long.")] = 3200.0,
+    seconds: Annotated[float, typer.Option(help="Simulated: length of the recording.")] = 3200.0,
     scale: Annotated[
-        float, typer.Option(help="Simulated: metres of the slave per metre of the master.")
+        float, typer.Option(help="Simulated: metres at the arm per metre at the master.")
     ] = 7.5,
     centre: Annotated[
         tuple[float, float],
-        typer.Option(metavar="X Y", help="Simulated: middle of the hand's box before the base, m."),
+        typer.Option(metavar="X Y", help="Simulated: centre of the hand's box in the base, m."),
     ] = (0.65, 0.0),
     seed: options.Seed = 0,
     save_csv: Annotated[
         Path | None, typer.Option(help="Simulated: also write the joint states.")
     ] = None,
-    text: _Text = None,
     as_json: options.Json = False,
 ) -> None:
-    """Make a map (ITCM) from recorded joint states, or from those of a simulated operator.
+    """Make a map (ITCM) from recorded joint states, or from a simulated recording.
 
-    The simulated hand keeps the tool at --height, 0.41 m if none is given.
+    The simulated hand keeps the tool at --height, by default 0.41 m.
     """
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
-    hand = work.SimulatedHand(seconds, scale, centre, seed, save_csv)
+    from tcs.capability import read_csv, write_csv
+
+    files.check(save_csv)
+    reach = grid.reach(scores.robot, scores.measure, scores.head)
+    if csv is not None:
+        recording = read_csv(csv, reach.robot, drop_bad=samples.drop_bad)
+        _map_recording(reach, recording, files, scores, grid, samples, {}, as_json=as_json)
+        return
+    from tcs.teleop.simulated_recording import HandMotion, simulate_recording
+
+    height = 0.41 if samples.height is None else samples.height
+    motion = HandMotion(height=height, seconds=seconds, scale=scale, centre=centre)
     with talk.progress_bar("samples") as on_progress:
-        result = work.record(
-            robot_setup, out, text, csv, hand, height=height, view=view, drop_bad=drop_bad,
-            on_progress=on_progress,
-        )  # fmt: skip
-    talk.print_result(result, reports.report_map, as_json=as_json)
+        simulated = simulate_recording(reach, motion, seed=seed, on_progress=on_progress)
+    if save_csv is not None:
+        write_csv(save_csv, reach.robot, simulated.recording)
+    more = {"seed": seed, "stopped": float(simulated.stopped.mean())}
+    samples = _Samples(height=height, grasps=samples.grasps)
+    _map_recording(reach, simulated.recording, files, scores, grid, samples, more, as_json=as_json)
 
 
 @app.command("from-bag")
+@expand_options
 def from_bag(
     bags: Annotated[
         list[Path], typer.Argument(metavar="BAG...", help="ROS 1 bag files or ROS 2 bag folders.")
     ],
-    out: _Out,
+    files: _Files,
+    scores: _Scores,
+    grid: _Grid,
+    samples: _Samples,
     topic: Annotated[
         str | None, typer.Option(help="Topic of the joint states.", show_default="any")
     ] = None,
-    robot: options.Robot = "tiago",
-    lift: _Lift = None,
-    height: _Height = None,
-    grasps: _Grasps = "side",
-    step: _Step = 0.05,
-    turns: _Turns = 16,
-    tool: _Tool = None,
-    measure: _Measure = _MEASURE,
-    view: _View = "corrected",
-    head: _Head = None,
-    drop_bad: _DropBad = False,
-    text: _Text = None,
     as_json: options.Json = False,
 ) -> None:
-    """Make a map (ITCM) from the joint states in ROS bags; needs the extra `bags` of tcs."""
-    robot_setup = Setup(robot, tool, lift, step, turns, grasps, measure, head)
-    result = work.from_bags(
-        robot_setup, out, text, bags, topic=topic, height=height, view=view, drop_bad=drop_bad
-    )
+    """Make a map (ITCM) from the joint states in ROS bags; requires the extra `bags` of tcs."""
+    from tcs.capability.bags import read_bags
+
+    files.check()
+    reach = grid.reach(scores.robot, scores.measure, scores.head)
+    recording = read_bags(bags, reach.robot, topic=topic, drop_bad=samples.drop_bad)
+    _map_recording(reach, recording, files, scores, grid, samples, {}, as_json=as_json)
+
+
+def _map_recording(
+    reach: Reach, recording: Recording, files: _Files, scores: _Scores, grid: _Grid,
+    samples: _Samples, more: dict[str, float], *, as_json: bool,
+) -> None:  # fmt: skip
+    """Make the map of a recording, write it and print a summary."""
+    from tcs.capability import map_from_recording
+
+    recorded = map_from_recording(
+        reach, grid.grid(samples.grasps), recording, height=samples.height,
+        view_rule=scores.visibility,
+    )  # fmt: skip
+    files.write(recorded.capability)
+    result = {
+        **reports.map_result(files.out, recorded.capability),
+        "dropped": recording.dropped,
+        **recorded.to_json(),
+        **more,
+    }
     talk.print_result(result, reports.report_map, as_json=as_json)
 
 
-@app.command("merge")
-def merge_maps(
-    capability: _Map,
-    task: Annotated[str, typer.Option(help="pick-and-place, linear or curved.")],
-    height: Annotated[float, typer.Option(help="Of the tool above the floor, in metres.")],
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    """A task of grasps by the name of its shape."""
+
+    task: Annotated[str, typer.Option(help="pick-and-place, linear or curved.")]
+    height: Annotated[float, typer.Option(help="Height of the tool above the floor, in metres.")]
     length: Annotated[
-        float, typer.Option(help="From the first to the last position; of an arc, its radius; m.")
-    ] = 0.15,
-    samples: Annotated[int, typer.Option(help="Positions along a line or an arc.")] = 3,
+        float,
+        typer.Option(
+            help="Distance from the first to the last position, or radius of an arc, in metres."
+        ),
+    ] = 0.15
+    samples: Annotated[int, typer.Option(help="Positions along a line or an arc.")] = 3
     heading_deg: Annotated[
         list[float] | None,
         typer.Option(help="Headings of the grasps, deg.", show_default="0, 90 and -90"),
-    ] = None,
-    approach: Annotated[str, typer.Option(help="side or top.")] = "side",
+    ] = None
+    approach: Annotated[str, typer.Option(help="side or top.")] = "side"
     pre_grasp: Annotated[
-        list[float] | None, typer.Option(help="How far back a pre-grasp is, in metres.")
-    ] = None,
+        list[float] | None,
+        typer.Option(help="Distance of a pre-grasp back along the approach, in metres."),
+    ] = None
     direction_deg: Annotated[
-        int, typer.Option(help="The way a line goes: 0, 90, 180 or 270 deg.")
-    ] = 90,
-    start_deg: Annotated[float, typer.Option(help="Arc: the closed door, deg.")] = 0.0,
-    end_deg: Annotated[float, typer.Option(help="Arc: the open door, deg.")] = 90.0,
-    lift: Annotated[
+        int, typer.Option(help="Direction of a line: 0, 90, 180 or 270 deg.")
+    ] = 90
+    start_deg: Annotated[float, typer.Option(help="Arc: the closed door, deg.")] = 0.0
+    end_deg: Annotated[float, typer.Option(help="Arc: the open door, deg.")] = 90.0
+
+
+@app.command("merge")
+@expand_options
+def merge_maps(
+    capability: _Map,
+    task: _Task,
+    torso_height: Annotated[
         float | None,
-        typer.Option(help="The only torso lift that counts.", show_default="any of the map's"),
+        typer.Option(
+            *_TORSO, help="Use only this torso height, in metres.", show_default="any of the map's"
+        ),
     ] = None,
-    scale: Annotated[str, typer.Option(help="Of the scores: fixed, or thesis.")] = "fixed",
+    scale: Annotated[str, typer.Option(help="Scale of the scores: fixed, or thesis.")] = "fixed",
     split: Annotated[
-        bool, typer.Option("--split", help="As many base poses as it takes, in order.")
+        bool,
+        typer.Option("--split", help="Use as many base poses as necessary, in the task's order."),
     ] = False,
     environment: Annotated[
         str | None,
-        typer.Option(help="Name or YAML file of a room: also the best base pose that it leaves."),
+        typer.Option(
+            help="Name or YAML file of an environment: also print the best base pose that is "
+            "feasible in it."
+        ),
     ] = None,
     task_at: Annotated[
         tuple[float, float, float],
-        typer.Option(metavar="X Y YAW_DEG", help="Where the task's frame is in that room."),
+        typer.Option(metavar="X Y YAW_DEG", help="Pose of the task frame in the environment."),
     ] = (0.0, 0.0, 0.0),
-    robot: _MapsRobot = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of the robot.", show_default="the map's own"),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="CSV of every base pose: x, y, yaw_deg, lift, score.")
+        Path | None,
+        typer.Option(help="CSV of every base pose: x, y, yaw_deg, torso_height, score."),
     ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="Picture to draw: .png, .pdf, .svg, or .html to turn.")
-    ] = None,
+    picture: Annotated[Path | None, typer.Option(help=_PICTURE)] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Merge a map over the grasps of a task: where to stand for all of it."""
-    asked = work.AskedTask(
-        kind=task,
-        height=height,
-        length=length,
-        samples=samples,
-        headings=tuple(math.radians(h) for h in heading_deg or (0.0, 90.0, -90.0)),
-        approach=approach,
-        pre_grasps=tuple(pre_grasp or ()),
-        direction_deg=direction_deg,
-        start=math.radians(start_deg),
-        end=math.radians(end_deg),
-    )
+    """Merge a map over the grasps of a task, and print its best base pose."""
+    from tcs.capability import Surroundings, load_map, merge, write_base_poses
+    from tcs.capability import split as split_task
+
     if split and (out, picture, environment) != (None, None, None):
         raise typer.BadParameter(
-            "--split has no one map to write, to draw or to put into a room.", param_hint="--split"
+            "--split makes no single task map; leave out --out, --picture and --environment.",
+            param_hint="--split",
         )
+    if task.direction_deg % 90:
+        raise typer.BadParameter("must be a multiple of 90.", param_hint="--direction-deg")
+    if out is not None:
+        check_writable(out)
+    _check_picture(picture)
+    loaded = load_map(capability)
+    grasps = _shape(task).task(loaded.grid.step)
     if split:
-        result = work.split(capability, asked, lift=lift, scale=scale)
-        talk.print_result(result, reports.report_stops, as_json=as_json)
+        stops = split_task(loaded, grasps, torso_height=torso_height, scale=scale)
+        sequence = {"task": grasps.name, "stops": [stop.to_json() for stop in stops]}
+        talk.print_result(sequence, reports.report_stops, as_json=as_json)
         return
-    at = (task_at[0], task_at[1], math.radians(task_at[2]))
-    room = None if environment is None else work.Room(environment, at, robot)
-    result = work.merge(
-        capability, asked, lift=lift, scale=scale, room=room, out=out, picture=picture
-    )
+    begun = time.perf_counter()
+    task_map = merge(loaded, grasps, torso_height=torso_height, scale=scale)
+    result = reports.task_map_result(task_map, time.perf_counter() - begun)
+    if out is not None:
+        write_base_poses(out, task_map)
+    if picture is not None:
+        from tcs.output.view.base_poses import save_task_map
+
+        save_task_map(picture, task_map)
+    if environment is not None:
+        x, y, yaw_deg = task_at
+        around = Surroundings.load(
+            capability, loaded, environment, (x, y, math.radians(yaw_deg)), robot=robot
+        )
+        base, rejected = around.best(task_map)
+        result |= {"best_in_environment": base.to_json(), "rejected": rejected}
     talk.print_result(result, reports.report_merged, as_json=as_json)
+
+
+def _shape(task: _Task) -> TaskShape:
+    """Return the parameters of a task in radians."""
+    from tcs.capability import TaskShape
+
+    return TaskShape(
+        shape=task.task,
+        height=task.height,
+        length=task.length,
+        samples=task.samples,
+        headings=tuple(math.radians(h) for h in task.heading_deg or (0.0, 90.0, -90.0)),
+        approach=task.approach,
+        pre_grasps=tuple(task.pre_grasp or ()),
+        direction_deg=task.direction_deg,
+        start=math.radians(task.start_deg),
+        end=math.radians(task.end_deg),
+    )
 
 
 @app.command()
 def show(
     capability: _Map,
-    out: Annotated[Path, typer.Option(help="Picture to draw: .png, .pdf, .svg, or .html to turn.")],
+    out: Annotated[Path, typer.Option(help=_PICTURE)],
     tilt: Annotated[int, typer.Option(min=0, help="Number of the tilt.")] = 0,
     height: Annotated[
         float | None,
-        typer.Option(help="Of the tool, in metres.", show_default="where most base poses are"),
+        typer.Option(help="Height of the tool, in metres.", show_default="that of most base poses"),
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draw a map from above: a short line for each base pose, seen from the tool."""
-    result = work.show(capability, out, tilt=tilt, height=height)
-    talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
+    """Draw a map from above: a short line for each base pose, relative to the tool."""
+    from tcs.capability import load_map
+    from tcs.output.view.base_poses import save_map_layer
+
+    _check_picture(out)
+    save_map_layer(out, load_map(capability), tilt=tilt, height=height)
+    talk.print_result({"file": str(out)}, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
 
 
+def _check_picture(path: Path | None) -> None:
+    """Check before the work that a picture can be drawn there."""
+    if path is None:
+        return
+    if path.suffix != ".html":
+        from tcs.output.draw import check_format
+
+        check_format(path)
+    check_writable(path)
+
+
+@expand_options
 def map_check(
+    grid: _Grid,
     capability: Annotated[
         Path | None,
         typer.Argument(
             metavar="MAP",
             help="A map made by inverse kinematics.",
-            show_default="one that would be made with these options",
+            show_default="the map that these options would make",
         ),
     ] = None,
     robot: Annotated[
@@ -285,23 +443,31 @@ def map_check(
             help="Name or YAML file of a robot.", show_default="the map's own; without MAP tiago"
         ),
     ] = None,
-    lift: _Lift = None,
     grasps: Annotated[
         list[str] | None, typer.Option(help="side, top or all.", show_default="each of them")
     ] = None,
-    step: _Step = 0.05,
-    turns: _Turns = 16,
     radius: _Radius = None,
-    tool: _Tool = None,
-    queries: Annotated[int, typer.Option(min=1, help="Random tool poses of each kind.")] = 20_000,
+    queries: Annotated[
+        int, typer.Option(min=1, help="Random tool poses for each set of grasps.")
+    ] = 20_000,
     seed: options.Seed = 0,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Compare a map's answers on random tool poses with inverse kinematics itself."""
-    robot_setup = Setup(robot or "tiago", tool, lift, step, turns, "side", _MEASURE)
-    result: dict[str, Any] = work.check(
-        capability, robot_setup, tuple(grasps or ()), robot=robot, radius=radius, queries=queries,
-        seed=seed, jobs=jobs,
-    )  # fmt: skip
+    """Compare a map with inverse kinematics at random tool poses."""
+    from tcs.capability import check_file, check_map
+
+    if capability is not None:
+        cells, checks = check_file(
+            capability, robot=robot, grasps=grasps or (), queries=queries, seed=seed, jobs=jobs
+        )
+    else:
+        reach = grid.reach(robot or "tiago")
+        checks = {}
+        for name in grasps or ("side", "top", "all"):
+            cells = grid.grid(name)
+            checks[name] = check_map(
+                reach, cells, name, radius=radius, queries=queries, seed=seed, jobs=jobs
+            )
+    result = reports.check_result(capability, cells, checks)
     talk.print_result(result, reports.report_check, as_json=as_json)

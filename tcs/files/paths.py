@@ -98,6 +98,18 @@ def expanded(path: str, what: str, error: type[TcsError]) -> Path:
         ) from None
 
 
+def data_reference(given: object, name: str) -> str:
+    """Return the reference by which a data file is loaded again: its name or absolute path.
+
+    Args:
+        given: The argument it was loaded by: a name, a path, or the loaded object.
+        name: The name that the file contains.
+    """
+    if isinstance(given, Path) or (isinstance(given, str) and given != name):
+        return str(expanded(str(given), "file", DataFileError).absolute())
+    return name
+
+
 def cache_folder(*parts: str) -> Path:
     """Return the user's cache folder for `tcs`, or a folder inside it; create it when missing.
 

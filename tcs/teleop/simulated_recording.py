@@ -140,7 +140,9 @@ def simulate_recording(
     motion = motion or HandMotion()
     count = _sample_count(motion)
     start = _start_posture(reach, motion)
-    session = Teleoperation(load_arm(reach.robot, torso_height=float(reach.lift)), start, _SETTINGS)
+    session = Teleoperation(
+        load_arm(reach.robot, torso_height=float(reach.torso_height)), start, _SETTINGS
+    )
     step = session.step(Command(mode=Mode.END_EFFECTOR))
     hand = _Hand(motion, np.random.default_rng(seed), step)
     joints, poses = np.empty((count, JOINTS)), np.empty((count, 3))
@@ -168,7 +170,7 @@ def simulate_recording(
     R_AT, p_AT = reach.tool_poses(joints)
     chord = np.linalg.norm(R_BC - reach.R_BA @ R_AT, axis=(1, 2)) / math.sqrt(8.0)
     return SimulatedRecording(
-        Recording(joints, np.full(count, float(reach.lift))),
+        Recording(joints, np.full(count, float(reach.torso_height))),
         np.linalg.norm(p_BC - (p_AT @ reach.R_BA.T + reach.p_BA), axis=1),
         2.0 * np.arcsin(np.minimum(chord, 1.0)),
         stopped,
@@ -252,7 +254,8 @@ def _start_posture(reach: Reach, motion: HandMotion) -> FloatArray:
         raise DataFileError(
             f"simulated recording: the arm cannot start, as it reaches no pose in the box of "
             f"{depth:.2f} x {width:.2f} m about x {motion.centre[0]:g}, y {motion.centre[1]:g} m "
-            f"at a height of {motion.height:g} m with the torso at {reach.lift:g} m. Move the box."
+            f"at a height of {motion.height:g} m with the torso at {reach.torso_height:g} m. Move "
+            "the box."
         )
     # Joints rounded to single precision may lie past a limit by their last digit.
     joints = np.asarray(solved.joints[int(np.argmax(solved.reached))], dtype=np.float64)

@@ -7,7 +7,7 @@ import pytest
 from tcs.capability import MapGrid, Reach, map_from_ik
 from tcs.model.robots import load_robot
 
-LIFT = 0.15
+TORSO_HEIGHT = 0.15
 
 
 @pytest.fixture(scope="session")
@@ -18,8 +18,8 @@ def tiago():
 
 @pytest.fixture(scope="session")
 def reach(tiago):
-    """TIAGo on an empty floor, lifts 0.05 m apart."""
-    return Reach(tiago, lift=LIFT)
+    """TIAGo on an empty floor, torso heights 0.05 m apart."""
+    return Reach(tiago, torso_height=TORSO_HEIGHT)
 
 
 @pytest.fixture(scope="session")
@@ -31,4 +31,4 @@ def coarse():
 @pytest.fixture(scope="session")
 def ihcm(tiago, coarse):
     """The IHCM of TIAGo on the coarse grid."""
-    return map_from_ik(Reach(tiago, lift=LIFT, step=0.1), coarse)
+    return map_from_ik(Reach(tiago, torso_height=TORSO_HEIGHT, step=0.1), coarse)

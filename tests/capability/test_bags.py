@@ -28,14 +28,14 @@ def joint_state(types, names, positions):
 
 def write_bag(path, messages, generation=1, topic="/joint_states"):
     """Write joint states, each (names, positions), as a bag of ROS 1 or 2."""
-    kind = "sensor_msgs/msg/JointState"
+    map_type = "sensor_msgs/msg/JointState"
     types = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_HUMBLE)
     writer = Writer1(path) if generation == 1 else Writer2(path, version=9)
     with writer:
-        connection = writer.add_connection(topic, kind, typestore=types)
+        connection = writer.add_connection(topic, map_type, typestore=types)
         serialize = types.serialize_ros1 if generation == 1 else types.serialize_cdr
         for i, message in enumerate(messages):
-            data = serialize(joint_state(types, *message), kind)
+            data = serialize(joint_state(types, *message), map_type)
             writer.write(connection, i * 20_000_000, data)
     return path
 
@@ -48,7 +48,7 @@ def test_joint_states_of_both_generations(generation, tiago, tmp_path):
     write_bag(path, [(NAMES, LISTING), shuffled, (["head_1_joint"], [0.1])], generation)
     found = read_bags([path], tiago)
     np.testing.assert_array_equal(found.joints, [LISTING[:7]] * 2)
-    np.testing.assert_array_equal(found.lift, [LISTING[8]] * 2)
+    np.testing.assert_array_equal(found.torso_height, [LISTING[8]] * 2)
 
 
 def test_several_bags_follow_one_another(tiago, tmp_path):
@@ -66,11 +66,11 @@ def test_a_bag_without_joint_states(tiago, tmp_path):
         connection = writer.add_connection("/words", "std_msgs/msg/String", typestore=types)
         word = types.types["std_msgs/msg/String"](data="hello")
         writer.write(connection, 0, types.serialize_ros1(word, "std_msgs/msg/String"))
-    with pytest.raises(DataFileError, match=r"holds no joint states. It holds: /words \(std_msgs"):
+    with pytest.raises(DataFileError, match=r"has no joint states. It has: /words \(std_msgs"):
         read_bags([path], tiago)
 
 
-def test_another_topic_than_asked_for(tiago, tmp_path):
+def test_a_topic_without_joint_states(tiago, tmp_path):
     path = write_bag(tmp_path / "a.bag", [(NAMES, LISTING)])
     with pytest.raises(DataFileError, match="no joint states on topic '/arm'"):
         read_bags([path], tiago, topic="/arm")
@@ -102,10 +102,10 @@ def test_more_names_than_positions(tiago, tmp_path):
         read_bags([path], tiago)
 
 
-def test_files_that_are_no_bags(tiago, tmp_path):
-    with pytest.raises(DataFileError, match="not there"):
+def test_files_that_are_not_bags(tiago, tmp_path):
+    with pytest.raises(DataFileError, match="does not exist"):
         read_bags([tmp_path / "none.bag"], tiago)
     path = tmp_path / "text.bag"
-    path.write_text("no bag at all")
+    path.write_text("not a bag")
     with pytest.raises(DataFileError, match="cannot be read"):
         read_bags([path], tiago)

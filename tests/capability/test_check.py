@@ -6,10 +6,10 @@ from tcs.capability.check import MapCheck, random_poses
 from tcs.errors import UnknownNameError
 
 
-def test_shares_by_hand():
-    says = np.array([True, True, True, False, False, False, False, False])
+def test_fractions_by_hand():
+    predicted = np.array([True, True, True, False, False, False, False, False])
     true = np.array([True, True, False, True, False, False, False, False])
-    found = MapCheck.of(says, true)
+    found = MapCheck.of(predicted, true)
     assert found.to_json() == {
         "queries": 8,
         "reachable": 3 / 8,
@@ -21,38 +21,38 @@ def test_shares_by_hand():
     }
 
 
-def test_a_map_that_is_not_made_judges_as_the_one_that_is(ihcm, tiago):
-    at = Reach(tiago, lift=ihcm.lift, step=0.1)
+def test_check_map_agrees_with_the_check_of_a_stored_map(ihcm, tiago):
+    at = Reach(tiago, torso_height=ihcm.torso_height, step=0.1)
     for grasps in ("side", "top"):
         lazy = check_map(at, ihcm.grid, grasps, queries=2000, seed=4)
         assert lazy == check_stored(at, ihcm, grasps, queries=2000, seed=4)
 
 
 @pytest.mark.parametrize("grasps", ["side", "top", "all"])
-def test_the_issue_bars_are_met(reach, grasps):
-    """Accuracy and false positives at 5 cm, 22.5 deg: bars of 95 and 2 % of all queries."""
+def test_accuracy_of_the_default_grid(reach, grasps):
+    """At 5 cm and 22.5 deg."""
     found = check_map(reach, MapGrid.of(0.05, 16, grasps), grasps, radius=0.9, queries=6000)
     # 98.2 to 98.8 and 0.4 to 0.6 % were measured with 40,000; a share of 2 % of 6,000 spreads by
     # 0.18 %, four of which are 0.7 %.
     assert found.accuracy >= 0.97
     assert found.false_positives <= 0.015
     assert found.reachable > 0.03
-    # One in eighteen is reachable: a map that always says no would be right 94 % of the time.
+    # One query in eighteen is reachable: an empty map would have an accuracy of 94 %.
     assert found.recall > 0.7
     assert found.precision > 0.8
 
 
-def test_half_the_steps_judge_better(reach):
+def test_a_finer_grid_is_more_accurate(reach):
     coarse, fine = (
-        check_map(reach, MapGrid.of(step, turns, "side"), "side", queries=6000)
-        for step, turns in ((0.1, 8), (0.025, 32))
+        check_map(reach, MapGrid.of(step, yaw_bins, "side"), "side", queries=6000)
+        for step, yaw_bins in ((0.1, 8), (0.025, 32))
     )
     assert fine.accuracy >= 0.98
     assert fine.false_positives <= 0.01
     assert fine.accuracy > coarse.accuracy
 
 
-def test_queries_are_what_they_are_called(reach):
+def test_orientations_of_the_queries(reach):
     R, p = random_poses(reach, "side", 100, 0)
     np.testing.assert_allclose(R[:, 2], np.tile([0, 0, 1], (100, 1)), atol=1e-15)
     R, _ = random_poses(reach, "top", 100, 0)

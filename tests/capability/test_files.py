@@ -8,7 +8,7 @@ import pytest
 from tcs.capability import MapGrid, export_text, import_text, load_map, save_map
 from tcs.errors import DataFileError, OutputError, StoreError, StoreFormatError, UnsafeStoreError
 
-ARRAYS = ("cells", "manipulability", "visibility", "free_lifts", "joints", "lifts")
+ARRAYS = ("cells", "manipulability", "visibility", "free_torso_heights", "joints", "torso_heights")
 
 
 @pytest.fixture
@@ -18,11 +18,15 @@ def stored(ihcm, tmp_path):
     return path
 
 
-def test_what_is_loaded_is_what_was_saved(ihcm, stored):
+def test_load_returns_what_was_saved(ihcm, stored):
     back = load_map(stored)
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(back, name), getattr(ihcm, name))
-    assert (back.grid, back.kind, back.lift) == (ihcm.grid, ihcm.kind, ihcm.lift)
+    assert (back.grid, back.map_type, back.torso_height) == (
+        ihcm.grid,
+        ihcm.map_type,
+        ihcm.torso_height,
+    )
     assert back.metadata == ihcm.metadata
     assert back.manipulability_scale == ihcm.manipulability_scale
 
@@ -33,14 +37,21 @@ def test_a_truncated_map_is_refused(stored):
         load_map(stored)
 
 
-def test_a_file_of_scores_is_no_map(tmp_path):
+def test_a_score_file_is_not_a_map(tmp_path):
     path = tmp_path / "scores.tcs"
     joblib.dump({"format": "tcs scores", "format_version": 1}, path)
-    with pytest.raises(StoreFormatError, match="no capability map"):
+    with pytest.raises(StoreFormatError, match="holds no capability map"):
         load_map(path)
 
 
-@pytest.mark.parametrize("name", ["kind", "step", "tilts", "key_step", "joints", "metadata"])
+def test_a_map_of_the_first_format_version_asks_for_a_new_one(stored):
+    content = joblib.load(stored)
+    joblib.dump(content | {"format_version": 1}, stored)
+    with pytest.raises(StoreFormatError, match=r"format version 1, .* reads version 2.*Make the map again"):
+        load_map(stored)
+
+
+@pytest.mark.parametrize("name", ["map_type", "step", "tilts", "key_step", "joints", "metadata"])
 def test_a_map_without_a_part_is_refused(stored, name):
     content = joblib.load(stored)
     del content[name]
@@ -56,18 +67,18 @@ def test_a_pickle_that_calls_something_is_refused(tmp_path):
         load_map(path)
 
 
-def test_a_map_that_is_not_there(tmp_path):
+def test_a_missing_map(tmp_path):
     with pytest.raises(StoreError, match="cannot be read"):
         load_map(tmp_path / "none.tcm")
 
 
-def test_a_map_cannot_be_written_into_a_folder_that_is_not_there(ihcm, tmp_path):
+def test_a_map_cannot_be_written_into_a_missing_folder(ihcm, tmp_path):
     for write in (save_map, export_text):
         with pytest.raises(OutputError, match="cannot be written"):
             write(tmp_path / "none" / "map", ihcm)
 
 
-def test_text_holds_the_base_as_the_tool_sees_it(ihcm, tmp_path):
+def test_text_holds_the_base_in_the_tool_frame(ihcm, tmp_path):
     path = tmp_path / "map.txt"
     export_text(path, ihcm)
     table = np.loadtxt(path)
@@ -78,18 +89,18 @@ def test_text_holds_the_base_as_the_tool_sees_it(ihcm, tmp_path):
     np.testing.assert_allclose(table[:, 4:], R_TB.reshape(-1, 9), atol=1e-8)
 
 
-def test_a_map_survives_the_way_through_text(ihcm, reach, tmp_path):
+def test_text_round_trip(ihcm, reach, tmp_path):
     path = tmp_path / "map.txt"
     export_text(path, ihcm)
-    back = import_text(path, reach, ihcm.grid, kind="IHCM")
+    back = import_text(path, reach, ihcm.grid, map_type="IHCM")
     np.testing.assert_array_equal(back.cells, ihcm.cells)
     np.testing.assert_allclose(back.manipulability, ihcm.manipulability, rtol=1e-6)
     np.testing.assert_allclose(back.visibility, ihcm.visibility, atol=1e-6)
     assert len(back.joints) == 0
-    # A text tells no postures, so that every lift is taken for free.
-    levels = len(back.lifts)
+    # A text file has no postures, so every torso height counts as free.
+    levels = len(back.torso_heights)
     assert levels > 1
-    assert np.all(back.free_lifts & ((1 << levels) - 1) == (1 << levels) - 1)
+    assert np.all(back.free_torso_heights & ((1 << levels) - 1) == (1 << levels) - 1)
 
 
 def test_of_two_equal_poses_the_better_score_counts(ihcm, reach, tmp_path):
@@ -103,26 +114,26 @@ def test_of_two_equal_poses_the_better_score_counts(ihcm, reach, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("", "empty"),
         ("0.1 0 0\n", "line 1: must be 13"),
         ("0.1 0 0 0 1 0 0 0 1 0 0 0 nan\n", "line 1: must be 13"),
         ("0.1 0 0 0 1 0 0 0 1 0 0 0 one\n", "line 1: must be 13"),
-        ("0.1 0 0 0 1 0 0 0 2 0 0 0 1\n", "no rotation"),
-        ("0.1 0.02 0 0 1 0 0 0 1 0 0 0 1\n", "no pose of a grid"),
+        ("0.1 0 0 0 1 0 0 0 2 0 0 0 1\n", "does not hold a rotation"),
+        ("0.1 0.02 0 0 1 0 0 0 1 0 0 0 1\n", "not a pose of a grid"),
         ("1.5 0.1 0 0 1 0 0 0 1 0 0 0 1\n", "outside 0 to 1"),
     ],
 )
-def test_lines_that_cannot_be_used(text, words, reach, coarse, tmp_path):
+def test_invalid_lines(text, message, reach, coarse, tmp_path):
     path = tmp_path / "map.txt"
     path.write_text(text)
-    with pytest.raises(DataFileError, match=words):
+    with pytest.raises(DataFileError, match=message):
         import_text(path, reach, coarse)
 
 
 def test_a_text_file_of_another_grid_is_refused(ihcm, reach, tmp_path):
     path = tmp_path / "map.txt"
     export_text(path, ihcm)
-    with pytest.raises(DataFileError, match="no pose of a grid"):
+    with pytest.raises(DataFileError, match="not a pose of a grid"):
         import_text(path, reach, MapGrid.of(0.03, 8))

@@ -17,7 +17,7 @@ def test_a_reached_cell_is_confirmed_by_drake(ihcm, reach, rng):
     lower, upper = scene.arm_limits
     try:
         scene.place_base(0.0, 0.0, 0.0)
-        scene.set_torso(ihcm.lift)
+        scene.set_torso(ihcm.torso_height)
         for row, R, p in zip(rows, R_BT, p_BT, strict=True):
             q = ihcm.joints[row].astype(float)
             scene.set_arm(q)
@@ -38,28 +38,28 @@ def test_free_lifts_are_those_at_which_drake_finds_nothing(ihcm, reach, rng):
     try:
         for row in rows:
             scene.set_arm(ihcm.joints[row].astype(float))
-            for bit, lift in enumerate(ihcm.lifts):
-                scene.set_torso(float(lift))
-                free = bool(int(ihcm.free_lifts[row]) >> bit & 1)
+            for bit, torso_height in enumerate(ihcm.torso_heights):
+                scene.set_torso(float(torso_height))
+                free = bool(int(ihcm.free_torso_heights[row]) >> bit & 1)
                 some_blocked |= not free
                 assert free == (scene.violations() == ())
     finally:
         scene.restore(before)
-    # Else the test has seen one answer only; other cells of this map are blocked at other lifts.
-    assert some_blocked or np.all(ihcm.free_lifts[rows] == ihcm.free_lifts.max())
-    assert len(np.unique(ihcm.free_lifts)) > 1
+    # Otherwise all of these cells are free; other cells of this map are not.
+    assert some_blocked or np.all(ihcm.free_torso_heights[rows] == ihcm.free_torso_heights.max())
+    assert len(np.unique(ihcm.free_torso_heights)) > 1
 
 
 def test_every_cell_is_free_at_the_lift_the_map_was_made_at(ihcm):
-    level = int(np.flatnonzero(ihcm.lifts == ihcm.lift)[0])
-    assert np.all(ihcm.free_lifts >> np.uint32(level) & 1)
+    level = int(np.flatnonzero(ihcm.torso_heights == ihcm.torso_height)[0])
+    assert np.all(ihcm.free_torso_heights >> np.uint32(level) & 1)
 
 
-def test_a_cell_that_is_not_held_is_not_reached(ihcm, tiago):
-    at = Reach(tiago, lift=ihcm.lift, step=0.1)
+def test_a_cell_that_is_not_in_the_map_is_not_reached(ihcm, tiago):
+    at = Reach(tiago, torso_height=ihcm.torso_height, step=0.1)
     cells = cells_around(ihcm.grid, at.shoulder, at.length)
-    gone = cells[ihcm.rows_of(cells) < 0][::97]
-    assert not at.solve(*ihcm.grid.tool_in_base(gone)).reached.any()
+    missing = cells[ihcm.rows_of(cells) < 0][::97]
+    assert not at.solve(*ihcm.grid.tool_in_base(missing)).reached.any()
 
 
 def test_manipulability_is_that_of_the_joints(ihcm, reach):
@@ -67,7 +67,7 @@ def test_manipulability_is_that_of_the_joints(ihcm, reach):
     np.testing.assert_allclose(ihcm.manipulability, again, rtol=1e-6)
 
 
-def test_cells_around_are_those_whose_shoulder_is_near(reach):
+def test_cells_around_have_the_shoulder_within_the_radius(reach):
     grid = MapGrid.of(0.1, 4, "side")
     cells = cells_around(grid, reach.shoulder, 0.5)
     _, p_BT = grid.tool_in_base(cells)
@@ -88,7 +88,7 @@ def test_no_posture_is_longer_than_the_arm(reach, rng):
 
 
 def test_a_smaller_radius_leaves_out_what_is_farther(tiago):
-    at = Reach(tiago, lift=0.15, step=0.1)
+    at = Reach(tiago, torso_height=0.15, step=0.1)
     grid = MapGrid.of(0.1, 4, "side")
     whole, near = map_from_ik(at, grid), map_from_ik(at, grid, radius=0.7)
     _, p_BT = grid.tool_in_base(whole.cells)
@@ -98,7 +98,7 @@ def test_a_smaller_radius_leaves_out_what_is_farther(tiago):
 
 
 def test_threads_do_not_change_the_map(tiago):
-    at = Reach(tiago, lift=0.15, step=0.2)
+    at = Reach(tiago, torso_height=0.15, step=0.2)
     grid = MapGrid.of(0.2, 4, "side")
     one, two = (map_from_ik(at, grid, jobs=jobs) for jobs in (1, 2))
     np.testing.assert_array_equal(one.cells, two.cells)
@@ -106,8 +106,8 @@ def test_threads_do_not_change_the_map(tiago):
 
 
 def test_another_measure_is_kept_by_name(tiago):
-    at = Reach(tiago, lift=0.15, step=0.2, measure="isotropy")
-    found = map_from_ik(at, MapGrid.of(0.2, 4, "side"), kind="ICM")
+    at = Reach(tiago, torso_height=0.15, step=0.2, measure="isotropy")
+    found = map_from_ik(at, MapGrid.of(0.2, 4, "side"), map_type="ICM")
     assert found.metadata["measure"] == "isotropy"
     assert found.metadata["measure"] in MEASURES
     assert 0.0 < manipulability_scale(at) <= 1.0
@@ -116,31 +116,31 @@ def test_another_measure_is_kept_by_name(tiago):
 def test_a_robot_without_a_head_makes_an_icm_but_no_ihcm():
     at = Reach(load_robot("iiwa7"), step=0.2)
     grid = MapGrid.of(0.2, 4, "side")
-    found = map_from_ik(at, grid, kind="ICM")
+    found = map_from_ik(at, grid, map_type="ICM")
     assert len(found.cells)
     assert not found.visibility.any()
-    with pytest.raises(RobotError, match="no head camera"):
-        map_from_ik(at, grid, kind="IHCM")
+    with pytest.raises(RobotError, match="no head file"):
+        map_from_ik(at, grid, map_type="IHCM")
 
 
-@pytest.mark.parametrize(("lift", "words"), [(0.5, "out of range"), (-0.1, "out of range")])
-def test_a_lift_out_of_range_is_refused(tiago, lift, words):
+@pytest.mark.parametrize(("torso_height", "words"), [(0.5, "out of range"), (-0.1, "out of range")])
+def test_a_lift_out_of_range_is_refused(tiago, torso_height, words):
     with pytest.raises(GridError, match=words):
-        Reach(tiago, lift=lift)
+        Reach(tiago, torso_height=torso_height)
 
 
-def test_what_no_map_can_be_made_of_is_refused_before_the_work(tiago, monkeypatch):
+def test_invalid_arguments_are_refused_before_the_work(tiago, monkeypatch):
     def solve(*_arguments, **_options):
         raise AssertionError
 
     monkeypatch.setattr(Reach, "solve", solve)
-    fine = Reach(tiago, lift=0.15, step=0.01)
-    with pytest.raises(GridError, match=r"36 levels of 0\.01 m; a map holds 32"):
+    fine = Reach(tiago, torso_height=0.15, step=0.01)
+    with pytest.raises(GridError, match=r"36 heights 0\.01 m apart; a map holds 32"):
         map_from_ik(fine, MapGrid.of(0.01, 16, "side"))
     with pytest.raises(UnknownNameError, match="unknown visibility 'best'"):
         map_from_ik(Reach(tiago), MapGrid.of(), view_rule="best")
 
 
-def test_far_too_many_cells_are_refused(reach):
+def test_too_many_cells_are_refused(reach):
     with pytest.raises(GridError, match="cells"):
         cells_around(MapGrid.of(0.01, 32, "all"), reach.shoulder, 0.9)

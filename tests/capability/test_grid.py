@@ -15,7 +15,7 @@ def random_cells(grid, count, rng):
         [
             rng.integers(0, len(grid.tilts), count),
             rng.integers(-40, 41, (count, 3)),
-            rng.integers(0, grid.turns, count),
+            rng.integers(0, grid.yaw_bins, count),
         ]
     )
 
@@ -28,7 +28,7 @@ def test_the_pose_of_a_cell_is_nearest_to_that_cell(grasps, rng):
     np.testing.assert_array_equal(near.cells, cells)
     # Rounding of a few products of metres.
     assert np.abs(near.offset).max() < 1e-12
-    assert near.turn.max() < 1e-7
+    assert near.angle.max() < 1e-7
 
 
 def test_base_in_tool_is_the_inverse_of_tool_in_base(rng):
@@ -56,10 +56,10 @@ def test_every_orientation_is_within_half_a_cell_of_the_grid(rng):
     R = Rotation.random(5000, rng=rng).as_matrix()
     near = grid.nearest(R, rng.uniform(-1, 1, (5000, 3)))
     assert np.abs(near.offset).max() <= 0.025 + 1e-12
-    # Half a turn step each in pitch, roll and yaw: no more than their sum, and seen to be less.
-    assert near.turn.max() < 1.5 * grid.turn
+    # Half a yaw step each in pitch, roll and yaw bounds the angle.
+    assert near.angle.max() < 1.5 * grid.yaw_step
     R_BT, _ = grid.tool_in_base(near.cells)
-    np.testing.assert_allclose(angle_of(np.swapaxes(R_BT, 1, 2) @ R), near.turn, atol=1e-6)
+    np.testing.assert_allclose(angle_of(np.swapaxes(R_BT, 1, 2) @ R), near.angle, atol=1e-6)
 
 
 def test_the_nearest_tilt_is_the_nearest_of_all(rng):
@@ -88,18 +88,18 @@ def test_keys_sort_as_cells_do_and_come_back(rows):
 
 
 @pytest.mark.parametrize(
-    ("step", "turns", "words"),
+    ("step", "yaw_bins", "words"),
     [
         (0.0, 16, "step"),
         (math.nan, 16, "step"),
         (0.05, 6, "multiple of 4"),
-        (0.05, 0, "headings"),
+        (0.05, 0, "yaw bins"),
         (0.05, 1024, "from 4 to 1020"),
     ],
 )
-def test_impossible_grids_are_refused(step, turns, words):
+def test_impossible_grids_are_refused(step, yaw_bins, words):
     with pytest.raises(GridError, match=words):
-        MapGrid.of(step, turns)
+        MapGrid.of(step, yaw_bins)
 
 
 def test_unknown_grasps_are_refused():

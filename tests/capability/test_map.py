@@ -8,21 +8,21 @@ from tcs.capability.map import CapabilityMap
 from tcs.errors import StoreError, UnknownNameError
 
 
-def small_map(cells, manipulability, visibility, kind="IHCM", grid=None, **changes):
-    """Return a map of a few cells at one of three lifts."""
+def small_map(cells, manipulability, visibility, map_type="IHCM", grid=None, **changes):
+    """Return a map of a few cells at one of three torso heights."""
     cells = np.array(cells, np.int32).reshape(-1, 5)
     count = len(cells)
     made = {
-        "kind": kind,
+        "map_type": map_type,
         "grid": grid or MapGrid.of(0.05, 16, "side+top"),
         "cells": cells,
         "manipulability": np.array(manipulability, np.float32),
         "visibility": np.array(visibility, np.float32),
-        "lifts": np.array([0.05, 0.10, 0.15]),
-        "lift": 0.10,
-        "free_lifts": np.full(count, 7, np.uint32),
+        "torso_heights": np.array([0.05, 0.10, 0.15]),
+        "torso_height": 0.10,
+        "free_torso_heights": np.full(count, 7, np.uint32),
         "manipulability_scale": 0.1,
-        "metadata": {"robot": "made up"},
+        "metadata": {"robot": "example"},
         "joints": np.empty((0, 7), np.float32),
     }
     return CapabilityMap(**(made | changes))
@@ -34,7 +34,7 @@ CELLS = [[0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [1, 0, 0, 0, 3]]
 def test_fixed_scores_count_manipulability_by_the_arms_best():
     found = small_map(CELLS, [0.05, 0.1, 0.2], [1.0, 0.5, 0.0])
     np.testing.assert_allclose(found.score(), [0.75, 0.75, 0.5], rtol=1e-6)
-    np.testing.assert_allclose(found.of_kind("ICM").score(), [0.5, 1.0, 1.0], rtol=1e-6)
+    np.testing.assert_allclose(found.of_type("ICM").score(), [0.5, 1.0, 1.0], rtol=1e-6)
 
 
 def test_the_thesis_stretches_both_within_the_map():
@@ -49,9 +49,9 @@ def test_a_map_of_equal_scores_can_be_stretched():
 
 def test_rows_of_cells():
     found = small_map(CELLS, [0.1] * 3, [0.5] * 3)
-    asked = np.array([CELLS[2], [0, 0, 0, 0, 1], CELLS[0]])
-    assert found.rows_of(asked).tolist() == [2, -1, 0]
-    assert small_map([], [], []).rows_of(asked).tolist() == [-1, -1, -1]
+    cells = np.array([CELLS[2], [0, 0, 0, 0, 1], CELLS[0]])
+    assert found.rows_of(cells).tolist() == [2, -1, 0]
+    assert small_map([], [], []).rows_of(cells).tolist() == [-1, -1, -1]
 
 
 def test_look_up_takes_the_nearest_cell(ihcm, rng):
@@ -64,7 +64,7 @@ def test_look_up_takes_the_nearest_cell(ihcm, rng):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
         ({"cells": np.array(CELLS[::-1], np.int32)}, "not sorted"),
         ({"cells": np.array(CELLS + CELLS, np.int32)[[0, 0, 1]]}, "not sorted"),
@@ -72,20 +72,20 @@ def test_look_up_takes_the_nearest_cell(ihcm, rng):
         ({"cells": np.array([*CELLS[:2], [1, 0, 0, 0, 16]], np.int32)}, "outside"),
         ({"manipulability": np.array([0.1, np.nan, 0.1], np.float32)}, "manipulability"),
         ({"visibility": np.array([0.1, 1.1, 0.1], np.float32)}, "visibility"),
-        ({"free_lifts": np.array([1], np.uint32)}, "free_lifts"),
-        ({"lift": 0.12}, "lift"),
+        ({"free_torso_heights": np.array([1], np.uint32)}, "free_torso_heights"),
+        ({"torso_height": 0.12}, "torso height is not one"),
         ({"manipulability_scale": 0.0}, "scale"),
         ({"joints": np.zeros((2, 7), np.float32)}, "joints"),
     ],
 )
-def test_contradictions_are_refused(changes, words):
-    with pytest.raises(StoreError, match=words):
+def test_contradictions_are_refused(changes, message):
+    with pytest.raises(StoreError, match=message):
         dataclasses.replace(small_map(CELLS, [0.1] * 3, [0.5] * 3), **changes)
 
 
 def test_names_are_checked():
     with pytest.raises(UnknownNameError, match="ITCM"):
-        small_map(CELLS, [0.1] * 3, [0.5] * 3, kind="TCM")
+        small_map(CELLS, [0.1] * 3, [0.5] * 3, map_type="TCM")
     with pytest.raises(UnknownNameError, match="scale"):
         small_map(CELLS, [0.1] * 3, [0.5] * 3).score("max")
 
@@ -95,4 +95,4 @@ def test_maps_cannot_be_written_to():
     with pytest.raises(ValueError, match="read-only"):
         found.cells[0, 0] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
-        found.lift = 0.2
+        found.torso_height = 0.2

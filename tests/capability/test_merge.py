@@ -15,20 +15,20 @@ from tcs.capability import (
     pick_and_place_task,
     split,
 )
-from tcs.capability.merge import position_scores, usable_lifts
+from tcs.capability.merge import position_scores, usable_torso_heights
 from tcs.capability.volume import Box
 from tcs.errors import SelectionError
 from tests.capability.test_map import small_map
 
 
-def merged_by_loops(capability, task, lift=None):
-    """Return {(x, y, yaw, lift): score} of a task, base pose by base pose in plain loops.
+def merged_by_loops(capability, task, torso_height=None):
+    """Return {(x, y, yaw, torso height): score} of a task, base pose by base pose in plain loops.
 
     Tool poses on the grid, at quarter turns, side or top grasps, one height.
     """
     grid, scores = capability.grid, capability.score()
     table = {tuple(cell): row for row, cell in enumerate(capability.cells.tolist())}
-    levels = capability.lifts
+    levels = capability.torso_heights
 
     def of_grasp(position, grasp, back):
         found = {}
@@ -38,21 +38,21 @@ def merged_by_loops(capability, task, lift=None):
         for (t, x, y, z, yaw), row in table.items():
             if t != tilt:
                 continue
-            raised = capability.lift + p[2] + z * grid.step
+            raised = capability.torso_height + p[2] + z * grid.step
             at = (raised - levels[0]) / grid.step
             near = {math.floor(at + 1e-6), math.ceil(at - 1e-6)}
             if not all(0 <= n < len(levels) for n in near):
                 continue
-            if not all(int(capability.free_lifts[row]) >> n & 1 for n in near):
+            if not all(int(capability.free_torso_heights[row]) >> n & 1 for n in near):
                 continue
-            if lift is not None and abs(raised - lift) > 0.5 * grid.step + 1e-9:
+            if torso_height is not None and abs(raised - torso_height) > 0.5 * grid.step + 1e-9:
                 continue
             for _ in range(quarter % 4):
                 x, y = -y, x
             key = (
                 x + round(p[0] / grid.step),
                 y + round(p[1] / grid.step),
-                (yaw + quarter * grid.turns // 4) % grid.turns,
+                (yaw + quarter * grid.yaw_bins // 4) % grid.yaw_bins,
                 round(raised, 6),
             )
             found[key] = scores[row]
@@ -80,13 +80,13 @@ def as_dict(found):
     levels, i, j, k = np.nonzero(~np.isnan(found.score))
     keys = zip(
         (i + found.box.x).tolist(), (j + found.box.y).tolist(), k.tolist(),
-        np.round(found.lifts[levels], 6).tolist(), strict=True,
+        np.round(found.torso_heights[levels], 6).tolist(), strict=True,
     )  # fmt: skip
     return dict(zip(keys, found.score[levels, i, j, k].tolist(), strict=True))
 
 
 def random_map(rng):
-    """Return a map of most cells of a small box, some of them blocked at some lifts."""
+    """Return a map of most cells of a small box, some of them blocked at some torso heights."""
     grid = MapGrid.of(0.05, 8, "side+top")
     sides = [range(2), range(-6, 7), range(-6, 7), range(-10, -5), range(8)]
     cells = np.array(list(itertools.product(*sides)), np.int32)
@@ -94,7 +94,7 @@ def random_map(rng):
     n = len(cells)
     free = np.where(rng.uniform(size=n) < 0.8, 7, 2).astype(np.uint32)
     return small_map(
-        cells, rng.uniform(0, 0.1, n), rng.uniform(0, 1, n), grid=grid, free_lifts=free
+        cells, rng.uniform(0, 0.1, n), rng.uniform(0, 1, n), grid=grid, free_torso_heights=free
     )
 
 
@@ -108,13 +108,13 @@ TASKS = {
 }
 
 
-@pytest.mark.parametrize("lift", [None, 0.1], ids=["any lift", "one lift"])
+@pytest.mark.parametrize("torso_height", [None, 0.1], ids=["any torso height", "one torso height"])
 @pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_merging_agrees_with_plain_loops(task, seed, lift):
+def test_merging_agrees_with_plain_loops(task, seed, torso_height):
     capability = random_map(np.random.default_rng(seed))
-    slow = merged_by_loops(capability, task, lift)
-    fast = as_dict(merge(capability, task, lift=lift))
+    slow = merged_by_loops(capability, task, torso_height)
+    fast = as_dict(merge(capability, task, torso_height=torso_height))
     assert fast.keys() == slow.keys()
     assert len(fast) > 20
     for key, score in slow.items():
@@ -124,39 +124,40 @@ def test_merging_agrees_with_plain_loops(task, seed, lift):
 
 @pytest.mark.parametrize("heading_deg", [0, 45, 30])
 @pytest.mark.parametrize("shift", [0.0, 0.024])
-def test_no_base_place_lies_outside_the_box_that_is_looked_at(heading_deg, shift):
+def test_the_box_contains_all_base_positions(heading_deg, shift):
     volume = MapVolume(random_map(np.random.default_rng(0)))
     grasp = Grasp(math.radians(heading_deg))
     position = GraspPosition(0.1 + shift, -0.05 - shift, 0.4, (grasp,))
-    lifts = usable_lifts(volume.capability, 0.4)
+    torso_heights = usable_torso_heights(volume.capability, 0.4)
     box = volume.box_about(position.x, position.y)
     wide = Box(box.x - 5, box.y - 5, box.width + 10, box.depth + 10)
-    found, all_there_are = (
-        int((~np.isnan(position_scores(volume, position, b, lifts)[0])).sum()) for b in (box, wide)
+    found, all_of_them = (
+        int((~np.isnan(position_scores(volume, position, b, torso_heights)[0])).sum())
+        for b in (box, wide)
     )
-    assert found == all_there_are > 1000
+    assert found == all_of_them > 1000
 
 
 def test_on_the_grid_nothing_is_rounded():
     found = merge(random_map(np.random.default_rng(0)), TASKS["pick and place"])
-    assert (found.nearness.offset, found.nearness.turn) == (0.0, 0.0)
+    assert (found.nearness.offset, found.nearness.angle) == (0.0, 0.0)
 
 
-def test_a_base_pose_of_the_winner_reaches_the_task(ihcm, reach):
-    """The real map: the kernel confirms every position at the winner's own lift."""
+def test_the_best_base_pose_reaches_the_task(ihcm, reach):
+    """The kernel confirms every position at the torso height of the best base pose."""
     task = pick_and_place_task(0.2, 0.65, step=0.1)
-    winner = merge(ihcm, task, lift=reach.lift).best()
+    best = merge(ihcm, task, torso_height=reach.torso_height).best()
     for position in task.positions:
-        c, s = math.cos(winner.yaw), math.sin(winner.yaw)
+        c, s = math.cos(best.yaw), math.sin(best.yaw)
         R_BF = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         R = np.stack([R_BF @ grasp.R_FT for grasp in position.grasps])
-        p = R_BF @ [position.x - winner.x, position.y - winner.y, position.height]
-        # The lift of the winner is within half a step of the map's; the arm rides on it.
-        p[2] -= winner.lift - reach.lift
+        p = R_BF @ [position.x - best.x, position.y - best.y, position.height]
+        # The torso height of the best is within half a step of the map's; the arm rides on it.
+        p[2] -= best.torso_height - reach.torso_height
         assert reach.solve(R, np.tile(p, (len(R), 1))).reached.any()
 
 
-def test_turning_the_task_by_a_quarter_turns_the_answer(ihcm):
+def test_rotating_the_task_by_90_deg_rotates_the_base_poses(ihcm):
     line = linear_task(0.3, 2, 0.65, headings=(0.0,), direction=0, step=0.1)
     turned = linear_task(0.3, 2, 0.65, headings=(math.pi / 2,), direction=1, step=0.1)
     one, two = merge(ihcm, line).base_poses, merge(ihcm, turned).base_poses
@@ -185,15 +186,15 @@ def test_a_pre_grasp_never_adds_a_base_pose(ihcm):
 
 
 @pytest.mark.parametrize(("heading_deg", "shift"), [(10.0, 0.0), (0.0, 0.02), (37.0, 0.013)])
-def test_off_the_grid_the_nearest_cell_answers_and_says_how_near(ihcm, heading_deg, shift):
+def test_off_the_grid_the_nearest_cell_is_used_and_its_distance_reported(ihcm, heading_deg, shift):
     grasp = Grasp(math.radians(heading_deg))
     task = GraspTask("t", (GraspPosition(shift, 0.0, 0.65, (grasp,)),))
     found = merge(ihcm, task)
-    step, turn = ihcm.grid.step, ihcm.grid.turn
+    step, turn = ihcm.grid.step, ihcm.grid.yaw_step
     assert 0.0 < found.nearness.offset <= 0.5 * step + 1e-9 or (heading_deg == 0.0 and shift == 0.0)
     off = abs((math.radians(heading_deg) + turn / 2) % turn - turn / 2)
-    assert found.nearness.turn == pytest.approx(off, abs=1e-9)
-    # The same as asking the map about each of its base poses.
+    assert found.nearness.angle == pytest.approx(off, abs=1e-9)
+    # The same as looking up each base pose in the map.
     poses = found.base_poses
     R_FB = np.stack(
         [
@@ -203,11 +204,15 @@ def test_off_the_grid_the_nearest_cell_answers_and_says_how_near(ihcm, heading_d
     )
     R_BT = np.swapaxes(R_FB, 1, 2) @ grasp.R_FT
     away = np.column_stack(
-        [shift - poses[:, 0], -poses[:, 1], np.full(len(poses), 0.65) - (poses[:, 3] - ihcm.lift)]
+        [
+            shift - poses[:, 0],
+            -poses[:, 1],
+            np.full(len(poses), 0.65) - (poses[:, 3] - ihcm.torso_height),
+        ]
     )
     rows = ihcm.look_up(R_BT, np.einsum("nji,nj->ni", R_FB, away))
     same = rows >= 0
-    # Half way between two cells either may answer.
+    # Between two cells either may be the nearest.
     assert same.mean() > 0.99
     np.testing.assert_allclose(ihcm.score()[rows[same]], poses[same, 4], rtol=1e-5)
 
@@ -225,14 +230,14 @@ def test_positions_too_far_apart_to_share_a_box(ihcm):
         merge(ihcm, linear_task(15.0, 2, 0.65, step=0.1))
 
 
-def test_a_height_nothing_reaches(ihcm):
+def test_an_unreachable_height(ihcm):
     with pytest.raises(SelectionError, match="nor any one of them"):
         merge(ihcm, linear_task(0.2, 2, 2.9, step=0.1))
 
 
 def test_a_lift_out_of_range(ihcm):
-    with pytest.raises(SelectionError, match="no lift that was asked for is within"):
-        merge(ihcm, linear_task(0.2, 2, 0.65, step=0.1), lift=2.0)
+    with pytest.raises(SelectionError, match="no torso height of this map"):
+        merge(ihcm, linear_task(0.2, 2, 0.65, step=0.1), torso_height=2.0)
 
 
 def test_the_best_and_the_worst(ihcm):
@@ -247,7 +252,7 @@ def test_a_volume_answers_as_its_map_does(ihcm):
     np.testing.assert_array_equal(merge(MapVolume(ihcm), task).score, merge(ihcm, task).score)
 
 
-def test_a_long_line_is_split_into_as_few_stops_as_can_be(ihcm):
+def test_a_long_line_is_split_into_the_fewest_stops(ihcm):
     task = linear_task(2.4, 9, 0.65, step=0.1)
     stops = split(ihcm, task)
     covered = [i for stop in stops for i in range(stop.first, stop.last + 1)]
@@ -272,9 +277,9 @@ def test_a_long_line_is_split_into_as_few_stops_as_can_be(ihcm):
             assert not all(reachable(a, b - 1) for a, b in itertools.pairwise(ends))
 
 
-def test_of_the_splits_into_as_few_stops_the_one_with_the_best_worst_stop_is_taken():
+def test_the_split_maximises_the_lowest_score():
     """By trying every way to cut a line on maps of random scores."""
-    told_apart = 0
+    distinguished = 0
     for seed in range(6):
         rng = np.random.default_rng(seed)
         capability = random_map(rng)
@@ -297,18 +302,18 @@ def test_of_the_splits_into_as_few_stops_the_one_with_the_best_worst_stop_is_tak
         ways = [way for way in ways if min(way) >= 0.0]
         fewest = min(map(len, ways))
         lowest = [min(way) for way in ways if len(way) == fewest]
-        told_apart += len(set(lowest)) > 1
+        distinguished += len(set(lowest)) > 1
         stops = split(capability, task)
         assert len(stops) == fewest
         assert min(stop.base.score for stop in stops) == max(lowest)
-    assert told_apart > 0
+    assert distinguished > 0
 
 
-def test_one_stop_where_one_will_do(ihcm):
+def test_one_stop_where_one_suffices(ihcm):
     task = linear_task(0.2, 2, 0.65, step=0.1)
     assert [stop.base for stop in split(ihcm, task)] == [merge(ihcm, task).best()]
 
 
-def test_a_position_reached_from_nowhere_cannot_be_split(ihcm):
+def test_an_unreachable_position_cannot_be_split(ihcm):
     with pytest.raises(SelectionError, match="nor any one"):
         split(ihcm, linear_task(0.2, 2, 2.9, step=0.1))

@@ -7,6 +7,7 @@ from tcs.capability import (
     Grasp,
     GraspPosition,
     GraspTask,
+    TaskShape,
     curved_task,
     linear_task,
     pick_and_place_task,
@@ -35,7 +36,7 @@ def test_lines_as_in_figures_16_27_and_28(length, samples, found):
     assert places(linear_task(length, samples, 0.8)) == [(0.0, y) for y in found]
 
 
-def test_a_line_goes_the_way_asked_for():
+def test_direction_of_a_line():
     assert places(linear_task(0.1, 2, 0.8, direction=2)) == [(0.0, 0.0), (-0.1, 0.0)]
 
 
@@ -85,13 +86,13 @@ def test_no_gripper_comes_from_behind_the_door(start_deg, opening):
 
 
 @pytest.mark.parametrize("step", [0.05, 0.1])
-def test_every_place_within_a_step_of_the_arc_may_be_asked_for(step):
+def test_all_points_within_a_step_of_the_arc_can_be_used(step):
     radius, reach = 0.6, range(0, 20)
-    there_are = sum(abs(math.hypot(i, j) * step - radius) <= step for i in reach for j in reach)
-    task = curved_task(radius, 0.0, math.pi / 2, there_are, 0.8, step=step)
-    assert len(task.positions) == len(set(places(task))) == there_are
-    with pytest.raises(TaskError, match=f"has {there_are} places within a step"):
-        curved_task(radius, 0.0, math.pi / 2, there_are + 1, 0.8, step=step)
+    count = sum(abs(math.hypot(i, j) * step - radius) <= step for i in reach for j in reach)
+    task = curved_task(radius, 0.0, math.pi / 2, count, 0.8, step=step)
+    assert len(task.positions) == len(set(places(task))) == count
+    with pytest.raises(TaskError, match=f"has {count} points within a step"):
+        curved_task(radius, 0.0, math.pi / 2, count + 1, 0.8, step=step)
 
 
 def test_a_door_that_opens_the_other_way_mirrors_the_grasps():
@@ -113,7 +114,7 @@ def test_every_position_of_any_door_has_a_grasp(degrees):
         assert all(position.grasps for position in task.positions)
 
 
-def test_grasps_point_where_they_say():
+def test_orientation_of_grasps():
     np.testing.assert_allclose(Grasp(math.pi / 2).R_FT[:, 0], [0, 1, 0], atol=1e-15)
     np.testing.assert_allclose(Grasp(1.0, "top").R_FT[:, 0], [0, 0, -1], atol=1e-15)
     tilted = Grasp(0.0, (math.radians(30), 0.0)).R_FT[:, 0]
@@ -121,12 +122,12 @@ def test_grasps_point_where_they_say():
 
 
 @pytest.mark.parametrize(
-    ("make", "words"),
+    ("make", "message"),
     [
-        (lambda: linear_task(0.01, 2, 0.8), "at least one step"),
+        (lambda: linear_task(0.01, 2, 0.8), "one step"),
         (lambda: linear_task(0.5, 1, 0.8), "2 samples"),
-        (lambda: linear_task(math.nan, 2, 0.8), "at least one step"),
-        (lambda: linear_task(500.0, 2, 0.8), "at most 20 m"),
+        (lambda: linear_task(math.nan, 2, 0.8), "one step"),
+        (lambda: linear_task(500.0, 2, 0.8), "to 20 m"),
         (lambda: linear_task(0.5, 2, 80.0), "Write metres"),
         (lambda: linear_task(0.5, 2, math.inf), "not finite"),
         (lambda: linear_task(0.5, 2, 0.8, headings=()), "no grasp"),
@@ -136,12 +137,40 @@ def test_grasps_point_where_they_say():
         (lambda: GraspTask("none", ()), "0 positions"),
     ],
 )
-def test_tasks_with_nothing_to_do_are_refused(make, words):
-    with pytest.raises(TaskError, match=words):
+def test_invalid_tasks_are_refused(make, message):
+    with pytest.raises(TaskError, match=message):
         make()
 
 
 def test_an_unknown_approach_is_refused():
     position = GraspPosition(0, 0, 0.5, (Grasp(0.0, "above"),))
     with pytest.raises(UnknownNameError, match="'above'"):
-        GraspTask("lift", (position,))
+        GraspTask("torso_height", (position,))
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        (
+            TaskShape(shape="pick-and-place", height=0.4, pre_grasps=(0.05,), samples=9),
+            pick_and_place_task(0.15, 0.4, pre_grasps=(0.05,)),
+        ),
+        (
+            TaskShape(shape="linear", height=0.4, length=0.3, samples=4, direction_deg=180),
+            linear_task(0.3, 4, 0.4, direction=2),
+        ),
+        (
+            TaskShape(shape="curved", height=0.8, length=0.4, end=-1.5),
+            curved_task(0.4, 0.0, -1.5, 3, 0.8),
+        ),
+    ],
+)
+def test_a_shape_by_name(shape, expected):
+    assert shape.task(0.05) == expected
+
+
+def test_unknown_shapes_and_directions_are_refused():
+    with pytest.raises(UnknownNameError, match="unknown task 'pour'"):
+        TaskShape(shape="pour", height=0.5).task(0.05)
+    with pytest.raises(TaskError, match="multiple of 90"):
+        TaskShape(shape="linear", height=0.5, direction_deg=45).task(0.05)

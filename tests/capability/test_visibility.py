@@ -11,8 +11,8 @@ from tcs.model.robots import load_robot
 TIAGO = View((0.0, 0.0, 0.0), tuple(np.radians([-104.0, 104.0])), tuple(np.radians([-82.5, 67.5])))
 
 
-def looking(yaw_deg, pitch_deg):
-    """Return a point that is seen under these angles."""
+def point_at(yaw_deg, pitch_deg):
+    """Return a point in a direction from the camera."""
     yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
     flat = math.cos(pitch)
     return np.array([[flat * math.cos(yaw), flat * math.sin(yaw), math.sin(pitch)]])
@@ -31,7 +31,7 @@ def looking(yaw_deg, pitch_deg):
     ],
 )
 def test_as_printed(yaw, pitch, score):
-    assert visibility(TIAGO, looking(yaw, pitch), THESIS)[0] == pytest.approx(score, abs=1e-9)
+    assert visibility(TIAGO, point_at(yaw, pitch), THESIS)[0] == pytest.approx(score, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -50,23 +50,23 @@ def test_as_printed(yaw, pitch, score):
 )
 def test_corrected(yaw, pitch, score):
     # A tenth of a millionth of a degree short of the bound costs 1e-6.
-    assert visibility(TIAGO, looking(yaw, pitch), CORRECTED)[0] == pytest.approx(score, abs=3e-6)
+    assert visibility(TIAGO, point_at(yaw, pitch), CORRECTED)[0] == pytest.approx(score, abs=3e-6)
 
 
-def test_straight_to_the_side_is_no_division_by_zero():
+def test_a_tool_to_the_side_is_finite():
     points = np.array([[0.0, 1.0, -1.0], [0.0, 0.0, -1.0]])
     assert np.all(np.isfinite(visibility(TIAGO, points, THESIS)))
 
 
-def test_tiago_sees_what_the_thesis_says(reach):
-    view = head_view(reach.scene, reach.lift)
+def test_the_view_of_tiago_is_that_of_the_thesis(reach):
+    view = head_view(reach.scene, reach.torso_height)
     np.testing.assert_allclose(np.degrees(view.yaw), [-104.0, 104.0], atol=1e-6)
     np.testing.assert_allclose(np.degrees(view.pitch), [-82.5, 67.5], atol=1e-6)
 
 
-def test_the_camera_rides_on_the_torso_and_the_scene_is_left_alone(reach):
+def test_the_camera_moves_with_the_torso_and_the_scene_is_restored(reach):
     before = reach.scene.positions()
-    low, high = (head_view(reach.scene, lift).p_BoCo_B for lift in (0.0, 0.3))
+    low, high = (head_view(reach.scene, torso_height).p_BoCo_B for torso_height in (0.0, 0.3))
     np.testing.assert_allclose(np.subtract(high, low), [0, 0, 0.3], atol=1e-12)
     np.testing.assert_array_equal(reach.scene.positions(), before)
 
@@ -76,8 +76,8 @@ def test_the_shipped_heads_fit_their_robots():
         assert load_head(load_robot(name)).source
 
 
-def test_a_robot_without_a_head_file_is_told_so():
-    with pytest.raises(RobotError, match="'iiwa7': no head camera of it is known, only of pr2"):
+def test_a_robot_without_a_head_file_is_refused():
+    with pytest.raises(RobotError, match="'iiwa7': no head file ships for it, only for pr2"):
         load_head(load_robot("iiwa7"))
 
 

@@ -1,4 +1,4 @@
-"""The commands on capability maps, as a user calls them."""
+"""The commands on capability maps."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 from tcs.capability import load_map
 from tcs.files.paths import data_folder
 
-COARSE = ("--step", 0.1, "--turns", 8, "--lift", 0.15)
+COARSE = ("--step", 0.1, "--yaw-bins", 8, "--torso-height", 0.15)
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A map made on the command line, and what that said."""
+    """A map made on the command line, and the output."""
     from typer.testing import CliRunner
 
     from tcs.cli.app import app
@@ -28,15 +28,15 @@ def made(tmp_path_factory):
 
 
 def test_from_ik_writes_a_map_and_its_text(made):
-    path, said = made
+    path, output = made
     capability = load_map(path)
-    assert f"{len(capability.cells):,} cells" in said
+    assert f"{len(capability.cells):,} cells" in output
     lines = path.with_suffix(".txt").read_text().splitlines()
     assert len(lines) == len(capability.cells)
     assert len(lines[0].split()) == 13
 
 
-def test_merge_tells_best_and_worst_and_writes_every_base_pose(made, tcs_command, tmp_path):
+def test_merge_prints_best_and_worst_and_writes_every_base_pose(made, tcs_command, tmp_path):
     table = tmp_path / "poses.csv"
     ran = tcs_command(
         "capability", "merge", made[0], "--task", "pick-and-place", "--height", 0.65,
@@ -51,7 +51,7 @@ def test_merge_tells_best_and_worst_and_writes_every_base_pose(made, tcs_command
     assert result["worst"]["score"] == pytest.approx(min(scores))
     best = rows[int(np.argmax(scores))]
     assert float(best["yaw_deg"]) == pytest.approx(result["best"]["yaw_deg"])
-    assert result["off_cell_m"] == 0.0
+    assert result["position_offset"] == 0.0
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "html"])
@@ -73,28 +73,38 @@ def test_show_draws_a_layer(made, tcs_command, tmp_path, ending):
     assert picture.stat().st_size > 10_000
     ran = tcs_command("capability", "show", made[0], "--out", picture, "--height", 3.0)
     assert ran.code == 1
-    assert "no base pose for a tool at 3 m; it holds heights from" in ran.err
+    assert "no base pose for a tool at 3 m; its heights are" in ran.err
     assert (
         "unknown tilt '7'"
         in tcs_command("capability", "show", made[0], "--out", picture, "--tilt", 7).err
     )
 
 
-def test_a_room_takes_base_poses_away(made, tcs_command, tmp_path):
+def test_an_environment_makes_base_poses_infeasible(made, tcs_command, tmp_path):
     task = ("--task", "linear", "--length", 0.2, "--samples", 2, "--height", 0.65)
     best = tcs_command("capability", "merge", made[0], *task, "--json").json["best"]
-    room = tmp_path / "room.yaml"
-    room.write_text(
+    environment = tmp_path / "post.yaml"
+    environment.write_text(
         "based_on: wheelchair\nname: post\nmodels: []\nbody_frames: {}\npadding: {}\njoints: {}\n"
         "errors: {}\nobstacles:\n- name: post\n  box: [0.1, 0.1, 1.0]\n"
         f"  xyz: [{best['x'] + 1.0}, {best['y']}, 0.5]\n"
     )
     ran = tcs_command(
-        "capability", "merge", made[0], *task, "--environment", room, "--task-at", 1, 0, 0, "--json"
+        "capability",
+        "merge",
+        made[0],
+        *task,
+        "--environment",
+        environment,
+        "--task-at",
+        1,
+        0,
+        0,
+        "--json",
     )
     assert ran.json["best"] == best
-    assert ran.json["taken"] >= 1
-    assert ran.json["left"]["score"] <= best["score"]
+    assert ran.json["rejected"] >= 1
+    assert ran.json["best_in_environment"]["score"] <= best["score"]
 
 
 def test_split_gives_stops_in_order(made, tcs_command):
@@ -119,7 +129,7 @@ def test_no_base_pose_for_all_is_one_line_and_exit_code_1(made, tcs_command):
 
 def test_record_from_a_simulated_operator_and_from_its_csv(tcs_command, tmp_path):
     arm = tmp_path / "arm.csv"
-    options = ("--lift", 0.15, "--height", 0.6)
+    options = ("--torso-height", 0.15, "--height", 0.6)
     one, two = tmp_path / "one.tcm", tmp_path / "two.tcm"
     first = tcs_command(
         "capability", "record", "--out", one, *options, "--seconds", 30, "--save-csv", arm,
@@ -129,9 +139,9 @@ def test_record_from_a_simulated_operator_and_from_its_csv(tcs_command, tmp_path
     assert first["samples"] == second["samples"] == 1500
     assert first["cells"] == second["cells"] > 5
     np.testing.assert_array_equal(load_map(one).cells, load_map(two).cells)
-    said = tcs_command("capability", "record", arm, "--out", two, *options).out
-    assert "yaw " in said
-    assert "1,500 samples" in said
+    output = tcs_command("capability", "record", arm, "--out", two, *options).out
+    assert "yaw " in output
+    assert "1,500 samples" in output
 
 
 def test_a_csv_of_another_robot_is_one_line(tcs_command, tmp_path):
@@ -155,10 +165,10 @@ def test_from_bag(tcs_command, tmp_path):
     assert ran.json["cells"] == 1
     ran = tcs_command("capability", "from-bag", bag, "--out", out, "--topic", "/none")
     assert ran.code == 1
-    assert "holds no joint states on topic '/none'" in ran.err
+    assert "has no joint states on topic '/none'" in ran.err
 
 
-def test_map_check_of_a_map_and_of_one_to_be_made(made, tcs_command):
+def test_map_check_with_and_without_a_map(made, tcs_command):
     ran = tcs_command("map-check", made[0], "--queries", 2000, "--json")
     stored = ran.json["grasps"]
     assert set(stored) == {"side", "top"}
@@ -169,31 +179,31 @@ def test_map_check_of_a_map_and_of_one_to_be_made(made, tcs_command):
     assert "accuracy" in tcs_command("map-check", made[0], "--queries", 200).out
 
 
-def test_map_check_refuses_what_was_recorded(tcs_command, tmp_path):
+def test_map_check_refuses_recorded_maps(tcs_command, tmp_path):
     path = tmp_path / "itcm.tcm"
-    recorded = ("--seconds", 10, "--lift", 0.15, "--height", 0.6)
+    recorded = ("--seconds", 10, "--torso-height", 0.15, "--height", 0.6)
     assert tcs_command("capability", "record", "--out", path, *recorded).code == 0
     ran = tcs_command("map-check", path)
     assert ran.code == 1
-    assert "holds what was recorded" in ran.err
+    assert "was recorded or imported" in ran.err
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
-        (("from-ik", "--kind", "ITCM"), "unknown kind of map 'ITCM'"),
-        (("from-ik", "--grasps", "left"), "unknown choice of grasps 'left'"),
+        (("from-ik", "--kind", "ITCM"), "unknown map type 'ITCM'"),
+        (("from-ik", "--grasps", "left"), "unknown set of grasps 'left'"),
         (("from-ik", "--tool", "hand"), "unknown tool frame 'hand'"),
-        (("from-ik", "--lift", 2), "lift 2 m is out of range"),
-        (("from-ik", "--step", 0), "step is 0.0 m"),
+        (("from-ik", "--lift", 2), "torso height 2 m is out of range"),
+        (("from-ik", "--step", 0), "step of the map is 0.0 m"),
         (("record", "--seconds", 0), "the time from 0.02 to 86,400 s"),
     ],
 )
-def test_what_cannot_be_is_one_line(words, said, tcs_command, tmp_path):
+def test_invalid_options_are_one_line(words, message, tcs_command, tmp_path):
     ran = tcs_command("capability", *words, "--out", tmp_path / "m.tcm")
     assert ran.code == 1
     assert ran.err.count("\n") == 1
-    assert said in ran.err
+    assert message in ran.err
 
 
 def test_an_unknown_task_or_file_is_one_line(made, tcs_command, tmp_path):
@@ -207,7 +217,7 @@ def test_an_unknown_task_or_file_is_one_line(made, tcs_command, tmp_path):
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory):
-    """A robot file of the user's own, and a map that was made with it."""
+    """A robot file of the user's own, and a map made with it."""
     from typer.testing import CliRunner
 
     from tcs.cli.app import app
@@ -220,13 +230,13 @@ def own(tmp_path_factory):
     return robot, path
 
 
-IN_A_ROOM = ("--task", "pick-and-place", "--height", 0.65, "--environment", "wheelchair")
-FAR_OFF = ("--task-at", 6.0, 6.0, 0.0)
+IN_AN_ENVIRONMENT = ("--task", "pick-and-place", "--height", 0.65, "--environment", "wheelchair")
+FAR_AWAY = ("--task-at", 6.0, 6.0, 0.0)
 
 
 @pytest.fixture
 def moved(own, tmp_path):
-    """The map, and its robot's file, which now lies elsewhere."""
+    """The map, and its robot file, moved."""
     robot, path = own
     elsewhere = tmp_path / "elsewhere.yaml"
     robot.rename(elsewhere)
@@ -234,24 +244,24 @@ def moved(own, tmp_path):
     elsewhere.rename(robot)
 
 
-def test_a_map_remembers_the_file_of_a_robot_of_ones_own(own, tcs_command, tmp_path):
+def test_a_map_stores_the_path_of_the_robot_file(own, tcs_command, tmp_path):
     robot, path = own
     assert load_map(path).metadata["robot"] == str(robot)
     assert set(tcs_command("map-check", path, "--queries", 300, "--json").json["grasps"]) == {
         "side", "top",
     }  # fmt: skip
-    ran = tcs_command("capability", "merge", path, *IN_A_ROOM, *FAR_OFF, "--json")
-    assert ran.json["left"] == ran.json["best"]
+    ran = tcs_command("capability", "merge", path, *IN_AN_ENVIRONMENT, *FAR_AWAY, "--json")
+    assert ran.json["best_in_environment"] == ran.json["best"]
     picture = tmp_path / "map.svg"
     assert tcs_command("capability", "show", path, "--out", picture).code == 0
 
 
-def test_a_robot_of_ones_own_is_looked_on_by_the_head_that_is_named(own, tcs_command, tmp_path):
+def test_the_head_option(own, tcs_command, tmp_path):
     robot, _ = own
     out, plain = tmp_path / "own.tcm", tmp_path / "tiago.tcm"
     ran = tcs_command("capability", "from-ik", "--robot", robot, "--out", out, *COARSE)
     assert ran.code == 1
-    assert "'mine': no head camera of it is known, only of pr2, tiago" in ran.err
+    assert "'mine': no head file ships for it, only for pr2, tiago" in ran.err
     assert ran.err.count("\n") == 1
     head = tmp_path / "head.yaml"
     shipped = data_folder() / "models" / "heads" / "tiago.yaml"
@@ -263,25 +273,73 @@ def test_a_robot_of_ones_own_is_looked_on_by_the_head_that_is_named(own, tcs_com
         seen[name] = load_map(path).visibility
     np.testing.assert_array_equal(seen["mine"], seen["tiago"])
     assert tcs_command("capability", "from-ik", "--head", head, "--out", out, *COARSE).code == 0
-    # A camera that sees less to either side; straight ahead nothing changes.
+    # A camera with a narrower view; straight ahead nothing changes.
     narrow = load_map(out).visibility
     assert (narrow <= seen["tiago"]).all()
     assert (narrow < seen["tiago"]).any()
 
 
-def test_a_robot_file_that_has_moved_is_asked_for(moved, tcs_command):
+def test_a_robot_file_that_has_moved(moved, tcs_command):
     elsewhere, path = moved
-    for words in (("map-check", path), ("capability", "merge", path, *IN_A_ROOM, *FAR_OFF)):
+    for words in (
+        ("map-check", path),
+        ("capability", "merge", path, *IN_AN_ENVIRONMENT, *FAR_AWAY),
+    ):
         ran = tcs_command(*words)
         assert ran.code == 1
         assert ran.err.count("\n") == 1
-        assert "Say where its file is with --robot FILE" in ran.err
+        assert "Name its file with --robot FILE" in ran.err
         assert tcs_command(*words, "--robot", elsewhere).code == 0
 
 
-def test_map_check_refuses_a_robot_that_the_map_was_not_made_for(own, tcs_command, tmp_path):
+def test_map_check_refuses_another_robot(own, tcs_command, tmp_path):
     other = tmp_path / "other.yaml"
     other.write_text("based_on: tiago\nname: mine\nlimits: hard\n")
     ran = tcs_command("map-check", own[1], "--robot", other)
     assert ran.code == 1
     assert "another model of robot" in ran.err
+
+
+def test_the_old_option_names_work(tcs_command, tmp_path):
+    path = tmp_path / "icm.tcm"
+    old = ("--step", 0.2, "--turns", 4, "--lift", 0.15, "--kind", "ICM", "--grasps", "side")
+    assert tcs_command("capability", "from-ik", "--out", path, *old).code == 0
+    capability = load_map(path)
+    assert (capability.grid.yaw_bins, capability.torso_height) == (4, 0.15)
+    assert capability.map_type == "ICM"
+    ran = tcs_command("map-check", *old[:6], "--grasps", "side", "--queries", 100, "--json")
+    assert ran.json["yaw_bins"] == 4
+
+
+@pytest.mark.parametrize("ending", ["png", "html"])
+@pytest.mark.parametrize("height", ["nan", "inf", "-inf", "1e300", "-1e300", "99999999999"])
+def test_show_refuses_odd_heights_in_one_line(made, tcs_command, tmp_path, height, ending):
+    picture = tmp_path / f"map.{ending}"
+    ran = tcs_command("capability", "show", made[0], "--out", picture, "--height", height)
+    assert (ran.code, ran.err.count("\n")) == (1, 1)
+    assert "height" in ran.err or "no base pose for a tool at" in ran.err
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize("tilt", ["2", "99999999999999999999999"])
+def test_show_refuses_odd_tilts_in_one_line(made, tcs_command, tmp_path, tilt):
+    for ending in ("png", "html"):
+        out = tmp_path / f"map.{ending}"
+        ran = tcs_command("capability", "show", made[0], "--out", out, "--tilt", tilt)
+        assert (ran.code, ran.err.count("\n")) == (1, 1)
+        assert f"unknown tilt '{tilt}'. Known: 0, 1." in ran.err
+
+
+def test_show_refuses_odd_files_in_one_line(made, tcs_command, tmp_path):
+    empty, text = tmp_path / "empty.tcm", tmp_path / "text.tcm"
+    empty.write_bytes(b"")
+    text.write_text("not a map")
+    picture = tmp_path / "map.png"
+    for path in (empty, text, tmp_path, tmp_path / "none.tcm"):
+        ran = tcs_command("capability", "show", path, "--out", picture)
+        assert (ran.code, ran.err.count("\n")) == (1, 1), path
+        assert "Capability map" in ran.err
+    for out in (tmp_path, tmp_path / "none" / "map.html", tmp_path / "map.xyz", tmp_path / ".html"):
+        ran = tcs_command("capability", "show", made[0], "--out", out)
+        assert ran.code in (0, 1), out
+        assert ran.err.count("\n") == ran.code, out

@@ -17,7 +17,7 @@ MINUTE = HandMotion(seconds=60.0, height=0.6)
 @pytest.fixture(scope="module")
 def reach():
     """TIAGo on an empty floor."""
-    return Reach(load_robot("tiago"), lift=0.15)
+    return Reach(load_robot("tiago"), torso_height=0.15)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_joints_keep_limits_and_speeds(reach, minute):
 def test_drake_finds_no_contact(reach, minute):
     scene, before = reach.scene, reach.scene.positions()
     try:
-        scene.set_torso(reach.lift)
+        scene.set_torso(reach.torso_height)
         for joints in minute.recording.joints[::60]:
             scene.set_arm(joints)
             assert scene.violations() == ()

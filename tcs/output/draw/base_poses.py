@@ -1,4 +1,4 @@
-"""Base poses from above, as short coloured lines: where a line starts is where to stand."""
+"""Figures of base poses from above: short lines from the base position along its heading."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 COLOURS = "turbo"
-"""From 0, dark blue, to 1, dark red; reads as the thesis's colour bar does."""
+"""From 0, dark blue, to 1, dark red, as in the ITCM thesis."""
 
 
 @dataclass(frozen=True, eq=False)
 class BasePoseView:
-    """One panel: base poses, and what they reach."""
+    """One panel: base poses and the tool positions that they reach."""
 
     poses: FloatArray
     """x, y [m], yaw [rad] and score of each, shape (n, 4)."""
     length: float
-    """Of the lines [m]: half a cell, so that those of neighbours keep apart."""
-    places: FloatArray
-    """Where the tool has to come to, x, y [m], shape (m, 2)."""
+    """Length of the lines [m]."""
+    positions: FloatArray
+    """Tool positions, x, y [m], shape (m, 2)."""
     grasps: FloatArray
-    """Where grippers are and which way they point, x, y [m] and heading [rad], shape (k, 3)."""
+    """Grippers: x, y [m] and heading [rad], shape (k, 3)."""
     caption: str
     marked: Sequence[tuple[str, FloatArray, str]] = ()
-    """Base poses to point out: name, x, y, yaw, and a colour."""
+    """Highlighted base poses: name, (x, y, yaw) and colour."""
 
 
 def draw_base_poses(views: Sequence[BasePoseView], *, title: str, score: str = "score") -> Figure:
-    """Return a picture with one panel for each view, all in one scale.
+    """Return a figure with one panel for each view, all at one scale.
 
     Args:
-        views: What to show, left to right.
-        title: First line, for a person.
-        score: What the colours stand for.
+        views: The panels, left to right.
+        title: Title of the figure.
+        score: Label of the colour bar.
 
     Source:
-        ITCM thesis, Figures 3, 5 and 37: where lines meet is the place, the direction of a line is
-        where the robot faces, its colour is the score.
+        ITCM thesis, Figures 3, 5 and 37: a line starts at the base position and points
+        along the heading of the robot; its colour is the score.
     """
     figure = Figure(figsize=(5.6 * len(views) + 0.9, 6.2), layout="constrained")
     panels = figure.subplots(1, len(views), squeeze=False)[0]
@@ -62,13 +62,13 @@ def draw_base_poses(views: Sequence[BasePoseView], *, title: str, score: str = "
 
 
 def _extent(views: Sequence[BasePoseView]) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of what all panels show [m]."""
-    points = np.concatenate([np.vstack([view.poses[:, :2], view.places]) for view in views])
+    """Return the limits of all panels [m]."""
+    points = np.concatenate([np.vstack([view.poses[:, :2], view.positions]) for view in views])
     return points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
 
 
 def _draw(axes: Axes, view: BasePoseView) -> None:
-    # Best last: it lies on top where lines cross.
+    # The best last, on top of the others.
     poses = view.poses[np.argsort(view.poses[:, 3], kind="stable")]
     start = poses[:, :2]
     ahead = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])])
@@ -78,7 +78,7 @@ def _draw(axes: Axes, view: BasePoseView) -> None:
     axes.add_collection(drawn)
     for x, y, heading in view.grasps:
         _draw_gripper(axes, x, y, heading)
-    axes.plot(*view.places.T, "o", ms=7, mfc="white", mec="black", mew=1.3, zorder=5)
+    axes.plot(*view.positions.T, "o", ms=7, mfc="white", mec="black", mew=1.3, zorder=5)
     for name, (x, y, yaw), colour in view.marked:
         tip = (x + 0.14 * np.cos(yaw), y + 0.14 * np.sin(yaw))
         arrow = {"arrowstyle": "-|>", "color": colour, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
@@ -95,10 +95,10 @@ def _draw(axes: Axes, view: BasePoseView) -> None:
 
 
 def _draw_gripper(axes: Axes, x: float, y: float, heading: float) -> None:
-    """Draw a gripper as a U, open towards what it holds."""
+    """Draw a gripper as a U, open towards the object."""
     c, s = np.cos(heading), np.sin(heading)
     shape = np.array([[0.02, 0.035], [-0.05, 0.035], [-0.05, -0.035], [0.02, -0.035]])
     wrist = np.array([[-0.05, 0.0], [-0.09, 0.0]])
-    turn = np.array([[c, s], [-s, c]])
+    rotation = np.array([[c, s], [-s, c]])
     for part, width in ((shape, 1.6), (wrist, 3.0)):
-        axes.plot(*(part @ turn + [x, y]).T, color="#7b3fa0", lw=width, zorder=4)
+        axes.plot(*(part @ rotation + [x, y]).T, color="#7b3fa0", lw=width, zorder=4)

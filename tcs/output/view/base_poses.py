@@ -1,8 +1,7 @@
-"""Base poses as a page that turns in the browser: Meshcat, everything inside one file."""
+"""Capability maps and task maps as pictures or interactive pages: one file each."""
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import matplotlib
@@ -10,16 +9,21 @@ import numpy as np
 from pydrake.geometry import Box, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
+from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import TaskMap
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
+from tcs.output.draw import save_figure
 from tcs.output.draw.base_poses import COLOURS
+from tcs.output.draw.capability_maps import LINE_STEPS, layer, map_figure, task_figure
+from tcs.output.view.live import open_meshcat
 
 _SHADES = 16
-"""Meshcat takes lines of one colour at a time."""
+"""Number of colours: Meshcat draws line segments of one colour at a time."""
 _ABOVE_FLOOR = 0.005
+"""Height of the lines [m]."""
 _EYE = np.array([-1.3, -1.3, 1.5])
-"""From the middle of what there is to the eye, when the page opens [m]."""
+"""Initial camera position relative to the centre of the base poses [m]."""
 _GREY = Rgba(0.92, 0.92, 0.9, 1.0)
 _PURPLE = Rgba(0.48, 0.25, 0.63, 1.0)
 
@@ -32,24 +36,19 @@ def write_page(
     tools: list[tuple[FloatArray, FloatArray]],
     best: FloatArray | None = None,
 ) -> None:
-    """Write base poses as lines on the floor, and tools as grippers in the air.
+    """Write an interactive page: base poses as lines on the floor, tools as grippers.
 
     Args:
         path: The page to write.
         poses: x, y [m], yaw [rad] and score, shape (n, 4).
-        length: Of the lines [m].
-        tools: Orientation (3, 3) and place (3,) [m] of each tool.
-        best: x, y, yaw of a base pose to point out, None for none.
+        length: Length of the lines [m].
+        tools: Orientation (3, 3) and position (3,) [m] of each tool.
+        best: x, y, yaw of a base pose to highlight, or None.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If Meshcat finds no free port, or the page cannot be written.
     """
-    # It also serves the page while it is made, and says where: nobody is to look there.
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.WARNING)
-    meshcat = Meshcat()
-    log.setLevel(level)
+    meshcat = open_meshcat()
     meshcat.SetProperty("/Grid", "visible", False)
     middle = np.append(0.5 * (poses[:, :2].min(axis=0) + poses[:, :2].max(axis=0)), 0.2)
     meshcat.SetCameraPose(middle + _EYE, middle)
@@ -69,32 +68,63 @@ def write_page(
     if best is not None:
         x, y, yaw = best
         meshcat.SetObject("best", Box(0.16, 0.03, 0.03), Rgba(0.75, 0.0, 0.48, 1.0))
-        turn = RotationMatrix.MakeZRotation(yaw)
-        centre = np.array([x, y, 0.02]) + turn.matrix() @ [0.08, 0.0, 0.0]
-        meshcat.SetTransform("best", RigidTransform(turn, centre))
+        R_WB = RotationMatrix.MakeZRotation(yaw)
+        centre = np.array([x, y, 0.02]) + R_WB.matrix() @ [0.08, 0.0, 0.0]
+        meshcat.SetTransform("best", RigidTransform(R_WB, centre))
     with whole_file(path, "Page") as stream:
         stream.write(meshcat.StaticHtml().encode())
 
 
-def task_page(path: Path, found: TaskMap) -> None:
-    """Write a task map as a page.
+def save_task_map(path: Path, task_map: TaskMap) -> None:
+    """Draw a task map: an interactive page if the path ends in .html, else a figure.
+
+    Args:
+        path: File to write.
+        task_map: The task map.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the format is unknown, or the file cannot be written.
     """
+    if path.suffix != ".html":
+        save_figure(path, task_figure(task_map))
+        return
     tools = [
         (grasp.R_FT, np.array([p.x, p.y, p.height]))
-        for p in found.task.positions
+        for p in task_map.task.positions
         for grasp in p.grasps
     ]
-    best = found.best()
+    best = task_map.best()
     write_page(
         path,
-        found.base_poses[:, [0, 1, 2, 4]],
-        length=0.42 * found.grid.step,
+        task_map.base_poses[:, [0, 1, 2, 4]],
+        length=LINE_STEPS * task_map.grid.step,
         tools=tools,
         best=np.array([best.x, best.y, best.yaw]),
     )
+
+
+def save_map_layer(
+    path: Path, capability: CapabilityMap, *, tilt: int = 0, height: float | None = None
+) -> None:
+    """Draw one layer of a map: an interactive page if the path ends in .html, else a figure.
+
+    Args:
+        path: File to write.
+        capability: The map.
+        tilt: Number of the tilt.
+        height: Height of the tool above the floor [m]; None is the height with most cells.
+
+    Raises:
+        UnknownNameError: If the grid has no such tilt.
+        SelectionError: If the map has no base pose there, or the height is not finite.
+        OutputError: If the format is unknown, or the file cannot be written.
+    """
+    if path.suffix != ".html":
+        save_figure(path, map_figure(capability, tilt=tilt, height=height))
+        return
+    poses, drawn = layer(capability, tilt=tilt, height=height)
+    tools = [(capability.grid.R_ET[tilt], np.array([0.0, 0.0, drawn]))]
+    write_page(path, poses, length=LINE_STEPS * capability.grid.step, tools=tools)
 
 
 def _add_gripper(meshcat: Meshcat, name: str, X_FT: RigidTransform) -> None:

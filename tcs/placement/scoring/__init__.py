@@ -7,7 +7,7 @@ Out: a score file, and its verification.
 from __future__ import annotations
 
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
-from tcs.placement.scoring.job import Job, data_reference, load_job
+from tcs.placement.scoring.job import Job, load_job
 from tcs.placement.scoring.live import LiveScorer, score_observed
 from tcs.placement.scoring.offline import score
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -23,7 +23,6 @@ __all__ = [
     "Sweep",
     "Verification",
     "build_sets",
-    "data_reference",
     "default_path",
     "load_job",
     "rebuild_scene",

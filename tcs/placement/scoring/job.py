@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from tcs.errors import DataFileError, TaskError
-from tcs.files.paths import expanded
+from tcs.errors import TaskError
+from tcs.files.paths import data_reference
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import (
@@ -114,15 +114,3 @@ def data_references(job: Job, task: object, environment: object, robot: object) 
             for key, (given, name) in loaded.items()
         },
     }
-
-
-def data_reference(given: object, name: str) -> str:
-    """Return the reference by which a data file is loaded again: its name or absolute path.
-
-    Args:
-        given: The argument it was loaded by: a name, a path, or the loaded object.
-        name: The name that the file contains.
-    """
-    if isinstance(given, Path) or (isinstance(given, str) and given != name):
-        return str(expanded(str(given), "file", DataFileError).absolute())
-    return name

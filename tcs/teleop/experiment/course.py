@@ -97,7 +97,7 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
     """
     walk = _Walk(arm, settings or Settings())
     rng = np.random.default_rng(seed)
-    reach = Reach(arm.robot, lift=arm.torso_height)
+    reach = Reach(arm.robot, torso_height=arm.torso_height)
     lower = np.where(arm.bounded, arm.lower, -math.pi)
     upper = np.where(arm.bounded, arm.upper, math.pi)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower) * _MARGIN

@@ -24,7 +24,7 @@ from tcs.capability import (
     merge,
     recording_of,
 )
-from tcs.capability.from_ik import seen_from
+from tcs.capability.from_ik import camera_view
 from tcs.capability.grid import TILT, Z
 from tcs.capability.map import ITCM
 from tcs.capability.visibility import CORRECTED
@@ -32,7 +32,7 @@ from tcs.errors import SelectionError
 from tcs.teleop.arm import Arm
 from tcs.teleop.experiment.within_subject import Experiment
 
-STEP, TURNS = 0.05, 16
+STEP, YAW_BINS = 0.05, 16
 """Of the grid [m], and headings in a full turn: those of the thesis."""
 
 
@@ -76,11 +76,11 @@ def check_map_robot(arm: Arm) -> None:
     Raises:
         UnknownNameError: If the robot has no head file.
     """
-    seen_from(_reach(arm), MapGrid.of(STEP, TURNS), ITCM, CORRECTED)
+    camera_view(_reach(arm), MapGrid.of(STEP, YAW_BINS), ITCM, CORRECTED)
 
 
 def _reach(arm: Arm) -> Reach:
-    return Reach(arm.robot, lift=arm.torso_height, step=STEP)
+    return Reach(arm.robot, torso_height=arm.torso_height, step=STEP)
 
 
 def controller_maps(experiment: Experiment) -> ControllerMaps:
@@ -98,7 +98,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
     """
     arm = experiment.arm
     reach = _reach(arm)
-    grid = MapGrid.of(STEP, TURNS, "all")
+    grid = MapGrid.of(STEP, YAW_BINS, "all")
     found = {}
     for condition, drives in experiment.drives.items():
         postures = np.concatenate([trial for drive in drives for trial in drive.postures])
@@ -106,7 +106,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
         recording = recording_of(arm.joints, postures, arm.robot, where=where)
         found[condition] = map_from_recording(reach, grid, recording)
     tilt, level = _grasp([one.capability for one in found.values()])
-    pitch, roll = (turn * grid.turn for turn in grid.tilts[tilt])
+    pitch, roll = (tilt_steps * grid.yaw_step for tilt_steps in grid.tilts[tilt])
     height = -level * grid.step
     first = next(iter(found.values())).capability
     maps = []
@@ -141,6 +141,6 @@ def _best(
 ) -> BasePose | None:
     task = GraspTask("one grasp", (GraspPosition(0.0, 0.0, height, (Grasp(0.0, approach),)),))
     try:
-        return merge(capability, task, lift=capability.lift).best()
+        return merge(capability, task, torso_height=capability.torso_height).best()
     except SelectionError:
         return None

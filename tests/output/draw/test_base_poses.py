@@ -11,7 +11,7 @@ def view(poses, **changes):
     given = {
         "poses": np.array(poses, dtype=float),
         "length": 0.02,
-        "places": np.zeros((1, 2)),
+        "positions": np.zeros((1, 2)),
         "grasps": np.array([[0.0, 0.0, np.pi / 2]]),
         "caption": "two poses",
     }
