@@ -47,7 +47,8 @@ def test_a_score_file_is_not_a_map(tmp_path):
 def test_a_map_of_the_first_format_version_asks_for_a_new_one(stored):
     content = joblib.load(stored)
     joblib.dump(content | {"format_version": 1}, stored)
-    with pytest.raises(StoreFormatError, match=r"format version 1, .* reads version 2.*Make the map again"):
+    message = r"format version 1, .* reads version 2.*Make the map again"
+    with pytest.raises(StoreFormatError, match=message):
         load_map(stored)
 
 
