@@ -1,6 +1,7 @@
-"""Ask why a goal is not reached from where the robot stands, and what would help.
+"""Explain why goals are not reached from a base pose, and the least change that would reach them.
 
-Each pair of configuration and goal that is not reached keeps its reason. Nothing is solved anew.
+A score file keeps a reason for each configuration and goal that is not reached; nothing is
+computed again.
 """
 
 from __future__ import annotations
@@ -11,18 +12,18 @@ import tcs
 
 
 def main() -> None:
-    """Explain every goal of feeding from one place."""
+    """Explain every goal of feeding from one configuration."""
     file = tcs.score("feeding")
     here = tcs.InitialConfiguration(base_x=1.1, base_y=0.7, base_yaw=math.pi, torso=0.0)
     for goal in range(len(file.task["goals"])):
         found = tcs.explain(file, goal, here)
-        standing = found.standing
-        assert standing is not None  # There is always one where a place is named.
-        line = f"goal {goal}: {standing.reason.name.lower()}"
-        if standing.pair is not None:
-            line += f", {standing.pair[0]} would touch {standing.pair[1]}"
-        # The least change from which it is reached, in words.
-        if not standing.is_reached and found.fix is not None:
+        explained = found.explained
+        assert explained is not None  # It is None only if no configuration is given.
+        line = f"goal {goal}: {explained.reason.name.lower()}"
+        if explained.pair is not None:
+            line += f", {explained.pair[0]} would touch {explained.pair[1]}"
+        # The least change to a configuration that reaches the goal, as a sentence.
+        if not explained.is_reached and found.fix is not None:
             line += f". {found.fix.sentence}"
         print(line)
 

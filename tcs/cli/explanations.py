@@ -51,8 +51,8 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
     """Print what came of the goal at the configuration that is explained."""
     explained = result["explained"]
     name = f"configuration {explained['configuration']}"
-    if explained["off"]:
-        off = ", ".join(_with_unit(axis, value) for axis, value in explained["off"].items())
+    if explained["offset"]:
+        off = ", ".join(_with_unit(axis, value) for axis, value in explained["offset"].items())
         out.print(f"The nearest that was scored is {name}; the place is off by {off}.")
     if explained["reached"]:
         out.print(f"It is reached from {name}, {result['measure']} {explained['dexterity']:.3f}.")

@@ -43,7 +43,7 @@ def test_options_reach_the_explanation(tcs_command, stored):
         "environment": {"bed_height": 7.0, "head_rest": 1.0},
         "route": "straight",
     }
-    assert result["explained"]["off"] == {
+    assert result["explained"]["offset"] == {
         "base_x": 0.05,
         "base_yaw_deg": 10.0,
         "torso": -0.05,
@@ -85,7 +85,7 @@ def test_report(tcs_command, stored):
     out = tcs_command("explain", stored, "--goal", 2, "--configuration", h).out
     explained = tcs.explain(file, 2, h)
     assert explained.fix.sentence in " ".join(out.split())
-    assert f"the best one: {pair_text(explained.standing.pair)}" in " ".join(out.split())
+    assert f"the best one: {pair_text(explained.explained.pair)}" in " ".join(out.split())
     for words in ("nearest reaching", "of those that came so far", "per metre of bed height"):
         assert words in " ".join(out.split())
 

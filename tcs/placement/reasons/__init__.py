@@ -1,21 +1,26 @@
-"""Why a goal is not reached, and the least change that would reach it; from a score file alone."""
+"""Reasons: why a goal is not reached, and the least change that would reach it.
+
+In: a loaded score file, a goal and a configuration; neither simulator nor compiler is needed. Out:
+an explanation with the reason, the counts of all reasons over the grid, and the nearest
+configuration that reaches the goal.
+"""
 
 from __future__ import annotations
 
 from tcs.placement.reasons.changes import Change
-from tcs.placement.reasons.distribution import BlockingPair, Check, Distribution
-from tcs.placement.reasons.explained import Standing
+from tcs.placement.reasons.distribution import BlockingPair, CheckCount, Distribution
+from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.reasons.explanation import Explanation, explain
 from tcs.placement.reasons.fix import Fix, fix_weights
 
 __all__ = [
     "BlockingPair",
     "Change",
-    "Check",
+    "CheckCount",
     "Distribution",
+    "ExplainedConfiguration",
     "Explanation",
     "Fix",
-    "Standing",
     "explain",
     "fix_weights",
 ]

@@ -1,4 +1,4 @@
-"""What to change to get from one configuration to another, axis by axis and in words."""
+"""Changes from one configuration to another, axis by axis and in words."""
 
 from __future__ import annotations
 
@@ -9,22 +9,21 @@ from typing import Any
 from tcs.model.grid import InitialConfiguration
 
 LEAST_CHANGE = 1e-9
-"""A change below a nanometre or a billionth of a degree is none: configurations are written with
-nine decimals."""
+"""Least change that counts [m or deg]: configurations are written with nine decimals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """How far to move along one axis."""
+    """A change along one axis."""
 
     axis: str
-    """The axis, called as in `InitialConfiguration.to_json`: angles end in `_deg`."""
+    """Name of the axis as in `InitialConfiguration.to_json`: angles end in `_deg`."""
     start: float
-    """Value now [unit]."""
+    """Value before the change [unit]."""
     end: float
-    """Value afterwards [unit]."""
+    """Value after the change [unit]."""
     change: float
-    """How far to move [unit]; headings the shorter way round."""
+    """Signed amount of the change [unit]; headings turn the shorter way."""
 
     @property
     def unit(self) -> str:
@@ -33,13 +32,13 @@ class Change:
 
     @property
     def words(self) -> str:
-        """What to do, for a person; base places along the axes of the environment frame."""
+        """The change as an instruction; the base drives along the axes of the environment frame."""
         name, up = self.axis.removesuffix("_deg"), self.change > 0.0
         amount = _angle(self.change) if self.unit == "deg" else _length(self.change)
         if name in ("base_x", "base_y"):
             return f"drive {amount} along {'+' if up else '-'}{name[-1]}"
         if name == "base_yaw":
-            # Half a turn is the same both ways.
+            # A turn of 180 degrees is the same in both directions.
             side = "" if abs(self.change) > 179.95 else f" to the {'left' if up else 'right'}"
             return f"turn {amount}{side}"
         part = name.replace("_", " ")
@@ -51,11 +50,11 @@ class Change:
 
     @property
     def is_noticeable(self) -> bool:
-        """Whether it is more than what words round away: half a millimetre, 0.05 degrees."""
+        """Whether the change is at least 0.5 mm or 0.05 degrees, the rounding of `words`."""
         return abs(self.change) >= (0.05 if self.unit == "deg" else 0.0005)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the change as plain containers."""
         return {
             "axis": self.axis,
             "from": self.start,
@@ -69,7 +68,7 @@ class Change:
 def changes_between(
     before: InitialConfiguration, after: InitialConfiguration
 ) -> tuple[Change, ...]:
-    """Return what differs between two configurations of the same axes, in their order."""
+    """Return the changes between two configurations of the same axes, in the order of the axes."""
     start, end = before.to_json(), after.to_json()
     changes = []
     for axis, value in end.items():
@@ -84,7 +83,7 @@ def changes_between(
 def ahead_and_left(
     before: InitialConfiguration, after: InitialConfiguration
 ) -> tuple[float, float]:
-    """Return how far the second place is ahead and to the left of the first base [m].
+    """Return how far the second base is ahead and to the left of the first [m].
 
     >>> here = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=math.pi / 2, torso=0.0)
     >>> there = InitialConfiguration(base_x=-0.5, base_y=2.0, base_yaw=0.0, torso=0.0)
@@ -99,12 +98,12 @@ def ahead_and_left(
 def sentence(
     before: InitialConfiguration, after: InitialConfiguration, *, around: float | None = None
 ) -> str:
-    """Return what to do as one sentence; forward and left are those of the base as it heads now.
+    """Return the changes as one sentence, with forward and left as seen from the first base.
 
     Args:
-        before: The configuration now.
-        after: The configuration afterwards.
-        around: Length of the way around the furniture [m], where that is what was asked for.
+        before: The configuration before the changes.
+        after: The configuration after them.
+        around: Length of the path around the furniture [m], to be stated in the sentence.
 
     >>> here = InitialConfiguration(base_x=1.0, base_y=0.0, base_yaw=0.0, torso=0.15)
     >>> there = InitialConfiguration(base_x=0.93, base_y=0.1, base_yaw=-0.7853981634, torso=0.3)
@@ -119,8 +118,8 @@ def sentence(
         legs.append(f"{_length(left)} to the {'left' if left > 0.0 else 'right'}")
     steps = []
     if legs:
-        way = f" ({_length(around)} around the furniture)" if around is not None else ""
-        steps.append(f"drive {' and '.join(legs)}{way}")
+        path = f" ({_length(around)} around the furniture)" if around is not None else ""
+        steps.append(f"drive {' and '.join(legs)}{path}")
     steps += [
         change.words
         for change in changes_between(before, after)
@@ -133,11 +132,11 @@ def sentence(
 
 
 def _length(metres: float) -> str:
-    """Return a length without its sign, to the millimetre below a metre."""
+    """Return the absolute length with its unit, to the millimetre below a metre."""
     size = abs(metres)
     return f"{round(100.0 * size, 1):g} cm" if size < 0.9995 else f"{size:.2f} m"
 
 
 def _angle(degrees: float) -> str:
-    """Return an angle without its sign."""
+    """Return the absolute angle with its unit."""
     return f"{round(abs(degrees), 1):g} deg"

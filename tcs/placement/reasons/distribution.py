@@ -1,4 +1,4 @@
-"""How the reasons of one goal are distributed over all configurations of the grid."""
+"""Distribution of the reasons of one goal over all configurations of the grid."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ CHECKS = (
     Reason.JOINT_LIMITS,
     Reason.ARM_BLOCKED,
 )
-"""What may keep a configuration from a goal, in the order in which it is looked at."""
+"""Reasons why a goal is not reached, in the order in which they are checked."""
 
 
 @dataclass(frozen=True, slots=True)
 class BlockingPair:
-    """Two bodies that keep the goal from being reached."""
+    """Two bodies in contact, and how many configurations this stops."""
 
     pair: tuple[str, str]
     """Names of the bodies."""
     reason: Reason
-    """What they block."""
+    """The check they fail."""
     count: int
-    """How many configurations they stop."""
+    """Number of configurations they stop."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the counts as plain containers."""
         return {"pair": list(self.pair), "reason": self.reason.name.lower(), "count": self.count}
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
-    """One check, and how many of the configurations that came so far it stopped."""
+class CheckCount:
+    """One check, with the number of configurations that came to it and that it stopped."""
 
     reason: Reason
-    """What the configurations that it stops have as their reason."""
+    """Reason of the configurations that the check stops."""
     of: int
-    """Configurations that no earlier check stopped."""
+    """Number of configurations that no earlier check stopped."""
     stopped: int
-    """Those of them that this one stopped."""
+    """Number of these that this check stopped."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the counts as plain containers."""
         return {"reason": self.reason.name.lower(), "of": self.of, "stopped": self.stopped}
 
 
@@ -57,17 +57,17 @@ class Distribution:
     """Reasons and blocking pairs of one goal, counted over the grid."""
 
     reasons: dict[Reason, int]
-    """How many configurations have each reason, reached ones among them."""
+    """Number of configurations with each reason, `REACHED` included."""
     blocking_pairs: tuple[BlockingPair, ...]
-    """The pairs of bodies that block, most frequent first."""
+    """The pairs of bodies in contact, most frequent first."""
 
     @classmethod
     def of(cls, scores: ScoreTable, goal: int) -> Distribution:
-        """Return the distribution of one goal of a table."""
+        """Return the distribution for one goal of a score table."""
         reason, pair = scores.reason[:, goal], scores.pair[:, goal]
         counts = np.bincount(reason, minlength=len(Reason))
         blocked = pair >= 0
-        # One number for each pair of bodies and what it blocks, so that one pass counts both.
+        # One number for pair and reason, so that one pass counts both.
         keys = pair[blocked].astype(np.int64) * len(Reason) + reason[blocked]
         found, times = np.unique(keys, return_counts=True)
         pairs = [
@@ -79,29 +79,29 @@ class Distribution:
 
     @property
     def configurations(self) -> int:
-        """How many configurations the grid has."""
+        """Number of configurations of the grid."""
         return sum(self.reasons.values())
 
     @property
     def reached(self) -> int:
-        """How many of them reach the goal."""
+        """Number of configurations that reach the goal."""
         return self.reasons[Reason.REACHED]
 
     @property
-    def checks(self) -> tuple[Check, ...]:
-        """Each of `CHECKS` among those configurations that no earlier one stopped."""
+    def checks(self) -> tuple[CheckCount, ...]:
+        """Counts of each of `CHECKS`, in order."""
         found, left = [], self.configurations
         for reason in CHECKS:
-            found.append(Check(reason, left, self.reasons[reason]))
+            found.append(CheckCount(reason, left, self.reasons[reason]))
             left -= self.reasons[reason]
         return tuple(found)
 
     @property
-    def farthest(self) -> Check | None:
-        """The last check that stopped any configuration; None where all reach the goal."""
+    def farthest(self) -> CheckCount | None:
+        """The last check that stopped any configuration; None if all reach the goal."""
         stopping = [check for check in self.checks if check.stopped]
         return stopping[-1] if stopping else None
 
     def pairs_of(self, reason: Reason) -> tuple[BlockingPair, ...]:
-        """Return the pairs that block in this way, most frequent first."""
+        """Return the pairs of bodies that fail a check, most frequent first."""
         return tuple(one for one in self.blocking_pairs if one.reason == reason)

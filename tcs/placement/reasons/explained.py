@@ -1,4 +1,4 @@
-"""The configuration that is explained: one of the grid, or the one nearest to a stated place."""
+"""The explained configuration: one of the grid, or the nearest one to a stated configuration."""
 
 from __future__ import annotations
 
@@ -16,48 +16,48 @@ from tcs.placement.tables import Reason, ScoreTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
-    """A configuration of the grid, and what came of it at one goal."""
+class ExplainedConfiguration:
+    """A configuration of the grid, with its outcome at one goal."""
 
     index: int
-    """Its flat index."""
+    """Flat index of the configuration."""
     configuration: InitialConfiguration
-    """It itself, as it was scored."""
-    place: InitialConfiguration
-    """What was stated; the configuration itself where an index was."""
+    """The configuration, as it was scored."""
+    stated: InitialConfiguration
+    """The configuration that was asked for: it need not be one of the grid."""
     reason: Reason
-    """Whether the goal is reached, or why not."""
+    """`REACHED`, or the reason why the goal is not reached."""
     pair: tuple[str, str] | None
-    """The two bodies that block, if any do. Where the arm does: those of the best solution."""
+    """The two bodies in contact, if any; for the arm, those of its best posture."""
     dexterity: float
-    """How evenly the arm can move at the goal; 0 where it is not reached."""
+    """Dexterity at the goal; 0 if it is not reached."""
 
     @classmethod
     def of(
-        cls, grid: Grid, scores: ScoreTable, goal: int, asked: int | InitialConfiguration
-    ) -> Standing:
-        """Return what came of a configuration at a goal.
+        cls, grid: Grid, scores: ScoreTable, goal: int, requested: int | InitialConfiguration
+    ) -> ExplainedConfiguration:
+        """Return the outcome of a configuration at a goal.
 
         Args:
             grid: The grid that was scored.
             scores: Its scores.
             goal: Number of the goal.
-            asked: Flat index, or a place of which the nearest configuration counts.
+            requested: Flat index, or a configuration of which the nearest one of the grid is taken.
 
         Raises:
             GridError: If there is no configuration of that index.
-            SelectionError: If the place is not finite, lacks an axis or is beyond the grid.
+            SelectionError: If a value is not finite, or an axis is missing or exceeded.
             UnknownNameError: If an environment axis has no such name.
         """
-        if isinstance(asked, InitialConfiguration):
-            index, place = nearest_configuration(grid, asked)
+        if isinstance(requested, InitialConfiguration):
+            index, stated = nearest_configuration(grid, requested)
         else:
-            index, place = int(asked), grid.configuration(asked)
+            index, stated = int(requested), grid.configuration(requested)
         pair = int(scores.pair[index, goal])
         return cls(
             index=index,
             configuration=grid.configuration(index),
-            place=place,
+            stated=stated,
             reason=Reason(scores.reason[index, goal]),
             pair=scores.pair_names[pair] if pair >= 0 else None,
             dexterity=float(scores.dexterity[index, goal]),
@@ -69,17 +69,17 @@ class Standing:
         return self.reason == Reason.REACHED
 
     @property
-    def off(self) -> dict[str, float]:
-        """By how much the stated place is off, called as in `InitialConfiguration.to_json`."""
-        changes = changes_between(self.configuration, self.place)
+    def offset(self) -> dict[str, float]:
+        """Stated minus scored values, by the names of `InitialConfiguration.to_json`."""
+        changes = changes_between(self.configuration, self.stated)
         return {change.axis: change.change for change in changes}
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the outcome as plain containers."""
         return {
             "configuration": self.index,
             "members": [self.configuration.to_json()],
-            "off": self.off,
+            "offset": self.offset,
             "reached": self.is_reached,
             "reason": self.reason.name.lower(),
             "pair": None if self.pair is None else list(self.pair),
@@ -88,30 +88,30 @@ class Standing:
 
 
 def nearest_configuration(
-    grid: Grid, place: InitialConfiguration
+    grid: Grid, stated: InitialConfiguration
 ) -> tuple[int, InitialConfiguration]:
-    """Return the configuration of a grid that is nearest to a place along every axis.
+    """Return the configuration of a grid that is nearest to a stated one along every axis.
 
     Args:
         grid: A grid.
-        place: A place, at most half a step beyond the ends of an axis. Along an axis that has a
-            single value anything is nearest to it.
+        stated: Any configuration, at most half a step beyond the ends of an axis. On an axis with a
+            single value any value is accepted.
 
     Returns:
-        Its flat index, and the place with its axes in the order of the grid.
+        Its flat index, and the stated configuration with its axes in the order of the grid.
 
     Raises:
-        SelectionError: If the place is not finite, lacks an axis or is beyond the grid.
+        SelectionError: If a value is not finite, or an axis is missing or exceeded.
         UnknownNameError: If an environment axis has no such name.
     """
-    told = dict(place.environment)
-    missing = [axis.name for axis in grid.environment_axes if axis.name not in told]
+    given = dict(stated.environment)
+    missing = [axis.name for axis in grid.environment_axes if axis.name not in given]
     if missing:
         raise SelectionError(
-            f"The place lacks {', '.join(missing)}: whether a goal is reached depends on it. "
-            "State its value."
+            f"The configuration lacks {', '.join(missing)}: whether a goal is reached depends on "
+            "it. State its value."
         )
-    values = current_values(place, grid, ())
+    values = current_values(stated, grid, ())
     index = int(grid.flat([_nearest_value(axis, values[axis.name]) for axis in grid.axes]))
     ordered = InitialConfiguration(
         base_x=values["base_x"],
@@ -125,20 +125,20 @@ def nearest_configuration(
 
 
 def _nearest_value(axis: Axis, value: float) -> int:
-    """Return the index of the value of an axis that is nearest, refusing one that is too far."""
-    off = axis.values - value
+    """Return the index of the nearest value of an axis; refuse values too far beyond its ends."""
+    error = axis.values - value
     if axis.name == "base_yaw":
-        off = np.mod(off + math.pi, 2.0 * math.pi) - math.pi
-    nearest = int(np.argmin(np.abs(off)))
+        error = np.mod(error + math.pi, 2.0 * math.pi) - math.pi
+    nearest = int(np.argmin(np.abs(error)))
     half = float(np.diff(axis.values[:2])[0]) / 2.0 if axis.count > 1 else math.inf
     # Rounding of the steps must not refuse what is half a step away.
-    if abs(off[nearest]) > half * (1.0 + 1e-9):
+    if abs(error[nearest]) > half * (1.0 + 1e-9):
         shown, first, last = (
             (math.degrees(number) if axis.unit == "deg" else number)
             for number in (value, axis.values[0], axis.values[-1])
         )
         raise SelectionError(
-            f"The place has {axis.name} {shown:g} {axis.unit}, beyond the grid, where it is "
-            f"{first:g} to {last:g} {axis.unit}. Take a place of the grid, or score a larger one."
+            f"The configuration has {axis.name} {shown:g} {axis.unit}, beyond the grid, where it "
+            f"is {first:g} to {last:g} {axis.unit}. Stay on the grid, or score a larger one."
         )
     return nearest

@@ -1,4 +1,4 @@
-"""Explain one goal: why it is not reached from here, from where it is, and what to change."""
+"""The explanation of one goal: why it is not reached, and from where it would be."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
-from tcs.placement.reasons.explained import Standing
+from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
 from tcs.placement.selection import Match, TravelWeights, nearest_table
 from tcs.placement.store import ScoreFile, state_to_json
@@ -20,33 +20,32 @@ from tcs.placement.tables import SetTable
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """What a score file tells about one goal."""
+    """Explanation of one goal, from a score file."""
 
     file: ScoreFile
-    """The file."""
+    """The score file."""
     goal: int
     """Number of the goal."""
     match: Match
-    """Which table of the file was read, and how far it is from what was observed."""
-    standing: Standing | None
-    """The configuration that is explained; None where no goal is reached from anywhere and none
-    was named."""
+    """The observed state that was read, and how far it is from the observation."""
+    explained: ExplainedConfiguration | None
+    """The explained configuration; None if none was stated and no configuration reaches a goal."""
     best_set: tuple[int, ...]
-    """Flat indices of the best set of the table."""
+    """Flat indices of the members of the best set."""
     best_reaching: tuple[int, ...]
-    """Those of them that reach the goal."""
+    """Flat indices of those members that reach the goal."""
     distribution: Distribution
-    """Reasons over the whole grid."""
+    """Distribution of the reasons over the whole grid."""
     weights: TravelWeights
-    """What each kind of change costs."""
+    """Cost of each type of change."""
     fix: Fix | None
-    """The nearest configuration that reaches the goal, None where there is none."""
+    """The nearest configuration that reaches the goal, None if there is none."""
     unreachable: int
-    """How many configurations reach the goal but cannot be driven to around the furniture."""
+    """Number of configurations that reach the goal but are unreachable around the furniture."""
 
     @property
     def body_frame(self) -> str | None:
-        """The part of the person the goal is on, where the file tells."""
+        """Body frame of the goal, None if the file does not state it."""
         goals = self.file.task.get("goals")
         goal = goals[self.goal] if isinstance(goals, list) and self.goal < len(goals) else None
         frame = goal.get("body_frame") if isinstance(goal, dict) else None
@@ -63,7 +62,7 @@ class Explanation:
             "body_frame": self.body_frame,
             "observed": state_to_json(axes, self.match.state),
             "observed_error": state_to_json(axes, self.match.observed_error),
-            "explained": None if self.standing is None else self.standing.to_json(),
+            "explained": None if self.explained is None else self.explained.to_json(),
             "best_set": {
                 "configurations": list(self.best_set),
                 "reaching": list(self.best_reaching),
@@ -90,32 +89,32 @@ def explain(
     observed: Mapping[str, float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
 ) -> Explanation:
-    """Return why a goal is not reached from a configuration, and what would reach it.
+    """Return why a goal is not reached from a configuration, and the least change that reaches it.
 
-    Reads the scores alone: neither simulator nor compiler is needed.
+    Only the scores are read: neither simulator nor compiler is needed.
 
     Args:
         file: A loaded score file.
         goal: Number of the goal, from 0.
-        configuration: Flat index of a configuration of the grid; or a place of robot and
-            environment, of which the nearest configuration is explained. None for the member of
-            the best set with the greatest P_R + P_M by itself.
-        weights: What each kind of change costs; by default `fix_weights` of the grid.
-        observed: How the person is found: values of the file's observed axes [m or rad].
-        frames: The same told by places of body frames in W [m], by name.
+        configuration: Flat index of a configuration of the grid, or any configuration, of which the
+            nearest one of the grid is explained. None for the member of the best set with the
+            greatest P_R + P_M by itself.
+        weights: Cost of each type of change; by default `fix_weights` of the grid.
+        observed: Observed values of the file's observed axes [m or rad].
+        frames: Instead of `observed`, positions of body frames in W [m], by name.
 
     Returns:
         The reason, the distribution of reasons over the grid, and the nearest configuration that
-        reaches the goal. Changes start at a stated place itself, not at what it is nearest to.
+        reaches the goal. Changes start at the stated configuration, not at the one of the grid.
 
     Raises:
         GridError: If there is no configuration of that index.
-        SelectionError: If there is no such goal, the place is beyond the grid or lacks an axis,
-            or what is observed was not scored.
+        SelectionError: If there is no such goal, the configuration is beyond the grid or lacks an
+            axis, or the observed state was not scored.
         UnknownNameError: If an axis has no such name.
     """
-    place = configuration if isinstance(configuration, InitialConfiguration) else None
-    match = nearest_table(file, place, observed, frames)
+    stated = configuration if isinstance(configuration, InitialConfiguration) else None
+    match = nearest_table(file, stated, observed, frames)
     table = file.tables[match.index]
     goals = table.sets.weights.size
     if isinstance(goal, bool) or not 0 <= goal < goals:
@@ -125,16 +124,18 @@ def explain(
         )
     grid, scores = Grid.from_dict(file.grid), table.scores
     weights = fix_weights(grid) if weights is None else weights
-    asked = _best_member(table.sets) if configuration is None else configuration
-    standing = None if asked is None else Standing.of(grid, scores, goal, asked)
+    requested = _best_member(table.sets) if configuration is None else configuration
+    explained = None
+    if requested is not None:
+        explained = ExplainedConfiguration.of(grid, scores, goal, requested)
     fix, unreachable = None, 0
-    if standing is not None:
-        fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, standing, weights)
+    if explained is not None:
+        fix, unreachable = nearest_fix(grid, scores, table.sets.lattice, goal, explained, weights)
     return Explanation(
         file=file,
         goal=goal,
         match=match,
-        standing=standing,
+        explained=explained,
         best_set=table.sets.best,
         best_reaching=tuple(h for h in table.sets.best if scores.reached[h, goal]),
         distribution=Distribution.of(scores, goal),
@@ -145,7 +146,7 @@ def explain(
 
 
 def _best_member(sets: SetTable) -> int | None:
-    """Return the member of the best set that has the greatest P_R + P_M by itself."""
+    """Return the member of the best set with the greatest P_R + P_M by itself."""
     if not sets.best:
         return None
     rows = np.searchsorted(sets.candidates, sets.best)

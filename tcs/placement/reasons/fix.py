@@ -1,4 +1,4 @@
-"""The nearest configuration from which a goal is reached, in stated weights."""
+"""The nearest configuration that reaches a goal, by the cost of the changes to it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.reasons.changes import Change, ahead_and_left, changes_between, sentence
-from tcs.placement.reasons.explained import Standing
+from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.selection import TravelWeights
 from tcs.placement.selection.distances import Distances, LatticeDistances, StraightDistances
 from tcs.placement.selection.travel import legs_from
@@ -21,36 +21,36 @@ from tcs.placement.tables import BaseLattice, Reason, ScoreTable, tc_manipulabil
 TURN_WEIGHT = 0.3
 """Cost of a radian of turning: the sides of a base as large as the PR2's move by 0.33 m."""
 AXIS_WEIGHTS = {"m": 2.0, "rad": 1.0}
-"""Cost of a metre or radian of an axis of the environment. It moves the person as well, and what
-moves the person shall cost double: a metre 2, and a radian of the head rest, which takes the upper
-body along by half a metre, 1."""
+"""Cost of a metre or radian of an axis of the environment. Such axes move the person, which costs
+double: 2 for a metre, and 1 for a radian of the head rest, which moves the upper body by about half
+a metre."""
 DETOUR = 1.1
-"""A way around the furniture that is longer than the straight line by this factor goes round
-something: in the open, the lattice alone makes it up to 8 percent longer."""
+"""A path longer than the straight line by this factor is reported as a detour: the lattice alone
+makes paths up to 8 percent longer in free space."""
 TIE = 1e-9
-"""Costs that differ by less are equal: steps of 0.05 m are no binary fractions, and a step to one
-side comes out 1e-16 cheaper than a step to the other."""
+"""Costs that differ by less are equal: steps of 0.05 m are not binary fractions, and a step to one
+side can cost 1e-16 less than a step to the other."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fix:
-    """The cheapest configuration that reaches the goal, and what to change to get there."""
+    """The cheapest configuration that reaches the goal, and the changes to get there."""
 
     index: int
-    """Its flat index."""
+    """Flat index of the configuration."""
     configuration: InitialConfiguration
-    """It itself."""
-    place: InitialConfiguration
-    """Where the robot is before, and how everything is set."""
+    """The configuration."""
+    start: InitialConfiguration
+    """The configuration before the changes."""
     cost: float
-    """What the changes cost, in the weights given."""
+    """Cost of the changes, by the given weights."""
     driving: float
-    """How far it is to drive [m]."""
+    """Driving distance [m]."""
     route: str
-    """How it drives: "around" the furniture; "straight" where that was asked for, or where the
-    base cannot be."""
+    """Route of the driving distance: "around" the furniture; "straight" if requested, or if the
+    base is in contact at the start."""
     dexterity: float
-    """How evenly the arm can move at the goal from there."""
+    """Dexterity at the goal from there."""
     reachability: float
     """P_R of this configuration by itself."""
     manipulability: float
@@ -62,20 +62,20 @@ class Fix:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What to change, axis by axis."""
-        return changes_between(self.place, self.configuration)
+        """The changes, axis by axis."""
+        return changes_between(self.start, self.configuration)
 
     @property
     def sentence(self) -> str:
-        """What to change, in words; forward and left as the base heads before."""
-        straight = math.hypot(*ahead_and_left(self.place, self.configuration))
+        """The changes as a sentence; forward and left are those of the base at the start."""
+        straight = math.hypot(*ahead_and_left(self.start, self.configuration))
         is_detour = self.route == "around" and self.driving > DETOUR * straight
         around = self.driving if is_detour else None
-        return sentence(self.place, self.configuration, around=around)
+        return sentence(self.start, self.configuration, around=around)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
-        ahead, left = ahead_and_left(self.place, self.configuration)
+        """Return the configuration and the changes as plain containers."""
+        ahead, left = ahead_and_left(self.start, self.configuration)
         return {
             "members": [self.configuration.to_json()],
             "configuration": self.index,
@@ -104,18 +104,18 @@ def fix_weights(
     environment: tuple[tuple[str, float], ...] = (),
     route: str = "around",
 ) -> TravelWeights:
-    """Return what each change costs by default, or as given.
+    """Return the cost of each type of change.
 
     Args:
-        grid: Grid whose environment axes are to be weighted.
+        grid: The grid; its environment axes get a cost each.
         metre: Cost of a metre of driving.
-        turn: Cost of a radian of turning.
-        torso: Cost of a metre of torso lift.
+        turn: Cost of a radian of rotation of the base.
+        torso: Cost of a metre of torso height.
         environment: Costs of some environment axes; the others get those of `AXIS_WEIGHTS`.
-        route: "around" the furniture, or "straight": the other side of a bed is near by line.
+        route: Driving distances "around" the furniture, or "straight".
 
     Raises:
-        SelectionError: If a weight is no number from 0 to 1e9, or an axis is named twice.
+        SelectionError: If a weight is not a number from 0 to 1e9, or an axis is named twice.
         UnknownNameError: If there is no such route.
     """
     named = {name for name, _ in environment}
@@ -134,24 +134,24 @@ def nearest_fix(
     scores: ScoreTable,
     lattice: BaseLattice,
     goal: int,
-    standing: Standing,
+    start: ExplainedConfiguration,
     weights: TravelWeights,
 ) -> tuple[Fix | None, int]:
-    """Return the cheapest configuration that reaches the goal from where the robot stands.
+    """Return the cheapest configuration that reaches the goal.
 
-    Of those that cost the same the one with the greatest P_M is taken, then the first.
+    Ties go to the greatest P_M, then to the first configuration.
 
     Args:
         grid: The grid that was scored.
         scores: Its scores.
         lattice: Where the base can drive.
         goal: Number of the goal.
-        standing: Where the robot stands.
-        weights: What each kind of change costs.
+        start: The configuration that the changes start from.
+        weights: Cost of each type of change.
 
     Returns:
-        The configuration, None where there is none; and how many reach the goal but cannot be
-        driven to around the furniture.
+        The configuration, None if there is none; and how many configurations reach the goal but
+        are unreachable around the furniture.
 
     Raises:
         UnknownNameError: If a weight names an axis that the environment does not have.
@@ -159,10 +159,10 @@ def nearest_fix(
     rows = np.flatnonzero(scores.reached[:, goal]).astype(np.int32)
     at = grid.values(rows)
     cell_xy = np.stack([at["base_x"], at["base_y"]], axis=1)
-    route, ways = _ways(weights.route, cell_xy, lattice, standing)
-    # Every row is a base cell of its own: legs start here and end there, none lead on.
+    route, distances = _distances(weights.route, cell_xy, lattice, start)
+    # Every row is a base cell of its own: each leg ends at one, and no leg starts there.
     legs = legs_from(
-        standing.place, grid, rows, np.arange(len(rows), dtype=np.int32), ways, weights
+        start.stated, grid, rows, np.arange(len(rows), dtype=np.int32), distances, weights
     )
     cost = np.where(legs.reachable, legs.from_here, np.inf)
     unreachable = int(np.count_nonzero(~legs.reachable))
@@ -171,13 +171,13 @@ def nearest_fix(
     near = np.flatnonzero(cost <= cost.min() + TIE)
     manipulability = tc_manipulability(scores.dexterity[rows[near]], scores.weights)
     best = int(near[np.argmax(manipulability)])
-    driving = ways.from_position(standing.place.base_x, standing.place.base_y)[best]
+    driving = distances.from_position(start.stated.base_x, start.stated.base_y)[best]
     index = int(rows[best])
-    here, there = scores.reached[standing.index], scores.reached[index]
+    here, there = scores.reached[start.index], scores.reached[index]
     fix = Fix(
         index=index,
         configuration=grid.configuration(index),
-        place=standing.place,
+        start=start.stated,
         cost=float(cost[best]),
         driving=float(driving),
         route=route,
@@ -190,19 +190,19 @@ def nearest_fix(
     return fix, unreachable
 
 
-def _ways(
-    route: str, cell_xy: NDArray[np.float64], lattice: BaseLattice, standing: Standing
+def _distances(
+    route: str, cell_xy: NDArray[np.float64], lattice: BaseLattice, start: ExplainedConfiguration
 ) -> tuple[str, Distances]:
-    """Return the route that can be taken from where the robot stands, and the ways to the cells.
+    """Return the route that is possible from the start, and the distances to the cells.
 
-    From a configuration in which the body touches something nobody drives: lines tell what is
-    near. A stated place is where the robot is, even if the nearest configuration is blocked.
+    From a configuration in contact the base cannot drive, so distances are straight. A stated
+    configuration counts as free, even if the nearest one of the grid is in contact.
     """
-    place = standing.place
-    if route == "around" and (standing.off or standing.reason != Reason.BODY_BLOCKED):
+    here = start.stated
+    if route == "around" and (start.offset or start.reason != Reason.BODY_BLOCKED):
         around = LatticeDistances(cell_xy, lattice)
         try:
-            around.from_position(place.base_x, place.base_y)
+            around.from_position(here.base_x, here.base_y)
         except SelectionError:
             return "straight", StraightDistances(cell_xy)
         return route, around

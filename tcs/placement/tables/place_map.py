@@ -1,4 +1,4 @@
-"""The best that each base place has to offer, over all headings, torso heights and beds."""
+"""Map of base positions: the best scores at each, over headings, torso heights and bed settings."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ _PLURALS = {"base_yaw": "headings", "torso": "torso heights"}
 
 @dataclass(frozen=True, eq=False)
 class PlaceMap:
-    """Scores of base places on a grid in x and y.
+    """Best scores at each base position of a grid.
 
-    Both scores of a place are maxima by themselves: they may belong to different headings.
+    The two scores of a position are separate maxima: they may belong to different headings.
     """
 
     x: FloatArray
-    """Places along x [m], shape (X,)."""
+    """Base positions along x [m], shape (X,)."""
     y: FloatArray
-    """Places along y [m], shape (Y,)."""
+    """Base positions along y [m], shape (Y,)."""
     reachability: FloatArray
-    """Greatest P_R of a single configuration at each place, shape (X, Y)."""
+    """Greatest P_R of a single configuration at each position, shape (X, Y)."""
     manipulability: FloatArray
-    """Greatest P_M of a single configuration at each place, shape (X, Y)."""
+    """Greatest P_M of a single configuration at each position, shape (X, Y)."""
     free: NDArray[np.bool_]
-    """Whether the robot can stand there in at least one way, shape (X, Y)."""
+    """Whether the robot's body is free of contact in at least one configuration, shape (X, Y)."""
     over: tuple[str, ...] = ()
-    """Names of the other axes, of whose values the best one counts."""
+    """Names of the other axes, over which the maxima are taken."""
 
     @property
     def over_words(self) -> str:
@@ -47,7 +47,7 @@ class PlaceMap:
 
     @classmethod
     def of(cls, scores: ScoreTable, grid: Grid) -> PlaceMap:
-        """Return the map of a score table, the best of all states of the environment.
+        """Return the map over all states of the environment.
 
         Args:
             scores: Scores of every configuration of the grid.
@@ -74,7 +74,7 @@ class PlaceMap:
         """Return the map of one state, or of all for None."""
         rows = rows_of_state(grid, state)
         reached, dexterity = scores.reached[rows], scores.dexterity[rows]
-        # The body is in the way, or not, whatever the goal.
+        # Contact of the body does not depend on the goal.
         blocked = (scores.reason[rows] == Reason.BODY_BLOCKED).any(axis=1)
         axes = _axes(grid, state)
         return cls(
@@ -85,18 +85,18 @@ class PlaceMap:
                 grid, tc_manipulability(dexterity, scores.weights), state
             ),
             free=best_per_place(grid, ~blocked, state),
-            # An axis of one value leaves nothing to choose from. Headings and heights first.
+            # Axes of one value are left out. Headings and torso heights come first.
             over=tuple(a.name for a in reversed(axes) if a.count > 1 and a.name not in _PLACE),
         )
 
 
 def best_per_place(grid: Grid, values: NDArray[Any], state: int | None = None) -> NDArray[Any]:
-    """Return the greatest value at each base place, shape (X, Y).
+    """Return the greatest value at each base position, shape (X, Y).
 
     Args:
         grid: The grid.
-        values: A value for each configuration of the state, or of the grid where it is None, in
-            their order.
+        values: A value for each configuration of the state, or of the grid if `state` is None, in
+            flat order.
         state: Number of the environment's state, in C order over its axes; None for all states.
     """
     axes = _axes(grid, state)
@@ -105,7 +105,7 @@ def best_per_place(grid: Grid, values: NDArray[Any], state: int | None = None) -
 
 
 def rows_of_state(grid: Grid, state: int | None = None) -> slice:
-    """Return the configurations of one state of the environment; all of them for None.
+    """Return the flat indices of the configurations in one state of the environment, None for all.
 
     Raises:
         GridError: If there is no state of that number.
@@ -120,5 +120,5 @@ def rows_of_state(grid: Grid, state: int | None = None) -> slice:
 
 
 def _axes(grid: Grid, state: int | None) -> tuple[Axis, ...]:
-    """Return the axes along which the configurations of a state, or of the grid, are ordered."""
+    """Return the axes of the configurations of a state, or of the grid for None, in flat order."""
     return grid.axes if state is None else grid.axes[len(grid.environment_axes) :]

@@ -5,7 +5,7 @@ import pytest
 
 from tcs.errors import GridError, SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.reasons.explained import Standing, nearest_configuration
+from tcs.placement.reasons.explained import ExplainedConfiguration, nearest_configuration
 from tcs.placement.tables import Reason
 from tests.placement.tables.small import random_scores, small_grid
 
@@ -39,7 +39,7 @@ def test_nearest_is_nearest_along_every_axis():
         off = off + np.abs(np.angle(np.exp(1j * (at["base_yaw"] - stated["base_yaw"]))))
         assert off[index] == off.min()
         assert [name for name, _ in ordered.environment] == ["bed_height", "head_rest"]
-        # The place itself, but for whole turns.
+        # The stated configuration itself, except for whole turns.
         assert dict(ordered.environment) == {
             name: stated[name] for name in ("bed_height", "head_rest")
         }
@@ -74,7 +74,7 @@ def test_axis_with_a_single_value_is_always_near():
         ({"bed_height": math.inf}, r"bed_height is inf"),
     ],
 )
-def test_place_beyond_the_grid(stated, words):
+def test_configuration_beyond_the_grid(stated, words):
     with pytest.raises(SelectionError, match=words):
         nearest_configuration(GRID, place(**stated))
 
@@ -101,27 +101,27 @@ def test_axes_that_are_missing_or_unknown():
         nearest_configuration(GRID, place(bed_hight=0.1))
 
 
-def test_standing_tells_what_the_table_holds():
+def test_the_outcome_is_that_of_the_score_table():
     scores = random_scores(GRID, 3, seed=4)
     for index in range(0, GRID.size, 97):
-        standing = Standing.of(GRID, scores, 2, index)
-        assert standing.configuration == standing.place == GRID.configuration(index)
-        assert standing.reason == scores.reason[index, 2]
-        assert standing.is_reached == (standing.reason == Reason.REACHED)
-        assert (standing.pair is None) == (scores.pair[index, 2] < 0)
-        if standing.pair is not None:
-            assert standing.pair == scores.pair_names[scores.pair[index, 2]]
-        assert standing.dexterity == scores.dexterity[index, 2]
-        assert standing.off == {}
+        found = ExplainedConfiguration.of(GRID, scores, 2, index)
+        assert found.configuration == found.stated == GRID.configuration(index)
+        assert found.reason == scores.reason[index, 2]
+        assert found.is_reached == (found.reason == Reason.REACHED)
+        assert (found.pair is None) == (scores.pair[index, 2] < 0)
+        if found.pair is not None:
+            assert found.pair == scores.pair_names[scores.pair[index, 2]]
+        assert found.dexterity == scores.dexterity[index, 2]
+        assert found.offset == {}
 
 
-def test_how_far_off_a_place_is():
+def test_offset_of_a_stated_configuration():
     scores = random_scores(GRID, 1, seed=4)
     stated = place(base_x=-0.27, base_yaw=math.radians(350), head_rest=math.radians(40))
-    standing = Standing.of(GRID, scores, 0, stated)
-    assert standing.configuration.to_json()["base_yaw_deg"] == 0.0
+    found = ExplainedConfiguration.of(GRID, scores, 0, stated)
+    assert found.configuration.to_json()["base_yaw_deg"] == 0.0
     # Written with nine decimals.
-    assert standing.off == pytest.approx(
+    assert found.offset == pytest.approx(
         {"base_x": 0.03, "base_yaw_deg": -10.0, "head_rest_deg": 5.0}, abs=1e-8
     )
 
@@ -129,4 +129,4 @@ def test_how_far_off_a_place_is():
 @pytest.mark.parametrize("index", [-1, GRID.size])
 def test_no_such_configuration(index):
     with pytest.raises(GridError, match=rf"no configuration {index}.* 0 to {GRID.size - 1}"):
-        Standing.of(GRID, random_scores(GRID, 1, seed=4), 0, index)
+        ExplainedConfiguration.of(GRID, random_scores(GRID, 1, seed=4), 0, index)

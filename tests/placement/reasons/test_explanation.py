@@ -179,13 +179,13 @@ def test_lines_count_where_the_base_cannot_be(room):
     grid, file = room
     blocked = 4 * 10 + 1
     explained = tcs.explain(file, 0, blocked)
-    assert explained.standing.reason == Reason.BODY_BLOCKED
+    assert explained.explained.reason == Reason.BODY_BLOCKED
     assert explained.weights.route == "around"
     assert (explained.fix.route, explained.fix.index) == ("straight", 52)
     # A robot that is a little off really is there, on the side of the bed that it is on.
     place = dataclasses.replace(grid.configuration(blocked), base_x=0.06)
     explained = tcs.explain(file, 0, place)
-    assert explained.standing.index == blocked
+    assert explained.explained.index == blocked
     assert (explained.fix.route, explained.fix.index) == ("around", 2)
 
 
@@ -236,7 +236,7 @@ def test_best_member_is_explained_by_default():
         explained = tcs.explain(file, goal)
         assert explained.best_set == sets.best
         alone = {h: sum(sets.scores_of((h,))) for h in sets.best}
-        assert alone[explained.standing.index] == max(alone.values())
+        assert alone[explained.explained.index] == max(alone.values())
         assert explained.best_reaching == tuple(
             h for h in sets.best if file.nominal.scores.reached[h, goal]
         )
@@ -247,7 +247,7 @@ def test_goal_that_is_reached_needs_no_change():
     h = int(file.nominal.sets.candidates[3])
     goal = int(np.argmax(file.nominal.scores.reached[h]))
     explained = tcs.explain(file, goal, h)
-    assert explained.standing.is_reached
+    assert explained.explained.is_reached
     assert (explained.fix.index, explained.fix.changes) == (h, ())
     # Half a turn less half a turn leaves a bit of rounding.
     assert explained.fix.cost == pytest.approx(0.0, abs=1e-12)
@@ -262,7 +262,7 @@ def test_goal_that_nothing_reaches():
     file = made(grid, reasons.__getitem__)
     for configuration in (None, 7):
         explained = tcs.explain(file, 0, configuration)
-        assert (explained.standing is None) == (configuration is None)
+        assert (explained.explained is None) == (configuration is None)
         plain = explained.to_json()
         assert plain["nearest_reaching"] is None
         assert plain["reasons"]["reached"] == 0
@@ -281,7 +281,7 @@ def test_observed_state_chooses_the_table():
         explained = tcs.explain(file, 2, 5, observed={"person_y": shift + 0.01})
         scores = file.tables[index].scores
         assert explained.match.index == index
-        assert explained.standing.reason == scores.reason[5, 2]
+        assert explained.explained.reason == scores.reason[5, 2]
         assert explained.distribution.reached == int(scores.reached[:, 2].sum())
         assert scores.reached[explained.fix.index, 2]
         assert explained.to_json()["observed"] == {"person_y": shift}
