@@ -1,7 +1,7 @@
-"""Try other robots at the same task: some that come along, and one with a spoon in its hand.
+"""Score the same task with other robots: two that ship with tcs, and a PR2 that holds a spoon.
 
-`pr2_spoon.yaml` beside this file is the PR2 with one more body and another tool frame. Any robot
-whose arm has seven turning joints will do; `tcs robot new` drafts its file from a URDF.
+`pr2_spoon.yaml` beside this file is the PR2 with a further body and another tool frame. Any robot
+whose arm has seven revolute joints is supported; `tcs robot new` drafts its file from a URDF.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ def main() -> None:
         file = tcs.score("shaving", environment="wheelchair", robot=robot)
         best = tcs.summary(file)["best_single"]
         # P_R compares robots. P_M does not: its Jacobian mixes metres and radians.
-        share = best["reachability"]
-        print(f"{file.robot['name']}: {share:.0%} of the goals from the best single place")
+        reachability = best["reachability"]
+        print(f"{file.robot['name']}: {reachability:.0%} of the goals from the best single place")
 
 
 if __name__ == "__main__":

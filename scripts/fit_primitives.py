@@ -1,6 +1,6 @@
-"""Fit the collision primitives of a robot anew, or find the pairs of bodies that need no check.
+"""Fit the collision primitives of a robot again, or find the pairs of bodies that need no check.
 
-    python scripts/fit_primitives.py pr2            rewrites the primitives file its YAML names
+    python scripts/fit_primitives.py pr2            rewrites the primitives file that its YAML names
     python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the YAML's last entry
 
 The same meshes give the same files. Both take a few minutes; pairs depend on the primitives.
@@ -21,7 +21,7 @@ from tcs.model.robots.self_collision import propose_disabled_pairs
 
 
 def main() -> int:
-    """Do what the arguments say."""
+    """Rewrite primitives or pairs of the robot that the arguments name."""
     names = [argument for argument in sys.argv[1:] if argument != "--pairs"]
     if len(names) != 1:
         print(__doc__, file=sys.stderr)
@@ -42,7 +42,7 @@ def main() -> int:
 
 
 def rewrite_primitives(robot: RobotFile) -> None:
-    """Fit, write, and print the table of docs/robots.md."""
+    """Fit and write the primitives, and print the table for docs/robots.md."""
     fits = fit_robot(robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr))
     write_primitives(Path(robot.primitives), [p for f in fits for p in f.fit.primitives])
     print("| body | shapes | hull [l] | union [l] | excess |")
@@ -56,7 +56,7 @@ def rewrite_primitives(robot: RobotFile) -> None:
 
 
 def rewrite_pairs(robot: RobotFile, path: Path) -> None:
-    """Find the pairs and put them where the YAML holds them."""
+    """Find the pairs and write them into the YAML file."""
     groups = [
         {
             "reason": group.reason,

@@ -1,19 +1,19 @@
-"""Every error `tcs` raises on purpose.
+"""The errors that `tcs` raises on purpose.
 
     TcsError
-    ├── UnknownNameError      a task, robot, environment or frame nobody has heard of
-    ├── DataFileError         a file of ours or the user's that says something impossible
+    ├── UnknownNameError      an unknown name of a task, robot, environment, frame or key
+    ├── DataFileError         a data file whose content cannot be used
     │   ├── TaskError
     │   ├── RobotError
-    │   │   └── ArmClassError     an arm the closed-form kernel cannot solve
+    │   │   └── ArmClassError     an arm without a closed-form inverse kinematics
     │   └── EnvironmentFileError
-    ├── GridError             an empty or enormous grid of initial configurations
+    ├── GridError             a grid of initial configurations that is empty or too large
     ├── StoreError            a score file that cannot be used
-    │   ├── StoreFormatError      truncated, foreign, or of an unknown version
+    │   ├── StoreFormatError      truncated, of another program, or of an unknown version
     │   ├── UnsafeStoreError      a pickle that names something outside the allow-list
-    │   └── StoreMismatchError    made from other models than today's
-    ├── SelectionError        nothing to choose from, or a state that is not stored
-    └── OutputError           a place that cannot be written
+    │   └── StoreMismatchError    made from models that have changed since
+    ├── SelectionError        no set to choose from, or a state that is not stored
+    └── OutputError           a file or folder that cannot be written
 
 A goal that cannot be reached is a zero score, never an exception.
 """
@@ -25,20 +25,20 @@ from collections.abc import Iterable
 
 
 class TcsError(Exception):
-    """Root of every error raised on purpose; its text is one line a user can act on."""
+    """Root of the errors raised on purpose; the text is one line on which a user can act."""
 
 
 class UnknownNameError(TcsError):
     """A name that is not known where it was used."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
-        """Say what was asked for, what there is, and what was probably meant.
+        """Compose a message with the unknown name, the known ones and the nearest of them.
 
         Args:
-            kind: What was looked up, e.g. "task".
-            name: The name that was not found.
-            known: Every name that would have been accepted.
-            where: Where the name stood, e.g. "goal 3 of task 'shaving'".
+            kind: Type of the name, e.g. "task".
+            name: The unknown name.
+            known: The names that would have been accepted.
+            where: Location of the name, e.g. "goal 3 of task 'shaving'".
         """
         self.kind = kind
         self.name = name
@@ -64,7 +64,7 @@ class RobotError(DataFileError):
 
 
 class ArmClassError(RobotError):
-    """An arm outside the class that the closed-form kernel solves."""
+    """An arm outside the classes with a closed-form inverse kinematics."""
 
 
 class EnvironmentFileError(DataFileError):
@@ -72,7 +72,7 @@ class EnvironmentFileError(DataFileError):
 
 
 class GridError(TcsError):
-    """A grid of initial configurations with no point, or with far too many."""
+    """A grid of initial configurations without a point, or with too many."""
 
 
 class StoreError(TcsError):
@@ -80,20 +80,20 @@ class StoreError(TcsError):
 
 
 class StoreFormatError(StoreError):
-    """A file that is truncated, foreign, or of an unknown version."""
+    """A file that is truncated, of another program, or of an unknown version."""
 
 
 class UnsafeStoreError(StoreError):
-    """A file that asks the loader for something outside its allow-list."""
+    """A file that names something outside the allow-list of the reader."""
 
 
 class StoreMismatchError(StoreError):
-    """A file made from other models than the ones installed now."""
+    """A file made from models that differ from the present ones."""
 
 
 class SelectionError(TcsError):
-    """A selection that has nothing to choose from."""
+    """A selection without a set to choose from, or in a state that is not stored."""
 
 
 class OutputError(TcsError):
-    """A place that cannot be written."""
+    """A file or folder that cannot be written."""

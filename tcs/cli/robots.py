@@ -1,4 +1,4 @@
-"""The commands `tcs robot ...`: draft a robot file from a URDF, and check one up."""
+"""The commands `tcs robot ...`: draft a robot file from a URDF, and check a robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from tcs.cli import options, talk
 
 app = typer.Typer(
-    help="Robots: draft a file from any URDF, and check one up.", no_args_is_help=True
+    help="Robots: draft a robot file from any URDF, and check a robot.", no_args_is_help=True
 )
 
 
@@ -19,17 +19,17 @@ def new(
     urdf: Annotated[
         str, typer.Argument(metavar="URDF", help="Path or package:// address of a URDF.")
     ],
-    tool: Annotated[str, typer.Option(help="Link of the URDF that has to come to a goal.")],
+    tool: Annotated[str, typer.Option(help="Link of the URDF that moves to the goals.")],
     base: Annotated[
         str | None,
-        typer.Option(help="Link that the arm starts at or beyond.", show_default="the root"),
+        typer.Option(help="Link at or beyond which the arm starts.", show_default="the root"),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="<urdf>.yaml")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draft a robot file from any URDF, with its collision shapes in a CSV file beside it."""
+    """Draft a robot file from any URDF, with its collision primitives in a CSV file beside it."""
     from tcs.cli.places import check_writable
     from tcs.model.robots.draft import check_free, draft_robot, write_draft
 
@@ -53,11 +53,11 @@ def new(
 
 
 def _report_draft(result: dict[str, Any]) -> None:
-    """Print for a person what was drafted."""
+    """Print a draft as text."""
     typer.echo(f"wrote {result['file']} and {result['primitives']}")
     for remark in result["remarks"]:
         typer.echo(f"- {remark}")
-    typer.echo(f"Look it over, then: tcs robot check {result['file']}")
+    typer.echo(f"Review it, then: tcs robot check {result['file']}")
 
 
 @app.command()
@@ -69,20 +69,20 @@ def check(
     seed: options.Seed = 0,
     as_json: options.Json = False,
 ) -> None:
-    """Check a robot up: arm class, limits, shapes, self-collision, IK; exit 1 if it is unfit."""
+    """Check a robot: arm class, limits, primitives, self-collision, IK; exit 1 if it is unfit."""
     from tcs.model.checkup import check_up
     from tcs.model.robots import load_robot
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
     talk.print_result(found.to_json(), _report_check, as_json=as_json)
     if not found.is_sound:
-        talk.say(f"robot '{found.robot.name}' is not fit for scoring as it is.")
+        talk.say(f"robot '{found.robot.name}' is not fit for scoring.")
         raise typer.Exit(1)
 
 
 def _report_check(found: dict[str, Any]) -> None:
-    """Print a check-up for a person."""
-    arm, trip, touch = found["arm_class"], found["ik_round_trip"], found["self_collision"]
+    """Print a check-up as text."""
+    arm, trip, contact = found["arm_class"], found["ik_round_trip"], found["self_collision"]
     echo = typer.echo
     echo(f"robot            {found['robot']}")
     echo(
@@ -103,22 +103,24 @@ def _report_check(found: dict[str, Any]) -> None:
     largest = sorted(found["excess_volume"].items(), key=lambda item: -item[1])
     for body, excess in largest[:5]:
         echo(f"  {body:<28} {excess:.2f}")
-    echo(f"self-collision   {len(touch['pairs'])} pairs closer than {touch['margin_m'] * 1e3:g} mm")
-    found_again = "poses reached again" if arm["class"] is None else "postures found again"
+    echo(
+        f"self-collision   {len(contact['pairs'])} pairs closer than {contact['margin_m'] * 1e3:g} mm"
+    )
+    recovered = "tool poses solved" if arm["class"] is None else "postures recovered"
     joints = trip["max_joint_error_rad"]
     echo(
-        f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} {found_again}, "
+        f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} {recovered}, "
         + ("" if joints is None else f"joints to {joints:.1e} rad, ")
         + f"tool to {trip['max_position_error_m']:.1e} m"
     )
-    for kind in ("problems", "notes"):
-        for line in found[kind]:
-            echo(f"{kind[:-1]:<16} {line}")
+    for heading in ("problems", "notes"):
+        for line in found[heading]:
+            echo(f"{heading[:-1]:<16} {line}")
 
 
 def _range(joint: dict[str, Any]) -> str:
     if joint["continuous"]:
         return "continuous"
-    shown = {kind: "[{:.4f}, {:.4f}]".format(*joint[kind]) for kind in ("in_force", "hard")}
+    shown = {name: "[{:.4f}, {:.4f}]".format(*joint[name]) for name in ("in_force", "hard")}
     same = shown["in_force"] == shown["hard"]
     return shown["in_force"] + ("" if same else f"  hard {shown['hard']}")

@@ -1,5 +1,5 @@
-"""Files: YAML documents, data paths, whole-file writing, and the safe reader of joblib files.
+"""Files: YAML documents, data paths, whole-file writing, and a safe reader of joblib files.
 
-In: paths and bytes from users and from the package's own data folders. Out: checked documents and
-plain containers, or one located error; files written whole or not at all.
+In: names and paths of data files, and bytes that may be damaged or hostile. Out: checked documents,
+plain containers and arrays, or an error of one line; files that are written whole or not at all.
 """

@@ -1,4 +1,4 @@
-"""Plain containers: the only things beside arrays that a score file may hold."""
+"""Plain containers: all that a stored file may contain beside arrays."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ import numpy as np
 from tcs.errors import StoreError
 
 MAX_DEPTH = 32
-"""Deepest nesting allowed; our own descriptions need less than ten levels."""
+"""Greatest depth allowed; files written by `tcs` have less than ten levels."""
 
 MAX_ITEMS = 100_000
-"""Most values allowed; our own descriptions need some thousand. A few lists that contain each
-other twice, thirty levels deep, fit into a hundred bytes and expand to a billion values."""
+"""Most values allowed; files written by `tcs` have a few thousand. Lists that contain each other
+twice, thirty levels deep, fit into a hundred bytes and expand to a billion values."""
 
 
 def plain(what: str, value: object) -> Any:
-    """Return a copy made of dict, list, tuple, str, int, float, bool and None alone.
+    """Return a copy that consists of dict, list, tuple, str, int, float, bool and None only.
 
     Mappings become dicts and numpy scalars become Python numbers.
 
     Args:
-        what: Name of the value for the error message, e.g. "metadata".
-        value: What to copy.
+        what: Name of the value in messages, e.g. "metadata".
+        value: The value to copy.
 
     Raises:
-        StoreError: If anything else is inside, or it is absurdly deep or large.
+        StoreError: If the value contains any other type, or exceeds `MAX_DEPTH` or `MAX_ITEMS`.
     """
     return _Copier().copy(what, value, 0)
 
 
 class _Copier:
-    """Copies one value, counting what it has copied."""
+    """Copies one value and counts the items copied."""
 
     def __init__(self) -> None:
         self._items = 0
@@ -42,17 +42,17 @@ class _Copier:
         self._items += 1
         if depth > MAX_DEPTH or self._items > MAX_ITEMS:
             raise StoreError(
-                f"{what[:80]}: more than {MAX_DEPTH} levels or {MAX_ITEMS} values; a description "
+                f"{what[:80]}: more than {MAX_DEPTH} levels or {MAX_ITEMS} values; a file of tcs "
                 "has far fewer."
             )
         if isinstance(value, np.generic):
             value = value.item()
-        # Exactly these types: a subclass would be stored under its own name, and refused on load.
+        # Convert subclasses: they would be stored under their own name and refused on loading.
         if value is None or isinstance(value, bool):
             return value
-        for kind in (str, int, float):
-            if isinstance(value, kind):
-                return kind(value)
+        for scalar in (str, int, float):
+            if isinstance(value, scalar):
+                return scalar(value)
         if isinstance(value, Mapping):
             if not all(isinstance(key, str) for key in value):
                 raise StoreError(f"{what[:80]}: keys must be text.")
@@ -63,6 +63,6 @@ class _Copier:
             items = (self.copy(f"{what}[{i}]", item, depth + 1) for i, item in enumerate(value))
             return list(items) if isinstance(value, list) else tuple(items)
         raise StoreError(
-            f"{what[:80]} is {type(value).__name__}; a score file holds plain containers only: "
+            f"{what[:80]} is {type(value).__name__}, but a file may contain plain types only: "
             "dict, list, tuple, str, int, float, bool, None."
         )

@@ -1,15 +1,15 @@
-"""Read a joblib file without trusting it.
+"""A reader of joblib files that executes nothing from the file.
 
-A joblib file is a pickle, and a pickle is a program: it may name any function of any
-module and call it. This reader takes the part of the pickle language that plain
-containers need, and knows three names. They stand for inert tokens, not for the
-classes themselves, so nothing that a file contains is ever called:
+A joblib file is a pickle, and a pickle is a program: it may name any function of any module and
+call it. This reader supports the part of the pickle language that plain containers need, and an
+allow-list of three names. They become inert tokens, not the classes, so no content of a file is
+ever called:
 
     joblib.numpy_pickle.NumpyArrayWrapper   an array follows
     numpy.ndarray, numpy.dtype              its class and its element type
 
-Arrays are views of the file's bytes, read by us: joblib's own reader would hand
-arrays of Python objects to pickle again.
+Arrays are views of the bytes of the file: joblib's own reader would pass arrays of Python objects
+to pickle again.
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ from numpy.typing import NDArray
 from tcs.errors import StoreError, StoreFormatError, TcsError, UnsafeStoreError
 
 MAX_BYTES = 2 * 1024**3
-"""Most bytes a file may decompress to: several times the largest store, within a common machine."""
+"""Most bytes after decompression: several times the largest score file, and less than the memory of
+a common machine."""
 
 ELEMENT_TYPES = ("u1", "u2", "u4", "u8", "i4", "i8", "f4", "f8")
-"""Element types of arrays: plain numbers. Objects ("O") would be pickles inside the pickle."""
+"""Element types of arrays: plain numbers. Arrays of objects ("O") contain further pickles."""
 
 MAX_DIMENSIONS = 4
-"""Our arrays have one or two."""
+"""Most dimensions of an array; those written by `tcs` have one or two."""
 
 AGAIN = "Make it again with `tcs score`."
 
 SCORE_FILE = "Score file"
-"""What messages call a file when the caller gives it no other name."""
+"""Default name of a file in messages."""
 
 _PLAIN_OPERATIONS = (
     *(pickle.PROTO, pickle.FRAME, pickle.STOP, pickle.MARK),
@@ -53,7 +54,7 @@ _PLAIN_OPERATIONS = (
     *(pickle.EMPTY_LIST, pickle.APPEND, pickle.APPENDS),
     *(pickle.EMPTY_DICT, pickle.SETITEM, pickle.SETITEMS),
     *(pickle.MEMOIZE, pickle.BINPUT, pickle.LONG_BINPUT, pickle.BINGET, pickle.LONG_BINGET),
-    # These name a global, and end in our `find_class`.
+    # These name a global and call `find_class` below.
     *(pickle.GLOBAL, pickle.STACK_GLOBAL, pickle.INST),
 )
 _REFUSED_OPERATIONS = (
@@ -65,7 +66,7 @@ Value = TypeVar("Value")
 
 
 class _Known(Enum):
-    """The names a file may use, as tokens without any behaviour."""
+    """The names a file may use, as tokens without behaviour."""
 
     ARRAY_FOLLOWS = ("joblib.numpy_pickle", "NumpyArrayWrapper")
     ARRAY = ("numpy", "ndarray")
@@ -73,7 +74,7 @@ class _Known(Enum):
 
 
 class _ElementType:
-    """An element type under construction: `np.dtype` is never given anything but two letters."""
+    """An element type under construction: `np.dtype` receives only a code of `ELEMENT_TYPES`."""
 
     def __init__(self, code: object) -> None:
         if code not in ELEMENT_TYPES:
@@ -84,7 +85,7 @@ class _ElementType:
         self.dtype = np.dtype(str(code))
 
     def set_byte_order(self, state: object) -> None:
-        """Take the byte order from the state that numpy pickles: (version, order, ...)."""
+        """Set the byte order from the state that numpy pickles: (version, order, ...)."""
         order = state[1] if isinstance(state, tuple) and len(state) > 1 else None
         if order not in ("<", ">", "|"):
             raise StoreFormatError("has an array of unknown byte order")
@@ -92,7 +93,7 @@ class _ElementType:
 
 
 class _ArrayToCome:
-    """Stands on the stack between the name of the array wrapper and its state."""
+    """Placeholder on the stack between the name of the array wrapper and its state."""
 
 
 class _Reader(pickle._Unpickler):
@@ -105,44 +106,44 @@ class _Reader(pickle._Unpickler):
         super().__init__(self._file)
 
     def load(self) -> object:
-        """Return the one value in the file."""
+        """Return the value in the file."""
         value = super().load()
         if self._file.tell() != len(self._data):
-            raise StoreFormatError("goes on after its end")
+            raise StoreFormatError("continues after its end")
         return value
 
     def find_class(self, module: str, name: str) -> _Known:
         """Return the token of a known name.
 
         Raises:
-            UnsafeStoreError: If the name is any other.
+            UnsafeStoreError: If the name is not on the allow-list.
         """
         try:
             return _Known((module, name))
         except ValueError:
             raise UnsafeStoreError(
-                f"asks for {_shown(f'{module}.{name}')}, which is outside the allow-list "
+                f"names {_shown(f'{module}.{name}')}, which is not on the allow-list "
                 "(numpy arrays and plain containers)"
             ) from None
 
     def load_reduce(self) -> None:
-        """Where pickle would call anything: build an element type, the only call we know."""
+        """Build an element type, where pickle would call any function."""
         arguments = self.stack.pop()
         called = self.stack.pop()
         if called is not _Known.ELEMENT_TYPE or not isinstance(arguments, tuple) or not arguments:
-            raise UnsafeStoreError(f"calls {_shown(called)}, and files may call nothing")
+            raise UnsafeStoreError(f"calls {_shown(called)}, but a file may call nothing")
         self.stack.append(_ElementType(arguments[0]))
 
     def load_newobj(self) -> None:
-        """Where pickle would make an object of any class: announce an array, nothing else."""
+        """Announce an array, where pickle would create an object of any class."""
         arguments = self.stack.pop()
         made = self.stack.pop()
         if made is not _Known.ARRAY_FOLLOWS or arguments != ():
-            raise UnsafeStoreError(f"makes an object of {_shown(made)}; only arrays are allowed")
+            raise UnsafeStoreError(f"creates an object of {_shown(made)}; only arrays are allowed")
         self.stack.append(_ArrayToCome())
 
     def load_build(self) -> None:
-        """Where pickle would set any attribute: complete an element type or an array."""
+        """Complete an element type or an array, where pickle would set any attribute."""
         state = self.stack.pop()
         built = self.stack[-1]
         if isinstance(built, _ElementType):
@@ -153,16 +154,16 @@ class _Reader(pickle._Unpickler):
             raise UnsafeStoreError(f"sets attributes of {_shown(built)}; only of arrays is allowed")
 
     def refuse(self) -> None:
-        """Refuse an operation that reaches outside the file by other means than a name."""
-        raise UnsafeStoreError("asks for objects from outside the file (a pickle extension)")
+        """Refuse an operation that refers to an object outside the file."""
+        raise UnsafeStoreError("refers to objects outside the file (a pickle extension)")
 
     def _array(self, state: object) -> NDArray[Any]:
-        """Return the array whose description has just been read and whose bytes follow."""
+        """Return the array whose bytes follow its description `state`."""
         if not isinstance(state, dict):
             raise StoreFormatError("has an array without a description")
         element, shape, order = state.get("dtype"), state.get("shape"), state.get("order")
         if state.get("subclass") is not _Known.ARRAY or not isinstance(element, _ElementType):
-            raise StoreFormatError("has an array of unknown kind")
+            raise StoreFormatError("has an array of unknown type")
         if (
             not isinstance(shape, tuple)
             or len(shape) > MAX_DIMENSIONS
@@ -191,21 +192,21 @@ class _Reader(pickle._Unpickler):
         pickle.NEWOBJ[0]: load_newobj,
         pickle.BUILD[0]: load_build,
     }
-    """What each operation does; an operation that is not listed does not exist."""
+    """Methods by operation; an operation that is not listed raises an error."""
 
 
 def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> object:
-    """Return what a joblib file holds: plain containers and arrays of numbers.
+    """Return the content of a joblib file: plain containers and arrays of numbers.
 
     Args:
-        path: A file written by `joblib.dump`, compressed by zlib or not at all.
-        what: What to call it in a message.
-        again: How such a file is made, for a message.
+        path: A file written by `joblib.dump`, uncompressed or compressed by zlib.
+        what: Name of the file in messages.
+        again: Advice in messages on how to make such a file.
 
     Raises:
-        StoreError: If it cannot be read.
-        StoreFormatError: If it is truncated, foreign, or decompresses to more than 2 GB.
-        UnsafeStoreError: If it names anything outside the allow-list.
+        StoreError: If the file cannot be read.
+        StoreFormatError: If it is truncated, of another program, or decompresses to more than 2 GB.
+        UnsafeStoreError: If it names anything that is not on the allow-list.
     """
     name = f"{what} '{path}'"
     reader = _Reader(_decompress(name, _bytes_of(path, name, again), again))
@@ -215,21 +216,20 @@ def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> objec
 def explained(
     path: Path, read: Callable[[], Value], what: str = SCORE_FILE, again: str = AGAIN
 ) -> Value:
-    """Return what `read` does, and turn whatever it raises into one line about the file."""
+    """Return the result of `read`; raise any error of it as one line that names the file."""
     try:
         return read()
     except UnsafeStoreError as error:
         raise UnsafeStoreError(
-            f"{what} '{path}' {error}. It was not written by tcs: do not open it with any "
-            "other program either."
+            f"{what} '{path}' {error}. tcs did not write it: do not open it with any other program."
         ) from None
     except TcsError as error:
-        # One line, whatever names a file brings along.
-        said = " ".join(str(error).split()).rstrip(".")
-        raise StoreFormatError(f"{what} '{path}': {said}. {again}") from None
+        # One line, even if the file contains names with line breaks.
+        text = " ".join(str(error).split()).rstrip(".")
+        raise StoreFormatError(f"{what} '{path}': {text}. {again}") from None
     except Exception as error:
-        # Bytes that are no pickle can break its reader in about any way, from KeyError (no such
-        # operation) to OverflowError; none of them says more than this.
+        # Bytes that are not a pickle raise errors of many classes, from KeyError (no such
+        # operation) to OverflowError; their texts do not help the user.
         raise StoreFormatError(
             f"{what} '{path}' is truncated or was not written by tcs "
             f"({type(error).__name__} while reading). {again}"
@@ -237,11 +237,11 @@ def explained(
 
 
 def _bytes_of(path: Path, name: str, again: str) -> bytes:
-    """Return the bytes of a regular file of bearable size."""
+    """Return the bytes of a regular file of at most MAX_BYTES."""
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            raise StoreError(f"{name} is no regular file. Name one that is.")
+            raise StoreError(f"{name} is not a regular file. Name one that is.")
         if status.st_size > MAX_BYTES:
             raise StoreFormatError(
                 f"{name} has {status.st_size} bytes; at most {MAX_BYTES} are read."
@@ -260,7 +260,7 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
     # The low half of the first byte names the method; 8 is the only one in use.
     if not data or data[0] & 0x0F != 8:
         raise StoreFormatError(
-            f"{name} is {'empty' if not data else 'no joblib file of tcs'}. {again}"
+            f"{name} is {'empty' if not data else 'not a joblib file of tcs'}. {again}"
         )
     decompressor = zlib.decompressobj()
     try:
@@ -269,11 +269,11 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
         raise StoreFormatError(f"{name} is damaged ({error}). {again}") from None
     if len(content) > MAX_BYTES:
         raise StoreFormatError(
-            f"{name} decompresses to more than {MAX_BYTES} bytes. It is damaged or made to "
+            f"{name} decompresses to more than {MAX_BYTES} bytes. It is damaged or meant to "
             f"fill the memory. {again}"
         )
     if not decompressor.eof or decompressor.unused_data:
-        what = "goes on after its end" if decompressor.eof else "is truncated"
+        what = "continues after its end" if decompressor.eof else "is truncated"
         raise StoreFormatError(f"{name} {what}. {again}")
     return content
 

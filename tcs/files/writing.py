@@ -1,4 +1,4 @@
-"""Write files, wholly or not at all, and the folders they go to."""
+"""Write files whole or not at all, and create folders."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ def whole_file(
     path: Path,
     what: str,
     *,
-    advice: str = "Name a file in an existing, writable folder with room for it.",
+    advice: str = "Name a file in an existing, writable folder with enough space.",
 ) -> Iterator[BinaryIO]:
-    """Open a file to write; an older one of that name stays until the new one is complete.
+    """Open a file to write that replaces an existing one only when it is complete.
 
-    It is written beside the target under another name, brought to the disk and then renamed.
-    Whatever goes wrong, Ctrl-C included, the older file stays as it was, and no half one is left.
+    The content goes to a temporary file beside the target, which is flushed to the disk and then
+    renamed. After any error, Ctrl-C included, the old file is unchanged and no partial one is left.
 
     Args:
-        path: Where to write; its folder must exist.
-        what: What to call it in a message, e.g. "Picture".
-        advice: What to do when it cannot be written there.
+        path: Path of the file; its folder must exist.
+        what: Name of the file in messages, e.g. "Picture".
+        advice: Advice to the user if the file cannot be written.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the file cannot be written.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
     try:
@@ -40,7 +40,7 @@ def whole_file(
             os.fsync(stream.fileno())
         beside.replace(path)
     except BaseException as error:
-        # Where no file could be made, there is none to remove; the first error is the one to tell.
+        # There may be no file to remove; the first error is the one to report.
         with contextlib.suppress(OSError):
             beside.unlink()
         if isinstance(error, OSError):
@@ -51,21 +51,21 @@ def whole_file(
 
 
 def make_folder(
-    folder: Path, what: str = "folder", *, advice: str = "Name a folder that can be."
+    folder: Path, what: str = "folder", *, advice: str = "Name a folder that can be created."
 ) -> None:
-    """Make a folder, and those above it, where they are not there yet.
+    """Create a folder and its parents where they do not exist.
 
     Args:
         folder: The folder.
-        what: What to call it in a message.
-        advice: What to do when it cannot be made.
+        what: Name of the folder in messages.
+        advice: Advice to the user if the folder cannot be created.
 
     Raises:
-        OutputError: If it cannot be made.
+        OutputError: If the folder cannot be created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"{what} '{folder}' cannot be made: {error.strerror}. {advice}"
+            f"{what} '{folder}' cannot be created: {error.strerror}. {advice}"
         ) from error

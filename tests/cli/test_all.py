@@ -96,7 +96,7 @@ def test_a_folder_that_cannot_be_made_is_told(process, tmp_path):
     (tmp_path / "file").write_text("x")
     ran = process("score", "--all", "--out", tmp_path / "file" / "all")
     assert ran.code == 1
-    assert "cannot be made" in ran.err
+    assert "cannot be created" in ran.err
     assert ran.err.count("\n") == 1
 
 

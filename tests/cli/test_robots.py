@@ -19,7 +19,7 @@ def test_draft_then_check(tcs_command, folder):
     ran = tcs_command("robot", "check", "made_up.yaml", "--samples", "50", "--json")
     assert ran.code == 0
     assert ran.json["sound"] is True
-    assert ran.json["arm_class"]["class"] == "closed form"
+    assert ran.json["arm_class"]["class"] == "spherical-wrist"
     assert ran.json["ik_round_trip"]["success_rate"] == 1.0
 
 
@@ -28,7 +28,7 @@ def test_a_draft_overwrites_nothing(tcs_command, folder):
     ran = tcs_command("robot", "new", "made_up.urdf", "--tool", "tool")
     assert ran.code == 1
     assert ran.err.count("\n") == 1
-    assert "'made_up.yaml' is already there" in ran.err
+    assert "'made_up.yaml' already exists" in ran.err
     assert (folder / "made_up.yaml").read_text() == "mine"
     assert not (folder / "made_up_primitives.csv").exists()
 
@@ -61,7 +61,7 @@ def test_an_arm_outside_the_classes_is_drafted_and_told(tcs_command, folder):
     assert ran.json["arm_class"]["class"] is None
     assert ran.json["problems"] == []
     assert "outside the closed-form classes" in ran.json["notes"][0]
-    assert ran.json["notes"][0].endswith("So it is solved numerically, which takes longer.")
+    assert ran.json["notes"][0].endswith("It is solved numerically, which takes longer.")
     assert ran.json["arm_class"]["metres_from_meeting"]["5-6-7"] == pytest.approx(0.03, abs=1e-9)
     assert ran.json["ik_round_trip"]["method"] == "numeric"
     assert ran.json["ik_round_trip"]["success_rate"] >= 0.98
@@ -73,7 +73,7 @@ def test_check_for_a_person(tcs_command):
     assert ran.code == 0
     assert ran.err == ""
     for words in (
-        "closed form",
+        "spherical-wrist",
         "20 of 20 postures",
         "0 pairs",
         "continuous",

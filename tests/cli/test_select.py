@@ -142,7 +142,7 @@ def test_malicious_file_is_refused_and_nothing_is_called(tcs_command, tmp_path):
     ran = tcs_command("select", path, *HERE)
     assert (ran.code, ran.out) == (1, "")
     assert ran.err.count("\n") == 1
-    assert "outside the allow-list" in ran.err
+    assert "not on the allow-list" in ran.err
     assert not folder.exists()
     pickle.loads(pickle.dumps(Call(folder)))
     assert folder.exists()

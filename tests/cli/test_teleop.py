@@ -46,7 +46,7 @@ def test_a_folder_that_cannot_be_made_is_told_before_the_work(tcs_command, tmp_p
     (tmp_path / "file").write_text("")
     ran = tcs_command("teleop", "experiment", "--out", tmp_path / "file" / "out")
     assert ran.code == 1
-    assert "cannot be made" in ran.err
+    assert "cannot be created" in ran.err
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ def test_a_cache_that_cannot_be_created_is_one_line(home, monkeypatch):
     blocked = home / "file"
     blocked.write_text("")
     monkeypatch.setenv("TCS_CACHE_DIR", str(blocked / "cache"))
-    with pytest.raises(OutputError, match=r"cache folder .* cannot be made.*TCS_CACHE_DIR"):
+    with pytest.raises(OutputError, match=r"cache folder .* cannot be created.*TCS_CACHE_DIR"):
         cache_folder()
 
 

@@ -96,7 +96,7 @@ def test_the_attacks_are_real(path, mark):
 
 def test_the_name_asked_for_is_told(path, mark):
     joblib.dump(attacks(mark)["os.system"], path)
-    with pytest.raises(UnsafeStoreError, match=r"attack\.tcs' asks for '(posix|nt)\.system'"):
+    with pytest.raises(UnsafeStoreError, match=r"attack\.tcs' names '(posix|nt)\.system'"):
         load_scores(path)
 
 

@@ -1,7 +1,7 @@
-"""Check-up of a robot file: whether its arm, limits and shapes are fit for scoring.
+"""Check-up of a robot file: whether its arm, limits and primitives are fit for scoring.
 
-A room of its own, because it needs both a live scene, for Drake's word on kinematics and contact,
-and the kernel, for its solutions; and because no score, set or choice needs it.
+In: a robot. Out: the class of its arm, its limits, enclosure and self-collision at rest, an IK
+round trip between Drake and the kernel, and what follows from them as problems and notes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which class of arms the kernel takes an arm for, and whether its solutions come back."""
+"""The class of an arm in the kernel, and an IK round trip between Drake and the kernel."""
 
 from __future__ import annotations
 
@@ -18,37 +18,38 @@ from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.model.scene import Scene, arm_chain
 
 RECOVERED = 1e-4
-"""A posture counts as found again when every joint agrees to this [rad]. Figures of a URDF let axes
-miss each other by up to a nanometre; where two solutions fall together, joints feel its root."""
+"""Largest joint error of a recovered posture [rad]. Rounded figures of a URDF let axes miss each
+other by up to a nanometre; where two solutions coincide, the joint error grows with its root."""
 ON_GOAL = 1e-6
-"""A solution whose tool is farther off its goal than this [m or rad] is none: a branch without a
-solution comes out clipped to the nearest pose there is."""
+"""Largest pose error of a solution [m or rad]: a branch without a solution returns the nearest
+pose, which does not count."""
 
 _MEETING = (("2-3", (2, 3)), ("5-6-7", (5, 6, 7)), ("1-2-3", (1, 2, 3)), ("5-6", (5, 6)))
-"""Axes that have to meet in one point: the first two in one class, the others in its mirror
-image."""
+"""Axes that must meet in one point: the first two entries for a spherical-wrist arm, the others for
+a spherical-shoulder arm."""
 
 
 @dataclass(frozen=True, slots=True)
 class ArmClass:
-    """The class of arms that an arm belongs to.
+    """The class of an arm, which decides how inverse kinematics is solved.
 
     Attributes:
-        name: "closed form": axes 2 and 3 meet, and 5, 6 and 7, joint 1 is free. "reversed": its
-            mirror image, axes 1, 2 and 3 meet, and 5 and 6, joint 7 is free. None: outside both.
-        reason: Why it is outside, else empty.
-        distances: How far axes are from meeting in one point [m], by their numbers; None where two
+        name: "spherical-wrist": axes 2 and 3 meet in a point, and so do axes 5, 6 and 7; joint 1 is
+            the free joint. "spherical-shoulder": axes 1, 2 and 3 meet, and axes 5 and 6; joint 7 is
+            the free joint. None: neither, so there is no closed form.
+        reason: Why the arm is in neither class, else empty.
+        distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.
-        solver: The closed form's constants, None outside.
+        solver: Constants of the closed form, None if there is none.
     """
 
-    name: Literal["closed form", "reversed"] | None
+    name: Literal["spherical-wrist", "spherical-shoulder"] | None
     reason: str
     distances: dict[str, float | None]
     solver: ArmSolver | None
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the class as plain containers."""
         return {
             "class": self.name,
             "reason": self.reason,
@@ -58,19 +59,19 @@ class ArmClass:
 
 @dataclass(frozen=True, slots=True)
 class RoundTrip:
-    """Random postures, brought to a tool pose by Drake and back by the kernel.
+    """Result of an IK round trip: tool poses of random postures by Drake, solved by the kernel.
 
     Attributes:
-        method: "closed form", which has to give every posture back, or "numeric", which looks for
-            any posture with the same tool pose, and may fail.
-        samples: How many postures were drawn, uniformly within the limits.
-        recovered: How many of them are among the kernel's solutions; numeric: for how many there
-            is a solution at all.
-        solutions: How many solutions the kernel gave in all.
-        joint_error: The worst joint of the recovered postures [rad]; None where solutions are
-            other postures.
-        position_error: How far the worst solution's tool is off its goal [m].
-        rotation_error: The same for its orientation [rad].
+        method: "closed form", which must recover every posture, or "numeric", which searches for
+            any posture with the same tool pose and may fail.
+        samples: Number of postures, drawn uniformly within the limits.
+        recovered: Number of postures that are among the kernel's solutions; numeric: number of
+            postures whose tool pose has a solution.
+        solutions: Number of solutions in all.
+        joint_error: Largest joint error of the recovered postures [rad]; None for "numeric", where
+            solutions are other postures.
+        position_error: Largest position error of the tool [m].
+        rotation_error: Largest orientation error of the tool [rad].
     """
 
     method: Literal["closed form", "numeric"]
@@ -82,7 +83,7 @@ class RoundTrip:
     rotation_error: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the result as plain containers."""
         return {
             "method": self.method,
             "samples": self.samples,
@@ -102,22 +103,25 @@ def arm_class(chain: Chain) -> ArmClass:
         solver = arm_solver(chain)
     except ArmClassError as error:
         return ArmClass(None, str(error), distances, None)
-    return ArmClass("closed form" if solver.free == FIRST else "reversed", "", distances, solver)
+    name: Literal["spherical-wrist", "spherical-shoulder"] = (
+        "spherical-wrist" if solver.free == FIRST else "spherical-shoulder"
+    )
+    return ArmClass(name, "", distances, solver)
 
 
 def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) -> RoundTrip:
-    """Return what becomes of random postures on the way to their tool pose and back.
+    """Return the result of an IK round trip over random postures.
 
-    Drake says where the tool is; the kernel solves for that pose, in closed form with the free
-    joint where it was drawn, on every branch; Drake says where each solution puts the tool.
+    Drake computes the tool pose of a posture, the kernel solves for it, and Drake computes the tool
+    pose of each solution. The closed form is solved on every branch, with the free joint as drawn.
 
     Args:
-        scene: The robot, anywhere; its state is changed.
-        solver: The arm's closed form; None has the arm solved numerically.
+        scene: A scene of the robot; its state is changed.
+        solver: The closed form of the arm; None solves it numerically.
         samples: Number of postures.
         seed: Seed of the draws.
     """
-    # The chain is read off the scene with the arm at zero.
+    # The chain is read from the scene with the arm at zero.
     scene.set_arm(np.zeros(len(scene.arm_limits[0])))
     chain, _ = arm_chain(scene)
     lower, upper = scene.arm_limits
@@ -129,16 +133,16 @@ def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) 
         closest = np.inf
         for q in _solved(chain, solver, X_AG, drawn):
             X_GT = X_AG.inverse() @ _tool_in_arm_base(scene, q)
-            off = float(np.linalg.norm(X_GT.translation()))
-            turned = abs(float(X_GT.rotation().ToAngleAxis().angle()))
-            if max(off, turned) > ON_GOAL:
+            distance = float(np.linalg.norm(X_GT.translation()))
+            angle = abs(float(X_GT.rotation().ToAngleAxis().angle()))
+            if max(distance, angle) > ON_GOAL:
                 continue
             solutions += 1
-            position_error = max(position_error, off)
-            rotation_error = max(rotation_error, turned)
-            apart = (q - drawn + np.pi) % (2 * np.pi) - np.pi
-            closest = min(closest, float(np.abs(apart).max()))
-        # Any solution will do where the posture itself is one of a continuum.
+            position_error = max(position_error, distance)
+            rotation_error = max(rotation_error, angle)
+            difference = (q - drawn + np.pi) % (2 * np.pi) - np.pi
+            closest = min(closest, float(np.abs(difference).max()))
+        # The numeric method may return any solution of a continuum.
         if closest <= (np.pi if solver is None else RECOVERED):
             recovered += 1
             joint_error = max(joint_error, closest)
@@ -163,7 +167,7 @@ def _solved(
 
 
 def _branches(solver: ArmSolver, X_AG: RigidTransform, free: float) -> list[FloatArray]:
-    """Return what the closed form gives on every branch [rad], each of shape (7,)."""
+    """Return the solution of the closed form on every branch [rad], each of shape (7,)."""
     goal, found = np.zeros((4, 3)), []
     R_AG = np.ascontiguousarray(X_AG.rotation().matrix())
     wrist_goal(solver, R_AG, np.array(X_AG.translation()), goal)
@@ -183,29 +187,29 @@ def _tool_in_arm_base(scene: Scene, q: FloatArray) -> RigidTransform:
 
 
 def _distance_from_meeting(chain: Chain, axes: tuple[int, ...]) -> float | None:
-    """Return how far neighbouring axes are from meeting in one point [m].
+    """Return the distance of neighbouring axes from meeting in one point [m].
 
-    For two axes that is their distance. For three it is the largest of the distances of
-    neighbours, and of that between the two places where the outer ones come closest to the middle
-    one. Joint angles do not matter.
+    For two axes it is their distance. For three it is the largest of the distances of neighbours
+    and of the distance, along the middle axis, between the points where the outer ones come
+    closest. Joint angles do not matter.
     """
-    passes = [_closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
-    known = [passing for passing in passes if passing is not None]
-    if len(known) < len(passes):
+    approaches = [_closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
+    known = [approach for approach in approaches if approach is not None]
+    if len(known) < len(approaches):
         return None
-    slips = (abs(after[1] - before[2]) for before, after in itertools.pairwise(known))
-    return max(max(passing[0] for passing in known), *slips, 0.0)
+    offsets = (abs(after[1] - before[2]) for before, after in itertools.pairwise(known))
+    return max(max(approach[0] for approach in known), *offsets, 0.0)
 
 
 def _closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
-    """Return how the z axis of a frame passes that of another one at the pose (R, p) in it.
+    """Return the closest approach of the z axes of a frame and of a frame at (R, p) in it.
 
     Returns:
-        Their distance, and where they come closest, on each axis from its origin [m]; None where
-        they are parallel.
+        Their distance, and the position of the closest point on each axis from its origin [m]; None
+        if the axes are parallel.
     """
     directions = np.column_stack([[0.0, 0.0, 1.0], -R[:, 2]])
-    # Sines below a millionth are the rounding of a URDF's figures.
+    # A sine below a millionth comes from the rounding of the figures of a URDF.
     along, _, rank, _ = np.linalg.lstsq(directions, p, rcond=1e-6)
     if rank < 2:
         return None

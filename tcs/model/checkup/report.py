@@ -1,4 +1,4 @@
-"""The check-up of a robot: everything that scoring relies on, looked at once."""
+"""The check-up of a robot: properties that scoring relies on, and what is wrong with them."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from tcs.model.robots.urdf.surfaces import body_triangles
 from tcs.model.scene import EMPTY_ENVIRONMENT, Contact, Scene, SceneSpec, arm_chain
 
 MOST_EXCESS = 2.0
-"""Shapes of the arm and hand that take more than so many times the volume of the hull deserve a
-look: they block goals that the real arm reaches."""
+"""Volume of the primitives of a body over that of its hull above which the check-up adds a note: on
+arm and hand the excess blocks goals that the real arm reaches."""
 
 MOST_LOST = 0.05
-"""Share of tool poses that a numeric solver may find nothing for: more would show in the scores."""
+"""Fraction of tool poses without a numeric solution above which scores would be affected."""
 
 SUNK = 0.02
-"""Surfaces that reach farther below the floor than this [m] mean that the root does not lie on it;
-models of wheels sink in by millimetres."""
+"""Depth of a surface below the floor [m] above which the root is not on the floor; models of wheels
+reach millimetres below it."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint that scoring moves [rad or m]; infinite where it turns on and on.
+    """Limits of one joint that scoring moves [rad or m]; infinite for a continuous joint.
 
     Attributes:
         name: The joint.
-        soft: Of the URDF's `safety_controller`; the hard ones where it says none.
-        hard: Of the URDF's `limit`.
-        in_force: Those of the two that the robot file chooses.
+        soft: Limits of the `safety_controller` of the URDF; the hard ones if there is none.
+        hard: Limits of the `limit` element of the URDF.
+        in_force: The pair that the robot file selects.
     """
 
     name: str
@@ -46,11 +46,11 @@ class JointLimits:
 
     @property
     def is_continuous(self) -> bool:
-        """Whether the joint turns on and on."""
+        """Whether the joint has no limits."""
         return math.isinf(self.in_force[0])
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers; no limits are null, for JSON knows no infinity."""
+        """Return the limits as plain containers; those of a continuous joint are None."""
         pairs = {"in_force": self.in_force, "soft": self.soft, "hard": self.hard}
         plain = {k: None if self.is_continuous else list(pair) for k, pair in pairs.items()}
         return {"continuous": self.is_continuous, **plain}
@@ -58,19 +58,19 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class RobotCheck:
-    """What a check-up found.
+    """Result of a check-up.
 
     Attributes:
-        robot: The robot that was looked at.
-        arm: Its arm's class.
-        limits: Limits of the arm's joints, and of the torso if there is one, last.
-        bodies: How the primitives enclose each body with a surface.
-        rest: Where the arm was for self-collision, by joint [rad]: at rest, as the file says.
-        margin: Contacts closer than this count [m].
+        robot: The robot.
+        arm: The class of its arm.
+        limits: Limits of the joints of the arm, and of the torso last, if there is one.
+        bodies: Enclosure of each body with a surface.
+        rest: Rest posture of the arm, by joint [rad], in which self-collision was checked.
+        margin: Distance below which bodies are in contact [m].
         lowest: Height of the lowest point of any surface above the root, the arm at rest [m].
-        contacts: Pairs that scoring checks and that are closer than that at rest.
-        trip: The IK round trip.
-        seed: Seed of the round trip's postures.
+        contacts: Pairs that scoring checks and that are in contact at rest.
+        trip: Result of the IK round trip.
+        seed: Seed of the postures of the round trip.
     """
 
     robot: RobotFile
@@ -85,68 +85,70 @@ class RobotCheck:
     seed: int
 
     @property
-    def unseen(self) -> tuple[str, ...]:
-        """Bodies that the robot file adds: there is no mesh to hold their primitives against."""
+    def bodies_without_mesh(self) -> tuple[str, ...]:
+        """Bodies that the robot file adds, without a mesh to compare their primitives with."""
         return tuple(body.name for body in self.robot.bodies)
 
     @property
     def is_sound(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there are no problems."""
         return not self.problems
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What keeps the robot from being scored, or its scores from being right."""
+        """Faults that prevent scoring or make its results wrong, one sentence each."""
         found = []
         found += [
             f"joint '{joint.name}' cannot move: its limits in force are both {joint.in_force[0]:g}."
             for joint in self.limits
             if joint.in_force[0] == joint.in_force[1]
         ]
-        found += [_stands_out(body) for body in self.bodies if body.outside]
+        found += [_protrusion(body) for body in self.bodies if body.outside]
         found += [
             f"'{first}' and '{second}' are {distance * 1e3:.1f} mm apart with the arm at rest, "
-            f"less than the margin of {self.margin * 1e3:g} mm: mend their primitives, or name the "
-            "pair under disabled_groups if it may touch."
+            f"less than the margin of {self.margin * 1e3:g} mm: correct their primitives, or list "
+            "the pair under disabled_groups if it may touch."
             for first, second, distance in self.contacts
         ]
         if self.lowest < -SUNK:
             found.append(
                 f"its surface reaches {-self.lowest:.3f} m below '{self.robot.root_body}', but the "
-                "root has to lie on the floor: give the URDF a link there that carries the rest."
+                "root must be on the floor: add a root link on the floor to the URDF."
             )
         lost = self.trip.samples - self.trip.recovered
         if lost and self.arm.solver is not None:
             found.append(
                 f"{lost} of {self.trip.samples} random postures are not among the kernel's "
-                "solutions for their own tool pose."
+                "solutions for their tool pose."
             )
         if lost > MOST_LOST * self.trip.samples and self.arm.solver is None:
             found.append(
                 f"no solution for {lost} of {self.trip.samples} tool poses of random postures: "
-                "what scoring reaches would be too little to go by."
+                "scoring would miss too many goals."
             )
         return tuple(found)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is not wrong, but worth knowing."""
+        """Remarks on properties that are no problem, one sentence each."""
         found = []
         if self.arm.solver is None:
-            found.append(f"{self.arm.reason} So it is solved numerically, which takes longer.")
+            found.append(f"{self.arm.reason} It is solved numerically, which takes longer.")
         bulky = [b for b in self.bodies if b.body in self._moved and b.excess > MOST_EXCESS]
         found += [
-            f"the primitives of '{body.body}' take {body.excess:.2f} times the volume of its hull: "
+            f"the primitives of '{body.body}' have {body.excess:.2f} times the volume of its hull: "
             "goals may count as blocked that the real arm reaches."
             for body in bulky
         ]
-        if self.unseen:
+        if self.bodies_without_mesh:
             found.append(
-                f"no mesh to hold the primitives against: {', '.join(self.unseen)} "
+                f"no mesh to compare the primitives with: {', '.join(self.bodies_without_mesh)} "
                 "(bodies of the robot file)."
             )
         if self.robot.limits == "soft" and all(j.soft == j.hard for j in self.limits):
-            found.append("limits: soft, but the URDF has no safety_controller: the hard ones hold.")
+            found.append(
+                "limits: soft, but the URDF has no safety_controller: the hard limits are in force."
+            )
         return tuple(found)
 
     @property
@@ -155,7 +157,7 @@ class RobotCheck:
         return self.robot.model().links_moved_by(self.robot.arm_joints[0])
 
     def to_json(self) -> dict[str, Any]:
-        """Return everything as plain containers."""
+        """Return the result as plain containers."""
         return {
             "robot": self.robot.name,
             "sound": self.is_sound,
@@ -178,7 +180,7 @@ class RobotCheck:
                     }
                     for body in self.bodies
                 },
-                "without_mesh": list(self.unseen),
+                "without_mesh": list(self.bodies_without_mesh),
             },
             "excess_volume": {body.body: body.excess for body in self.bodies},
             "lowest_point_m": self.lowest,
@@ -195,12 +197,12 @@ class RobotCheck:
 
 
 def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCheck:
-    """Return what a look at everything that scoring relies on finds.
+    """Check every property of a robot that scoring relies on.
 
     Args:
         robot: The robot, as `load_robot` returns it.
-        samples: Random postures of the IK round trip.
-        seed: Seed of their draws.
+        samples: Number of random postures of the IK round trip.
+        seed: Seed of the draws.
 
     Raises:
         RobotError: If a model or mesh of the robot cannot be used.
@@ -245,10 +247,10 @@ def _lowest(robot: RobotFile, positions: Mapping[str, float]) -> float:
     return min(lows)
 
 
-def _stands_out(body: BodyEnclosure) -> str:
+def _protrusion(body: BodyEnclosure) -> str:
     if math.isinf(body.farthest):
         return f"'{body.body}' has a surface, but no primitive: fit one."
     return (
-        f"'{body.body}': {body.outside} of {body.triangles} triangles lie wholly in none of its "
-        f"primitives, up to {body.farthest * 1e3:.1f} mm out: fit them anew."
+        f"'{body.body}': {body.outside} of {body.triangles} triangles do not lie in one of its "
+        f"primitives, by up to {body.farthest * 1e3:.1f} mm: fit them again."
     )

@@ -1,4 +1,8 @@
-"""Robots: their files, their URDF, and the primitives that enclose their meshes."""
+"""Robots: their files, their URDF, and the primitives that enclose their meshes.
+
+In: a robot file (YAML), the URDF and meshes that it names, and its primitives (CSV). Out: a checked
+`RobotFile` with limits, postures and primitives, the URDF as values, and the text that Drake reads.
+"""
 
 from __future__ import annotations
 

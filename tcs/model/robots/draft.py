@@ -1,4 +1,4 @@
-"""Draft a robot file from a URDF: arm, torso, posture, shapes and pairs, found, not typed."""
+"""Draft a robot file from a URDF: arm, torso, posture, primitives and disabled pairs."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from tcs.model.robots.urdf.surfaces import body_triangles
 
 ARM_JOINTS = 7
 _VERTICAL = 0.99
-"""Cosine beyond which a sliding joint counts as a torso lift."""
+"""Cosine to the vertical above which a prismatic joint counts as torso joint."""
 _ON_FLOOR = 0.02
-"""Bodies that come as low as this [m] stand on the floor."""
+"""Bodies that reach down to this height [m] stand on the floor."""
 
 _HEADER = """\
-# Drafted by `tcs robot new`; look it over:
+# Drafted by `tcs robot new`; review these choices:
 {remarks}
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A robot file that nobody has looked over yet.
+    """A robot file drafted from a URDF, to be reviewed by the user.
 
     Attributes:
-        robot: What it says; its URDF is an absolute path or a `package://` address.
-        primitives: The collision shapes.
-        remarks: What was chosen and why, a line each.
+        robot: Content of the file; its URDF is an absolute path or a `package://` address.
+        primitives: The collision primitives.
+        remarks: The choices made, one line each.
     """
 
     robot: RobotFile
@@ -61,39 +61,39 @@ def draft_robot(
 ) -> Draft:
     """Return a robot file for a URDF.
 
-    The arm is the seven turning joints nearest the tool. The torso is a vertical sliding joint
-    between root and arm. Every other joint stands at 0 where its range reaches to both sides of
-    it, else in the middle of its range. Shapes enclose the meshes, as `fit_robot` has them, and
-    pairs need no check for the reasons of `propose_disabled_pairs`.
+    The arm consists of the seven revolute joints nearest the tool. The torso is a vertical
+    prismatic joint between root and arm. Every other joint is at 0 if its range includes values on
+    both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
+    `propose_disabled_pairs` the pairs that need no check.
 
     Args:
         urdf: Path of the URDF, or its `package://` address.
-        tool: T, the link that has to come to a goal.
-        base: Link that the arm has to start at or beyond; None is the root.
-        name: What to call the robot; None takes the URDF's file name.
-        on_progress: Called with the bodies fitted and all bodies.
+        tool: T, the link that moves to the goals.
+        base: Link at or beyond which the arm starts; None is the root.
+        name: Name of the robot; None is the file name of the URDF.
+        on_progress: Called with the number of bodies fitted and of all bodies.
 
     Raises:
-        UnknownNameError: If the URDF has no link named like tool or base.
-        RobotError: If the URDF or a mesh cannot be used, the tool does not hang on the base, or
-            fewer than seven turning joints lead to it.
+        UnknownNameError: If tool or base is not a link of the URDF.
+        RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or fewer
+            than seven revolute joints lead to it.
     """
     path = resolve_uri(str(urdf), Path()).resolve()
     model = read_urdf(path)
     arm, arm_base, torso = _arm(model, tool, base)
     if not body_triangles(model):
         raise RobotError(
-            f"URDF '{path}': no link has a visual or collision geometry, so nothing could ever "
-            "collide. Add shapes to its links."
+            f"URDF '{path}': no link has a visual or collision geometry, so there is nothing to "
+            "check for collisions. Add geometry to its links."
         )
     address = str(urdf) if str(urdf).startswith("package://") else str(path)
     posture, gripper = _positions(model, arm, torso)
     remarks = [
-        f"arm: the seven turning joints nearest '{tool}', from '{arm_base}' on: "
+        f"arm: the seven revolute joints nearest '{tool}', from '{arm_base}' on: "
         f"{', '.join(joint.name for joint in arm)}",
-        f"torso: {f'{torso.name!r}' if torso else 'no vertical sliding joint below the arm'}",
+        f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
     ]
-    # The search for pairs reads the shapes from their file.
+    # The search for disabled pairs reads the primitives from their file.
     with tempfile.TemporaryDirectory() as folder:
         shapes = Path(folder) / "primitives.csv"
         write_primitives(shapes, ())
@@ -122,37 +122,37 @@ def draft_robot(
         robot = robot.model_copy(update={"disabled_groups": propose_disabled_pairs(robot)})
         rest = free_posture(robot)
         if rest is None:
-            remarks.append(f"rest: none of {DRAWS} postures of the arm is free of self-collision")
+            remarks.append(f"rest: all of {DRAWS} postures of the arm are in self-collision")
         robot = robot.model_copy(update={"rest": rest or {}})
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks += [
-        f"shapes: {len(primitives)}, of which '{worst.body}' exceeds its hull most, "
+        f"primitives: {len(primitives)}; those of '{worst.body}' exceed its hull most, "
         f"{worst.fit.excess:.2f} times",
-        "posture: 0 where a joint's range reaches to both sides of it, else the middle of its "
-        "range; see that the gripper is open and a second arm out of the way",
-        f"root: '{model.root}' has to lie on the floor, z up, x forward",
+        "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
+        "check that the gripper is open and a second arm out of the way",
+        f"root: '{model.root}' must be on the floor, z up, x forward",
     ]
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
 
 
 def write_draft(draft: Draft, path: Path) -> Path:
-    """Write a draft as a YAML file with its shapes in a CSV file beside it; both or neither.
+    """Write a draft as a YAML file with its primitives in a CSV file beside it; both or neither.
 
     Args:
         draft: The draft.
-        path: The YAML file; it must not be there yet.
+        path: The YAML file; it must not exist yet.
 
     Returns:
-        The CSV file.
+        Path of the CSV file.
 
     Raises:
-        OutputError: If one of the two is there already or cannot be written.
+        OutputError: If one of the files exists or cannot be written.
     """
     shapes = check_free(path)
     content = draft.robot.model_dump(mode="json", exclude_defaults=True)
     content["primitives"] = shapes.name
     if not draft.robot.urdf.startswith("package://"):
-        # Folders of one's own move together.
+        # Relative, so that the folder of both files can be moved.
         content["urdf"] = Path(os.path.relpath(draft.robot.urdf, path.resolve().parent)).as_posix()
     text = _HEADER.format(remarks="\n".join(f"# - {remark}" for remark in draft.remarks))
     text += yaml.safe_dump(
@@ -169,45 +169,46 @@ def write_draft(draft: Draft, path: Path) -> Path:
 
 
 def check_free(path: Path) -> Path:
-    """Return the CSV file that belongs to a YAML file, if neither of them is there yet.
+    """Return the path of the CSV file for a YAML file, if neither of them exists.
 
     Raises:
-        OutputError: If one is, or the name does not end in `.yaml`.
+        OutputError: If one exists, or the name of the YAML file does not end in `.yaml`.
     """
     if path.suffix != ".yaml":
         raise OutputError(
-            f"robot file '{path}': its name must end in .yaml, by which `tcs` knows a path from "
-            "the name of a robot."
+            f"robot file '{path}': its name must end in .yaml, which tells a path from the name of "
+            "a robot."
         )
     shapes = path.with_name(f"{path.stem}_primitives.csv")
     for file in (path, shapes):
         if file.exists():
-            raise OutputError(f"'{file}' is already there. Remove it, or name another file.")
+            raise OutputError(f"'{file}' already exists. Remove it, or name another file.")
     return shapes
 
 
 def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Joint | None]:
-    """Return the arm's joints, the link that carries the first one, and the torso joint."""
+    """Return the joints of the arm, the link that carries the first one, and the torso joint."""
     where = f"URDF '{model.path}'"
     for what, link in (("tool frame", tool), ("base", base)):
         if link is not None and link not in model.links:
             raise UnknownNameError("link", link, model.links, where=f"{where}, {what}")
     chain = model.chain(base or model.root, tool)
     if chain is None:
-        raise RobotError(f"{where}: tool frame '{tool}' does not hang on base '{base}'.")
+        raise RobotError(f"{where}: base '{base}' does not carry tool frame '{tool}'.")
     movable = [joint for joint in chain if joint.is_movable]
     arm: list[Joint] = []
     end = ""
     for joint in reversed(movable):
         if joint.type == "prismatic" or joint.mimic is not None:
-            end = f"; '{joint.name}' before them {'mimics another' if joint.mimic else 'slides'}"
+            obstacle = "mimics another" if joint.mimic else "is prismatic"
+            end = f"; '{joint.name}' before them {obstacle}"
         if end or len(arm) == ARM_JOINTS:
             break
         arm.insert(0, joint)
     if len(arm) < ARM_JOINTS:
         found = ", ".join(joint.name for joint in arm) or "none"
         raise RobotError(
-            f"{where}: an arm of seven turning joints is needed, but from "
+            f"{where}: an arm of seven revolute joints is needed, but from "
             f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
             f"({found}{end}). Name another tool frame or base."
         )
@@ -217,22 +218,22 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
 
 
 def _torso(model: Urdf, arm_base: str) -> Joint | None:
-    """Return the vertical sliding joint of the greatest travel between root and arm, if any."""
-    lifts = []
+    """Return the vertical prismatic joint of the greatest travel between root and arm, if any."""
+    vertical = []
     for joint in model.chain(model.root, arm_base) or ():
         if joint.type != "prismatic" or joint.mimic is not None:
             continue
         R, _ = pose_in_root(model, joint.child, {})
         axis = R @ np.array(joint.axis) / np.linalg.norm(joint.axis)
         if axis[2] > _VERTICAL:
-            lifts.append(joint)
-    return max(lifts, key=lambda joint: joint.soft[1] - joint.soft[0], default=None)
+            vertical.append(joint)
+    return max(vertical, key=lambda joint: joint.soft[1] - joint.soft[0], default=None)
 
 
 def _positions(
     model: Urdf, arm: list[Joint], torso: Joint | None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return where the other joints stand [rad or m]: those the hand carries apart."""
+    """Return the positions of the other joints, and of those in the hand [rad or m]."""
     held = model.links_moved_by(arm[-1].name)
     posture: dict[str, float] = {}
     gripper: dict[str, float] = {}
@@ -249,7 +250,7 @@ def _positions(
 def _standing(
     model: Urdf, posture: dict[str, float], arm: list[Joint], torso: Joint | None
 ) -> tuple[str, ...]:
-    """Return the bodies that reach down to the floor, but for those that arm or torso move."""
+    """Return the bodies that reach down to the floor and that neither arm nor torso moves."""
     first = [joint.name for joint in (arm[0], torso) if joint is not None]
     moved = frozenset[str]().union(*map(model.links_moved_by, first))
     found = []
@@ -261,14 +262,12 @@ def _standing(
 
 
 def _source(path: Path, address: str) -> str:
-    """Return where the figures come from, and what is known about their licence."""
-    licence = "no package.xml lies above it: look up its licence before you pass anything on"
+    """Return the origin of the figures, and what is known about their licence."""
+    licence = "no package.xml in a folder above it: look up its licence before passing it on"
     for folder in path.parents:
         package = folder / "package.xml"
         if package.is_file():
-            licence = (
-                f"the package it lies in is licensed {_licence(package)}; its meshes may not be"
-            )
+            licence = f"its package is licensed {_licence(package)}; its meshes may not be"
             break
     shown = path.name if address == str(path) else address
     figures = f"Kinematics, limits and meshes: {shown}; {licence}. No mesh is copied."

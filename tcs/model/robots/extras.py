@@ -1,4 +1,4 @@
-"""A robot's URDF together with the frames and bodies that its file adds."""
+"""The URDF of a robot extended by the frames and bodies that its robot file adds."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tcs.model.robots.urdf.kinematic import kinematic_urdf
 
 
 def model_with_extras(robot: RobotFile) -> Urdf:
-    """Return the URDF's model with extra frames and bodies as further links on fixed joints.
+    """Return the URDF with the extra frames and bodies as further links on fixed joints.
 
-    The primitives of an extra body stand for its surface, for nothing else is known of it; a
-    capsule becomes a cylinder with a sphere at either end.
+    An extra body has no mesh: its primitives serve as its surface. A capsule becomes a cylinder
+    with a sphere at either end.
 
     Raises:
         RobotError: If the URDF cannot be used.
@@ -75,10 +75,10 @@ def _geometries(shape: BodyPrimitive) -> tuple[Geometry, ...]:
     )
     if shape.kind == "box":
         return (geometry,)
-    ball = replace(geometry, shape="sphere", size=shape.size[:1])
+    sphere = replace(geometry, shape="sphere", size=shape.size[:1])
     if shape.kind == "sphere":
-        return (ball,)
+        return (sphere,)
     along = Rotation.from_euler("xyz", shape.rpy).as_matrix()[:, 2] * (shape.size[1] / 2)
     ends = np.array(shape.xyz) + np.stack([along, -along])
-    balls = tuple(replace(ball, xyz=(float(x), float(y), float(z))) for x, y, z in ends)
-    return (replace(geometry, shape="cylinder"), *balls)
+    caps = tuple(replace(sphere, xyz=(float(x), float(y), float(z))) for x, y, z in ends)
+    return (replace(geometry, shape="cylinder"), *caps)

@@ -1,4 +1,4 @@
-"""Boxes, capsules and spheres that enclose a robot's meshes, and the CSV files that keep them."""
+"""Boxes, capsules and spheres that enclose the meshes of a robot, and the CSV files of them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ BoolArray = NDArray[np.bool_]
 
 Kind = Literal["sphere", "capsule", "box"]
 SIZES: dict[str, int] = {"sphere": 1, "capsule": 2, "box": 3}
-"""How many numbers `size` holds."""
+"""Length of `size` for each type of shape."""
 
 _COLUMNS = (
     "body", "kind", "size_a", "size_b", "size_c", "x", "y", "z", "qw", "qx", "qy", "qz",
 )  # fmt: skip
-# Written with 6 decimals (rotations with 9), so a quaternion's length is 1 to a few 1e-9.
+# Files hold 9 decimals of a rotation, so the length of a quaternion is 1 to a few 1e-9.
 _UNIT_TOLERANCE = 1e-6
 
 
@@ -35,7 +35,7 @@ class Primitive:
     """One convex shape P on a body B of the robot.
 
     Raises:
-        RobotError: If the kind is unknown, a size is not positive, or the quaternion is not unit.
+        RobotError: If `kind` is unknown, a size is not positive, or the quaternion is not unit.
     """
 
     body: str
@@ -51,7 +51,7 @@ class Primitive:
     def __post_init__(self) -> None:
         where = f"primitive of body '{self.body}'"
         if self.kind not in SIZES:
-            raise RobotError(f"{where}: kind '{self.kind}' is none of {', '.join(SIZES)}.")
+            raise RobotError(f"{where}: kind is '{self.kind}', but must be {', '.join(SIZES)}.")
         if len(self.size) != SIZES[self.kind] or not all(0 < s < math.inf for s in self.size):
             raise RobotError(
                 f"{where}: a {self.kind} needs {SIZES[self.kind]} positive size(s) [m], "
@@ -81,7 +81,7 @@ class Primitive:
 
         Args:
             p_BoQ_B: Points in the body frame [m], shape (..., 3).
-            tolerance: How far outside a point may lie [m].
+            tolerance: Distance outside that still counts as inside [m].
 
         Returns:
             Booleans, shape (...).
@@ -97,7 +97,7 @@ class Primitive:
         return np.asarray(np.square(p_PoQ_P).sum(axis=-1) <= radius**2)
 
     def distance(self, p_BoQ_B: FloatArray) -> FloatArray:
-        """Return how far points of the body lie outside the primitive [m], 0 inside.
+        """Return the distances of points of the body from the primitive [m], 0 inside.
 
         Args:
             p_BoQ_B: Points in the body frame [m], shape (..., 3).
@@ -114,11 +114,11 @@ class Primitive:
         return np.asarray(np.maximum(beyond - radius, 0.0))
 
     def contains_triangles(self, triangles: FloatArray, *, tolerance: float = 0.0) -> BoolArray:
-        """Return which triangles lie wholly in the primitive: it is convex, so corners decide.
+        """Return which triangles lie wholly in the primitive, by their corners: it is convex.
 
         Args:
             triangles: Corners in the body frame [m], shape (n, 3, 3).
-            tolerance: How far outside a corner may lie [m].
+            tolerance: Distance outside that still counts as inside [m].
 
         Returns:
             Booleans, shape (n,).
@@ -129,7 +129,7 @@ class Primitive:
         """Return the primitive with every face moved inward by `by` [m]; negative: outward.
 
         Raises:
-            RobotError: If nothing would be left.
+            RobotError: If no volume would be left.
         """
         if self.kind == "box":
             size = tuple(s - 2 * by for s in self.size)
@@ -169,7 +169,8 @@ def quaternion_of_rpy(rpy: Iterable[float]) -> tuple[float, float, float, float]
 def enclosed(primitives: Iterable[Primitive], triangles: FloatArray) -> BoolArray:
     """Return which triangles lie wholly in at least one of the primitives.
 
-    Corners in two different primitives would not do: the middle could stand out between them.
+    A triangle whose corners lie in different primitives does not count: its middle could protrude
+    between them.
 
     Args:
         primitives: Primitives of one body.
@@ -185,15 +186,15 @@ def enclosed(primitives: Iterable[Primitive], triangles: FloatArray) -> BoolArra
 
 
 def union_volume(primitives: Iterable[Primitive], samples: int = 20_000, seed: int = 0) -> float:
-    """Return the volume that the primitives of one body fill together [m^3].
+    """Return the volume of the union of the primitives of one body [m^3].
 
-    Each primitive is sampled uniformly; a point that lies in m of them counts 1/m. One primitive
-    alone is therefore exact, and the standard error of several is at most half their summed volume
-    over the square root of the samples each gets.
+    Each primitive is sampled uniformly; a point that lies in m of them counts 1/m. The volume of
+    one primitive is exact; the standard error of a union is at most half the summed volume over the
+    square root of the samples per primitive.
 
     Args:
         primitives: Primitives of one body.
-        samples: Points in each primitive.
+        samples: Points per primitive.
         seed: Seed of the points; the same seed gives the same volume.
     """
     shapes = tuple(primitives)
@@ -225,7 +226,7 @@ def write_primitives(path: Path, primitives: Iterable[Primitive]) -> None:
     """Write primitives to a CSV file: metres with 6 decimals, quaternions (wxyz) with 9.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the file cannot be written.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -239,17 +240,17 @@ def write_primitives(path: Path, primitives: Iterable[Primitive]) -> None:
 
 
 def read_primitives(path: Path) -> tuple[Primitive, ...]:
-    """Return the primitives that a CSV file holds, in its order.
+    """Return the primitives of a CSV file, in its order.
 
     Raises:
-        RobotError: If the file cannot be read, or a row makes no primitive.
+        RobotError: If the file cannot be read, or a row is not a valid primitive.
     """
     try:
         rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
     except OSError as error:
         raise RobotError(f"primitives '{path}' cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        raise RobotError(f"primitives '{path}' is no text file in UTF-8.") from error
+        raise RobotError(f"primitives '{path}' is not a text file in UTF-8.") from error
     found = []
     for number, row in enumerate(rows, start=2):
         where = f"primitives '{path}', line {number}"

@@ -70,7 +70,7 @@ def test_shapes_that_are_too_small_are_found(pr2, tmp_path):
     assert not found.is_sound
     (problem,) = found.problems
     assert "'l_upper_arm_link'" in problem
-    assert "lie wholly in none" in problem
+    assert "do not lie in one" in problem
 
 
 def test_a_body_without_shapes_is_found(pr2, tmp_path):

@@ -94,7 +94,7 @@ def test_pairs_that_need_no_check_cannot_meet(drafted):
             assert not touching & set(group.pairs)
     off = {frozenset(pair) for pair in robot.disabled_pairs}
     met = {frozenset(pair) for pair in touching} - off
-    # Folded back, the hand meets the mast, the base or the upper arm: these stay checked.
+    # When the arm is bent back, the hand meets the mast, the base or the upper arm: these stay checked.
     assert met
 
 
@@ -103,14 +103,14 @@ def test_arm_base_may_be_named(path):
     assert draft_robot(path, "tool", base="mast").robot.arm_base == "mast"
     with pytest.raises(RobotError, match="only 6 in a row"):
         draft_robot(path, "tool", base="arm1")
-    with pytest.raises(RobotError, match="does not hang on base 'head'"):
+    with pytest.raises(RobotError, match="base 'head' does not carry"):
         draft_robot(path, "tool", base="head")
 
 
 def test_too_few_joints_are_one_clear_line(tmp_path):
     file = tmp_path / "short.urdf"
     file.write_text(urdf(joints=5))
-    found = r"only 5 in a row lead there \(a1, a2, a3, a4, a5; 'lift' before them slides\)"
+    found = r"only 5 in a row lead there \(a1, a2, a3, a4, a5; 'lift' before them is prismatic\)"
     with pytest.raises(RobotError, match=found) as e:
         draft_robot(file, "tool")
     assert "\n" not in str(e.value)
@@ -129,11 +129,11 @@ def test_unknown_tool_names_the_nearest(path):
         (
             "revolute",
             "prismatic",
-            r"only 3 in a row lead there \(a5, a6, a7; 'a4' before them slides",
+            r"only 3 in a row lead there \(a5, a6, a7; 'a4' before them is prismatic",
         ),
         ("revolute", "revolute", r"\(a5, a6, a7; 'a4' before them mimics another\)"),
     ],
-    ids=["slides", "mimics"],
+    ids=["prismatic", "mimics"],
 )
 def test_a_joint_that_ends_the_arm_too_soon_is_named(tmp_path, old, new, message):
     mimic = '<mimic joint="a3"/>' if old == new else ""
@@ -157,7 +157,7 @@ def test_missing_meshes_are_named(tmp_path):
 def test_a_robot_without_any_shape_is_refused(tmp_path):
     file = tmp_path / "bare.urdf"
     file.write_text(urdf().replace("visual>", "ignored>"))
-    with pytest.raises(RobotError, match="nothing could ever collide"):
+    with pytest.raises(RobotError, match="nothing to check for collisions"):
         draft_robot(file, "tool")
 
 
@@ -178,7 +178,7 @@ def test_nothing_is_overwritten(drafted, tmp_path):
     draft = drafted[0]
     kept = tmp_path / "mine_primitives.csv"
     kept.write_text("mine")
-    with pytest.raises(OutputError, match=r"mine_primitives\.csv' is already there"):
+    with pytest.raises(OutputError, match=r"mine_primitives\.csv' already exists"):
         write_draft(draft, tmp_path / "mine.yaml")
     assert not (tmp_path / "mine.yaml").exists()
     assert kept.read_text() == "mine"

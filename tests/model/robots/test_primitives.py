@@ -88,7 +88,7 @@ def test_file_holds_what_was_written(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("box", "cone", "line 2.*'cone' is none of"),
+        ("box", "cone", "line 2.*kind is 'cone', but must be sphere"),
         ("0.100000", "-0.100000", "line 2.*positive"),
         ("0.100000", "wide", "line 2.*wide"),
         ("1.000000000", "0.900000000", "line 2.*length 1"),

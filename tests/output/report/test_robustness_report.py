@@ -106,7 +106,7 @@ def test_files_are_written_whole(study, pictures, plan, tmp_path):
 
 def test_a_path_that_takes_no_folder_is_reported(study, pictures, plan, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be made"):
+    with pytest.raises(OutputError, match="cannot be created"):
         write_report(tmp_path / "file" / "x", [study], [pictures], plan, seconds=1.0, command="it")
 
 

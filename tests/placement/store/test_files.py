@@ -154,10 +154,10 @@ def test_a_missing_file_is_told(path):
 
 
 def test_a_folder_or_pipe_is_no_file(tmp_path):
-    with pytest.raises(StoreError, match="no regular file"):
+    with pytest.raises(StoreError, match="not a regular file"):
         load_scores(tmp_path)
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(StoreError, match="no regular file"):
+    with pytest.raises(StoreError, match="not a regular file"):
         load_scores(tmp_path / "pipe")
 
 
@@ -229,7 +229,7 @@ def test_another_joblib_file_is_told(path, content, compress):
 def test_a_longer_file_is_told(path, file):
     save_scores(path, file)
     path.write_bytes(path.read_bytes() + b"more")
-    with pytest.raises(StoreFormatError, match="goes on after its end"):
+    with pytest.raises(StoreFormatError, match="continues after its end"):
         load_scores(path)
 
 

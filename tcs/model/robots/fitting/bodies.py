@@ -24,22 +24,22 @@ from tcs.model.robots.urdf.surfaces import (
 
 FloatArray = NDArray[np.float64]
 
-# What the kernel checks grows with the number of shapes, so each must earn its place.
+# The cost of a collision check grows with the number of shapes.
 HAND = Target(excess=1.25, max_shapes=2)
-"""Goals lie 1-4 cm off the skin: a bulky hand would block what the real one reaches."""
+"""Goals are 1-4 cm from the skin: a bulky hand would block goals that the real one reaches."""
 ARM = Target(excess=1.40, max_shapes=2)
 """Links that the arm joints move."""
 REST = Target(excess=0.0, max_shapes=6)
-"""Base, torso, head: as closely as a few shapes can, for they are large and not convex."""
+"""Base, torso and head: large and not convex, so the fit uses every shape allowed."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodyFit:
-    """What encloses one body, or several welded together.
+    """Primitives of one body, or of several that are welded together.
 
     Attributes:
         body: The body that carries the primitives.
-        enclosed: Every body whose triangles they enclose.
+        enclosed: Bodies whose triangles they enclose.
         fit: The primitives and their excess.
     """
 
@@ -53,9 +53,9 @@ def fit_robot(
 ) -> tuple[BodyFit, ...]:
     """Return primitives that enclose every triangle of a robot, body by body.
 
-    What is welded to the root (a base with its wheels) is enclosed as one body; other bodies each
-    on their own. Bodies of the same shape, such as those of a left and a right arm, get the same
-    primitives. What the URDF draws as a few boxes keeps these.
+    The root and the bodies welded to it (a base with its wheels) are enclosed as one body. Bodies
+    of the same shape, such as those of a left and a right arm, get the same primitives. A body that
+    the URDF describes by a few boxes keeps them.
 
     Args:
         robot: The robot.
@@ -73,7 +73,7 @@ def fit_robot(
     for body in groups:
         target = HAND if body in held else ARM if body in moved else REST
         key = _shape_key(model, body) if body in triangles else body
-        # The scored arm decides for the other one, too: same shape, same primitives.
+        # The target of the scored arm holds for the other arm, which has the same shapes.
         known = targets.get(key, REST)
         targets[key] = min(known, target, key=lambda t: t.max_shapes)
     fits: dict[object, tuple[Fit, FloatArray, FloatArray]] = {}
@@ -86,7 +86,7 @@ def fit_robot(
         R, p = _key_frame(model, body)
         if key not in fits:
             target = targets.get(key, REST)
-            fit = _as_drawn(model, body, members, target) or fit_triangles(body, own, target)
+            fit = _boxes_of_urdf(model, body, members, target) or fit_triangles(body, own, target)
             fits[key] = fit, R, p
         else:
             fit = _transferred(fits[key], body, own, R, p)
@@ -99,7 +99,7 @@ def fit_robot(
 def _groups(
     robot: RobotFile, model: Urdf, triangles: dict[str, FloatArray]
 ) -> dict[str, list[str]]:
-    """Return which bodies are enclosed together, by the body that carries the primitives."""
+    """Return the bodies that are enclosed together, by the body that carries the primitives."""
     groups: dict[str, list[str]] = {}
     standing = [body for body in triangles if welded_top(model, body)[0] == robot.root_body]
     if standing:
@@ -111,7 +111,7 @@ def _groups(
 def _in_frame_of(
     model: Urdf, body: str, members: list[str], triangles: dict[str, FloatArray]
 ) -> FloatArray:
-    """Return the triangles of welded bodies in the frame of one of them [m], shape (n, 3, 3)."""
+    """Return the triangles of bodies welded together in the frame of one [m], shape (n, 3, 3)."""
     _, R_AB, p_AB = welded_top(model, body)
     pieces = []
     for member in members:
@@ -121,9 +121,9 @@ def _in_frame_of(
     return np.concatenate(pieces)
 
 
-def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit | None:
-    """Return the boxes that the URDF draws, if there is nothing else and they are few."""
-    # Once each: what is seen and what is touched are often the same box.
+def _boxes_of_urdf(model: Urdf, body: str, members: list[str], target: Target) -> Fit | None:
+    """Return the boxes of the URDF if it has only a few boxes for a body, else None."""
+    # Each box once: visual and collision geometry are often the same.
     drawn = {
         (member, g.shape, g.size, g.xyz, g.rpy): (member, g)
         for member in members
@@ -145,19 +145,19 @@ def _as_drawn(model: Urdf, body: str, members: list[str], target: Target) -> Fit
 
 
 def _key_frame(model: Urdf, body: str) -> tuple[FloatArray, FloatArray]:
-    """Return the pose in the body of its first geometry: R of shape (3, 3), p of shape (3,)."""
+    """Return the pose of the first geometry in its body: R of shape (3, 3), p of shape (3,)."""
     first = surface_geometries(model, body)[0]
     return Rotation.from_euler("xyz", first.rpy).as_matrix(), np.array(first.xyz)
 
 
 def _shape_key(model: Urdf, body: str) -> object:
-    """Return what two bodies share when they are equal but for where their geometry sits."""
+    """Return a key that is equal for bodies of the same shape, wherever their frame is."""
     R, p = _key_frame(model, body)
     keys = set()
     for geometry in surface_geometries(model, body):
         corners = place(geometry_triangles(geometry)[:1], geometry.xyz, geometry.rpy)
-        seen = np.round((corners - p) @ R, 6) + 0.0
-        keys.add((geometry.shape, geometry.mesh, geometry.size, seen.tobytes()))
+        in_key_frame = np.round((corners - p) @ R, 6) + 0.0
+        keys.add((geometry.shape, geometry.mesh, geometry.size, in_key_frame.tobytes()))
     return frozenset(keys)
 
 
@@ -168,13 +168,13 @@ def _transferred(
     R: FloatArray,
     p: FloatArray,
 ) -> Fit:
-    """Return the fit of a body of the same shape, turned to this body and measured anew."""
+    """Return the fit of a body of the same shape, rotated to this body and measured again."""
     fit, R_known, p_known = known
     R_step = R @ R_known.T
     in_known = (triangles - p) @ R_step + p_known
     shapes: list[Primitive] = []
     for shape in fit.primitives:
-        # What the other body's file holds was rounded outward by a few micrometres.
+        # The shapes of the other body were rounded outward by a few micrometres.
         inside = shape.contains_triangles(in_known, tolerance=1e-9)
         points = corner_points(triangles[inside])
         shapes.append(enclose(body, points, shape.kind, R_step @ shape.rotation))

@@ -1,4 +1,4 @@
-"""The tightest box or capsule around a set of triangles."""
+"""Smallest bounding boxes and capsules of points."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ FloatArray = NDArray[np.float64]
 _DECIMALS = 6
 _STEP = 10.0**-_DECIMALS
 _QUATERNION_DECIMALS = 9
-# Thinner than any part that matters; a flat part still needs a box with some thickness.
+# A flat part still needs a box with some thickness; this is thinner than any relevant part.
 _THINNEST = 1e-4
 _FACETS = 32
-"""So many facets of a hull at most are looked at closely: those of a rounded part go into the
-thousands, and all but a few can be told to be worse by a glance."""
-_GLANCES = np.linspace(0.0, np.pi / 2, 6, endpoint=False)
-"""Angles about a facet's normal at which a box is tried at a glance [rad]."""
+"""Most facets of a hull for which the smallest rectangle is computed: a rounded part has thousands,
+and a coarse estimate rules out most of them."""
+_COARSE_ANGLES = np.linspace(0.0, np.pi / 2, 6, endpoint=False)
+"""Angles about the normal of a facet at which its box is estimated [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A shape that encloses some points, before it is rounded and named.
+    """A bounding shape of points, before its figures are rounded.
 
     Attributes:
         kind: "box" or "capsule".
@@ -43,7 +43,7 @@ class Candidate:
 
 
 def corner_points(triangles: FloatArray) -> FloatArray:
-    """Return the corners that decide about enclosing: those of the convex hull, shape (m, 3).
+    """Return the corners of the convex hull of triangles, shape (m, 3).
 
     Args:
         triangles: Corners [m], shape (n, 3, 3).
@@ -52,18 +52,18 @@ def corner_points(triangles: FloatArray) -> FloatArray:
 
 
 def hull_corners(points: FloatArray) -> FloatArray:
-    """Return which of some points are the corners of their convex hull, shape (m, 3)."""
+    """Return the points that are corners of the convex hull of points, shape (m, 3)."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except QhullError:
-        # Flat or too few: all of them then.
+        # Flat or too few points.
         return points
 
 
 def hull_volume(triangles: FloatArray) -> float:
     """Return the volume of the convex hull of triangles [m^3], shape (n, 3, 3).
 
-    A flat part has none; it counts as the box around it, a tenth of a millimetre thick.
+    A flat part counts as its bounding box, with a thickness of a tenth of a millimetre.
     """
     points = triangles.reshape(-1, 3)
     try:
@@ -73,10 +73,10 @@ def hull_volume(triangles: FloatArray) -> float:
 
 
 def tightest_orientation(points: FloatArray) -> FloatArray:
-    """Return the orientation R_BP of the smallest box around points that rests on a hull facet.
+    """Return the orientation R_BP of the smallest box around points with a face on a hull facet.
 
-    For each facet of the hull the box that has it as a face is the smallest rectangle around the
-    points as seen along its normal. The smallest box of all need not rest on a facet, but is
+    The cross-section of such a box is the smallest rectangle around the points projected along the
+    normal of the facet. The smallest box of any orientation need not have a face on a facet, but is
     hardly smaller.
 
     Args:
@@ -93,7 +93,7 @@ def tightest_orientation(points: FloatArray) -> FloatArray:
         seen = points @ frame
         angle, area = _tightest_rectangle(seen[:, :2])
         volume = area * float(np.ptp(seen[:, 2]))
-        # A box must beat another clearly: then the result does not hang on rounding.
+        # A margin, so that the result does not depend on rounding.
         if volume < best_volume * (1 - 1e-9):
             best_volume = volume
             c, s = math.cos(angle), math.sin(angle)
@@ -106,15 +106,15 @@ def best_candidate(points: FloatArray, orientations: FloatArray) -> Candidate:
 
     Args:
         points: [m], shape (m, 3).
-        orientations: Further orientations worth a try, shape (k, 3, 3).
+        orientations: Further orientations to try, shape (k, 3, 3).
     """
     tried = [tightest_orientation(points), *orientations]
     boxes = [Candidate("box", R, _box_volume(points, R)) for R in tried]
     smallest = min(boxes, key=lambda candidate: candidate.volume)
-    # A capsule lies along any axis of a frame worth a try.
+    # A capsule may lie along any axis of a frame.
     for R, axis in itertools.product(tried[:2], range(3)):
         frame = np.roll(R, 2 - axis, axis=1)
-        # The circle takes long to find; it is at least as wide as the points.
+        # A lower bound of the volume first, because finding the circle is slow.
         width, height = np.ptp(points @ frame[:, :2], axis=0).max(), np.ptp(points @ frame[:, 2])
         if _capsule_volume(width / 2, max(height - width, 0.0)) < smallest.volume:
             radius, length, _ = _capsule_around(points, frame)
@@ -125,10 +125,10 @@ def best_candidate(points: FloatArray, orientations: FloatArray) -> Candidate:
 
 
 def enclose(body: str, points: FloatArray, kind: str, R: FloatArray) -> Primitive:
-    """Return the primitive of that kind and orientation around points, rounded outward.
+    """Return the bounding primitive of points with a given orientation, rounded outward.
 
-    Orientation and centre are rounded first, then the sizes are measured from there and rounded
-    up, so what the file holds encloses every point exactly.
+    Orientation and centre are rounded first; the sizes are measured from the rounded pose and
+    rounded up, so the figures in the file enclose every point exactly.
 
     Args:
         body: Name of the body.
@@ -162,7 +162,7 @@ def enclose(body: str, points: FloatArray, kind: str, R: FloatArray) -> Primitiv
 
 
 def _rounded_up(length: float) -> float:
-    """Return a length rounded up, with a step to spare for the arithmetic of whoever checks."""
+    """Return a length rounded up, plus one step as margin for rounding errors in checks."""
     return round((math.ceil(length / _STEP) + 1) * _STEP, _DECIMALS)
 
 
@@ -181,14 +181,14 @@ def _capsule_volume(radius: float, length: float) -> float:
 
 
 def _frame_with_z(z: FloatArray) -> FloatArray:
-    """Return a right-handed frame whose z axis is given, shape (3, 3)."""
+    """Return a right-handed frame with a given z axis, shape (3, 3)."""
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
 def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:
-    """Return the frames whose z a small box around points may well have, shape (k, 3, 3)."""
+    """Return the frames whose box around points has the least estimated volume, shape (k, 3, 3)."""
     if len(frames) <= _FACETS:
         return frames
     x, y, z = np.moveaxis(frames, 2, 0)
@@ -199,10 +199,10 @@ def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:
     areas = [
         widths(math.cos(angle) * x + math.sin(angle) * y)
         * widths(math.cos(angle) * y - math.sin(angle) * x)
-        for angle in _GLANCES
+        for angle in _COARSE_ANGLES
     ]
     volumes = np.min(areas, axis=0) * widths(z)
-    # In the order of the facets, so that a tie goes to the same one as ever.
+    # In the order of the facets, so that ties are resolved in the same way.
     chosen = np.sort(np.argsort(volumes, kind="stable")[:_FACETS])
     return np.asarray(frames[chosen])
 
@@ -227,7 +227,7 @@ def _capsule_around(points: FloatArray, R: FloatArray) -> tuple[float, float, Fl
     seen = points @ R
     middle, radius = _circle_around(seen[:, :2])
     off_axis = np.square(seen[:, :2] - middle).sum(axis=1)
-    # How far before a point a cap centre may lie and still reach it.
+    # Largest axial distance from a point to a cap centre whose cap contains it.
     reach = np.sqrt(np.maximum(radius**2 - off_axis, 0.0))
     top, bottom = float((seen[:, 2] - reach).max()), float((seen[:, 2] + reach).min())
     centre = R @ np.array([*middle, (top + bottom) / 2])
@@ -238,8 +238,9 @@ def _circle_around(points: FloatArray, steps: int = 2000) -> tuple[FloatArray, f
     """Return centre and radius of a circle around points, shape (m, 2), nearly the smallest.
 
     Source:
-        Badoiu and Clarkson, "Smaller core-sets for balls", 2003: step toward the farthest point,
-        each time by a smaller share; the radius is off by less than 1/steps.
+        Badoiu and Clarkson, "Smaller core-sets for balls", 2003: step toward the farthest point
+        by a decreasing fraction of the distance; the relative error of the radius is below
+        1/steps.
     """
     centre = points.mean(axis=0)
     for i in range(1, steps):

@@ -1,4 +1,7 @@
-"""Fit boxes and capsules to triangles so that each triangle lies wholly inside one of them."""
+"""Divide triangles into parts and fit a box or capsule to each part.
+
+Every triangle lies wholly inside one of the shapes.
+"""
 
 from __future__ import annotations
 
@@ -23,25 +26,25 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 _BEAM = 6
-"""Divisions that are pursued side by side."""
+"""Beam width: divisions that are kept in each step of the search."""
 _SPLITS = 8
-"""Splits of one cluster that are pursued."""
+"""Splits of one part that are kept."""
 _ENOUGH = 0.04
-"""A further shape must save this share of the hull's volume, or it is not worth its cost."""
+"""Least volume that a further shape must save, as a fraction of the hull volume."""
 _FINE = 15_000
-"""More triangles than this are not divided one by one: small neighbours stay together, or a finely
-meshed cover would take many minutes."""
+"""Number of triangles above which small neighbouring triangles are grouped into units; the division
+of a fine mesh would otherwise take many minutes."""
 _MOST_UNITS = 4_000
-"""So many groups of triangles at most are divided then."""
+"""Most units of grouped triangles."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """When a fit is good enough.
+    """Stopping criterion of a fit.
 
     Attributes:
-        excess: Volume of the union over the hull's volume at which no shape is added.
-        max_shapes: Most shapes on one body.
+        excess: Volume of the union over the volume of the hull below which no shape is added.
+        max_shapes: Largest number of shapes on one body.
     """
 
     excess: float
@@ -50,10 +53,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Primitives around one body, and how much they exceed it.
+    """Primitives around one body, with their volume and that of its hull.
 
     Attributes:
-        primitives: They enclose every triangle.
+        primitives: Shapes that enclose every triangle.
         hull: Volume of the convex hull of the triangles [m^3].
         union: Volume of the primitives together [m^3].
     """
@@ -64,21 +67,21 @@ class Fit:
 
     @property
     def excess(self) -> float:
-        """Union over hull."""
+        """Volume of the union over that of the hull."""
         return self.union / self.hull
 
 
 def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
-    """Return few primitives that enclose every triangle closely.
+    """Return a small number of primitives that enclose every triangle closely.
 
-    Triangles are divided by planes, the division that leaves the least volume first, with a few
-    rivals pursued beside it; each part gets its smallest box or capsule. The first number of shapes
-    that meets the target is taken.
+    A beam search divides the triangles by planes and keeps the divisions of least volume; each part
+    gets its smallest box or capsule. The search stops at the smallest number of shapes that meets
+    the target.
 
     Args:
         body: Name of the body.
         triangles: Corners in its frame [m], shape (n, 3, 3).
-        target: When to stop.
+        target: Stopping criterion.
     """
     hull = hull_volume(triangles)
     search = _Search(body, triangles)
@@ -102,14 +105,14 @@ Beam = list[tuple[float, Parts]]
 
 
 class _Search:
-    """Divisions of triangles into parts, judged by the summed volume of boxes in set frames.
+    """Divisions of triangles into parts, rated by the summed volume of boxes in given frames.
 
-    A part is a set of units: a triangle each, or several small ones that lie side by side.
+    A part is a set of units; a unit is one triangle, or several small neighbouring ones.
     """
 
     def __init__(self, body: str, triangles: FloatArray) -> None:
         self._body = body
-        # A corner of a mesh is shared by half a dozen triangles: each counts once from here on.
+        # About six triangles share a corner of a mesh: store each corner once.
         corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
         self._corners, self._index = corners, index.reshape(-1, 3)
         self._shapes: dict[bytes, Primitive] = {}
@@ -119,11 +122,11 @@ class _Search:
         self._starts = np.append(starts, len(triangles))
         self.everything: IntArray = np.arange(len(starts), dtype=np.int64)
         self.orientations = _orientations(hull_corners(corners))
-        # Along each axis of each frame every unit spans an interval; a box around several units is
-        # the span of their intervals.
+        # Along each axis of each frame a unit spans an interval; the box of a part spans the
+        # intervals of its units.
         ordered = triangles[self._order]
         seen = [ordered @ R for R in self.orientations]
-        # Units last, side by side in memory: (frames, 3, units).
+        # Shape (frames, 3, units), so that units are contiguous in memory.
         self._low = np.stack([np.minimum.reduceat(s.min(axis=1), starts).T for s in seen])
         self._high = np.stack([np.maximum.reduceat(s.max(axis=1), starts).T for s in seen])
         self._splits: dict[bytes, list[tuple[float, IntArray, IntArray]]] = {}
@@ -134,10 +137,10 @@ class _Search:
         return np.sort(np.concatenate(pieces))
 
     def tightest(self, triangles: IntArray) -> Primitive:
-        """Return the smallest shape around some triangles."""
+        """Return the smallest shape around triangles, given by their indices."""
         used = np.zeros(len(self._corners), dtype=np.bool_)
         used[self._index[triangles]] = True
-        # Rivals share most of their parts.
+        # The divisions of a beam have most parts in common.
         key = np.packbits(used).tobytes()
         if key not in self._shapes:
             points = hull_corners(self._corners[used])
@@ -146,16 +149,16 @@ class _Search:
         return self._shapes[key]
 
     def within(self, shape: Primitive) -> BoolArray:
-        """Return which triangles lie wholly in a shape: it is convex, so corners decide."""
+        """Return which triangles lie wholly in a shape, by their corners: it is convex."""
         return np.asarray(shape.contains(self._corners)[self._index].all(axis=1))
 
     def volume(self, part: IntArray) -> float:
-        """Return the volume of the smallest box around a part in the set frames [m^3]."""
+        """Return the volume of the smallest box around a part in the given frames [m^3]."""
         size = self._high[..., part].max(axis=2) - self._low[..., part].min(axis=2)
         return float(size.prod(axis=1).min())
 
     def divide(self, beam: Beam) -> Beam:
-        """Return the best divisions with one part more."""
+        """Return the best divisions with one more part."""
         found: dict[tuple[bytes, ...], tuple[float, Parts]] = {}
         for total, parts in beam:
             for i, part in enumerate(parts):
@@ -164,7 +167,7 @@ class _Search:
                     divided = (*parts[:i], first, second, *parts[i + 1 :])
                     key = tuple(sorted(p.tobytes() for p in divided))
                     found[key] = (rest + volume, divided)
-        # Keys break ties, so the result does not hang on the order of finding.
+        # Keys break ties, so the result does not depend on the order of the search.
         ranked = sorted(found.items(), key=lambda item: (item[1][0], item[0]))
         return [division for _, division in ranked[:_BEAM]] or beam
 
@@ -175,14 +178,14 @@ class _Search:
         return self._splits[key]
 
     def _find_splits(self, part: IntArray) -> list[tuple[float, IntArray, IntArray]]:
-        """Return the best splits of a part by planes across the axes of the set frames."""
+        """Return the best splits of a part by planes normal to the axes of the given frames."""
         if len(part) < 2:
             return []
         low, high = self._low[..., part], self._high[..., part]
         found: list[tuple[float, IntArray, IntArray]] = []
         for frame, axis in itertools.product(range(len(self.orientations)), range(3)):
             starts, ends = low[frame, axis], high[frame, axis]
-            # A triangle that the plane cuts goes to the far side, the near side, or by its middle.
+            # A triangle that the plane cuts is assigned by its far end, near end or middle.
             for position in (ends, starts, starts + ends):
                 order = np.argsort(position, kind="stable")
                 ordered = low[..., order], high[..., order]
@@ -198,7 +201,7 @@ class _Search:
 
 
 def _units(triangles: FloatArray) -> IntArray:
-    """Return the unit that each triangle belongs to, numbered from 0, shape (n,)."""
+    """Return the unit of each triangle, numbered from 0, shape (n,)."""
     count = len(triangles)
     if count <= _FINE:
         return np.arange(count, dtype=np.int64)
@@ -206,7 +209,7 @@ def _units(triangles: FloatArray) -> IntArray:
     sizes = np.ptp(triangles, axis=1).max(axis=1)
     cell = float(np.ptp(middles, axis=0).max()) / 100
     while True:
-        # A triangle that is larger than its cell would stretch what it is kept together with.
+        # A triangle larger than its cell is a unit of its own: it would enlarge any other.
         alone = sizes > cell
         keys = np.floor((middles - middles.min(axis=0)) / cell).astype(np.int64)
         keys[alone] = np.array([-1, -1, 0])
@@ -214,7 +217,7 @@ def _units(triangles: FloatArray) -> IntArray:
         _, units = np.unique(keys, axis=0, return_inverse=True)
         if units.max() < _MOST_UNITS:
             return np.asarray(units.reshape(-1), dtype=np.int64)
-        # At last the cell holds everything.
+        # This ends, because a cell that contains everything makes one unit.
         cell *= 1.25
 
 
@@ -225,38 +228,38 @@ def _running_volumes(low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _orientations(points: FloatArray) -> FloatArray:
-    """Return the frames that are searched: the body's own, its tightest box's, and turned ones."""
-    turned = [
+    """Return the frames to search: that of the body, of its smallest box, and rotated ones."""
+    rotated = [
         Rotation.from_euler(axis, angle, degrees=True).as_matrix()
         for axis in "xyz"
         for angle in (15, 30, 45, 60, 75)
     ]
-    return np.stack([np.eye(3), tightest_orientation(points), *turned])
+    return np.stack([np.eye(3), tightest_orientation(points), *rotated])
 
 
 def _finish(parts: Parts, search: _Search, hull: float) -> Fit:
-    """Return the tightest primitives for a division, each freed of what others enclose."""
+    """Return the smallest primitives for a division, refitted to what no other one encloses."""
     shapes = [search.tightest(search.triangles_of(part)) for part in parts]
     best: Fit | None = None
-    # Who is freed first matters; with many shapes the rotations of the order must do.
+    # The order of refitting matters; with many shapes only cyclic orders are tried.
     orders: list[tuple[int, ...]] = [
         tuple(np.roll(range(len(shapes)), shift)) for shift in range(len(shapes))
     ]
     if len(shapes) <= 3:
         orders = list(itertools.permutations(range(len(shapes))))
     for order in orders:
-        freed = _freed(shapes, order, search)
-        union = union_volume(freed)
+        refitted = _refitted(shapes, order, search)
+        union = union_volume(refitted)
         if best is None or union < best.union:
-            best = Fit(primitives=freed, hull=hull, union=union)
+            best = Fit(primitives=refitted, hull=hull, union=union)
     assert best is not None
     return best
 
 
-def _freed(
+def _refitted(
     shapes: list[Primitive], order: tuple[int, ...], search: _Search
 ) -> tuple[Primitive, ...]:
-    """Return the shapes after each in turn was fitted anew to what only it encloses."""
+    """Return the shapes, each in turn refitted to the triangles that only it encloses."""
     current: list[Primitive | None] = list(shapes)
     within = [search.within(shape) for shape in shapes]
     for i in order:

@@ -1,4 +1,4 @@
-"""Whether a robot's primitives enclose its meshes, and how much room they take beyond them."""
+"""Whether the primitives of a robot enclose its meshes, and how much volume they add."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BodyEnclosure:
-    """How one body's primitives sit around the surface they have to enclose.
+    """How well the primitives of one body enclose the surface assigned to them.
 
     Attributes:
         body: The body that carries the primitives.
-        members: Bodies whose surface they have to enclose: its own, and what is welded to it and
-            carries none.
-        triangles: How many triangles those surfaces have.
-        outside: How many of them lie wholly in no primitive.
-        farthest: How far the worst of these stands out of the primitive that holds it best [m];
-            infinite where the body has no primitive.
+        members: Bodies whose surface they must enclose: the body itself, and bodies that are welded
+            to it and have no primitives of their own.
+        triangles: Number of triangles of those surfaces.
+        outside: Number of triangles that do not lie wholly in one primitive.
+        farthest: Largest distance of such a triangle from the primitive nearest to it [m];
+            infinite if the body has no primitive.
         hull: Volume of the convex hull of the surfaces [m^3].
         union: Volume of the primitives together [m^3].
     """
@@ -43,18 +43,18 @@ class BodyEnclosure:
 
     @property
     def excess(self) -> float:
-        """Volume of the primitives together over that of the hull."""
+        """Volume of the union of the primitives over that of the hull."""
         return self.union / self.hull
 
 
 def enclosure(robot: RobotFile) -> tuple[BodyEnclosure, ...]:
-    """Return how the primitives of every body with a surface enclose it.
+    """Return how well the primitives of every body with a surface enclose it.
 
     Raises:
         RobotError: If the URDF, a mesh or the primitives cannot be used.
     """
     return tuple(
-        _measured(body, members, shapes, surface)
+        _body_enclosure(body, members, shapes, surface)
         for body, (members, shapes, surface) in surfaces_to_enclose(robot).items()
     )
 
@@ -62,11 +62,11 @@ def enclosure(robot: RobotFile) -> tuple[BodyEnclosure, ...]:
 def surfaces_to_enclose(
     robot: RobotFile,
 ) -> Mapping[str, tuple[tuple[str, ...], tuple[Primitive, ...], FloatArray]]:
-    """Return what each body's primitives have to enclose.
+    """Return the surface that the primitives of each body must enclose.
 
     Returns:
-        By body: the bodies concerned, its primitives, and the triangles in its frame [m], shape
-        (n, 3, 3).
+        By body: the bodies whose surface it is, the primitives, and the triangles in the frame of
+        the body [m], shape (n, 3, 3).
 
     Raises:
         RobotError: If the URDF, a mesh or the primitives cannot be used.
@@ -83,14 +83,14 @@ def surfaces_to_enclose(
         carrier: (
             tuple(bodies),
             shapes.get(carrier, ()),
-            np.concatenate([_seen_from(model, carrier, b, triangles[b]) for b in bodies]),
+            np.concatenate([_in_frame_of(model, carrier, b, triangles[b]) for b in bodies]),
         )
         for carrier, bodies in members.items()
     }
 
 
 def _carrier(model: Urdf, body: str, shapes: Mapping[str, object]) -> str:
-    """Return the body whose primitives have to enclose a body: itself, or one welded to it."""
+    """Return the body whose primitives must enclose a body: itself, or one welded to it."""
     if body in shapes:
         return body
     top, _, _ = welded_top(model, body)
@@ -98,8 +98,8 @@ def _carrier(model: Urdf, body: str, shapes: Mapping[str, object]) -> str:
     return next(welded, body)
 
 
-def _seen_from(model: Urdf, carrier: str, body: str, triangles: FloatArray) -> FloatArray:
-    """Return a body's triangles in the frame of a body that it is welded to, or is."""
+def _in_frame_of(model: Urdf, carrier: str, body: str, triangles: FloatArray) -> FloatArray:
+    """Return the triangles of a body in the frame of a carrier welded to it, or of itself."""
     if carrier == body:
         return triangles
     _, R_AB, p_AB = welded_top(model, body)
@@ -107,13 +107,13 @@ def _seen_from(model: Urdf, carrier: str, body: str, triangles: FloatArray) -> F
     return np.asarray((triangles @ R_AB.T + p_AB - p_AC) @ R_AC)
 
 
-def _measured(
+def _body_enclosure(
     body: str, members: tuple[str, ...], shapes: tuple[Primitive, ...], surface: FloatArray
 ) -> BodyEnclosure:
     out = surface[~enclosed(shapes, surface)]
     farthest = 0.0
     if len(out):
-        # A triangle is as far out of a convex shape as its farthest corner.
+        # The shapes are convex, so the farthest corner of a triangle decides.
         beyond = [shape.distance(out).max(axis=1) for shape in shapes]
         farthest = float(np.min(beyond, axis=0).max()) if beyond else float("inf")
     return BodyEnclosure(

@@ -18,29 +18,28 @@ from tcs.model.robots.urdf.surfaces import welded_top
 FloatArray = NDArray[np.float64]
 
 SPACING = 0.005
-"""Distance between the points that stand for a surface [m]."""
+"""Spacing of the points that sample a surface [m]."""
 CLEAR = 0.008
-"""Surfaces whose points never come closer than this [m] do not meet: they are at least half of it
-apart even where both surfaces lie between their points."""
+"""Surfaces whose points never come closer than this [m] do not meet: even between the points they
+are at least half of it apart."""
 FINER = 0.2
-"""Parts that glide past each other a few millimetres apart are looked at once more, with points
-and clearance smaller by this factor."""
+"""Factor on spacing and clearance for a second, finer search of parts that pass each other a few
+millimetres apart."""
 MEETING = CLEAR * FINER
-"""Closer than this [m] is never clear: whoever comes so close meets, and need not be looked at
-further."""
+"""Surfaces that come closer than this [m] count as meeting, and the search ends."""
 _FAR = 0.05
-"""Distances beyond this [m] are not told apart."""
+"""Cap of the distances [m]."""
 _NEAR = 2 * CLEAR
-"""Surfaces farther apart than this [m] as seen from points 5 mm apart are looked at no closer."""
+"""Distance at the usual spacing above which the finer search is skipped [m]."""
 _POINT_SEED = 0
 _DRAWS = 300
 _DESCENTS = 6
 _AT_LIMIT = 0.3
-"""Share of draws that put a joint at one of its limits, where bodies come closest."""
+"""Fraction of draws that put a joint at one of its limits, where bodies come closest."""
 
 
 class SurfaceDistance:
-    """The bodies' original surfaces as points, and how close two of them can come."""
+    """Distances between the surfaces of two bodies, sampled as points."""
 
     def __init__(
         self,
@@ -49,13 +48,14 @@ class SurfaceDistance:
         scale: float = 1.0,
         rough: SurfaceDistance | None = None,
     ) -> None:
-        """Take the surfaces; points are spread when a body is first asked for.
+        """Keep the surfaces; a body is sampled when it is first used.
 
         Args:
             model: The robot.
-            triangles: Its bodies' surfaces, each in its body's frame [m], shapes (n, 3, 3).
-            scale: How many times smaller than usual distances are looked at.
-            rough: The same surfaces at the usual scale, which say where a closer look is due.
+            triangles: Surface of each body in its frame [m], shapes (n, 3, 3).
+            scale: Factor on spacing and clearance.
+            rough: The same surfaces at the usual scale; only pairs that are near in it are
+                computed at this scale.
         """
         self._model = model
         self._rough = rough
@@ -70,14 +70,14 @@ class SurfaceDistance:
         return body in self._triangles
 
     def closest_approach(self, pair: BodyPair, robot: RobotFile, seed: int) -> float:
-        """Return how close two bodies' surfaces come [m], at most 0.05, within the limits in force.
+        """Return the least distance of two surfaces within the limits in force [m], at most 0.05.
 
-        The joints between them are drawn at random, often at their limits; from the closest draws
-        a search descends further.
+        The joints between the bodies are drawn at random, often at their limits; the closest draws
+        start a local minimisation.
 
         Args:
             pair: Names of the bodies.
-            robot: Whose limits are in force.
+            robot: The robot, with its limits in force.
             seed: Seed of the draws.
         """
         joints = joints_between(self._model, *pair)
@@ -117,33 +117,33 @@ class SurfaceDistance:
         return closest
 
     def distance(self, pair: BodyPair, positions: Mapping[str, float]) -> float:
-        """Return how far two bodies' surfaces are apart [m], at most 0.05.
+        """Return the distance of two surfaces [m], at most 0.05.
 
         Args:
             pair: Names of the bodies.
-            positions: Every joint between them [rad or m].
+            positions: Positions of every joint between them [rad or m].
         """
         far = _FAR
         if self._rough is not None:
             rough = self._rough.distance(pair, positions)
             if rough > _NEAR:
                 return rough
-            # Points at a fifth of the spacing lie within it of those that are this close.
+            # A finer point has a rough point of its surface within the usual spacing.
             far = rough + SPACING
-        # The tree takes the body of many points; each point of the other costs a query.
+        # The body with more points goes into the tree; each point of the other is one query.
         many, few = sorted(pair, key=lambda body: -len(self._of(body)))
         if many not in self._trees:
             self._trees[many] = cKDTree(self._of(many))
         tree = self._trees[many]
         R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
-        seen = self._of(few) @ R_AB.T + p_AB
-        # Far points take the tree longest, and nobody asks how far they are.
-        seen = seen[((seen > tree.mins - far) & (seen < tree.maxes + far)).all(axis=1)]
-        near, _ = tree.query(seen, distance_upper_bound=far)
+        points = self._of(few) @ R_AB.T + p_AB
+        # Queries of far points are the slowest, and do not change the result.
+        points = points[((points > tree.mins - far) & (points < tree.maxes + far)).all(axis=1)]
+        near, _ = tree.query(points, distance_upper_bound=far)
         return min(float(near.min(initial=far)), far)
 
     def _of(self, body: str) -> FloatArray:
-        """Return points on a body's surface in its frame [m], shape (n, 3): corners included."""
+        """Return points on the surface of a body, corners included, in its frame [m], (n, 3)."""
         if body not in self._points:
             triangles = self._triangles[body]
             edges = triangles[:, 1:] - triangles[:, :1]
@@ -152,7 +152,7 @@ class SurfaceDistance:
             count = int(areas.sum() / self._spacing**2) + 1
             chosen = rng.choice(len(triangles), count, p=areas / areas.sum())
             uv = rng.random((count, 2))
-            # The half of the square beyond its diagonal folds back onto the triangle.
+            # Reflect the half of the unit square beyond its diagonal onto the triangle.
             uv = np.where(uv.sum(axis=1, keepdims=True) > 1, 1 - uv, uv)
             inner = triangles[chosen, 0] + np.einsum("ni,nij->nj", uv, edges[chosen])
             corners = np.unique(triangles.reshape(-1, 3), axis=0)
@@ -161,14 +161,14 @@ class SurfaceDistance:
 
 
 def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:
-    """Return the movable joints on the way from one body to another."""
+    """Return the movable joints between one body and another."""
     up, down = (_movable_above(model, body) for body in (first, second))
     shared = {joint.name for joint in up} & {joint.name for joint in down}
     return tuple(joint for joint in (*up, *down) if joint.name not in shared)
 
 
 def free_joints(model: Urdf, joints: Iterable[Joint]) -> tuple[str, ...]:
-    """Return the joints that decide where some joints stand: themselves, or whom they mimic."""
+    """Return the independent joints that determine given joints: themselves or their leaders."""
     names = []
     for joint in joints:
         while joint.mimic is not None:
@@ -188,6 +188,6 @@ def _movable_above(model: Urdf, body: str) -> list[Joint]:
 def _relative_pose(
     model: Urdf, pair: BodyPair, positions: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return R_AB and p_AoBo_A of the second body B of a pair in the first, A."""
+    """Return R_AB and p_AoBo_A of the second body B of a pair in the first body A."""
     (R_A, p_A), (R_B, p_B) = (pose_in_root(model, body, positions) for body in pair)
     return R_A.T @ R_B, R_A.T @ (p_B - p_A)

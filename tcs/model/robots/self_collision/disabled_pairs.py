@@ -1,4 +1,4 @@
-"""Which pairs of a robot's bodies need no collision check, and the evidence for each."""
+"""Pairs of bodies of a robot that need no collision check, with the evidence for each."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ from tcs.model.robots.urdf.surfaces import body_triangles
 FloatArray = NDArray[np.float64]
 
 _MOST_JOINTS = 3
-"""Up to so many joints between two bodies, the closest approach is searched for."""
+"""Most joints between two bodies for which the closest approach is searched."""
 
 
 def propose_disabled_pairs(
     robot: RobotFile, *, postures: int = 2000, seed: int = 0
 ) -> tuple[DisabledGroup, ...]:
-    """Return the pairs of bodies that need no check, in groups with their reason.
+    """Return the pairs of bodies that need no check, grouped by reason.
 
-    Only pairs with a body that the scored arm moves are looked at; others are never checked. A pair
-    whose primitives touch in none of the postures is left enabled, for its check costs little and
-    may yet catch something. Of the others a pair is proposed when
+    Only pairs with a body that the scored arm moves are considered; scoring checks no others. A
+    pair whose primitives touch in no sampled posture stays enabled: its check costs little and may
+    find a contact that the samples missed. Of the others a pair is proposed if
 
-    - one joint of the URDF connects the two: they touch where it turns, and its limits keep them
-      apart (an extra body, such as a tool, was not built that way and gets no such credit);
-    - no more than three joints lie between them, and the original surfaces never come close: what
-      touches then is the room that primitives take beyond them. If that needs the soft limits, the
-      group holds only while they are in force;
-    - its primitives touch in every posture, so that its check would forbid all of them.
+    - one joint of the URDF connects the bodies: they touch at the joint, and its limits keep the
+      rest apart (this does not apply to an extra body, such as a tool);
+    - at most three joints lie between the bodies and their meshes never come close, so only the
+      volume that the primitives add touches. If this requires the soft limits, the group holds only
+      while they are in force;
+    - the primitives touch in every posture, so a check would forbid all of them.
 
     Args:
-        robot: The robot; its present disabled pairs do not matter.
+        robot: The robot; its present disabled pairs are ignored.
         postures: Postures drawn uniformly within the hard limits.
         seed: Seed of the draws.
 
@@ -57,9 +57,9 @@ def propose_disabled_pairs(
     both = hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
     model = model_with_extras(robot)
     built = robot.model().links.keys()
-    judge = SelfCollision(robot)
+    plant = SelfCollision(robot)
     sampled = sample_positions(hard, postures, seed)
-    counts = Counter(pair for posture in sampled for pair in judge.touching(posture))
+    counts = Counter(pair for posture in sampled for pair in plant.touching(posture))
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     triangles = _carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
@@ -81,7 +81,7 @@ def propose_disabled_pairs(
         elif near[1] >= CLEAR:
             found.apart_soft[pair] = near[1]
         elif set(pair) <= hand:
-            # Never checked either, so a long look would be wasted.
+            # Scoring does not check pairs within the hand.
             continue
         elif near[0] >= MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= MEETING:
             found.apart_hard[pair] = gap
@@ -92,7 +92,7 @@ def propose_disabled_pairs(
 
 @dataclass
 class _Found:
-    """Pairs by the reason for which they need no check; distances are closest approaches [m]."""
+    """Pairs by the reason why they need no check; distances are closest approaches [m]."""
 
     neighbours: list[BodyPair] = field(default_factory=list)
     apart_hard: dict[BodyPair, float] = field(default_factory=dict)
@@ -100,7 +100,7 @@ class _Found:
     always: list[BodyPair] = field(default_factory=list)
 
     def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
-        """Return the groups that hold any pair."""
+        """Return the groups that are not empty."""
         apart = (
             "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
             "only the room that primitives take beyond them touches"
@@ -124,9 +124,9 @@ class _Found:
 
 
 def _carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
-    """Return the surface that each body's primitives stand for, in its frame [m].
+    """Return the surface that the primitives of each body enclose, in its frame [m].
 
-    Those of a base stand for all that is welded to it as well: a column, a torso.
+    The primitives of a base also enclose the bodies welded to it, such as a column or a torso.
     """
     carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
     added = body_triangles(model)

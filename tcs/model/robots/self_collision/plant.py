@@ -1,4 +1,4 @@
-"""Which bodies of a robot touch each other: by its primitives, and by its meshes' hulls."""
+"""Drake plant of a robot alone that finds its self-collisions, by primitives or by mesh hulls."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ FloatArray = NDArray[np.float64]
 BodyPair = tuple[str, str]
 
 MARGIN = 0.001
-"""Primitives closer than this [m] touch: what scoring counts as contact unless a room says more."""
+"""Primitives closer than this [m] touch; the default contact margin of an environment."""
 
 
 class SelfCollision:
-    """A robot alone, as a Drake plant that tells which of its bodies touch.
+    """A Drake plant of a robot alone that finds the pairs of bodies in contact.
 
-    Every pair of bodies is compared, disabled or not, but for those that are welded together.
+    It compares every pair of bodies that are not welded together, disabled or not.
     """
 
     def __init__(self, robot: RobotFile, *, hulls: bool = False) -> None:
@@ -65,12 +65,12 @@ class SelfCollision:
         if hulls:
             _add_hulls(add, model)
         for primitive in robot.load_primitives():
-            # Extra bodies have no mesh: their primitives are all there is.
+            # Extra bodies have no mesh, so their primitives are used.
             if not hulls or primitive.body not in model.links:
                 add.primitive(primitive if hulls else primitive.shrunk(-MARGIN / 2))
         plant.Finalize()
         self._bodies = add.bodies
-        _compare_all_but_welded(scene_graph.collision_filter_manager(), self._bodies, robot)
+        _compare_unwelded(scene_graph.collision_filter_manager(), self._bodies, robot)
         joints = (plant.get_joint(index) for index in plant.GetJointIndices())
         self._starts = {j.name(): j.position_start() for j in joints if j.num_positions() == 1}
         self._plant = plant
@@ -86,7 +86,7 @@ class SelfCollision:
         Primitives touch when they come closer than `MARGIN`, hulls when they overlap.
 
         Args:
-            positions: Joints [rad or m]; those not named stay where they were.
+            positions: Positions by joint [rad or m]; a joint left out keeps its position.
         """
         q = self._plant.GetPositions(self._state).copy()
         for name, value in positions.items():
@@ -97,7 +97,7 @@ class SelfCollision:
 
 
 class _Adder:
-    """Registers collision shapes and remembers whose they are."""
+    """Registers collision shapes and records the body of each."""
 
     def __init__(self, plant: MultibodyPlant) -> None:
         self.plant = plant
@@ -105,12 +105,12 @@ class _Adder:
 
     def primitive(self, primitive: Primitive) -> None:
         rotation = RotationMatrix(primitive.rotation)
-        kinds: dict[str, type[Sphere] | type[Capsule] | type[Box]] = {
+        classes: dict[str, type[Sphere] | type[Capsule] | type[Box]] = {
             "sphere": Sphere,
             "capsule": Capsule,
             "box": Box,
         }
-        shape = kinds[primitive.kind](*primitive.size)
+        shape = classes[primitive.kind](*primitive.size)
         self.shape(primitive.body, RigidTransform(rotation, primitive.xyz), shape)
 
     def shape(self, body: str, X_BS: RigidTransform, shape: Shape) -> None:
@@ -142,10 +142,10 @@ def _hull_of(geometry: Geometry) -> Shape:
     return Cylinder(*geometry.size)
 
 
-def _compare_all_but_welded(
+def _compare_unwelded(
     manager: CollisionFilterManager, bodies: Mapping[GeometryId, str], robot: RobotFile
 ) -> None:
-    """Undo Drake's own filter, which drops neighbours across a joint, but for welded bodies."""
+    """Compare neighbours across a joint, which Drake excludes by default, but no welded bodies."""
     model = robot.model()
     carriers = {extra.name: extra.parent for extra in (*robot.frames, *robot.bodies)}
     groups: dict[str, list[GeometryId]] = {}

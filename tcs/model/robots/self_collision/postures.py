@@ -9,26 +9,26 @@ from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.plant import SelfCollision
 
 DRAWS = 500
-"""Random postures among which one that is free is looked for."""
+"""Random postures that the search for a collision-free one tries."""
 
 
 def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
-    """Return a posture of the scored arm in which no pair that scoring checks touches [rad].
+    """Return a posture of the scored arm without self-collision in the pairs scoring checks [rad].
 
-    Everything at 0, or at the nearest limit, is tried first, then the middle of every range, then
-    random postures; the torso is down.
+    The candidates are all joints at 0 or at the limit nearest to 0, the middle of every range, and
+    random postures; the torso is at its lowest.
 
     Args:
         robot: The robot.
         seed: Seed of the draws.
 
     Returns:
-        Positions by joint: none where 0 will do; None when nothing tried is free.
+        Positions by joint, empty if all joints may be at 0; None if every candidate collides.
     """
     model, limits = model_with_extras(robot), robot.joint_limits()
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     off = {frozenset(pair) for pair in robot.disabled_pairs}
-    judge, standing = SelfCollision(robot), robot.joint_positions()
+    plant, others = SelfCollision(robot), robot.joint_positions()
     bounded = {name: tuple(np.clip(limits[name], -np.pi, np.pi)) for name in robot.arm_joints}
     middle = {name: float(np.mean(pair)) for name, pair in bounded.items()}
     draws = (
@@ -36,9 +36,9 @@ def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
         for sample in sample_positions(robot, DRAWS, seed)
     )
     for drawn in ({}, middle, *draws):
-        # As it will be written: with few digits, and still within limits.
+        # Rounded for the file, and still within the limits.
         arm = {name: float(np.clip(round(q, 4), *limits[name])) for name, q in drawn.items()}
-        touching = judge.touching(robot.with_mimics({**standing, **arm}))
+        touching = plant.touching(robot.with_mimics({**others, **arm}))
         checked = (pair for pair in touching if moved & set(pair) and not set(pair) <= hand)
         if not any(frozenset(pair) not in off for pair in checked):
             return arm
@@ -46,14 +46,14 @@ def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
 
 
 def sample_positions(robot: RobotFile, count: int, seed: int) -> list[dict[str, float]]:
-    """Return postures spread uniformly over every joint's limits in force [rad or m].
+    """Return postures drawn uniformly within the limits in force of every joint [rad or m].
 
-    Arm, torso, head, other arm and grippers all move; joints that mimic another follow it, and
-    those that turn on and on take one full turn.
+    Arm, torso, head, other arm and grippers all move; mimic joints follow their leader, and
+    continuous joints are drawn from one revolution.
 
     Args:
         robot: The robot.
-        count: How many postures.
+        count: Number of postures.
         seed: Seed of the draws.
     """
     rng = np.random.default_rng(seed)

@@ -17,8 +17,8 @@ def kinematic_urdf(
 ) -> str:
     """Return the text of a URDF that Drake reads without a warning.
 
-    Transmissions, sensors, simulator extensions, inertias, mimic and collision geometry are left
-    out: scoring needs none of them, and the PR2's own file makes Drake warn 117 times.
+    It lacks transmissions, sensors, simulator extensions, inertias, mimic elements and collision
+    geometry, which scoring does not need and for which Drake prints warnings, 117 for the PR2.
 
     Args:
         urdf: The original: a path, or a `package://` address.
@@ -65,7 +65,7 @@ def _add_visual(link: ElementTree.Element, geometry: Geometry) -> None:
     _add_origin(visual, geometry.xyz, geometry.rpy)
     holder = ElementTree.SubElement(visual, "geometry")
     if geometry.mesh is not None:
-        # Drake takes an address here, for a text has no folder that a path could start from.
+        # Drake needs a URI here: a text has no folder that a relative path could start from.
         address = f"file://{as_obj(geometry.mesh)}"
         attributes = {"filename": address, "scale": _words(geometry.size)}
         ElementTree.SubElement(holder, "mesh", attributes)
@@ -77,7 +77,7 @@ def _add_visual(link: ElementTree.Element, geometry: Geometry) -> None:
         radius, length = geometry.size
         ElementTree.SubElement(holder, "cylinder", radius=repr(radius), length=repr(length))
     if geometry.rgba is not None:
-        # Named, for Drake asks every material for a name; the colour makes it a local one.
+        # Drake requires a name for every material; the colour in it makes it unique.
         name = "rgba_" + "_".join(f"{channel:g}" for channel in geometry.rgba)
         material = ElementTree.SubElement(visual, "material", name=name)
         ElementTree.SubElement(material, "color", rgba=_words(geometry.rgba))
@@ -88,5 +88,5 @@ def _add_origin(element: ElementTree.Element, xyz: Iterable[float], rpy: Iterabl
 
 
 def _words(numbers: Iterable[float]) -> str:
-    # repr gives a float back exactly, so Drake's kinematics are those of the original file.
+    # repr preserves a float exactly, so Drake's kinematics are those of the original file.
     return " ".join(repr(float(number)) for number in numbers)

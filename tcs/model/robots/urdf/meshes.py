@@ -1,4 +1,4 @@
-"""Meshes of a URDF: read as triangles, or converted once to OBJ, the format that Drake reads."""
+"""Meshes of a URDF: their triangles, and their conversion to OBJ, the format that Drake reads."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _VERSION = b"1"
-"""Part of the cache key: raise it when the conversion changes."""
+"""Part of the cache key: increase it when the conversion changes."""
 
 
 def as_obj(mesh: Path) -> Path:
-    """Return an OBJ file of a mesh: itself, or its conversion in the user's cache.
+    """Return an OBJ file of a mesh: the mesh itself, or its conversion in the user's cache.
 
-    The file is named by the content it was made from, so an edited mesh never meets a stale
-    conversion, and equal meshes share one.
+    The name of the converted file contains a hash of the mesh, so an edited mesh is converted
+    anew, and equal meshes share one file.
 
     Args:
-        mesh: A file in any format that trimesh reads: STL, Collada, OBJ, ...
+        mesh: A file in any format that trimesh reads, e.g. STL, Collada or OBJ.
 
     Raises:
         RobotError: If the mesh cannot be read.
@@ -50,9 +50,9 @@ def as_obj(mesh: Path) -> Path:
 
 @cache
 def mesh_triangles(mesh: Path) -> FloatArray:
-    """Return the corners of every triangle of a mesh [its own unit], shape (n, 3, 3).
+    """Return the corners of every triangle of a mesh [unit of the mesh], shape (n, 3, 3).
 
-    Triangles without area are kept: they are part of what must be enclosed.
+    Triangles without area are kept, because the primitives must enclose them as well.
 
     Raises:
         RobotError: If the mesh cannot be read.
@@ -77,14 +77,14 @@ def _obj_text(mesh: Path) -> str:
 
 
 def _load(mesh: Path) -> trimesh.Trimesh:
-    # Imported where it is needed: it costs half a second that scoring does not have to spend.
+    # A late import: it takes half a second, and scoring does not need it.
     import trimesh
 
     _content(mesh)
     try:
         loaded = trimesh.load(mesh, force="mesh", process=False)
-    except Exception as error:  # whatever its many readers raise on a broken file
+    except Exception as error:  # its readers raise errors of many classes
         raise RobotError(f"mesh '{mesh}' cannot be used: {error}.") from error
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
-        raise RobotError(f"mesh '{mesh}' holds no triangle.")
+        raise RobotError(f"mesh '{mesh}' contains no triangles.")
     return loaded

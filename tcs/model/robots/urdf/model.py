@@ -14,12 +14,12 @@ from tcs.errors import UnknownNameError
 Vector = tuple[float, float, float]
 
 MOVABLE = ("revolute", "continuous", "prismatic")
-"""Joint types with one degree of freedom; every other joint but `fixed` is refused."""
+"""Joint types with one degree of freedom; beside them only `fixed` is supported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mimic:
-    """A joint that follows another: q = multiplier * q_leader + offset."""
+    """Coupling of a mimic joint to its leader: q = multiplier * q_leader + offset."""
 
     leader: str
     multiplier: float
@@ -40,12 +40,12 @@ class Joint:
     """Roll, pitch, yaw about the parent's fixed axes [rad]."""
     axis: Vector
     hard: tuple[float, float]
-    """The `limit` element; infinite where continuous."""
+    """Limits of the `limit` element; infinite for a continuous joint."""
     soft: tuple[float, float]
-    """The `safety_controller` element within the hard limits; the hard ones without it."""
+    """Limits of the `safety_controller` element, within the hard ones; `hard` if there is none."""
     mimic: Mimic | None
     velocity: float = math.inf
-    """How fast it may move by the `limit` element [m/s or rad/s]; infinite where that says none."""
+    """Speed limit of the `limit` element [m/s or rad/s]; infinite if there is none."""
 
     @property
     def is_movable(self) -> bool:
@@ -71,7 +71,7 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Urdf:
-    """The tree of a robot: links, joints, geometry."""
+    """The kinematic tree of a robot: links with their geometry, and joints."""
 
     path: Path
     links: Mapping[str, tuple[Geometry, ...]]
@@ -79,19 +79,19 @@ class Urdf:
 
     @cached_property
     def parent_joints(self) -> Mapping[str, Joint]:
-        """The joint above each link, by link name; the root has none."""
+        """The joint that carries each link, by link name; the root has none."""
         return {joint.child: joint for joint in self.joints.values()}
 
     @property
     def root(self) -> str:
-        """Name of the link that nothing carries."""
+        """Name of the link without a parent joint."""
         return next(link for link in self.links if link not in self.parent_joints)
 
     def joint(self, name: str, where: str) -> Joint:
         """Return a joint by name.
 
         Raises:
-            UnknownNameError: If there is none; `where` begins its message.
+            UnknownNameError: If there is none; its message starts with `where`.
         """
         try:
             return self.joints[name]
@@ -104,7 +104,7 @@ class Urdf:
         return frozenset(link for link in self.links if self.chain(first, link) is not None)
 
     def chain(self, base: str, tip: str) -> tuple[Joint, ...] | None:
-        """Return the joints from link `base` out to link `tip`, None if `tip` hangs elsewhere."""
+        """Return the joints from link `base` to link `tip`, None if `base` does not carry `tip`."""
         joints: list[Joint] = []
         link = tip
         while link != base:

@@ -1,4 +1,4 @@
-"""Where a `package://` address lies on this machine."""
+"""Resolve `package://` addresses to files on this machine."""
 
 from __future__ import annotations
 
@@ -8,27 +8,28 @@ from functools import cache
 from pathlib import Path
 
 from tcs.errors import RobotError
+from tcs.files.paths import expanded
 
 _SCHEME = "package://"
 
 
 def resolve_uri(uri: str, beside: Path) -> Path:
-    """Return the file that an address in a robot file or a URDF means.
+    """Return the file at an address in a robot file or a URDF.
 
     Args:
         uri: `package://<package>/<path>`, `file://<path>`, or a path.
         beside: Folder that relative paths start from; a package may also be one of the folders
-            above it, which is how a URDF of one's own finds its meshes.
+            above it, as for the meshes of a URDF that belongs to the user.
 
     Raises:
-        RobotError: If the package is not installed, or the file is not there.
+        RobotError: If the package is not installed, or there is no such file.
     """
     if uri.startswith(_SCHEME):
         package, _, inside = uri.removeprefix(_SCHEME).partition("/")
         path = _package_folder(package, beside, uri) / inside
     else:
-        # An absolute path on the right replaces what stands left of it.
-        path = beside / Path(uri.removeprefix("file://")).expanduser()
+        # An absolute path replaces `beside`.
+        path = beside / expanded(uri.removeprefix("file://"), "file", RobotError)
     if not path.is_file():
         raise RobotError(f"'{uri}': there is no file '{path}'.")
     return path
@@ -43,7 +44,7 @@ def _package_folder(package: str, beside: Path, uri: str) -> Path:
     if installed is None:
         raise RobotError(
             f"'{uri}': package '{package}' is neither installed nor a folder above '{beside}'. "
-            "Put the file that names it into that package's folder, or name a path from there."
+            "Move the file that names it into the folder of that package, or write a relative path."
         )
     return installed
 
@@ -51,8 +52,8 @@ def _package_folder(package: str, beside: Path, uri: str) -> Path:
 @cache
 def _installed_folder(package: str) -> Path | None:
     """Return `share/<package>` of an installed distribution, None if there is none."""
-    # Robot descriptions built with cmeel hold no module to import: their data lies under
-    # cmeel.prefix/share, listed in the distribution's record.
+    # Robot descriptions built with cmeel contain no module to import: their data is under
+    # cmeel.prefix/share, as listed in the record of the distribution.
     marker = f"share/{package}/package.xml"
     try:
         files = importlib.metadata.files(package) or []
@@ -61,5 +62,5 @@ def _installed_folder(package: str) -> Path | None:
     for file in files:
         if file.as_posix().endswith(marker):
             return Path(str(file.locate())).resolve().parent
-    places = (Path(entry) / "cmeel.prefix" / "share" / package for entry in sys.path)
-    return next((place for place in places if place.is_dir()), None)
+    folders = (Path(entry) / "cmeel.prefix" / "share" / package for entry in sys.path)
+    return next((folder for folder in folders if folder.is_dir()), None)

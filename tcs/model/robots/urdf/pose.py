@@ -1,4 +1,4 @@
-"""Where a robot's bodies are, from its URDF alone."""
+"""Forward kinematics of a URDF without Drake."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ FloatArray = NDArray[np.float64]
 def pose_in_root(
     model: Urdf, body: str, positions: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where a body B is in the root link A: R_AB of shape (3, 3) and p_AoBo_A [m].
+    """Return the pose of a body B in the root link A: R_AB of shape (3, 3) and p_AoBo_A [m].
 
     Args:
         model: The robot.
         body: Name of the body.
-        positions: Joints on the way [rad or m]; those not named are at 0.
+        positions: Positions of the joints from root to body [rad or m]; 0 for those left out.
     """
     chain = model.chain(model.root, body)
     assert chain is not None

@@ -13,31 +13,31 @@ from tcs.model.robots.urdf.model import MOVABLE, Geometry, Joint, Mimic, Urdf, V
 from tcs.model.robots.urdf.packages import resolve_uri
 
 _XACRO = "{http://www.ros.org/wiki/xacro}"
-"""The namespace of macros that a URDF is generated from."""
+"""XML namespace of the macros from which a URDF is generated."""
 
 
 @cache
 def read_urdf(path: Path) -> Urdf:
-    """Return links and joints of a URDF file.
+    """Return the links and joints of a URDF file.
 
     Args:
-        path: The file; read once in a process.
+        path: The file; read once per process.
 
     Raises:
-        RobotError: If it cannot be read, is no URDF, names a mesh that is not there, or its joints
-            form no tree.
+        RobotError: If the file cannot be read, is not a URDF, names a missing mesh, or its joints
+            do not form one tree.
     """
     try:
         root = ElementTree.parse(path).getroot()
     except OSError as error:
         raise RobotError(f"URDF '{path}' cannot be read: {error.strerror}.") from error
     except ElementTree.ParseError as error:
-        raise RobotError(f"URDF '{path}' is no sound XML: {error}.") from error
+        raise RobotError(f"URDF '{path}' is not valid XML: {error}.") from error
     if root.tag != "robot":
         raise RobotError(f"URDF '{path}': the root element is '{root.tag}', but must be 'robot'.")
     if any(element.tag.startswith(_XACRO) for element in root.iter()):
         raise RobotError(
-            f"URDF '{path}' holds xacro macros. Expand them first: xacro {path.name} > robot.urdf"
+            f"URDF '{path}' has xacro macros. Expand them first: xacro {path.name} > robot.urdf"
         )
     colours = {
         element.get("name", ""): colour
@@ -61,7 +61,7 @@ def read_urdf(path: Path) -> Urdf:
 
 
 def _check_tree(model: Urdf) -> None:
-    """Refuse a model whose joints name unknown links or form no single tree."""
+    """Raise an error if joints name unknown links or do not form one tree."""
     for joint in model.joints.values():
         for link in (joint.parent, joint.child):
             if link not in model.links:
@@ -69,12 +69,13 @@ def _check_tree(model: Urdf) -> None:
                 raise UnknownNameError("link", link, model.links, where=where)
         _check_mimic(model, joint)
     roots = [link for link in model.links if link not in model.parent_joints]
-    # One joint above every link but the root: then whatever hangs nowhere runs in a circle.
-    adrift = len(roots) != 1 or len(model.parent_joints) != len(model.joints)
-    if adrift or not all(_reaches_root(model, link) for link in model.links):
+    # If every link but the root has one parent joint, a link that does not lead to the root is part
+    # of a cycle.
+    disconnected = len(roots) != 1 or len(model.parent_joints) != len(model.joints)
+    if disconnected or not all(_reaches_root(model, link) for link in model.links):
         raise RobotError(
-            f"URDF '{model.path}': its joints form no single tree "
-            f"(links that nothing carries: {', '.join(roots) or 'none'})."
+            f"URDF '{model.path}': its joints do not form one tree "
+            f"(links without a parent joint: {', '.join(roots) or 'none'})."
         )
 
 
@@ -87,23 +88,23 @@ def _reaches_root(model: Urdf, link: str) -> bool:
 
 
 def _check_mimic(model: Urdf, joint: Joint) -> None:
-    """Refuse a joint that follows an unknown or fixed one, or at last itself."""
+    """Raise an error if the chain of leaders of a mimic joint is unknown, fixed or cyclic."""
     where = f"URDF '{model.path}', joint '{joint.name}', mimic"
     seen = {joint.name}
     while joint.mimic is not None:
         joint = model.joint(joint.mimic.leader, where)
         if joint.name in seen or not joint.is_movable:
-            raise RobotError(f"{where}: '{joint.name}' must be another joint, and movable.")
+            raise RobotError(f"{where}: '{joint.name}' must be another, movable joint.")
         seen.add(joint.name)
 
 
 def _joint(element: ElementTree.Element, path: Path) -> Joint:
     name = _attribute(element, "name", path)
     where = f"URDF '{path}', joint '{name}'"
-    kind = element.get("type", "")
-    if kind not in (*MOVABLE, "fixed"):
+    joint_type = element.get("type", "")
+    if joint_type not in (*MOVABLE, "fixed"):
         raise RobotError(
-            f"{where}: type '{kind}' is not supported, only {', '.join(MOVABLE)} and fixed."
+            f"{where}: type '{joint_type}' is not supported, only {', '.join(MOVABLE)} and fixed."
         )
     ends = {}
     for end in ("parent", "child"):
@@ -111,12 +112,12 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
         if found is None:
             raise RobotError(f"{where}: there is no '{end}' element.")
         ends[end] = _attribute(found, "link", path)
-    hard = _hard_limits(element, kind, where)
+    hard = _hard_limits(element, joint_type, where)
     xyz, rpy = _origin(element, where)
     axis = element.find("axis")
     return Joint(
         name=name,
-        type=kind,
+        type=joint_type,
         parent=ends["parent"],
         child=ends["child"],
         xyz=xyz,
@@ -129,15 +130,15 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
     )
 
 
-def _hard_limits(element: ElementTree.Element, kind: str, where: str) -> tuple[float, float]:
-    if kind == "fixed":
+def _hard_limits(element: ElementTree.Element, joint_type: str, where: str) -> tuple[float, float]:
+    if joint_type == "fixed":
         return 0.0, 0.0
-    if kind == "continuous":
+    if joint_type == "continuous":
         return -math.inf, math.inf
     limit = element.find("limit")
     if limit is None:
-        raise RobotError(f"{where}: a {kind} joint needs a 'limit' element.")
-    # The URDF specification takes a missing bound as 0.
+        raise RobotError(f"{where}: a {joint_type} joint needs a 'limit' element.")
+    # By the URDF specification a missing bound is 0.
     lower, upper = (_numbers(limit.get(key, "0"), 1, where)[0] for key in ("lower", "upper"))
     if lower > upper:
         raise RobotError(f"{where}: its lower limit {lower} is above its upper limit {upper}.")
@@ -147,7 +148,7 @@ def _hard_limits(element: ElementTree.Element, kind: str, where: str) -> tuple[f
 def _velocity(element: ElementTree.Element, where: str) -> float:
     limit = element.find("limit")
     text = "0" if limit is None else limit.get("velocity", "0")
-    # Exporters write 0 where they know no velocity; a joint that may not move would be fixed.
+    # Exporters write 0 for an unknown velocity; an immovable joint would be fixed.
     speed = _numbers(text, 1, where)[0]
     return speed if speed > 0.0 else math.inf
 
@@ -165,7 +166,7 @@ def _soft_limits(
     )
     lower, upper = max(lower, hard[0]), min(upper, hard[1])
     if lower > upper:
-        raise RobotError(f"{where}: its soft limits leave no position within the hard ones.")
+        raise RobotError(f"{where}: its soft limits do not overlap its hard limits.")
     return lower, upper
 
 
@@ -199,7 +200,9 @@ def _geometry(
     elif shape.tag == "sphere":
         size = _numbers(shape.get("radius", ""), 1, where)
     else:
-        raise RobotError(f"{where}: geometry '{shape.tag}' is none of mesh, box, cylinder, sphere.")
+        raise RobotError(
+            f"{where}: geometry is '{shape.tag}', but must be mesh, box, cylinder or sphere."
+        )
     xyz, rpy = _origin(element, where)
     material = element.find("material")
     rgba = None

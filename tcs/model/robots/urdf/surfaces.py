@@ -1,4 +1,4 @@
-"""The surface of each body of a robot, as triangles, and which bodies are welded together."""
+"""Surfaces of the bodies of a robot as triangles, and the bodies that are welded together."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
 FloatArray = NDArray[np.float64]
 
 MARKER_SIZE = 0.011
-"""A box, cylinder or ball no longer or wider than this [m] marks a frame and is no part of the
-robot."""
+"""A box, cylinder or sphere of at most this length and width [m] marks a frame and is not part of
+the robot."""
 
 _ROUND_SECTIONS = 48
 
@@ -24,8 +24,9 @@ _ROUND_SECTIONS = 48
 def body_triangles(model: Urdf) -> dict[str, FloatArray]:
     """Return the triangles of every body that has a surface, in its own frame [m].
 
-    Visual and collision geometry both count: either may show something that the other lacks.
-    Boxes, cylinders and balls of at most `MARKER_SIZE` are skipped, for they only mark frames.
+    They are those of the visual and the collision geometry, because either may contain parts that
+    the other lacks. Boxes, cylinders and spheres of at most `MARKER_SIZE` are left out: they mark
+    frames.
 
     Args:
         model: The robot.
@@ -43,21 +44,21 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
             for geometry in surface_geometries(model, body)
         ]
         if pieces:
-            # Often one mesh serves both as visual and as collision geometry.
+            # One mesh often is both visual and collision geometry.
             found[body] = np.unique(np.concatenate(pieces), axis=0)
     return found
 
 
 def surface_geometries(model: Urdf, body: str) -> tuple[Geometry, ...]:
-    """Return the geometries of a body that are part of the robot: all but frame markers."""
+    """Return the geometries of a body that are part of the robot: those that mark no frame."""
     return tuple(geometry for geometry in model.links[body] if not _is_marker(geometry))
 
 
 def geometry_triangles(geometry: Geometry) -> FloatArray:
     """Return the triangles of a geometry in its own frame [m], shape (n, 3, 3).
 
-    A cylinder or sphere becomes a polyhedron around it, so that what encloses the triangles
-    encloses the round body as well.
+    A cylinder or sphere becomes a circumscribed polyhedron, so that a primitive that encloses the
+    triangles encloses the round geometry as well.
     """
     if geometry.mesh is not None:
         return np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
@@ -70,27 +71,27 @@ def geometry_triangles(geometry: Geometry) -> FloatArray:
         )
     else:
         solid = trimesh.creation.icosphere(subdivisions=2, radius=geometry.size[0])
-        # Its faces cut into the sphere: move the nearest one out to it.
+        # The faces cut into the sphere: scale until the nearest one touches it.
         nearest = np.einsum("ij,ij->i", solid.triangles[:, 0], solid.face_normals).min()
         solid.apply_scale(geometry.size[0] / nearest)
     return np.asarray(solid.triangles, dtype=np.float64)
 
 
 def place(triangles: FloatArray, xyz: Vector, rpy: Vector) -> FloatArray:
-    """Return triangles moved from a frame to its parent, given the frame's pose there."""
+    """Return triangles in the parent frame, given the pose of their frame in the parent."""
     R = Rotation.from_euler("xyz", rpy).as_matrix()
     return np.asarray(triangles @ R.T + np.array(xyz))
 
 
 def welded_top(model: Urdf, body: str) -> tuple[str, FloatArray, FloatArray]:
-    """Return the uppermost body that fixed joints tie a body to, and the body's pose in it.
+    """Return the uppermost body to which fixed joints weld a body, and the pose of the body in it.
 
     Args:
         model: The robot.
         body: Name of the body B.
 
     Returns:
-        Name of the uppermost body A (B itself when a movable joint carries it), R_AB of shape
+        Name of the uppermost body A (B itself if a movable joint carries it), R_AB of shape
         (3, 3) and p_AoBo_A of shape (3,) [m].
     """
     R, p = np.eye(3), np.zeros(3)
@@ -106,7 +107,7 @@ def welded_top(model: Urdf, body: str) -> tuple[str, FloatArray, FloatArray]:
 def _is_marker(geometry: Geometry) -> bool:
     if geometry.mesh is not None:
         return False
-    # Radius before length, where there are any.
+    # A cylinder gives its radius first, then its length.
     widths = (
         geometry.size if geometry.shape == "box" else (2 * geometry.size[0], *geometry.size[1:])
     )

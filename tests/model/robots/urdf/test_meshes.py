@@ -75,6 +75,6 @@ def test_cache_that_cannot_be_written_is_told(stl, tmp_path, monkeypatch):
     (blocked / "meshes").write_text("a file where a folder should be")
     monkeypatch.setenv("TCS_CACHE_DIR", str(blocked))
     with pytest.raises(
-        OutputError, match=r"cache folder .*meshes' cannot be made: File exists\. Set TCS_"
+        OutputError, match=r"cache folder .*meshes' cannot be created: File exists\. Set TCS_"
     ):
         as_obj(stl)

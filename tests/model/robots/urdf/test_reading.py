@@ -13,7 +13,7 @@ TWO_LINKS = """<robot name="two">
   <link name="b">
     <visual><geometry>{geometry}</geometry></visual>
   </link>
-  <joint name="hinge" type="{kind}">
+  <joint name="hinge" type="{type}">
     <parent link="{parent}"/><child link="b"/><axis xyz="0 0 1"/>
     <limit lower="-1" upper="2" effort="1" velocity="1"/>
     {more}
@@ -22,7 +22,7 @@ TWO_LINKS = """<robot name="two">
 
 
 def two_links(folder, **changes):
-    parts = {"geometry": '<sphere radius="1"/>', "kind": "revolute", "parent": "a", "more": ""}
+    parts = {"geometry": '<sphere radius="1"/>', "type": "revolute", "parent": "a", "more": ""}
     path = folder / "two.urdf"
     path.write_text(TWO_LINKS.format(**(parts | changes)))
     return path
@@ -43,17 +43,17 @@ def test_without_safety_controller_hard_limits_hold(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"kind": "floating"}, "type 'floating' is not supported"),
+        ({"type": "floating"}, "type 'floating' is not supported"),
         ({"parent": "c"}, "unknown link 'c'"),
-        ({"parent": "b"}, "no single tree"),
+        ({"parent": "b"}, "do not form one tree"),
         ({"geometry": '<mesh filename="gone.stl"/>'}, "there is no file"),
-        ({"geometry": '<cone radius="1"/>'}, "'cone' is none of"),
+        ({"geometry": '<cone radius="1"/>'}, "geometry is 'cone', but must be mesh"),
         ({"geometry": '<sphere radius="wide"/>'}, "'wide' must be 1 finite number"),
         ({"more": '<mimic joint="hinge"/>'}, "'hinge' must be another joint"),
         ({"more": '<mimic joint="lever"/>'}, "unknown joint 'lever'"),
         (
             {"more": '<safety_controller soft_lower_limit="3" soft_upper_limit="4"/>'},
-            "no position within",
+            "do not overlap",
         ),
     ],
 )
@@ -70,11 +70,11 @@ XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filen
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<robot", "is no sound XML"),
+        ("<robot", "is not valid XML"),
         ("<sdf/>", "the root element is 'sdf', but must be 'robot'"),
-        (XACRO, r"holds xacro macros\. Expand them first: xacro no\.urdf"),
+        (XACRO, r"has xacro macros\. Expand them first: xacro no\.urdf"),
     ],
-    ids=["no XML", "another format", "macros"],
+    ids=["not XML", "another format", "macros"],
 )
 def test_what_is_no_urdf_is_refused(text, message, tmp_path):
     path = tmp_path / "no.urdf"
