@@ -103,9 +103,8 @@ def _report_check(found: dict[str, Any]) -> None:
     largest = sorted(found["excess_volume"].items(), key=lambda item: -item[1])
     for body, excess in largest[:5]:
         echo(f"  {body:<28} {excess:.2f}")
-    echo(
-        f"self-collision   {len(contact['pairs'])} pairs closer than {contact['margin_m'] * 1e3:g} mm"
-    )
+    margin = f"{contact['margin_m'] * 1e3:g} mm"
+    echo(f"self-collision   {len(contact['pairs'])} pairs closer than {margin}")
     recovered = "tool poses solved" if arm["class"] is None else "postures recovered"
     joints = trip["max_joint_error_rad"]
     echo(

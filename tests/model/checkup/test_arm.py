@@ -65,7 +65,8 @@ def test_a_numeric_solver_that_finds_too_little_is_a_problem(pr2):
     nothing = replace(found.trip, method="numeric", samples=100, recovered=94, joint_error=None)
     broken = replace(found, arm=outside, trip=nothing)
     assert broken.problems == (
-        "no solution for 6 of 100 tool poses of random postures: scoring would miss too many goals.",
+        "no solution for 6 of 100 tool poses of random postures: scoring would miss too many "
+        "goals.",
     )
     assert replace(broken, trip=replace(nothing, recovered=95)).problems == ()
     assert "solved numerically" in broken.notes[0]

@@ -94,7 +94,7 @@ def test_pairs_that_need_no_check_cannot_meet(drafted):
             assert not touching & set(group.pairs)
     off = {frozenset(pair) for pair in robot.disabled_pairs}
     met = {frozenset(pair) for pair in touching} - off
-    # When the arm is bent back, the hand meets the mast, the base or the upper arm: these stay checked.
+    # With the arm bent back, the hand meets mast, base or upper arm: these stay checked.
     assert met
 
 

@@ -49,7 +49,7 @@ def test_without_safety_controller_hard_limits_hold(tmp_path):
         ({"geometry": '<mesh filename="gone.stl"/>'}, "there is no file"),
         ({"geometry": '<cone radius="1"/>'}, "geometry is 'cone', but must be mesh"),
         ({"geometry": '<sphere radius="wide"/>'}, "'wide' must be 1 finite number"),
-        ({"more": '<mimic joint="hinge"/>'}, "'hinge' must be another joint"),
+        ({"more": '<mimic joint="hinge"/>'}, "'hinge' must be another, movable joint"),
         ({"more": '<mimic joint="lever"/>'}, "unknown joint 'lever'"),
         (
             {"more": '<safety_controller soft_lower_limit="3" soft_upper_limit="4"/>'},
