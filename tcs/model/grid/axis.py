@@ -1,4 +1,4 @@
-"""One degree of freedom and the values it may take."""
+"""One axis of a grid: equally spaced values of a degree of freedom."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ UNITS = ("m", "deg")
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Equally spaced values of one degree of freedom, told apart by integer index.
+    """Equally spaced values of one degree of freedom, identified by integer index.
 
-    A value is known by its index and never by its float: 3 * 0.1 is not 0.3, so looking a
-    configuration up by its coordinates would miss.
+    Values are never looked up by their floats, because 3 * 0.1 is not 0.3.
     """
 
     name: str
@@ -33,14 +32,14 @@ class Axis:
     step: float
     """Distance between neighbours [unit]; positive, or 0 for a single value."""
     count: int
-    """How many values there are."""
+    """Number of values."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no axis.
+        """Check the fields.
 
         Raises:
             GridError: If the unit is unknown, a number is not finite, the step is not positive,
-                or there is no value at all.
+                or the count is less than 1.
         """
         where = f"axis '{self.name}'"
         if self.unit not in UNITS:
@@ -70,11 +69,11 @@ class Axis:
         >>> Axis("base_yaw", "deg", 0.0, 90.0, 3).values.round(4).tolist()
         [0.0, 1.5708, 3.1416]
         """
-        # Degrees turn into radians last: the multiples of a step stay exact that way.
-        written: NDArray[np.float64] = (
+        # Converted to radians last, so that the multiples of a step are exact in degrees.
+        values: NDArray[np.float64] = (
             self.start + np.arange(self.count, dtype=np.float64) * self.step
         )
-        return np.deg2rad(written) if self.unit == "deg" else written
+        return np.deg2rad(values) if self.unit == "deg" else values
 
     @property
     def held_unit(self) -> str:
@@ -86,11 +85,11 @@ class Axis:
 
         Args:
             changes: New values by key.
-            where: Where the changes stand, for the message.
+            where: The source of the changes, for the message.
 
         Raises:
-            UnknownNameError: If a key is none of an axis.
-            GridError: If the result is no axis, or has another unit than this one.
+            UnknownNameError: If an axis has no such key.
+            GridError: If the result is invalid, or has another unit than this axis.
         """
         changed = self.from_dict(
             {**self.to_dict(), **_only_keys(changes, _SPEC_KEYS, self.name, where)}, where=where
@@ -108,19 +107,19 @@ class Axis:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, object], *, where: str = "") -> Self:
-        """Return the axis that `to_dict` wrote, or a file spells out.
+        """Return the axis given as a mapping, e.g. by `to_dict` or a file.
 
         Args:
             plain: Name, unit, start, step and count.
-            where: Where it stands, for the message.
+            where: The source of the mapping, for the message.
 
         Raises:
-            UnknownNameError: If a key is none of an axis.
-            GridError: If a key is missing, or the values are no axis.
+            UnknownNameError: If an axis has no such key.
+            GridError: If a key is missing or a value is invalid.
         """
         name = plain.get("name")
         if not isinstance(name, str) or not name:
-            raise GridError(f"{_prefix(where)}an axis is named {name!r}; it needs a name.")
+            raise GridError(f"{_prefix(where)}an axis has the name {name!r}, but must have a text.")
         known = _only_keys(plain, _KEYS, name, where)
         missing = [key for key in _KEYS if key not in known]
         if missing:
@@ -145,7 +144,7 @@ def _is_number(value: object) -> bool:
 def _only_keys(
     plain: Mapping[str, object], known: tuple[str, ...], name: str, where: str
 ) -> dict[str, object]:
-    """Return `plain` as a dict, refusing keys that are not known."""
+    """Return `plain` as a dict; raise for unknown keys."""
     for key in plain:
         if key not in known:
             raise UnknownNameError("key", str(key), known, where=f"{_prefix(where)}axis '{name}'")

@@ -1,4 +1,4 @@
-"""One initial configuration: where the robot stands, how high its torso, how the bed is set."""
+"""Initial configurations: base pose, torso height, and state of the environment."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tcs.errors import TcsError
 
 ENVIRONMENT_UNITS = ("m", "rad")
-"""Units in which an environment axis may be held."""
+"""Units of the values of environment axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,14 +25,14 @@ class InitialConfiguration:
     base_yaw: float
     """Heading of the base about z of W [rad]."""
     torso: float
-    """Torso lift [m]."""
+    """Torso height [m]."""
     environment: tuple[tuple[str, float], ...] = ()
     """Name and value of each environment axis, e.g. ("bed_height", 0.2) [m, rad]."""
     environment_units: tuple[str, ...] = ()
     """Unit of each environment axis, "m" or "rad", in the order of `environment`."""
 
     def __post_init__(self) -> None:
-        """Refuse environment axes without a unit: a guess would be wrong by a factor of 57.
+        """Check that every environment axis has a unit.
 
         Raises:
             TcsError: If the units do not match the axes one by one.

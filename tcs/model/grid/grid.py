@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,17 +16,17 @@ from tcs.model.grid import InitialConfiguration
 from tcs.model.grid.axis import Axis
 
 ROBOT_AXES = {"base_x": "m", "base_y": "m", "base_yaw": "deg", "torso": "m"}
-"""The axes every grid ends with, in flat order, and the unit each is written in."""
+"""The last axes of every grid, in flat order, and the unit of each."""
 
 MAX_CONFIGURATIONS = 20_000_000
-"""Most configurations a grid may hold: scores of more would not fit into memory."""
+"""Largest number of configurations of a grid: scores of more would not fit into memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Every combination of the values of some axes.
+    """Every combination of the values of its axes.
 
-    A configuration is known by its flat index: C order over the axes, so that the last one,
+    A configuration is identified by its flat index in C order over the axes, so that the last one,
     the torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`.
 
     >>> grid = Grid.from_spec({
@@ -43,21 +44,21 @@ class Grid:
     axes: tuple[Axis, ...]
 
     def __post_init__(self) -> None:
-        """Refuse a set of axes that spans no usable grid.
+        """Check the axes.
 
         Raises:
-            GridError: If a robot axis is missing, out of place or in a wrong unit, an axis comes
-                twice, a heading does, or there would be far too many configurations.
+            GridError: If a robot axis is missing, out of place or in a wrong unit, an axis or a
+                heading is repeated, or there are more than `MAX_CONFIGURATIONS`.
         """
         names = [axis.name for axis in self.axes]
         for name in names:
             if names.count(name) > 1:
-                raise GridError(f"grid: axis '{name}' is there twice.")
+                raise GridError(f"grid: axis '{name}' is repeated. Remove one of the two.")
         missing = [name for name in ROBOT_AXES if name not in names]
         if missing:
             raise GridError(
                 f"grid: needs axis {', '.join(missing)}. Every grid has {', '.join(ROBOT_AXES)}; "
-                "give an axis count 1 to hold it still."
+                "give an axis count 1 to fix its value."
             )
         if names[-len(ROBOT_AXES) :] != list(ROBOT_AXES):
             raise GridError(
@@ -72,8 +73,8 @@ class Grid:
         # A micro-degree short of a full turn is a rounded full turn.
         if (yaw.count - 1) * yaw.step > 360.0 - 1e-6:
             raise GridError(
-                f"grid: axis 'base_yaw': {yaw.count} values {yaw.step:g} deg apart go round more "
-                f"than once and repeat headings. At most {max(1, math.ceil(360.0 / yaw.step))}."
+                f"grid: axis 'base_yaw': {yaw.count} values {yaw.step:g} deg apart exceed a full "
+                f"turn and repeat headings. Give at most {max(1, math.ceil(360.0 / yaw.step))}."
             )
         if self.size > MAX_CONFIGURATIONS:
             counts = " x ".join(str(count) for count in self.shape)
@@ -84,12 +85,12 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many values each axis has."""
+        """Number of values of each axis."""
         return tuple(axis.count for axis in self.axes)
 
     @property
     def size(self) -> int:
-        """How many configurations there are."""
+        """Number of configurations."""
         return math.prod(self.shape)
 
     @property
@@ -99,11 +100,17 @@ class Grid:
 
     @property
     def environment_shape(self) -> tuple[int, ...]:
-        """How many values each environment axis has; () where nothing in the room moves."""
+        """Number of values of each environment axis; () without any."""
         return tuple(axis.count for axis in self.environment_axes)
 
+    def environment_states(self) -> Iterator[dict[str, float]]:
+        """Yield the values of the environment axes [m or rad], in flat order."""
+        axes = self.environment_axes
+        for values in itertools.product(*(axis.values.tolist() for axis in axes)):
+            yield {axis.name: value for axis, value in zip(axes, values, strict=True)}
+
     def axis(self, name: str) -> Axis:
-        """Return the axis of that name.
+        """Return the axis of a name.
 
         Raises:
             UnknownNameError: If the grid has no such axis.
@@ -114,7 +121,7 @@ class Grid:
         raise UnknownNameError("axis", name, (axis.name for axis in self.axes), where="grid")
 
     def indices(self, flat: ArrayLike) -> NDArray[np.int64]:
-        """Return where configurations lie along each axis.
+        """Return the index of configurations along each axis.
 
         Args:
             flat: Flat indices, shape (...).
@@ -182,15 +189,15 @@ class Grid:
         )
 
     def overridden(self, changes: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
-        """Return this grid with some axes changed, as a task asks for in an environment.
+        """Return this grid with some axes changed, e.g. by a task.
 
         Args:
-            changes: For each axis to change, new values of some of its start, step and count.
-            where: Where the changes stand, for the message.
+            changes: For each axis to change, new values of its start, step or count.
+            where: The source of the changes, for the message.
 
         Raises:
-            UnknownNameError: If the grid has no such axis, or an axis no such key.
-            GridError: If the result is no grid.
+            UnknownNameError: If the grid has no such axis, or an axis has no such key.
+            GridError: If the resulting grid is invalid.
         """
         names = [axis.name for axis in self.axes]
         for name in changes:
@@ -213,8 +220,8 @@ class Grid:
         """Return the grid that `to_dict` wrote.
 
         Raises:
-            GridError: If it is not of that form, or spans no usable grid.
-            UnknownNameError: If an axis has a key that is none.
+            GridError: If it is not of that form, or the grid is invalid.
+            UnknownNameError: If an axis has no such key.
         """
         axes = plain.get("axes")
         if not isinstance(axes, list | tuple) or not all(isinstance(a, Mapping) for a in axes):
@@ -223,16 +230,16 @@ class Grid:
 
     @classmethod
     def from_spec(cls, spec: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:
-        """Return the grid that an environment file spells out under `grid:`.
+        """Return the grid of an environment file's field `grid`.
 
         Args:
-            spec: For each axis its unit, start, step and count. The robot's axes may stand in
-                any order; axes of the environment keep the order they are written in.
-            where: Where it stands, for the message.
+            spec: For each axis its unit, start, step and count. The robot's axes may be in any
+                order; axes of the environment keep their order.
+            where: The source of the axes, for the message.
 
         Raises:
-            GridError: If it spans no usable grid.
-            UnknownNameError: If an axis has a key that is none.
+            GridError: If the grid is invalid.
+            UnknownNameError: If an axis has no such key.
         """
         order = [name for name in spec if name not in ROBOT_AXES]
         order += [name for name in ROBOT_AXES if name in spec]
@@ -249,7 +256,7 @@ class Grid:
 
     @classmethod
     def _located(cls, axes: tuple[Axis, ...], where: str) -> Self:
-        """Return the grid of these axes; what is wrong with it is told with its place."""
+        """Return the grid of these axes; errors name their source."""
         try:
             return cls(axes)
         except GridError as error:
@@ -257,14 +264,14 @@ class Grid:
             raise GridError(f"{where}: {text}" if where else text) from None
 
     def _checked(self, flat: ArrayLike) -> NDArray[np.int64]:
-        """Return flat indices as an array, refusing those that are not of this grid."""
+        """Return flat indices as an array; raise for those that are not of this grid."""
         checked = np.asarray(flat)
         if checked.dtype.kind not in "iu" and checked.size:
-            raise GridError(f"grid: a configuration is known by a whole number, not {flat!r}.")
+            raise GridError(f"grid: a configuration has a whole number as its index, not {flat!r}.")
         outside = (checked < 0) | (checked >= self.size)
         if np.any(outside):
             first = np.atleast_1d(checked)[np.atleast_1d(outside)][0]
             raise GridError(
-                f"grid: there is no configuration {first}. They are numbered 0 to {self.size - 1}."
+                f"grid: there is no configuration {first}; indices are 0 to {self.size - 1}."
             )
         return checked.astype(np.int64)

@@ -1,4 +1,8 @@
-"""Scenes: a robot in an environment, as a live Drake plant or as arrays for the kernel."""
+"""Scenes: a robot in an environment, as a live Drake plant or as arrays for the kernel.
+
+In: a robot file and an environment file. Out: a plant that places the robot and checks contacts,
+and its lowering to arrays, from which the kernel computes the same.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which contacts are checked: one rule, used by Drake's filter and by the lowered arrays alike."""
+"""The contact rule: which pairs of shapes are checked, by Drake and by the kernel alike."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Group(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One collision shape of the scene and what it belongs to."""
+    """One collision shape of the scene, with the group and the body it belongs to."""
 
     geometry: GeometryId
     body: BodyIndex
@@ -45,9 +45,9 @@ class Part:
     """The arm: 1..7, the link that carries the shape. The rest of the robot: 1 if mounted on the
     torso, 0 if fixed to the base. The environment: 0."""
     name: str
-    """What a blocked configuration is blamed on, e.g. "person::head_center"."""
+    """Name under which its contacts are reported, e.g. "person::head_center"."""
     pad: float
-    """How far the true surface may stand out of the shape [m]."""
+    """How far the true surface may protrude from the shape [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,8 @@ class ContactRule:
     posture and the environment is static, so neither is checked against itself.
 
     Attributes:
-        disabled_pairs: Pairs of robot bodies never checked (the robot file's).
-        allowed_contacts: Pairs of a robot body and an environment body that may touch (the task's).
+        disabled_pairs: Pairs of robot bodies that are never checked, from the robot file.
+        allowed_contacts: Pairs (robot body, environment body) that may touch, from the task.
     """
 
     disabled_pairs: frozenset[frozenset[str]]
@@ -78,10 +78,10 @@ class ContactRule:
         """Return the rule for a robot's disabled pairs and a task's allowed contacts.
 
         Args:
-            parts: Every part of the scene, to know which names there are.
+            parts: Every part of the scene, whose names the contacts may use.
             disabled_pairs: Pairs of robot bodies that are never checked.
             allowed_contacts: Pairs (robot body, environment body) that may touch.
-            where: Where the allowed contacts stand, for the message.
+            where: The source of the allowed contacts, for the message.
 
         Raises:
             UnknownNameError: If an allowed contact names a body that has no shape in the scene.
@@ -104,21 +104,21 @@ class ContactRule:
         )
 
     def is_checked(self, first: Part, second: Part) -> bool:
-        """Return whether contact between two parts counts, in either order."""
+        """Return whether contact between two parts is checked, in either order."""
         groups = {first.group, second.group}
         names = frozenset((first.name, second.name))
         if groups in ({Group.ENVIRONMENT}, {Group.BODY}):
             return False
         if Group.ENVIRONMENT not in groups:
-            moves = groups == {Group.ARM, Group.BODY} or first.carrier != second.carrier
-            return moves and names not in self.disabled_pairs
+            moves_relatively = groups == {Group.ARM, Group.BODY} or first.carrier != second.carrier
+            return moves_relatively and names not in self.disabled_pairs
         if groups == {Group.BODY, Group.ENVIRONMENT} and FLOOR in names:
             return False
         return names not in self.allowed_contacts
 
 
 def apply_rule(scene_graph: SceneGraph, parts: tuple[Part, ...], rule: ContactRule) -> None:
-    """Make Drake check exactly the pairs that the rule says."""
+    """Make Drake check exactly the pairs of the rule."""
     everything = GeometrySet([part.geometry for part in parts])
     declaration = CollisionFilterDeclaration().ExcludeWithin(everything)
     for i, part in enumerate(parts):
@@ -129,10 +129,10 @@ def apply_rule(scene_graph: SceneGraph, parts: tuple[Part, ...], rule: ContactRu
 
 
 def shape_of(inspector: SceneGraphInspector, part: Part) -> tuple[int, tuple[float, float, float]]:
-    """Return kind and size of a part's shape, in the kernel's terms [m].
+    """Return type and size of a part's shape, as the kernel encodes them [m].
 
     Raises:
-        EnvironmentFileError: If it is of a kind that the kernel does not know.
+        EnvironmentFileError: If the kernel does not support shapes of this type.
     """
     shape = inspector.GetShape(part.geometry)
     if isinstance(shape, Sphere):
@@ -144,5 +144,5 @@ def shape_of(inspector: SceneGraphInspector, part: Part) -> tuple[int, tuple[flo
     raise EnvironmentFileError(
         f"'{part.name}': collision shape '{inspector.GetName(part.geometry)}' is a "
         f"{type(shape).__name__}, but must be a Box, Capsule or Sphere. "
-        "Put boxes or capsules that enclose it in its place."
+        "Replace it by boxes or capsules that enclose it."
     )

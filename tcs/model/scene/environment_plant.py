@@ -1,4 +1,4 @@
-"""Everything around the robot, put into a Drake plant: models, obstacles, floor."""
+"""The environment in a Drake plant: models, obstacles, floor, and the joints that move them."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tcs.model.scene.joints import EnvironmentJoints
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Wider than any environment, so that there is a floor at every base pose; thick enough that
 nothing lies below it [m]."""
-_CALM = np.array([0.70, 0.66, 0.58, 1.0])
+_OBSTACLE_COLOUR = np.array([0.70, 0.66, 0.58, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentPlant:
-    """The environment inside a plant.
+    """The elements of an environment in a plant.
 
     Attributes:
-        links: Every link, by "model::link"; a box obstacle by its name alone.
-        joints: Every joint that moves.
-        named_by_link: Names of the models whose shapes are reported by link.
+        links: Every link by "model::link", every box obstacle by its name.
+        joints: Every movable joint.
+        named_by_link: Names of the models whose contacts are reported by link.
         floor: Whether there is a floor.
     """
 
@@ -47,12 +47,12 @@ class EnvironmentPlant:
 
 
 def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> EnvironmentPlant:
-    """Add everything the environment file names to a plant that is not finalized.
+    """Add an environment to a plant that is not finalized.
 
     Raises:
-        EnvironmentFileError: If a model cannot be used, or a joint not go where the file puts it.
-        GridError: If an observed axis is none of its joint's.
-        UnknownNameError: If the file names a parent, link or joint that is not there.
+        EnvironmentFileError: If a model cannot be used, or a joint cannot take its position.
+        GridError: If an observed axis does not fit its joint.
+        UnknownNameError: If the file names a parent, link or joint that does not exist.
     """
     links: dict[str, RigidBody] = {}
     by_name: dict[str, Joint] = {}
@@ -74,7 +74,7 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
                 continue
             if joint.name() in by_name:
                 raise EnvironmentFileError(
-                    f"{here}: joint '{joint.name()}' is there twice. Rename it in one of the files."
+                    f"{here}: joint '{joint.name()}' exists twice. Rename it in one of the files."
                 )
             by_name[joint.name()] = joint
     if environment.floor:
@@ -125,12 +125,12 @@ def _parent_frame(
 def _add_box(
     plant: MultibodyPlant, name: str, size: tuple[float, float, float], X_WO: RigidTransform
 ) -> RigidBody:
-    # Its own body, not a shape of the world: so it is found and named like every other obstacle.
+    # A body of its own rather than a shape of the world, so that it is named like other obstacles.
     body = plant.AddRigidBody(name, plant.AddModelInstance(name))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WO)
     at_body = RigidTransform()
     plant.RegisterCollisionGeometry(body, at_body, Box(*size), "box", ProximityProperties())
-    plant.RegisterVisualGeometry(body, at_body, Box(*size), "box", _CALM)
+    plant.RegisterVisualGeometry(body, at_body, Box(*size), "box", _OBSTACLE_COLOUR)
     return body
 
 
@@ -143,7 +143,7 @@ def _add_model(
 ) -> ModelInstanceIndex:
     """Parse the entry's file and fix its model frame M to the parent."""
     parser = Parser(plant)
-    # The file's own model name does not matter: two shelves may come from one file.
+    # Several entries may use one file, e.g. two shelves.
     parser.SetAutoRenaming(True)
     try:
         instances = parser.AddModels(str(entry.file))
@@ -152,7 +152,7 @@ def _add_model(
         raise EnvironmentFileError(f"{where}: '{entry.file}' cannot be used: {reason}") from error
     if len(instances) != 1:
         raise EnvironmentFileError(
-            f"{where}: '{entry.file}' holds {len(instances)} models, but must hold one. "
+            f"{where}: '{entry.file}' contains {len(instances)} models, but must contain one. "
             "Give each a file of its own."
         )
     (instance,) = instances
@@ -168,16 +168,16 @@ def _fix(
     X_PM: RigidTransform,
     where: str,
 ) -> None:
-    """Weld a model's root to its parent, wherever the file itself had placed it."""
+    """Weld a model's root to its parent, replacing the pose in the model file."""
     model_frame = plant.GetFrameByName("__model__", instance)
     joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
     to_world = [j for j in joints if j.parent_body() == plant.world_body()]
     if not all(isinstance(joint, WeldJoint) for joint in to_world):
         raise EnvironmentFileError(
-            f"{where}: a joint hangs the model from the world, but the environment file places it. "
-            "Hang it from a link of the model."
+            f"{where}: a joint connects the model to the world, but the environment file places "
+            "it. Give the joint a link of the model as its parent."
         )
-    # A <static> model, or one fixed to the world, is taken off and placed as the file says.
+    # A <static> model, or one welded to the world, is detached and placed as the file requires.
     pose_of = {joint.child_body().index(): joint.X_FM() for joint in to_world}
     moved = {j.child_body().index() for j in joints} - set(pose_of)
     for joint in to_world:
@@ -189,8 +189,8 @@ def _fix(
     if not all(root in pose_of for root in roots):
         names = ", ".join(plant.get_body(root).name() for root in roots)
         raise EnvironmentFileError(
-            f"{where}: the model has {len(roots)} links that hang from nothing: {names}. "
-            "Fix them to one another with joints."
+            f"{where}: the model has {len(roots)} links without a parent: {names}. "
+            "Connect them with joints."
         )
     base = model_frame.body().index()
     X_WM = pose_of[base] @ model_frame.GetFixedPoseInBodyFrame()
@@ -202,7 +202,7 @@ def _fix(
 def _check_names(
     environment: EnvironmentFile, links: Iterable[str], joints: EnvironmentJoints, where: str
 ) -> None:
-    """Refuse names in the environment file that its models do not have."""
+    """Raise for names in the environment file that its models do not have."""
     for link in environment.padding:
         if link not in links:
             raise UnknownNameError("link", link, links, where=f"{where}, field 'padding'")

@@ -1,4 +1,4 @@
-"""How far one joint of the environment may be from where the robot believes it is."""
+"""Error distributions of joints: how far a joint may be from its assumed position."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ from pydantic import model_validator
 from tcs.files.documents import Document, Length
 
 _WIDTHS = {"normal": ("std", "std_deg"), "uniform": ("half_width", "half_width_deg")}
-"""How the width of each distribution is called, of joints that slide [m] and that turn [deg]."""
+"""Key of the width of each distribution, for prismatic [m] and for revolute joints [deg]."""
 
 
 class ErrorDistribution(Document):
-    """The error of one joint: a distribution about zero."""
+    """The distribution of one joint's error, with mean zero."""
 
     distribution: Literal["normal", "uniform"]
     std: Length | None = None
-    """Standard deviation of a sliding joint's normal error [m]."""
+    """Standard deviation of a prismatic joint's normal error [m]."""
     std_deg: Length | None = None
-    """Standard deviation of a turning joint's normal error [deg]."""
+    """Standard deviation of a revolute joint's normal error [deg]."""
     half_width: Length | None = None
-    """Greatest uniform error of a sliding joint, to either side [m]."""
+    """Largest magnitude of a prismatic joint's uniform error [m]."""
     half_width_deg: Length | None = None
-    """Greatest uniform error of a turning joint, to either side [deg]."""
+    """Largest magnitude of a revolute joint's uniform error [deg]."""
 
     @model_validator(mode="after")
     def _has_one_width(self) -> Self:
         given = [
             name for both in _WIDTHS.values() for name in both if getattr(self, name) is not None
         ]
-        slides, turns = _WIDTHS[self.distribution]
-        if len(given) != 1 or given[0] not in (slides, turns):
+        prismatic, revolute = _WIDTHS[self.distribution]
+        if len(given) != 1 or given[0] not in (prismatic, revolute):
             raise ValueError(
-                f"give either '{slides}' [m] or '{turns}' [deg] for a {self.distribution} error, "
-                "and nothing else"
+                f"give either '{prismatic}' [m] or '{revolute}' [deg] for a {self.distribution} "
+                "error, and nothing else"
             )
         return self
 
     @property
-    def turns(self) -> bool:
-        """Whether it is written as the error of a joint that turns."""
+    def is_revolute(self) -> bool:
+        """Whether it is the error of a revolute joint."""
         return self.std_deg is not None or self.half_width_deg is not None
 
     @property
     def width_key(self) -> tuple[str, str]:
-        """How the width of this distribution is called of joints that slide and that turn."""
+        """Keys of this distribution's width, for prismatic and for revolute joints."""
         return _WIDTHS[self.distribution]
 
     @property
     def width(self) -> float:
         """Standard deviation of a normal error, half width of a uniform one [m or rad]."""
-        slides, turns = (getattr(self, name) for name in _WIDTHS[self.distribution])
-        return math.radians(turns) if turns is not None else float(slides)
+        prismatic, revolute = (getattr(self, name) for name in _WIDTHS[self.distribution])
+        return math.radians(revolute) if revolute is not None else float(prismatic)
 
     @property
     def standard_deviation(self) -> float:
@@ -63,7 +63,7 @@ class ErrorDistribution(Document):
         return self.width / math.sqrt(3.0) if self.distribution == "uniform" else self.width
 
     def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Return so many errors [m or rad], the next of this stream, shape (count,)."""
+        """Return the next `count` samples of the stream [m or rad], shape (count,)."""
         if self.distribution == "uniform":
             return self.width * rng.uniform(-1.0, 1.0, count)
         return self.width * rng.standard_normal(count)

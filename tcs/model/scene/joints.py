@@ -1,4 +1,4 @@
-"""The joints of an environment: how far they go, and which of them follow which."""
+"""The joints of an environment: their limits, and which of them follow others."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
 
 _ROUNDING = 1e-9
-"""How far a position may be past a limit [m or rad]: 3 * 0.1 is a hair more than 0.3, and limits
-in a model file are rounded."""
+"""Tolerance of the limits [m or rad]: 3 * 0.1 is greater than 0.3, and limits in model files are
+rounded."""
 
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentJoints:
-    """Every joint of the environment that moves.
+    """The movable joints of an environment.
 
     Attributes:
         by_name: The joints.
-        posture: For each leading joint what follows it.
+        posture: For each leading joint the joints that follow it.
     """
 
     by_name: dict[str, Joint]
     posture: Mapping[str, Posture]
 
-    def turns(self, name: str) -> bool:
-        """Return whether a joint turns (rad); else it slides (m)."""
+    def is_revolute(self, name: str) -> bool:
+        """Return whether a joint is revolute [rad]; otherwise it is prismatic [m]."""
         return bool(self.by_name[name].type_name() == "revolute")
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Return how far a joint may go [m or rad]: by its model, and by the knots it leads.
+        """Return the limits of a joint [m or rad]: its model's, and the outer knots it leads.
 
         Raises:
-            EnvironmentFileError: If it is neither a turning nor a sliding joint.
+            EnvironmentFileError: If it is neither revolute nor prismatic.
         """
         joint = self.by_name[name]
         if joint.num_positions() != 1:
             raise EnvironmentFileError(
-                f"joint '{name}' is {joint.type_name()}, but only joints that turn about one axis "
-                "(revolute) or slide along one (prismatic) can be set."
+                f"joint '{name}' is {joint.type_name()}, but only revolute and prismatic joints "
+                "can be set."
             )
         lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
         if name in self.posture:
@@ -55,17 +55,17 @@ class EnvironmentJoints:
     def positions(
         self, name: str, position: float, *, where: str, error: type[TcsError] = TcsError
     ) -> Iterator[tuple[Joint, float]]:
-        """Yield the joint and every joint that follows it, with the positions they take.
+        """Yield the joint and every joint that follows it, with their positions.
 
         Args:
             name: The joint to move.
-            position: Where to [m or rad].
-            where: Where that is asked for, for the message.
-            error: What to raise for a position that is none of the joint's.
+            position: Its new position [m or rad].
+            where: The source of the position, for the message.
+            error: Type of the error for a joint or position that cannot be set.
 
         Raises:
             UnknownNameError: If there is no such joint.
-            TcsError: As `error`, if the joint follows another one, or does not go that far.
+            TcsError: As `error`, if the joint follows another one, or would exceed its limits.
         """
         self._check_free(name, where, error)
         self._check_position(name, position, f"{where}, joint '{name}'", error)
@@ -75,14 +75,14 @@ class EnvironmentJoints:
                 yield self.by_name[follower], at
 
     def check_axis(self, axis: Axis, *, where: str) -> None:
-        """Refuse an axis whose values its joint cannot take.
+        """Raise if the joint of an axis cannot take the axis's values.
 
         Raises:
             UnknownNameError: If no joint has the axis's name.
-            GridError: If the joint follows another one, is of another unit, or does not go as far.
+            GridError: If the joint follows another one, or the unit or the limits differ.
         """
         self._check_free(axis.name, where, GridError, kind="environment axis")
-        unit = "deg" if self.turns(axis.name) else "m"
+        unit = "deg" if self.is_revolute(axis.name) else "m"
         if axis.unit != unit:
             raise GridError(
                 f"{where}, axis '{axis.name}': unit is '{axis.unit}', but the joint is "
@@ -92,34 +92,34 @@ class EnvironmentJoints:
             self._check_position(axis.name, float(value), f"{where}, axis '{axis.name}'", GridError)
 
     def check_error(self, name: str, error: ErrorDistribution, *, where: str) -> None:
-        """Refuse an error of a joint that cannot have it.
+        """Raise if an error distribution does not fit its joint.
 
         Raises:
             UnknownNameError: If there is no such joint.
-            EnvironmentFileError: If the joint follows another one, or the error's unit is another.
+            EnvironmentFileError: If the joint follows another one, or the unit differs.
         """
         self._check_free(name, where, EnvironmentFileError)
-        if self.turns(name) != error.turns:
-            right = error.width_key[self.turns(name)]
+        if self.is_revolute(name) != error.is_revolute:
+            right = error.width_key[self.is_revolute(name)]
             raise EnvironmentFileError(
                 f"{where}, joint '{name}': it is {self.by_name[name].type_name()}, so give "
                 f"'{right}'."
             )
 
     def check_posture(self, *, where: str) -> None:
-        """Refuse a posture that names joints there are not, or asks them to go too far.
+        """Raise if a posture does not fit the joints.
 
         Raises:
-            UnknownNameError: If a joint is not there.
-            EnvironmentFileError: If a joint's unit or limits do not fit.
+            UnknownNameError: If there is no joint of a name in it.
+            EnvironmentFileError: If the unit or a limit of a joint does not fit.
         """
         for leader, posture in self.posture.items():
             here = f"{where}, field 'posture.{leader}'"
             for name in (leader, *posture.joints):
                 if name not in self.by_name:
                     raise UnknownNameError("joint", name, self.by_name, where=here)
-            if self.turns(leader) != posture.turns:
-                key = "knots_deg" if self.turns(leader) else "knots"
+            if self.is_revolute(leader) != posture.is_revolute:
+                key = "knots_deg" if self.is_revolute(leader) else "knots"
                 raise EnvironmentFileError(
                     f"{here}: the joint is {self.by_name[leader].type_name()}, so give '{key}'."
                 )
@@ -130,11 +130,11 @@ class EnvironmentJoints:
                     )
 
     def set_defaults(self, positions: Mapping[str, float], *, where: str) -> None:
-        """Let the joints stand at these positions from the start, the others at 0.
+        """Set the default positions of all joints: these, and 0 for the others.
 
         Raises:
-            UnknownNameError: If a joint is not there.
-            EnvironmentFileError: If a joint follows another one, or does not go that far.
+            UnknownNameError: If there is no joint of a name.
+            EnvironmentFileError: If a joint follows another one, or a position exceeds its limits.
         """
         leaders = {name: 0.0 for name in self.posture if name not in positions}
         for name, position in {**leaders, **positions}.items():
@@ -146,12 +146,12 @@ class EnvironmentJoints:
     def _check_free(
         self, name: str, where: str, error: type[TcsError], *, kind: str = "joint"
     ) -> None:
-        """Refuse a joint that is not there, or not free to be set."""
+        """Raise for a joint that does not exist or that follows another one."""
         for leader, posture in self.posture.items():
             if name in posture.joints:
                 raise error(
                     f"{where}: joint '{name}' follows '{leader}' (field 'posture'), so it cannot "
-                    f"be set. Set '{leader}', or take '{name}' out of the posture."
+                    f"be set. Set '{leader}', or remove '{name}' from the posture."
                 )
         if name not in self.by_name:
             raise UnknownNameError(kind, name, self.by_name, where=where)
@@ -159,14 +159,14 @@ class EnvironmentJoints:
     def _check_position(
         self, name: str, position: float, where: str, error: type[TcsError]
     ) -> None:
-        """Refuse a position that a joint cannot take."""
+        """Raise for a position beyond a joint's limits."""
         lower, upper = self.limits(name)
-        # Written so that "not a number" is refused as well.
+        # In this form the comparison rejects "not a number" as well.
         if lower - _ROUNDING <= position <= upper + _ROUNDING:
             return
-        unit, scale = ("deg", math.degrees(1.0)) if self.turns(name) else ("m", 1.0)
+        unit, scale = ("deg", math.degrees(1.0)) if self.is_revolute(name) else ("m", 1.0)
         raise error(
             f"{where}: {position * scale:g} {unit} is beyond the joint's limits, "
-            f"{lower * scale:g} to {upper * scale:g} {unit}. Stay within, or widen the limits in "
-            "its model."
+            f"{lower * scale:g} to {upper * scale:g} {unit}. Choose a value within, or widen the "
+            "limits in its model."
         )

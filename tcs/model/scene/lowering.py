@@ -112,7 +112,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
     for axis in grid.environment_axes:
         built.environment_joints.check_axis(axis, where=where)
-    room_poses, poses_of_goals = _environment_states(scene, room, task, _states_of(grid))
+    room_poses, poses_of_goals = _environment_states(scene, room, task, grid.environment_states())
 
     arrays = SceneArrays(
         chain=chain,
@@ -228,13 +228,6 @@ def environment_at(
     return lowered.arrays._replace(
         room=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
     )
-
-
-def _states_of(grid: Grid) -> Iterator[dict[str, float]]:
-    """Yield the states of the environment in a grid, in its order."""
-    names = [axis.name for axis in grid.environment_axes]
-    for state in itertools.product(*(axis.values for axis in grid.environment_axes)):
-        yield {name: float(value) for name, value in zip(names, state, strict=True)}
 
 
 def _environment_states(

@@ -44,7 +44,7 @@ BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 
 @dataclass(frozen=True, slots=True)
 class ScenePlant:
-    """A finalized plant and what in it plays which role.
+    """A finalized plant and the roles of its elements.
 
     Attributes:
         diagram: Plant and scene graph together.
@@ -52,17 +52,17 @@ class ScenePlant:
         scene_graph: The scene graph.
         base_joints: base_x, base_y, base_yaw.
         arm_joints: The scored arm's seven joints, in the robot file's order.
-        arm_lower: Their lower limits in force [rad], -inf where continuous.
-        arm_upper: Their upper limits in force [rad], +inf where continuous.
-        torso_joint: The torso lift, None for a robot without one.
-        torso_limits: Limits of the torso in force [m].
+        arm_lower: Their lower limits [rad], -inf where continuous.
+        arm_upper: Their upper limits [rad], +inf where continuous.
+        torso_joint: The joint that raises the torso, None for a robot without one.
+        torso_limits: Limits of the torso height [m].
         base_frame: B, the robot's base.
-        arm_base_frame: A, the link that carries joint 1.
+        arm_base_frame: A, the parent link of joint 1.
         tool_frame: T.
         environment_joints: Joints of the environment.
-        body_frames: Frames that goals may name.
+        body_frames: Frames that goals may be fixed to.
         parts: Every collision shape: arm, body, environment.
-        rule: Which pairs of them are checked.
+        rule: The pairs of them that are checked.
     """
 
     diagram: Diagram
@@ -89,20 +89,7 @@ def build_plant(
     *,
     meshes: bool = False,
 ) -> ScenePlant:
-    """Return the finalized plant of a scene.
-
-    Args:
-        spec: Robot and environment.
-        allowed_contacts: Pairs (robot body, environment body) that may touch.
-        meshes: Whether to load the robot's visual meshes.
-
-    Raises:
-        RobotError: If the robot's model cannot be used.
-        EnvironmentFileError: If a model of the environment cannot be used, or a joint not go where
-            the file puts it.
-        GridError: If an observed axis is none of its joint's.
-        UnknownNameError: If a file names something that is not there.
-    """
+    """Return the finalized plant of a scene; `Scene` documents the arguments and errors."""
     robot, environment = spec.robot, spec.environment
     builder = DiagramBuilder()
     # A continuous plant: nothing is simulated, and a time step would only add discrete state.
@@ -151,7 +138,7 @@ def build_plant(
 
 
 def _add_base(plant: MultibodyPlant, root: RigidBody) -> tuple[Joint, ...]:
-    """Hang the robot's root from the world on x, y and yaw."""
+    """Attach the robot's root to the world by planar joints: x, y and yaw."""
     instance = plant.AddModelInstance("base")
     axes = (np.eye(3)[0], np.eye(3)[1], np.eye(3)[2])
     parent = plant.world_body()
@@ -186,7 +173,7 @@ def _add_robot(plant: MultibodyPlant, robot: RobotFile, meshes: bool) -> ModelIn
 def _add_primitives(
     plant: MultibodyPlant, robot: RobotFile, instance: ModelInstanceIndex
 ) -> tuple[GeometryId, ...]:
-    """Give the robot's links their collision shapes."""
+    """Register the collision shapes of the robot's links."""
     added = []
     for i, primitive in enumerate(robot.load_primitives()):
         X_BG = RigidTransform(Quaternion(primitive.quaternion), primitive.xyz)
@@ -207,7 +194,7 @@ def _robot_parts(
     arm_joints: tuple[Joint, ...],
     torso: Joint | None,
 ) -> tuple[Part, ...]:
-    """Sort the robot's shapes into what each arm link carries and what stays with the body."""
+    """Return the robot's shapes with the arm link, or the part of the body, that carries each."""
     above = {joint.child_body().index(): joint for joint in _joints(plant)}
     arm_link = {joint.index(): i + 1 for i, joint in enumerate(arm_joints)}
     parts = []

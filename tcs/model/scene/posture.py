@@ -1,4 +1,4 @@
-"""How joints of the person follow a joint of the furniture: piecewise linear, as data."""
+"""Posture: joints of the person that follow a joint of the furniture, piecewise linearly."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Knots = Annotated[tuple[Number, ...], Field(min_length=2)]
 
 
 class Posture(Document):
-    """Where the joints that follow one joint stand, at some of its positions.
+    """Positions of the joints that follow one leading joint, at some positions of that joint.
 
-    Between two knots every joint moves in proportion; beyond the outer ones nothing is known, so
-    the leading joint may not go there.
+    They are interpolated linearly between knots. They are undefined beyond the outer knots, so the
+    outer knots limit the leading joint.
 
     >>> posture = Posture(knots_deg=(0, 40, 80), joints={"neck": (-0.1, -0.2, -0.55)})
     >>> round(posture.positions(math.radians(60))["neck"], 12)
@@ -27,30 +27,30 @@ class Posture(Document):
     """
 
     knots: Knots | None = None
-    """Positions of a leading joint that slides, rising [m]."""
+    """Positions of a prismatic leading joint, ascending [m]."""
     knots_deg: Knots | None = None
-    """Positions of a leading joint that turns, rising [deg]."""
+    """Positions of a revolute leading joint, ascending [deg]."""
     joints: Annotated[Mapping[str, tuple[Number, ...]], Field(min_length=1)]
-    """For each joint that follows its position at each knot [m or rad]."""
+    """Position of each following joint at each knot [m or rad]."""
 
     @model_validator(mode="after")
-    def _fits_together(self) -> Self:
+    def _is_consistent(self) -> Self:
         if (self.knots is None) == (self.knots_deg is None):
             raise ValueError("give either 'knots' [m] or 'knots_deg' [deg]")
-        written = self.knots or self.knots_deg or ()
-        if any(after <= before for before, after in itertools.pairwise(written)):
+        knots = self.knots or self.knots_deg or ()
+        if any(after <= before for before, after in itertools.pairwise(knots)):
             raise ValueError("every knot must be greater than the one before")
         for name, positions in self.joints.items():
-            if len(positions) != len(written):
+            if len(positions) != len(knots):
                 raise ValueError(
                     f"joint '{name}' has {len(positions)} positions, but there are "
-                    f"{len(written)} knots; give one for each"
+                    f"{len(knots)} knots; give one for each"
                 )
         return self
 
     @property
-    def turns(self) -> bool:
-        """Whether the leading joint is one that turns."""
+    def is_revolute(self) -> bool:
+        """Whether the leading joint is revolute."""
         return self.knots_deg is not None
 
     @property
@@ -60,9 +60,9 @@ class Posture(Document):
             return tuple(math.radians(knot) for knot in self.knots_deg)
         return self.knots or ()
 
-    def positions(self, at: float) -> dict[str, float]:
-        """Return where each joint stands with the leading joint at `at` [m or rad]."""
+    def positions(self, leading: float) -> dict[str, float]:
+        """Return the position of each following joint, given the leading one's [m or rad]."""
         return {
-            name: float(np.interp(at, self.leading, positions))
+            name: float(np.interp(leading, self.leading, positions))
             for name, positions in self.joints.items()
         }

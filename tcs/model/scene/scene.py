@@ -1,4 +1,4 @@
-"""A live scene: place the robot, ask where its tool is and what it touches."""
+"""A live scene: a robot in an environment with one state, its kinematics and its contacts."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Contact = tuple[str, str, float]
 class Scene:
     """One robot in one environment, as a Drake plant with one state.
 
-    It starts with the base at the origin, the torso at its lowest, the arm at zero and the
-    environment as its file says. Drake plants do not pickle: pass the spec on and build another
-    scene.
+    Initially the base is at the origin, the torso at its lower limit, the arm at zero and the
+    environment in the state of its file. Drake plants do not pickle: pass on the spec, and build
+    another scene from it.
     """
 
     def __init__(
@@ -41,14 +41,15 @@ class Scene:
         Args:
             spec: Robot and environment.
             allowed_contacts: Pairs (robot body, environment body) that may touch.
-            meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
+            meshes: Whether to load the robot's visual meshes, which takes seconds; only views show
+                them.
 
         Raises:
             RobotError: If the robot's model cannot be used.
-            EnvironmentFileError: If a model of the environment cannot be used, or a joint not go
-                where the file puts it.
-            GridError: If an observed axis is none of its joint's.
-            UnknownNameError: If a file names something that is not there.
+            EnvironmentFileError: If a model of the environment cannot be used, or a joint cannot
+                take its position.
+            GridError: If an observed axis does not fit its joint.
+            UnknownNameError: If a file names something that does not exist.
         """
         self.spec = spec
         self.built: ScenePlant = build_plant(spec, tuple(allowed_contacts), meshes=meshes)
@@ -59,29 +60,29 @@ class Scene:
         self._arm_velocities = np.array([joint.velocity_start() for joint in joints])
         self._pads: dict[str, float] = {}
         for part in self.built.parts:
-            # A link may come with several shapes; they share its padding.
+            # The shapes of one link share its padding.
             self._pads[part.name] = max(part.pad, self._pads.get(part.name, 0.0))
         self.set_torso(0.0)
 
     @property
     def plant_context(self) -> Context:
-        """The plant's own part of the context."""
+        """The plant's subcontext."""
         return self._state
 
     @property
     def arm_limits(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper limits of the arm in force [rad], infinite where continuous."""
+        """Lower and upper limits of the arm [rad], infinite where continuous."""
         return self.built.arm_lower, self.built.arm_upper
 
     def place_base(self, x: float, y: float, yaw: float) -> None:
-        """Put the robot's base B at (x, y) in W [m], heading `yaw` [rad]."""
+        """Place the robot's base B at (x, y) in W [m] with heading `yaw` [rad]."""
         for joint, value in zip(self.built.base_joints, (x, y, yaw), strict=True):
             self._set(joint.position_start(), value)
 
     def set_torso(self, height: float) -> float:
-        """Lift the torso and return the height used [m]: the one asked for, within its limits.
+        """Set the torso to a height, clipped to its limits, and return the height set [m].
 
-        A robot without a torso joint stays as it is, and 0 is returned.
+        For a robot without a torso joint, return 0.
         """
         joint = self.built.torso_joint
         if joint is None:
@@ -93,7 +94,7 @@ class Scene:
     def set_arm(self, positions: ArrayLike) -> None:
         """Set the seven joints of the scored arm [rad], in the robot file's order.
 
-        Limits are not enforced: what breaks them is for the caller to judge.
+        Limits are not enforced.
 
         Raises:
             TcsError: If there are not exactly seven finite numbers.
@@ -109,22 +110,22 @@ class Scene:
         self.built.plant.SetPositions(self._state, q)
 
     def set_joint(self, name: str, value: float) -> None:
-        """Set a joint of the environment [m or rad], and with it all that follow it.
+        """Set a joint of the environment [m or rad], and the joints that follow it.
 
         Raises:
             UnknownNameError: If the environment has no such joint.
-            TcsError: If the joint follows another one, or does not go that far.
+            TcsError: If the joint follows another one, or the value exceeds its limits.
         """
         where = f"environment '{self.spec.environment.name}'"
         for joint, position in self.built.environment_joints.positions(name, value, where=where):
             self._set(joint.position_start(), position)
 
     def positions(self) -> FloatArray:
-        """Return the positions of all joints, for `restore`, shape (n,)."""
+        """Return the positions of all joints, an argument for `restore`, shape (n,)."""
         return np.array(self.built.plant.GetPositions(self._state))
 
     def restore(self, positions: FloatArray) -> None:
-        """Set all joints to what `positions` returned."""
+        """Set all joints to positions that `positions` returned."""
         self.built.plant.SetPositions(self._state, positions)
 
     def tool_pose(self) -> RigidTransform:
@@ -136,11 +137,11 @@ class Scene:
         return self.built.base_frame.CalcPoseInWorld(self._state)
 
     def body_frame_pose(self, name: str, *, where: str = "") -> RigidTransform:
-        """Return X_WH, the pose of a part of the person, e.g. "head".
+        """Return X_WH, the pose of a body frame, e.g. "head".
 
         Args:
             name: One of the environment file's body frames.
-            where: Where the name stands, for the message.
+            where: The source of the name, for the message.
 
         Raises:
             UnknownNameError: If the environment has no such body frame.
@@ -170,20 +171,20 @@ class Scene:
         return np.array(jacobian[:, self._arm_velocities])
 
     def query_object(self) -> QueryObject:
-        """Return Drake's geometry queries at the present state."""
+        """Return Drake's query object at the current state."""
         port = self.built.plant.get_geometry_query_input_port()
         query: QueryObject = port.Eval(self._state)
         return query
 
     def clearances(self, max_distance: float) -> tuple[Contact, ...]:
-        """Return how close the checked pairs of bodies are, closest first.
+        """Return the distances between checked pairs of bodies, closest first.
 
         Args:
-            max_distance: Pairs farther apart are left out [m].
+            max_distance: Distance beyond which pairs are omitted [m].
 
         Returns:
-            For each pair of bodies the least signed distance over their shapes, negative where
-            they overlap. Arm before body before environment.
+            For each pair of bodies the least signed distance between their shapes, negative where
+            they overlap. Bodies of the arm come first in a pair, those of the environment last.
         """
         part_of = {part.geometry: part for part in self.built.parts}
         order = (Group.ARM, Group.BODY, Group.ENVIRONMENT)
@@ -199,7 +200,7 @@ class Scene:
         return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
 
     def required_clearance(self, first: str, second: str) -> float:
-        """Return how far two bodies must stay apart: margin, or their paddings if larger [m].
+        """Return the distance that two bodies must keep: margin, or their paddings if larger [m].
 
         Raises:
             UnknownNameError: If a name has no collision shape.

@@ -1,4 +1,4 @@
-"""What a scene is made of, as a value: the robot file and the environment file."""
+"""Specification of a scene as a value: the robot file and the environment file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tcs.model.scene.environment import EnvironmentFile
 class SceneSpec:
     """One robot in one environment.
 
-    Hashable and picklable, which a live Drake plant is not: hand this to a worker and let it build
-    its own `Scene`.
+    It is hashable and picklable, which a live Drake plant is not: pass it to a worker process,
+    which builds its own `Scene`.
     """
 
     robot: RobotFile

@@ -1,4 +1,7 @@
-"""Tasks: a few tool poses on the body, written as YAML."""
+"""Tasks: goal poses of the tool, fixed to the person's body or another frame of the environment.
+
+In: task files. Out: checked goals with weights, allowed contacts, and changes to the grid.
+"""
 
 from __future__ import annotations
 

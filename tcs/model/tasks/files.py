@@ -1,4 +1,4 @@
-"""Task files: how a task is written down, and which ones ship with `tcs`."""
+"""Task files: their format, and those that ship with `tcs`."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ TASKS = DataFiles("task", "tasks/*/*.yaml")
 
 
 class _Entry(Document):
-    """What a task file says, without a guess at what it may have meant."""
+    """Part of a task file, with strict types: no text is converted to a number."""
 
     model_config = ConfigDict(strict=True)
 
 
 class GoalEntry(_Entry):
-    """One goal as it is written."""
+    """One goal of a task file."""
 
     body_frame: str
     position: list[float]
@@ -31,7 +31,7 @@ class GoalEntry(_Entry):
 
 
 class AxisEntry(_Entry):
-    """What a task changes on one axis of an environment's grid."""
+    """Changes of a task to one axis of an environment's grid."""
 
     start: float | None = None
     step: float | None = None
@@ -39,7 +39,7 @@ class AxisEntry(_Entry):
 
 
 class TaskFile(_Entry):
-    """A task as it is written."""
+    """The content of a task file."""
 
     name: str
     title: str
@@ -60,12 +60,12 @@ def load_task(name_or_path: str | Path) -> Task:
     """Return a task.
 
     Args:
-        name_or_path: One of `task_names()`, or the path of a file: anything that ends in `.yaml`
-            or holds a path separator.
+        name_or_path: One of `task_names()`, or the path of a file: a text that ends in `.yaml` or
+            contains a path separator.
 
     Raises:
-        UnknownNameError: If no task has that name, or a key in the file is not known.
-        TaskError: If the file cannot be read or says something impossible.
+        UnknownNameError: If no task has that name, or a key in the file is unknown.
+        TaskError: If the file cannot be read or its content is invalid.
 
     >>> len(load_task("shaving").goals)
     8

@@ -1,4 +1,4 @@
-"""What a task is: goal poses of the tool, each fixed to a part of the body."""
+"""Tasks and goals: poses of the tool, each fixed to a body frame."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from tcs.errors import TaskError, UnknownNameError
 
 UNIT_TOLERANCE = 1e-5
-"""How far a quaternion's length may be from 1: six written digits round by less than this."""
+"""Tolerance of a quaternion's length: six printed digits round by less than this."""
 
 MAX_DISTANCE = 2.0
-"""Farthest a goal may be from its body frame [m]; beyond it, the figures are no metres."""
+"""Greatest distance of a goal from its body frame [m]; larger figures are not metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """A pose the tool has to take, fixed to a part of the body (frame H).
+    """A goal pose of the tool, fixed to a body frame H.
 
     Poses are those of the tool frame T: x forward out of the fingers, y the way they open.
     """
@@ -27,21 +27,21 @@ class Goal:
     body_frame: str
     """Name of frame H, e.g. "head"."""
     position: NDArray[np.float64]
-    """p_HoGo_H: the tool's place in H [m], shape (3,)."""
+    """p_HoGo_H: position of the goal in H [m], shape (3,)."""
     quaternion: NDArray[np.float64]
-    """R_HG: the tool's orientation in H, wxyz, unit, shape (4,)."""
+    """R_HG: orientation of the goal in H, unit quaternion wxyz, shape (4,)."""
     weight: float = 1.0
-    """How much this goal counts beside the others; `Task.weights` sums to 1."""
+    """Weight of this goal relative to the others; `Task.weights` sums to 1."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
 
         Raises:
-            TaskError: If a value is not finite, of a wrong shape or unit, or not positive where
-                it has to be.
+            TaskError: If a value is not finite, has a wrong shape or unit, or is not positive where
+                it must be.
         """
         if not self.body_frame:
-            raise TaskError("field 'body_frame' is empty. Name the part of the body, e.g. 'head'.")
+            raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
         position = _finite("position", self.position, ("x", "y", "z"))
         distance = float(np.linalg.norm(position))
         if distance > MAX_DISTANCE:
@@ -77,36 +77,34 @@ class Goal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """Something to be done on the body, as the tool poses it takes.
+    """A task as a set of goal poses of the tool.
 
-    Goals count one by one and standing still: a task says nothing of the way to a goal, nor of
-    the order of the goals.
+    Goals are evaluated one by one and at rest: a task has neither paths to the goals nor an order.
     """
 
     name: str
     title: str
-    """What it is, in a few words for a person."""
+    """Title for readers, a few words."""
     goals: tuple[Goal, ...]
     environments: tuple[str, ...]
-    """Names of the environments it was written for."""
+    """Names of the environments it is made for."""
     source: str
-    """Where its figures come from."""
+    """Source of its figures."""
     tool: str = ""
-    """Which frame the goals are poses of, in words."""
+    """Description of the tool frame that the goals refer to."""
     allowed_contacts: tuple[tuple[str, str], ...] = ()
     """Pairs of bodies that may touch."""
     grids: Mapping[str, Mapping[str, Mapping[str, object]]] = field(
         default_factory=dict, hash=False
     )
-    """For an environment, the axes of its grid that this task changes: new values of some of
-    start, step and count."""
+    """For an environment, changes to the axes of its grid: new values of start, step or count."""
 
     def __post_init__(self) -> None:
-        """Check that there is something to do, and somewhere to do it.
+        """Check the fields.
 
         Raises:
-            TaskError: If there are no goals or environments, or an environment comes twice.
-            UnknownNameError: If a grid is changed in an environment the task is not for.
+            TaskError: If there are no goals or environments, or an environment is repeated.
+            UnknownNameError: If `grids` names an environment that is not one of `environments`.
         """
         if not self.name:
             raise TaskError("field 'name' is empty.")
@@ -115,7 +113,7 @@ class Task:
                 raise TaskError(f"field '{key}' is empty. A task needs at least one {what}.")
         for name in self.environments:
             if self.environments.count(name) > 1:
-                raise TaskError(f"field 'environments': '{name}' is there twice.")
+                raise TaskError(f"field 'environments': '{name}' is repeated. Remove one of them.")
         for name in self.grids:
             if name not in self.environments:
                 raise UnknownNameError(
@@ -124,17 +122,17 @@ class Task:
 
     @property
     def weights(self) -> NDArray[np.float64]:
-        """How much each goal counts, summing to 1, shape (goals,)."""
+        """Weight of each goal, summing to 1, shape (goals,)."""
         raw = np.array([goal.weight for goal in self.goals], dtype=np.float64)
         return np.asarray(raw / raw.sum(), dtype=np.float64)
 
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
-        """Return the axes this task changes in that environment; none for one it does not name."""
+        """Return the changes to the axes of an environment's grid; empty where there are none."""
         return self.grids.get(environment, {})
 
 
 def _finite(field: str, numbers: ArrayLike, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return the numbers as a new array, refusing a wrong count or one that is not finite."""
+    """Return the numbers as a new array; raise for a wrong count or numbers not finite."""
     wanted = f"{len(names)} finite numbers ({', '.join(names)})"
     try:
         array = np.array(numbers, dtype=np.float64)

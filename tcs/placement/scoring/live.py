@@ -105,7 +105,7 @@ class LiveScorer:
         joints = {**{axis.name: 0.0 for axis in self.job.observed}, **joints}
         axes = []
         for name, value in joints.items():
-            is_angle = self._setup.scene.built.environment_joints.turns(name)
+            is_angle = self._setup.scene.built.environment_joints.is_revolute(name)
             start = math.degrees(value) if is_angle else value
             axes.append(Axis(name, "deg" if is_angle else "m", start, 0.0, 1))
         return dataclasses.replace(self.job, observed=tuple(axes))

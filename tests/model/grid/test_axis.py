@@ -61,7 +61,7 @@ def test_a_single_value_needs_no_step():
         ({"count": -3}, "the grid would be empty"),
         ({"count": 2.0}, "count is 2.0, but must be a whole number"),
         ({"count": True}, "count is True, but must be a whole number"),
-        ({"name": ""}, "needs a name"),
+        ({"name": ""}, "an axis has the name '', but must have a text"),
     ],
     ids=str,
 )

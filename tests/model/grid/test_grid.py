@@ -133,7 +133,7 @@ def test_axis_by_name():
             "but at most 20,000,000 are allowed",
         ),
         (changed("base_x", unit="deg"), "axis 'base_x': unit is 'deg', but must be 'm'"),
-        (changed("base_yaw", count=9), "go round more than once and repeat headings. At most 8"),
+        (changed("base_yaw", count=9), "exceed a full turn and repeat headings. Give at most 8"),
         ({k: v for k, v in WHEELCHAIR.items() if k != "torso"}, "needs axis torso"),
         ({}, "needs axis base_x, base_y, base_yaw, torso"),
         ({**WHEELCHAIR, "torso": 3}, "axis 'torso' is 3, but needs unit, start, step and count"),
@@ -165,7 +165,7 @@ def test_the_largest_grid_is_allowed_and_one_more_is_not():
 
 def test_axes_may_not_repeat_or_stand_elsewhere():
     axes = Grid.from_spec(WHEELCHAIR).axes
-    with pytest.raises(GridError, match="axis 'base_x' is there twice"):
+    with pytest.raises(GridError, match="axis 'base_x' is repeated"):
         Grid((axes[0], *axes))
     with pytest.raises(GridError, match="must end with base_x, base_y, base_yaw, torso"):
         Grid(axes[::-1])
@@ -173,11 +173,11 @@ def test_axes_may_not_repeat_or_stand_elsewhere():
 
 @pytest.mark.parametrize("flat", [-1, 89_304, [0, 89_304], 10**15], ids=str)
 def test_a_configuration_that_is_not_there(flat):
-    with pytest.raises(GridError, match=r"no configuration .* numbered 0 to 89303"):
+    with pytest.raises(GridError, match=r"no configuration .* indices are 0 to 89303"):
         Grid.from_spec(WHEELCHAIR).indices(flat)
 
 
-def test_configurations_are_never_known_by_floats():
+def test_configurations_are_never_identified_by_floats():
     grid = Grid.from_spec(WHEELCHAIR)
     with pytest.raises(GridError, match="whole number"):
         grid.values(0.5)
@@ -213,3 +213,12 @@ def test_changes_that_make_no_grid_say_where_they_stand():
 def test_what_is_no_plain_form_is_refused(plain):
     with pytest.raises(GridError, match="needs 'axes', a list of axes"):
         Grid.from_dict(plain)
+
+
+def test_environment_states_are_those_of_the_flat_order():
+    grid = Grid.from_spec(BED)
+    states = list(grid.environment_states())
+    assert len(states) == math.prod(grid.environment_shape) == 12
+    each = grid.size // len(states)
+    for i, state in enumerate(states):
+        assert dict(grid.configuration(i * each).environment) == state

@@ -102,7 +102,7 @@ def test_a_leader_goes_no_farther_than_its_knots(lift):
         (
             {"joints": {"ball": 1.0}},
             EnvironmentFileError,
-            r"joint 'ball' is ball_rpy, but only joints that turn",
+            r"joint 'ball' is ball_rpy, but only revolute and prismatic",
         ),
         (
             {"posture": {"heigth": {"knots": [0, 1], "joints": {"flap": [0, 1]}}}},

@@ -32,11 +32,11 @@ def test_joints_move_in_proportion_between_the_knots(deg, a, b):
 
 def test_a_sliding_leader_has_knots_in_metres():
     posture = Posture(knots=(0.0, 0.5), joints={"a": (0.0, 1.0)})
-    assert not posture.turns
+    assert not posture.is_revolute
     assert posture.leading == (0.0, 0.5)
     assert posture.positions(0.2) == pytest.approx({"a": 0.4}, abs=1e-15)
 
 
 def test_a_turning_leader_has_knots_in_degrees():
-    assert TURNING.turns
+    assert TURNING.is_revolute
     assert TURNING.leading == pytest.approx(np.radians([0, 40, 80]), abs=1e-15)

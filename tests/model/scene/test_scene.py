@@ -275,14 +275,14 @@ def test_a_model_of_the_users_own_stands_where_the_environment_file_says(
     ("shape", "joint", "said"),
     [
         ("<cylinder><radius>1</radius><length>1</length></cylinder>", FIXED, "a Cylinder.*Box"),
-        (BOARD, "", r"2 links that hang from nothing: board, leg"),
+        (BOARD, "", r"2 links without a parent: board, leg"),
         (BOARD, FIXED + "</model><model name='b'><link name='l'/>", "'shelf'.*cannot be used|two"),
         ("<box><size>1</size></box>", FIXED, r"'shelf'.*cannot be used.*size"),
         (
             BOARD,
             FIXED + "<joint name='hang' type='revolute'><parent>world</parent>"
             "<child>board</child><axis><xyz>0 0 1</xyz></axis></joint>",
-            "hangs the model from the world",
+            "a joint connects the model to the world",
         ),
     ],
     ids=["cylinder", "loose link", "two models", "torn box", "hung"],
@@ -310,7 +310,7 @@ def test_names_that_are_not_there_are_refused(spec):
     with pytest.raises(EnvironmentFileError, match=r"'errors', joint 'person_x'.*prismatic.*'std'"):
         Scene(with_changes(spec, errors=bends))
     twice = environment.models[0].model_copy(update={"name": "second chair"})
-    with pytest.raises(EnvironmentFileError, match="'wheelchair_x' is there twice"):
+    with pytest.raises(EnvironmentFileError, match="'wheelchair_x' exists twice"):
         Scene(with_changes(spec, models=(*environment.models, twice)))
 
 

@@ -96,7 +96,7 @@ def test_what_is_no_goal_is_refused(changes, said):
         ({"name": ""}, "field 'name' is empty"),
         ({"goals": ()}, "needs at least one goal"),
         ({"environments": ()}, "needs at least one environment"),
-        ({"environments": ("bed", "bed")}, "'bed' is there twice"),
+        ({"environments": ("bed", "bed")}, "'bed' is repeated"),
     ],
     ids=["name", "goals", "environments", "twice"],
 )
