@@ -6,9 +6,9 @@ import dataclasses
 import time
 
 import numpy as np
-from lane_costs import measure_shares
 from peer_drake import WinnersChecker
 from peer_problems import Bench, Pair
+from sample_costs import measure_shares
 from table import row, spread
 
 from tcs.kernel.arrays import FloatArray, IntArray
@@ -23,7 +23,7 @@ GRID_PARTS = (8, 4, 2, 1)
 EVERY = 4
 """Every how manieth slice of the grid the parts are timed on."""
 SERIES = ("1", "2", "cpu", "floor", "floor cpu", "overlaps")
-ARM_GAPS = ("gap_room", "gap_body", "gap_arm")
+ARM_GAPS = ("gap_environment", "gap_body", "gap_arm")
 
 
 def sweep_costs(bench: Bench, repeats: int) -> None:
@@ -79,7 +79,7 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
     The sweep itself runs on altered data: without goals only the base is checked; with an elbow
     that spans no distance the reach test turns every goal away; with no shape of the arm to check
     there is no collision. The differences are the parts. Inverse kinematics and the measure share
-    a loop: `lane_costs` tells them apart.
+    a loop: `sample_costs` tells them apart.
     """
     problem = bench.problem
     no_goals = {"goal_R": problem.goal_R[:, :0].copy(), "goal_p": problem.goal_p[:, :0].copy()}
@@ -126,7 +126,7 @@ def _processor_seconds(problem: Problem, grippers: IntArray, size: int) -> float
         scores = Scores(
             reason=np.empty(shape, np.uint8),
             contact=np.empty(shape, np.int32),
-            isotropy=np.zeros(shape, np.float32),
+            dexterity=np.zeros(shape, np.float32),
             joints=np.zeros((*shape, 7), np.float32),
         )
         begun = time.process_time()

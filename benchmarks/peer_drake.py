@@ -1,6 +1,6 @@
 """Drake's inverse kinematics and Drake's collision checker, on a plant as small as can be.
 
-The plant is built from the lowered arrays: the room and the robot's other parts stand still, and
+The plant is built from the lowered arrays: environment and the robot's other parts are fixed, and
 nothing but what the question needs is a joint. On the full plant of the scene (40 positions) the
 same inverse kinematics takes about twice as long, so this is Drake at its best.
 """
@@ -72,7 +72,7 @@ def add_arm(
 ) -> ArmPlant:
     """Build and finalize the plant; Drake will check exactly the pairs that our kernel checks.
 
-    Base against room is left out without joints: there, nothing that moves takes part in it.
+    Base against environment is left out without joints: there, nothing that moves takes part in it.
     """
     arrays = lowered.arrays
     robot = plant.AddModelInstance("robot")
@@ -127,21 +127,25 @@ def add_arm(
         return carrier(name, torso if arrays.body.frame[k] else base, robot)
 
     def in_room(k: int) -> RigidBody:
-        return carrier(lowered.room_bodies[arrays.room.body[k]], plant.world_frame(), environment)
+        return carrier(
+            lowered.environment_bodies[arrays.environment.body[k]], plant.world_frame(), environment
+        )
 
     arm = _register(plant, arrays.arm, on_link, "arm")
     body = _register(plant, arrays.body, on_body, "body")
-    room = _register(plant, arrays.room, in_room, "room")
+    room = _register(plant, arrays.environment, in_room, "room")
     plant.Finalize()
     declaration = CollisionFilterDeclaration().ExcludeWithin(GeometrySet([*arm, *body, *room]))
     for i, shape in enumerate(arm):
         partners = [arm[j] for j in np.flatnonzero(arrays.arm_vs_arm[i, :i])]
         partners += [body[j] for j in np.flatnonzero(arrays.arm_vs_body[i])]
-        partners += [room[j] for j in np.flatnonzero(arrays.arm_vs_room[i])]
+        partners += [room[j] for j in np.flatnonzero(arrays.arm_vs_environment[i])]
         _allow(declaration, shape, partners)
     if joints:
         for i, shape in enumerate(body):
-            _allow(declaration, shape, [room[j] for j in np.flatnonzero(arrays.body_vs_room[i])])
+            _allow(
+                declaration, shape, [room[j] for j in np.flatnonzero(arrays.body_vs_environment[i])]
+            )
     scene_graph.collision_filter_manager().Apply(declaration)
     return ArmPlant(base, torso, tool, robot)
 
@@ -293,18 +297,18 @@ def _register(
         plant.RegisterCollisionGeometry(
             body(k),
             _pose(shapes.R[0, k], shapes.p[0, k]),
-            _shape(int(shapes.kind[k]), shapes.size[k]),
+            _shape(int(shapes.type[k]), shapes.size[k]),
             f"{name} {k}",
             ProximityProperties(),
         )
-        for k in range(len(shapes.kind))
+        for k in range(len(shapes.type))
     ]
 
 
-def _shape(kind: int, size: FloatArray) -> Shape:
-    if kind == BOX:
+def _shape(shape_type: int, size: FloatArray) -> Shape:
+    if shape_type == BOX:
         return Box(*(2.0 * size))
-    return Capsule(size[0], 2.0 * size[1]) if kind == CAPSULE else Sphere(size[0])
+    return Capsule(size[0], 2.0 * size[1]) if shape_type == CAPSULE else Sphere(size[0])
 
 
 def _allow(

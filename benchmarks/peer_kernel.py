@@ -49,7 +49,7 @@ def score_each(
             one = Scores(
                 scores.reason[i : i + 1],
                 scores.contact[i : i + 1],
-                scores.isotropy[i : i + 1],
+                scores.dexterity[i : i + 1],
                 scores.joints[i : i + 1],
             )
             _score_slice(problem, work, search, grippers, h, h + 1, one)
@@ -105,7 +105,7 @@ class Kernel:
         scores = Scores(
             reason=np.empty((rows.size, 1), np.uint8),
             contact=np.empty((rows.size, 1), np.int32),
-            isotropy=np.zeros((rows.size, 1), np.float32),
+            dexterity=np.zeros((rows.size, 1), np.float32),
             joints=np.zeros((rows.size, 1, 7), np.float32),
         )
         memory = self._work, self._search

@@ -223,7 +223,7 @@ class Reach:
         p = self._problem
         kept: Any = {
             name: getattr(p, name)[part].copy()
-            for name in ("base_R", "base_p", "body", "body_A", "body_balls")
+            for name in ("base_R", "base_p", "body", "body_A", "body_spheres")
         }
         return p._replace(**kept, torso_levels=1)
 
@@ -242,7 +242,7 @@ def _solve_part(
     )
     score_slice(problem, gripper_contacts(problem), 0, 1, scores)
     solved.reached[part] = scores.reason[0] == REACHED
-    solved.manipulability[part] = scores.isotropy[0]
+    solved.manipulability[part] = scores.dexterity[0]
     solved.joints[part] = scores.joints[0]
     return count
 

@@ -18,7 +18,7 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 SPHERE, CAPSULE, BOX = 0, 1, 2
-"""Shape kinds. `size` holds: sphere (radius, 0, 0); capsule along its own z
+"""Shape types. `size` holds: sphere (radius, 0, 0); capsule along its own z
 (radius, half length between cap centres, 0); box (three half sizes)."""
 
 
@@ -41,7 +41,7 @@ class Chain(NamedTuple):
 class Shapes(NamedTuple):
     """Collision shapes, in one or several states of whatever carries them."""
 
-    kind: NDArray[np.int8]
+    type: NDArray[np.int8]
     """SPHERE, CAPSULE or BOX, shape (n,)."""
     size: FloatArray
     """Sizes [m], shape (n, 3)."""
@@ -51,7 +51,7 @@ class Shapes(NamedTuple):
     """Index of the body it belongs to, in the lowered scene's list of names, shape (n,)."""
     frame: NDArray[np.int8]
     """What carries it, shape (n,). Arm shapes: 1..7, the link. Body shapes: 0 what stays when
-    the torso moves, 1 what rides on it. Room shapes: 0."""
+    the torso moves, 1 what rides on it. Environment shapes: 0."""
     R: FloatArray
     """Orientations, shape (states, n, 3, 3)."""
     p: FloatArray
@@ -73,16 +73,16 @@ class SceneArrays(NamedTuple):
     """Shapes the arm moves, one state: poses in link frames. Frame 7 is the gripper."""
     body: Shapes
     """Every other shape of the robot: poses in B, one state for each torso level."""
-    room: Shapes
+    environment: Shapes
     """Furniture, person, obstacles: poses in W, one state for each environment state."""
     arm_vs_arm: BoolArray
     """Pairs that are checked, shape (n_arm, n_arm); symmetric, diagonal False."""
     arm_vs_body: BoolArray
     """Pairs that are checked, shape (n_arm, n_body)."""
-    arm_vs_room: BoolArray
-    """Pairs that are checked, shape (n_arm, n_room)."""
-    body_vs_room: BoolArray
-    """Pairs that are checked, shape (n_body, n_room)."""
+    arm_vs_environment: BoolArray
+    """Pairs that are checked, shape (n_arm, n_environment)."""
+    body_vs_environment: BoolArray
+    """Pairs that are checked, shape (n_body, n_environment)."""
     margin: float
     """Contacts closer than this count as collision [m]."""
     goal_R: FloatArray

@@ -71,7 +71,7 @@ def is_compiled(entry: str = "sweep._score_slice") -> bool:
     return folder is not None and any(folder.rglob(f"{entry}*.nbc"))
 
 
-def whole(number: int) -> int:
+def int_constant(number: int) -> int:
     """Return a constant to hand to kernel functions, whose type says nothing of its value.
 
     Numba compiles a function anew for every literal, and every plain constant, it is handed.

@@ -16,23 +16,23 @@ PARALLEL = 1e-12
 
 
 # Columns of packed shapes. A shape is one row of floats: its inner loops then touch one array.
-KIND, BALL, SIZE, CENTRE, TURN, COLUMNS = 0, 1, 2, 5, 8, 17
-"""Kind; radius of the ball about the centre that holds the shape [m]; three sizes as in `Shapes`
+TYPE, BOUND, SIZE, CENTRE, ROTATION, COLUMNS = 0, 1, 2, 5, 8, 17
+"""Type; radius of the ball about the centre that holds the shape [m]; three sizes as in `Shapes`
 [m]; centre [m]; rotation matrix row by row."""
 
 
 def pack(shapes: Shapes, order: IntArray | None = None) -> FloatArray:
     """Return shapes as rows, shape (states, n, COLUMNS), in `order` if one is given."""
     states, n = shapes.p.shape[:2]
-    kind, size = shapes.kind, shapes.size
+    types, size = shapes.type, shapes.size
     length = np.linalg.norm(size, axis=1)
-    ball = np.where(kind == CAPSULE, size[:, 0] + size[:, 1], size[:, 0])
+    sphere = np.where(types == CAPSULE, size[:, 0] + size[:, 1], size[:, 0])
     rows = np.empty((states, n, COLUMNS))
-    rows[..., KIND] = kind
-    rows[..., BALL] = np.where(kind == BOX, length, ball)
+    rows[..., TYPE] = types
+    rows[..., BOUND] = np.where(types == BOX, length, sphere)
     rows[..., SIZE : SIZE + 3] = size
     rows[..., CENTRE : CENTRE + 3] = shapes.p
-    rows[..., TURN:] = shapes.R.reshape(states, n, 9)
+    rows[..., ROTATION:] = shapes.R.reshape(states, n, 9)
     return rows if order is None else np.ascontiguousarray(rows[:, order])
 
 
@@ -46,13 +46,15 @@ def move(R: FloatArray, p: FloatArray, local: FloatArray, i: int, out: FloatArra
         a, b, c_ = R[r, 0], R[r, 1], R[r, 2]
         out[k, CENTRE + r] = p[r] + a * x + b * y + c_ * z
         for c in range(3):
-            out[k, TURN + 3 * r + c] = (
-                a * local[i, TURN + c] + b * local[i, TURN + 3 + c] + c_ * local[i, TURN + 6 + c]
+            out[k, ROTATION + 3 * r + c] = (
+                a * local[i, ROTATION + c]
+                + b * local[i, ROTATION + 3 + c]
+                + c_ * local[i, ROTATION + 6 + c]
             )
 
 
 @jit
-def balls_meet(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
+def spheres_overlap(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
     """Return whether the balls about two shapes are closer than `gap` [m]: ask before `closer`.
 
     On its own because a function that calls another one counts references to its arrays, which
@@ -61,31 +63,31 @@ def balls_meet(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool
     x = b[j, CENTRE] - a[i, CENTRE]
     y = b[j, CENTRE + 1] - a[i, CENTRE + 1]
     z = b[j, CENTRE + 2] - a[i, CENTRE + 2]
-    apart = a[i, BALL] + b[j, BALL] + gap
+    apart = a[i, BOUND] + b[j, BOUND] + gap
     return x * x + y * y + z * z < apart * apart
 
 
 @jit
 def closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
     """Return whether shape i of a and shape j of b are closer than `gap` > 0 [m]."""
-    if a[i, KIND] > b[j, KIND]:
+    if a[i, TYPE] > b[j, TYPE]:
         a, i, b, j = b, j, a, i
-    if a[i, KIND] == BOX:
+    if a[i, TYPE] == BOX:
         return _boxes_closer(a, i, b, j, gap)
     reach = a[i, SIZE] + gap
-    half_a = a[i, SIZE + 1] if a[i, KIND] == CAPSULE else 0.0
-    if b[j, KIND] == BOX:
+    half_a = a[i, SIZE + 1] if a[i, TYPE] == CAPSULE else 0.0
+    if b[j, TYPE] == BOX:
         return _segment_box(a, i, half_a, b, j) < reach * reach
     reach += b[j, SIZE]
-    half_b = b[j, SIZE + 1] if b[j, KIND] == CAPSULE else 0.0
+    half_b = b[j, SIZE + 1] if b[j, TYPE] == CAPSULE else 0.0
     return _segments(a, i, half_a, b, j, half_b) < reach * reach
 
 
 @inner
 def _segments(a: FloatArray, i: int, half_a: float, b: FloatArray, j: int, half_b: float) -> float:
     """Return the squared distance between two segments along the shapes' z axes [m^2]."""
-    ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
-    vx, vy, vz = b[j, TURN + 2], b[j, TURN + 5], b[j, TURN + 8]
+    ux, uy, uz = a[i, ROTATION + 2], a[i, ROTATION + 5], a[i, ROTATION + 8]
+    vx, vy, vz = b[j, ROTATION + 2], b[j, ROTATION + 5], b[j, ROTATION + 8]
     x, y, z = (
         b[j, CENTRE] - a[i, CENTRE],
         b[j, CENTRE + 1] - a[i, CENTRE + 1],
@@ -117,13 +119,13 @@ def _segment_box(a: FloatArray, i: int, half: float, b: FloatArray, j: int) -> f
         a[i, CENTRE + 1] - b[j, CENTRE + 1],
         a[i, CENTRE + 2] - b[j, CENTRE + 2],
     )
-    ux, uy, uz = a[i, TURN + 2], a[i, TURN + 5], a[i, TURN + 8]
-    px = b[j, TURN] * x + b[j, TURN + 3] * y + b[j, TURN + 6] * z
-    py = b[j, TURN + 1] * x + b[j, TURN + 4] * y + b[j, TURN + 7] * z
-    pz = b[j, TURN + 2] * x + b[j, TURN + 5] * y + b[j, TURN + 8] * z
-    dx = half * (b[j, TURN] * ux + b[j, TURN + 3] * uy + b[j, TURN + 6] * uz)
-    dy = half * (b[j, TURN + 1] * ux + b[j, TURN + 4] * uy + b[j, TURN + 7] * uz)
-    dz = half * (b[j, TURN + 2] * ux + b[j, TURN + 5] * uy + b[j, TURN + 8] * uz)
+    ux, uy, uz = a[i, ROTATION + 2], a[i, ROTATION + 5], a[i, ROTATION + 8]
+    px = b[j, ROTATION] * x + b[j, ROTATION + 3] * y + b[j, ROTATION + 6] * z
+    py = b[j, ROTATION + 1] * x + b[j, ROTATION + 4] * y + b[j, ROTATION + 7] * z
+    pz = b[j, ROTATION + 2] * x + b[j, ROTATION + 5] * y + b[j, ROTATION + 8] * z
+    dx = half * (b[j, ROTATION] * ux + b[j, ROTATION + 3] * uy + b[j, ROTATION + 6] * uz)
+    dy = half * (b[j, ROTATION + 1] * ux + b[j, ROTATION + 4] * uy + b[j, ROTATION + 7] * uz)
+    dz = half * (b[j, ROTATION + 2] * ux + b[j, ROTATION + 5] * uy + b[j, ROTATION + 8] * uz)
     return _line_box(
         px - dx, py - dy, pz - dz, 2.0 * dx, 2.0 * dy, 2.0 * dz,
         b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2],
@@ -194,57 +196,59 @@ def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> b
     )
     ax, ay, az = a[i, SIZE], a[i, SIZE + 1], a[i, SIZE + 2]
     bx, by, bz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
-    tx = a[i, TURN] * x + a[i, TURN + 3] * y + a[i, TURN + 6] * z
+    tx = a[i, ROTATION] * x + a[i, ROTATION + 3] * y + a[i, ROTATION + 6] * z
     m00 = (
-        a[i, TURN] * b[j, TURN] + a[i, TURN + 3] * b[j, TURN + 3] + a[i, TURN + 6] * b[j, TURN + 6]
+        a[i, ROTATION] * b[j, ROTATION]
+        + a[i, ROTATION + 3] * b[j, ROTATION + 3]
+        + a[i, ROTATION + 6] * b[j, ROTATION + 6]
     )
     m01 = (
-        a[i, TURN] * b[j, TURN + 1]
-        + a[i, TURN + 3] * b[j, TURN + 4]
-        + a[i, TURN + 6] * b[j, TURN + 7]
+        a[i, ROTATION] * b[j, ROTATION + 1]
+        + a[i, ROTATION + 3] * b[j, ROTATION + 4]
+        + a[i, ROTATION + 6] * b[j, ROTATION + 7]
     )
     m02 = (
-        a[i, TURN] * b[j, TURN + 2]
-        + a[i, TURN + 3] * b[j, TURN + 5]
-        + a[i, TURN + 6] * b[j, TURN + 8]
+        a[i, ROTATION] * b[j, ROTATION + 2]
+        + a[i, ROTATION + 3] * b[j, ROTATION + 5]
+        + a[i, ROTATION + 6] * b[j, ROTATION + 8]
     )
     most = abs(tx) - (ax + abs(m00) * bx + abs(m01) * by + abs(m02) * bz)
     if most >= gap:
         return False
-    ty = a[i, TURN + 1] * x + a[i, TURN + 4] * y + a[i, TURN + 7] * z
+    ty = a[i, ROTATION + 1] * x + a[i, ROTATION + 4] * y + a[i, ROTATION + 7] * z
     m10 = (
-        a[i, TURN + 1] * b[j, TURN]
-        + a[i, TURN + 4] * b[j, TURN + 3]
-        + a[i, TURN + 7] * b[j, TURN + 6]
+        a[i, ROTATION + 1] * b[j, ROTATION]
+        + a[i, ROTATION + 4] * b[j, ROTATION + 3]
+        + a[i, ROTATION + 7] * b[j, ROTATION + 6]
     )
     m11 = (
-        a[i, TURN + 1] * b[j, TURN + 1]
-        + a[i, TURN + 4] * b[j, TURN + 4]
-        + a[i, TURN + 7] * b[j, TURN + 7]
+        a[i, ROTATION + 1] * b[j, ROTATION + 1]
+        + a[i, ROTATION + 4] * b[j, ROTATION + 4]
+        + a[i, ROTATION + 7] * b[j, ROTATION + 7]
     )
     m12 = (
-        a[i, TURN + 1] * b[j, TURN + 2]
-        + a[i, TURN + 4] * b[j, TURN + 5]
-        + a[i, TURN + 7] * b[j, TURN + 8]
+        a[i, ROTATION + 1] * b[j, ROTATION + 2]
+        + a[i, ROTATION + 4] * b[j, ROTATION + 5]
+        + a[i, ROTATION + 7] * b[j, ROTATION + 8]
     )
     most = max(most, abs(ty) - (ay + abs(m10) * bx + abs(m11) * by + abs(m12) * bz))
     if most >= gap:
         return False
-    tz = a[i, TURN + 2] * x + a[i, TURN + 5] * y + a[i, TURN + 8] * z
+    tz = a[i, ROTATION + 2] * x + a[i, ROTATION + 5] * y + a[i, ROTATION + 8] * z
     m20 = (
-        a[i, TURN + 2] * b[j, TURN]
-        + a[i, TURN + 5] * b[j, TURN + 3]
-        + a[i, TURN + 8] * b[j, TURN + 6]
+        a[i, ROTATION + 2] * b[j, ROTATION]
+        + a[i, ROTATION + 5] * b[j, ROTATION + 3]
+        + a[i, ROTATION + 8] * b[j, ROTATION + 6]
     )
     m21 = (
-        a[i, TURN + 2] * b[j, TURN + 1]
-        + a[i, TURN + 5] * b[j, TURN + 4]
-        + a[i, TURN + 8] * b[j, TURN + 7]
+        a[i, ROTATION + 2] * b[j, ROTATION + 1]
+        + a[i, ROTATION + 5] * b[j, ROTATION + 4]
+        + a[i, ROTATION + 8] * b[j, ROTATION + 7]
     )
     m22 = (
-        a[i, TURN + 2] * b[j, TURN + 2]
-        + a[i, TURN + 5] * b[j, TURN + 5]
-        + a[i, TURN + 8] * b[j, TURN + 8]
+        a[i, ROTATION + 2] * b[j, ROTATION + 2]
+        + a[i, ROTATION + 5] * b[j, ROTATION + 5]
+        + a[i, ROTATION + 8] * b[j, ROTATION + 8]
     )
     most = max(most, abs(tz) - (az + abs(m20) * bx + abs(m21) * by + abs(m22) * bz))
     s = tx * m00 + ty * m10 + tz * m20
@@ -297,11 +301,11 @@ def _edges_box(a: FloatArray, i: int, b: FloatArray, j: int) -> float:
     for k in range(3):
         c[k] = 0.0
         for m in range(3):
-            c[k] += b[j, TURN + 3 * m + k] * (a[i, CENTRE + m] - b[j, CENTRE + m])
+            c[k] += b[j, ROTATION + 3 * m + k] * (a[i, CENTRE + m] - b[j, CENTRE + m])
         for m in range(3):
             e[m, k] = 0.0
             for n in range(3):
-                e[m, k] += b[j, TURN + 3 * n + k] * a[i, TURN + 3 * n + m] * a[i, SIZE + m]
+                e[m, k] += b[j, ROTATION + 3 * n + k] * a[i, ROTATION + 3 * n + m] * a[i, SIZE + m]
     least = np.inf
     hx, hy, hz = b[j, SIZE], b[j, SIZE + 1], b[j, SIZE + 2]
     for m in range(3):

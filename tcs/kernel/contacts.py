@@ -1,7 +1,7 @@
 """Which pair of shapes touches first: base, gripper and arm, each in the frame that suits it.
 
-A contact is a code `robot_body * bodies + other`, where `other` counts the room's bodies first
-and then the robot's; NO_CONTACT where nothing touches.
+A contact is a code `robot_body * bodies + other`, where `other` counts the bodies of the
+environment first and then those of the robot; NO_CONTACT where nothing touches.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner, jit, whole
-from tcs.kernel.collide import BALL, CENTRE, balls_meet, closer, move
+from tcs.kernel.cache import inner, int_constant, jit
+from tcs.kernel.collide import BOUND, CENTRE, closer, move, spheres_overlap
 from tcs.kernel.problem import Problem
 
 NO_CONTACT = -1
-ROOM, BODY, ARM = whole(0), whole(1), whole(2)
+ENVIRONMENT, BODY, ARM = int_constant(0), int_constant(1), int_constant(2)
 """What the arm touched."""
-STAYS, RIDES = whole(0), whole(1)
-"""Body shapes that stay where they are, or ride on the torso; the former at any torso level."""
+BASE_FIXED, TORSO_MOUNTED = int_constant(0), int_constant(1)
+"""Mount of a body shape: fixed to the base, or mounted on the torso."""
 AT_GOAL = 1e-7
 """How far off [m, and as entries of a rotation] a solution may be. The closed form is good to 1e-12
 except within 1e-7 rad of a singularity."""
@@ -30,12 +30,12 @@ class Workspace(NamedTuple):
 
     arm: FloatArray
     """Arm shapes in A at the posture in hand, packed."""
-    room_B: FloatArray
-    """Room shapes in B, packed."""
-    room_A: FloatArray
-    """Room shapes in A, packed; only those listed in `near` are up to date."""
+    environment_B: FloatArray
+    """Environment shapes in B, packed."""
+    environment_A: FloatArray
+    """Environment shapes in A, packed; only those listed in `near` are up to date."""
     near: IntArray
-    """Indices of the room shapes that the arm could touch from here, shape (n_room,)."""
+    """Indices of the environment shapes within the arm's reach, shape (n_environment,)."""
     near_count: IntArray
     """How many there are, shape (1,)."""
     link_R: FloatArray
@@ -43,7 +43,7 @@ class Workspace(NamedTuple):
     link_p: FloatArray
     """Origins of L1..L7 in A [m], shape (8, 3)."""
     last: IntArray
-    """The pair that blocked last (kind of partner, arm shape, partner), shape (3,)."""
+    """The pair that blocked last (what the partner belongs to, arm shape, partner), shape (3,)."""
     R_BW: FloatArray
     """Orientation of the environment W in the base B in hand, shape (3, 3)."""
     p_BW: FloatArray
@@ -58,9 +58,9 @@ def new_workspace(problem: Problem) -> Workspace:
     """Return scratch memory for one worker."""
     return Workspace(
         np.empty_like(problem.links),
-        np.empty_like(problem.room[0]),
-        np.empty_like(problem.room[0]),
-        np.zeros(problem.room_body.size, np.int64),
+        np.empty_like(problem.environment[0]),
+        np.empty_like(problem.environment[0]),
+        np.zeros(problem.environment_body.size, np.int64),
         np.zeros(1, np.int64),
         np.empty((8, 3, 3)),
         np.empty((8, 3)),
@@ -74,46 +74,56 @@ def new_workspace(problem: Problem) -> Workspace:
 
 @inner
 def contact_code(problem: Problem, robot_body: int, other: int, partner: int) -> int:
-    """Return the code of a contact between a robot body and a ROOM body or another robot body."""
-    if partner != ROOM:
-        other += problem.room_bodies
-    return robot_body * (problem.room_bodies + problem.robot_bodies) + other
+    """Return the code of a contact of a robot body with `other`, numbered within its partner."""
+    if partner != ENVIRONMENT:
+        other += problem.environment_bodies
+    return robot_body * (problem.environment_bodies + problem.robot_bodies) + other
 
 
 @inner
-def base_contact(problem: Problem, work: Workspace, torso: int, rides: int) -> int:
-    """Return the first contact with the room of the body shapes that ride on the torso, or not.
+def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> int:
+    """Return the first contact of the body shapes of one mount with the environment.
 
-    The room must stand in `work.room_B`.
+    `work.environment_B` must be up to date.
     """
-    body, room, gaps = problem.body[torso], work.room_B, problem.gap_base
-    carried, ball = problem.body_rides, problem.body_balls[torso, rides]
-    for j in range(len(room)):
-        x = room[j, CENTRE] - ball[0]
-        y = room[j, CENTRE + 1] - ball[1]
-        z = room[j, CENTRE + 2] - ball[2]
-        apart = room[j, BALL] + ball[3] + problem.widest_gap
+    body, environment, gaps = problem.body[torso], work.environment_B, problem.gap_base
+    mounts, sphere = problem.body_mount, problem.body_spheres[torso, mount]
+    for j in range(len(environment)):
+        x = environment[j, CENTRE] - sphere[0]
+        y = environment[j, CENTRE + 1] - sphere[1]
+        z = environment[j, CENTRE + 2] - sphere[2]
+        apart = environment[j, BOUND] + sphere[3] + problem.widest_gap
         if apart <= 0.0 or x * x + y * y + z * z > apart * apart:
             continue
         for i in range(len(body)):
             gap = gaps[i, j]
-            if carried[i] != rides or gap <= 0.0:
+            if mounts[i] != mount or gap <= 0.0:
                 continue
-            if balls_meet(body, i, room, j, gap) and closer(body, i, room, j, gap):
-                return contact_code(problem, problem.body_body[i], problem.room_body[j], ROOM)
+            if spheres_overlap(body, i, environment, j, gap) and closer(
+                body, i, environment, j, gap
+            ):
+                return contact_code(
+                    problem, problem.body_body[i], problem.environment_body[j], ENVIRONMENT
+                )
     return NO_CONTACT
 
 
 @inner
-def gripper_room_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
-    """Return the first contact of the gripper, tool at a goal, with the room; all in W."""
+def gripper_environment_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
+    """Return the first contact of the gripper, tool at a goal, with the environment; all in W."""
     _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
-    arm, room, gaps = work.arm, problem.room[state], problem.gap_room
+    arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
     for i in range(problem.grippers):
-        for j in range(len(room)):
+        for j in range(len(environment)):
             gap = gaps[i, j]
-            if gap > 0.0 and balls_meet(arm, i, room, j, gap) and closer(arm, i, room, j, gap):
-                return contact_code(problem, problem.link_body[i], problem.room_body[j], ROOM)
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, i, environment, j, gap)
+                and closer(arm, i, environment, j, gap)
+            ):
+                return contact_code(
+                    problem, problem.link_body[i], problem.environment_body[j], ENVIRONMENT
+                )
     return NO_CONTACT
 
 
@@ -128,7 +138,11 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
     for i in range(problem.grippers):
         for j in range(len(body_A)):
             gap = gaps[i, j]
-            if gap > 0.0 and balls_meet(arm, i, body_A, j, gap) and closer(arm, i, body_A, j, gap):
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, i, body_A, j, gap)
+                and closer(arm, i, body_A, j, gap)
+            ):
                 return contact_code(problem, problem.link_body[i], problem.body_body[j], BODY)
     return NO_CONTACT
 
@@ -178,12 +192,12 @@ def place_links(
 
 @inner
 def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatArray) -> int:
-    """Return the first contact of the arm at joint angles q, gripper against the room excepted.
+    """Return the first contact of the arm at joint angles q, except gripper against environment.
 
     `gripper_body_contact` must have placed the gripper. The pair that blocked last is tried first.
     """
-    arm, room = work.arm, work.room_A
-    gap_room, gap_body, gap_arm = problem.gap_room, problem.gap_body, problem.gap_arm
+    arm, environment = work.arm, work.environment_A
+    gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
     place_links(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
     partner, i, j = work.last[0], work.last[1], work.last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
@@ -192,18 +206,26 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
         _place_link(problem, work, i)
         for n in range(work.near_count[0]):
             j = work.near[n]
-            gap = gap_room[i, j]
-            if gap > 0.0 and balls_meet(arm, i, room, j, gap) and closer(arm, i, room, j, gap):
-                work.last[0], work.last[1], work.last[2] = ROOM, i, j
-                return pair_code(problem, ROOM, i, j)
+            gap = gap_environment[i, j]
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, i, environment, j, gap)
+                and closer(arm, i, environment, j, gap)
+            ):
+                work.last[0], work.last[1], work.last[2] = ENVIRONMENT, i, j
+                return pair_code(problem, ENVIRONMENT, i, j)
         for j in range(len(body_A)):
             gap = gap_body[i, j]
-            if gap > 0.0 and balls_meet(arm, i, body_A, j, gap) and closer(arm, i, body_A, j, gap):
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, i, body_A, j, gap)
+                and closer(arm, i, body_A, j, gap)
+            ):
                 work.last[0], work.last[1], work.last[2] = BODY, i, j
                 return pair_code(problem, BODY, i, j)
         for j in range(i):
             gap = gap_arm[i, j]
-            if gap > 0.0 and balls_meet(arm, i, arm, j, gap) and closer(arm, i, arm, j, gap):
+            if gap > 0.0 and spheres_overlap(arm, i, arm, j, gap) and closer(arm, i, arm, j, gap):
                 work.last[0], work.last[1], work.last[2] = ARM, i, j
                 return pair_code(problem, ARM, i, j)
     return NO_CONTACT
@@ -233,8 +255,8 @@ def pair_touches(
     """Return whether arm shape i touches shape j of a partner, the links being placed."""
     arm = work.arm
     _place_link(problem, work, i)
-    if partner == ROOM:
-        return closer(arm, i, work.room_A, j, problem.gap_room[i, j])
+    if partner == ENVIRONMENT:
+        return closer(arm, i, work.environment_A, j, problem.gap_environment[i, j])
     if partner == BODY:
         return closer(arm, i, body_A, j, problem.gap_body[i, j])
     _place_link(problem, work, j)
@@ -244,8 +266,8 @@ def pair_touches(
 @inner
 def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
     """Return the contact code of arm shape i and shape j of a partner."""
-    if partner == ROOM:
-        other = problem.room_body[j]
+    if partner == ENVIRONMENT:
+        other = problem.environment_body[j]
     elif partner == BODY:
         other = problem.body_body[j]
     else:

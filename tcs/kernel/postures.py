@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.base_pose import environment_in_arm_base, place_base
+from tcs.kernel.cache import int_constant, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
     arm_contact,
     gripper_body_contact,
-    gripper_room_contact,
+    gripper_environment_contact,
     place_links,
 )
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.stand import room_in_arm_base, stand
-from tcs.kernel.views import borrowed
+from tcs.kernel.views import unowned
 
-HERE = whole(0)
+HERE = int_constant(0)
 """The one place, environment state or goal of a problem that has no more."""
 
 
@@ -65,7 +65,7 @@ def tool_poses(
 @jit
 def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
     """Fill the problem's dexterity measure of many postures: q of shape (n, 7), value (n,)."""
-    problem = borrowed(owned_problem)
+    problem = unowned(owned_problem)
     for i in range(len(q)):
         value[i] = measure_at(problem, q[i])
 
@@ -74,26 +74,26 @@ def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
 def free_postures(
     owned_problem: Problem, owned_work: Workspace, torso: int, q: FloatArray, free: BoolArray
 ) -> None:
-    """Fill whether postures touch nothing: neither the room nor the robot itself.
+    """Fill whether postures touch nothing: neither the environment nor the robot itself.
 
     The base stands at place 0 of the problem's grid. Goal i of environment state 0 must be the
     pose at which posture i holds the tool.
 
     Args:
-        owned_problem: Robot and room.
+        owned_problem: Robot and environment.
         owned_work: Scratch.
         torso: Torso level.
         q: Joint angles [rad], shape (n, 7).
         free: Filled, shape (n,).
     """
-    problem, work = borrowed(owned_problem), borrowed(owned_work)
-    stand(problem, work, HERE)
-    room_in_arm_base(problem, work, torso)
+    problem, work = unowned(owned_problem), unowned(owned_work)
+    place_base(problem, work, HERE)
+    environment_in_arm_base(problem, work, torso)
     body_A = problem.body_A[torso]
     work.last[0] = -1
     for i in range(len(q)):
         free[i] = False
-        if gripper_room_contact(problem, work, HERE, i) != NO_CONTACT:
+        if gripper_environment_contact(problem, work, HERE, i) != NO_CONTACT:
             continue
         tool_pose(
             problem.chain_R, problem.chain_p, q[i], work.link_R, work.link_p, work.R_AG, work.p_AG

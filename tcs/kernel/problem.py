@@ -17,7 +17,7 @@ from tcs.kernel.arrays import (
     SceneArrays,
     Shapes,
 )
-from tcs.kernel.collide import BALL, CENTRE, pack
+from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 
 UNCHECKED = -1.0
@@ -54,29 +54,30 @@ class Problem(NamedTuple):
     """Shapes of the rest of the robot in B, packed, shape (torso levels, n_body, 17)."""
     body_A: FloatArray
     """The same in A."""
-    body_balls: FloatArray
+    body_spheres: FloatArray
     """Centre and radius of a ball about all body shapes that stay (0) and that ride on the torso
     (1), in B [m], shape (torso levels, 2, 4)."""
-    body_rides: IntArray
+    body_mount: IntArray
     """1 where a body shape rides on the torso, else 0, shape (n_body,)."""
     body_body: IntArray
     """Robot body each belongs to, shape (n_body,)."""
-    room: FloatArray
-    """Shapes of the room in W, packed, shape (environment states, n_room, 17)."""
-    room_body: IntArray
-    """Room body each belongs to, shape (n_room,)."""
-    room_bodies: int
-    """How many bodies the room has."""
+    environment: FloatArray
+    """Shapes of the environment in W, packed, shape (environment states, n_environment, 17)."""
+    environment_body: IntArray
+    """Environment body each belongs to, shape (n_environment,)."""
+    environment_bodies: int
+    """How many bodies the environment has."""
     robot_bodies: int
     """How many the robot has."""
-    gap_room: FloatArray
-    """Distance [m] that arm and room shapes must keep, or UNCHECKED, shape (n_arm, n_room)."""
+    gap_environment: FloatArray
+    """Distance [m] that arm and environment shapes must keep, or UNCHECKED, shape
+    (n_arm, n_environment)."""
     gap_body: FloatArray
     """The same for arm and body shapes, shape (n_arm, n_body)."""
     gap_arm: FloatArray
     """The same for arm shapes among themselves, shape (n_arm, n_arm)."""
     gap_base: FloatArray
-    """The same for body and room shapes, shape (n_body, n_room)."""
+    """The same for body and environment shapes, shape (n_body, n_environment)."""
     widest_gap: float
     """The greatest of all these distances [m]."""
     arm_radius: float
@@ -105,7 +106,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         R=R_AB[:, None] @ scene.body.R, p=np.einsum("tij,tnj->tni", R_AB, from_arm_base)
     )
     frame = scene.arm.frame[order].astype(np.int64)
-    pads = scene.arm.pad[order], scene.body.pad, scene.room.pad
+    pads = scene.arm.pad[order], scene.body.pad, scene.environment.pad
     margin = scene.margin
     widest = max(margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
     links = pack(scene.arm, order)[0]
@@ -122,17 +123,17 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         base_p=_own(scene.arm_base_p),
         body=pack(scene.body),
         body_A=pack(body_A),
-        body_balls=_balls(pack(scene.body), scene.body.frame),
-        body_rides=scene.body.frame.astype(np.int64),
+        body_spheres=_bounding_spheres(pack(scene.body), scene.body.frame),
+        body_mount=scene.body.frame.astype(np.int64),
         body_body=scene.body.body.astype(np.int64),
-        room=pack(scene.room),
-        room_body=scene.room.body.astype(np.int64),
-        room_bodies=_count(scene.room),
+        environment=pack(scene.environment),
+        environment_body=scene.environment.body.astype(np.int64),
+        environment_bodies=_count(scene.environment),
         robot_bodies=max(_count(scene.arm), _count(scene.body)),
-        gap_room=_gaps(scene.arm_vs_room[order], pads[0], pads[2], margin),
+        gap_environment=_gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin),
         gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], margin),
         gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], margin),
-        gap_base=_gaps(scene.body_vs_room, pads[1], pads[2], margin),
+        gap_base=_gaps(scene.body_vs_environment, pads[1], pads[2], margin),
         widest_gap=widest,
         arm_radius=_arm_radius(scene.chain, links, frame) + widest,
         goal_R=_own(scene.goal_R),
@@ -148,24 +149,24 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
 def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
     """Return how far from the origin of A the arm's shapes can get [m]."""
     reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain.p[:7], axis=1))])
-    out = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1) + links[:, BALL]
+    out = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1) + links[:, BOUND]
     return float(np.max(reach[frame] + out, initial=0.0))
 
 
-def _balls(bodies: FloatArray, rides: NDArray[np.int8]) -> FloatArray:
+def _bounding_spheres(bodies: FloatArray, mount: NDArray[np.int8]) -> FloatArray:
     """Return a ball about each of the two groups of shapes; radius -inf for an empty one."""
-    balls = np.full((len(bodies), 2, 4), -np.inf)
-    balls[..., :3] = 0.0
+    spheres = np.full((len(bodies), 2, 4), -np.inf)
+    spheres[..., :3] = 0.0
     for group in (0, 1):
-        rows = bodies[:, rides == group]
+        rows = bodies[:, mount == group]
         if not rows.shape[1]:
             continue
-        centres, radii = rows[..., CENTRE : CENTRE + 3], rows[..., BALL, None]
+        centres, radii = rows[..., CENTRE : CENTRE + 3], rows[..., BOUND, None]
         low, high = (centres - radii).min(axis=1), (centres + radii).max(axis=1)
         middle = (low + high) / 2
-        out = np.linalg.norm(centres - middle[:, None], axis=2) + rows[..., BALL]
-        balls[:, group, :3], balls[:, group, 3] = middle, out.max(axis=1)
-    return balls
+        out = np.linalg.norm(centres - middle[:, None], axis=2) + rows[..., BOUND]
+        spheres[:, group, :3], spheres[:, group, 3] = middle, out.max(axis=1)
+    return spheres
 
 
 def _count(shapes: Shapes) -> int:

@@ -26,7 +26,7 @@ class SetArrays(NamedTuple):
     """Members of a set share this number, shape (C,); all 0 where they need not."""
     xy: FloatArray
     """Places of the cells [m], shape (N, 2)."""
-    isotropy: FloatArray
+    dexterity: FloatArray
     """Isotropy at each goal, 0 where not reached, shape (C, G)."""
     reached: BoolArray
     """Whether each goal is reached, shape (C, G)."""
@@ -137,19 +137,19 @@ def bound_cell_pair(
     best: BestPairs,
 ) -> None:
     """Go through the pairs between two cells, and write what is kept to `row` of `out`."""
-    isotropy, peak, weights = arrays.isotropy, arrays.peak, arrays.weights
+    dexterity, peak, weights = arrays.dexterity, arrays.peak, arrays.weights
     least = arrays.least_manipulability
     # No pair can beat the cells' peaks, at every goal, taken together.
     if pair_manipulability(peak, first, peak, second, weights) < least:
         return
     for i in range(arrays.start[first], arrays.start[first + 1]):
-        if pair_manipulability(isotropy, i, peak, second, weights) < least:
+        if pair_manipulability(dexterity, i, peak, second, weights) < least:
             continue
         begin = i + 1 if first == second else arrays.start[second]
         for j in range(begin, arrays.start[second + 1]):
             if arrays.state[i] != arrays.state[j]:
                 continue
-            manipulability = pair_manipulability(isotropy, i, isotropy, j, weights)
+            manipulability = pair_manipulability(dexterity, i, dexterity, j, weights)
             larger = max(arrays.single[i], arrays.single[j])
             if manipulability < least or manipulability < arrays.least_gain * larger:
                 continue

@@ -21,21 +21,21 @@ from tcs.kernel.analytic.pairs import (
 from tcs.kernel.analytic.search import Search, new_search
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
+    BASE_FIXED,
     NO_CONTACT,
-    RIDES,
-    STAYS,
+    TORSO_MOUNTED,
     Workspace,
     base_contact,
     gripper_body_contact,
-    gripper_room_contact,
+    gripper_environment_contact,
     new_workspace,
 )
 from tcs.kernel.measure import measure_at, rounded_inward
 from tcs.kernel.problem import Problem
-from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
-from tcs.kernel.views import borrowed
+from tcs.kernel.views import unowned
 
 
 class Scores(NamedTuple):
@@ -45,14 +45,14 @@ class Scores(NamedTuple):
     """Shape (n, goals)."""
     contact: NDArray[np.int32]
     """Contact code or NO_CONTACT, shape (n, goals)."""
-    isotropy: NDArray[np.float32]
+    dexterity: NDArray[np.float32]
     """The measure, isotropy if no other was asked for; 0 where not reached, shape (n, goals)."""
     joints: NDArray[np.float32]
     """Winning joints [rad], 0 where not reached, shape (n, goals, 7)."""
 
 
 def gripper_contacts(problem: Problem) -> IntArray:
-    """Return the gripper's contact with the room at every goal, shape (states, goals).
+    """Return the gripper's contact with the environment at every goal, shape (states, goals).
 
     It does not depend on where the robot stands.
     """
@@ -63,10 +63,10 @@ def gripper_contacts(problem: Problem) -> IntArray:
 
 @jit
 def _gripper_contacts(owned_problem: Problem, owned_work: Workspace, codes: IntArray) -> None:
-    problem, work = borrowed(owned_problem), borrowed(owned_work)
+    problem, work = unowned(owned_problem), unowned(owned_work)
     for s in range(codes.shape[0]):
         for g in range(codes.shape[1]):
-            codes[s, g] = gripper_room_contact(problem, work, s, g)
+            codes[s, g] = gripper_environment_contact(problem, work, s, g)
 
 
 def score_slice(
@@ -101,19 +101,19 @@ def _score_slice(
     stop: int,
     owned_scores: Scores,
 ) -> None:
-    problem, scores = borrowed(owned_problem), borrowed(owned_scores)
-    work, search = borrowed(owned_work), borrowed(owned_search)
+    problem, scores = unowned(owned_problem), unowned(owned_scores)
+    work, search = unowned(owned_work), unowned(owned_search)
     rounded = np.empty(7)
     place, base_code, state = -1, NO_CONTACT, 0
     for h in range(start, stop):
         row, torso = h - start, h % problem.torso_levels
         if h // problem.torso_levels != place:
             place = h // problem.torso_levels
-            state = stand(problem, work, place)
-            base_code = base_contact(problem, work, STAYS, STAYS)
+            state = place_base(problem, work, place)
+            base_code = base_contact(problem, work, BASE_FIXED, BASE_FIXED)
         code = base_code
         if code == NO_CONTACT:
-            code = base_contact(problem, work, torso, RIDES)
+            code = base_contact(problem, work, torso, TORSO_MOUNTED)
         if code != NO_CONTACT:
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code
@@ -121,7 +121,7 @@ def _score_slice(
         body_A = problem.body_A[torso]
         # What blocks here must not depend on what was scored before.
         work.last[0] = -1
-        room_placed = False
+        environment_placed = False
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
             if grippers[state, g] != NO_CONTACT:
@@ -139,9 +139,9 @@ def _score_slice(
                 scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
                 scores.contact[row, g] = code
                 continue
-            if not room_placed:
-                room_in_arm_base(problem, work, torso)
-                room_placed = True
+            if not environment_placed:
+                environment_in_arm_base(problem, work, torso)
+                environment_placed = True
             reason, code = score_pair(problem, work, body_A, search, arcs)
             scores.reason[row, g] = reason
             scores.contact[row, g] = code
@@ -157,4 +157,4 @@ def keep(
     rounded_inward(best, problem.arm.lower, problem.arm.upper, rounded)
     for i in range(7):
         scores.joints[row, g, i] = rounded[i]
-    scores.isotropy[row, g] = measure_at(problem, rounded)
+    scores.dexterity[row, g] = measure_at(problem, rounded)

@@ -17,8 +17,8 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.sets import BestPairs, MemberPairs, SetArrays, pair_manipulability
 
-ROOM = 1e-6
-"""Room for rounding in the bounds: pairs are held in single precision, good to 6e-8."""
+ROUNDING = 1e-6
+"""Allowance for rounding in the bounds: pairs are held in single precision, good to 6e-8."""
 
 
 class KeptTriples(NamedTuple):
@@ -44,7 +44,7 @@ def fill_pairs(
             apart = np.sqrt(dx * dx + dy * dy) >= arrays.least_distance
             if i != j and apart and arrays.state[i] == arrays.state[j]:
                 pairs[i, j] = pair_manipulability(
-                    arrays.isotropy, i, arrays.isotropy, j, arrays.weights
+                    arrays.dexterity, i, arrays.dexterity, j, arrays.weights
                 )
             else:
                 pairs[i, j] = -1.0
@@ -54,10 +54,10 @@ def fill_pairs(
 def triple_scores(arrays: SetArrays, i: int, j: int, k: int) -> tuple[float, float]:
     """Return P_R and P_M of three rows together, TCS eq. (1) and (4)."""
     reachability = manipulability = 0.0
-    isotropy, reached = arrays.isotropy, arrays.reached
+    dexterity, reached = arrays.dexterity, arrays.reached
     for g in range(arrays.weights.size):
         weight = arrays.weights[g]
-        manipulability += weight * max(isotropy[i, g], isotropy[j, g], isotropy[k, g])
+        manipulability += weight * max(dexterity[i, g], dexterity[j, g], dexterity[k, g])
         if reached[i, g] or reached[j, g] or reached[k, g]:
             reachability += weight
     return reachability, manipulability
@@ -120,7 +120,7 @@ def partners_of(
     found = 0
     # The other partner of i adds at most what its best partner does.
     for j in range(count):
-        if pairs[i, j] + most - single[i] + ROOM < least or pairs[i, j] < 0.0:
+        if pairs[i, j] + most - single[i] + ROUNDING < least or pairs[i, j] < 0.0:
             continue
         if single[j] < single[i] or (single[j] == single[i] and j > i):
             rows[found] = j
@@ -165,9 +165,9 @@ def find_triples(
         if out.reachability.size - found < rows.size:
             return found, p
         j, first = rows[p], values[p]
-        of_i = least + single[i] - first - ROOM
-        of_j = least + single[j] - first - ROOM
-        of_both = 2.0 * least - first - ROOM
+        of_i = least + single[i] - first - ROUNDING
+        of_j = least + single[j] - first - ROUNDING
+        of_both = 2.0 * least - first - ROUNDING
         of_j_pairs = pairs[j]
         for q in range(p + 1, rows.size):
             second = values[q]
@@ -177,7 +177,7 @@ def find_triples(
             third = of_j_pairs[k]
             if third < of_j or third < 0.0 or second + third < of_both:
                 continue
-            if second + third < least + single[k] - ROOM:
+            if second + third < least + single[k] - ROUNDING:
                 continue
             reachability, manipulability = triple_scores(arrays, i, j, k)
             if manipulability < least:

@@ -24,48 +24,48 @@ from numba.extending import intrinsic, lower_getattr_generic, register_model
 _Owned = TypeVar("_Owned")
 
 
-class OnLoan(types.Type):
+class UnownedView(types.Type):
     """The address of a named tuple whose arrays have no owner."""
 
-    def __init__(self, lent: Any) -> None:
+    def __init__(self, owned: Any) -> None:
         """Take the type of the named tuple that is lent."""
         # Names of types become names of functions: the tuple's own runs over pages.
-        mark = hashlib.sha256(str(lent).encode()).hexdigest()[:12]
-        super().__init__(name=f"OnLoan[{lent.instance_class.__name__},{mark}]")
-        self.lent = lent
+        mark = hashlib.sha256(str(owned).encode()).hexdigest()[:12]
+        super().__init__(name=f"UnownedView[{owned.instance_class.__name__},{mark}]")
+        self.owned = owned
 
     @property
     def key(self) -> Any:
         """What makes two of these types the same."""
-        return self.lent
+        return self.owned
 
 
-@register_model(OnLoan)
-class _OnLoanModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: OnLoan) -> None:
-        super().__init__(manager, kind, manager[kind.lent].get_value_type().as_pointer())
+@register_model(UnownedView)
+class _UnownedViewModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: UnownedView) -> None:
+        super().__init__(manager, kind, manager[kind.owned].get_value_type().as_pointer())
 
 
 @infer_getattr
-class _OnLoanFields(AttributeTemplate):
-    key = OnLoan
+class _UnownedViewFields(AttributeTemplate):
+    key = UnownedView
 
     # Numba declares it as NotImplemented, for subclasses to fill in.
     def generic_resolve(self, value: Any, attr: str) -> Any:  # type: ignore[override]
         """Return the type of a field; named tuples in it are on loan too."""
-        if attr not in value.lent.fields:
+        if attr not in value.owned.fields:
             return None
-        kind = value.lent.types[value.lent.fields.index(attr)]
-        return OnLoan(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+        kind = value.owned.types[value.owned.fields.index(attr)]
+        return UnownedView(kind) if isinstance(kind, types.BaseNamedTuple) else kind
 
 
-@lower_getattr_generic(OnLoan)
+@lower_getattr_generic(UnownedView)
 def _field(context: Any, builder: Any, loan: Any, address: Any, name: str) -> Any:
     """Return the field of that name, or its address if it is a named tuple."""
-    which = loan.lent.fields.index(name)
+    which = loan.owned.fields.index(name)
     zero, index = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.IntType(32), which)
     at = builder.gep(address, [zero, index], inbounds=True)
-    return at if isinstance(loan.lent.types[which], types.BaseNamedTuple) else builder.load(at)
+    return at if isinstance(loan.owned.types[which], types.BaseNamedTuple) else builder.load(at)
 
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
@@ -86,7 +86,7 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
 
-    def borrowed(owned: _Owned) -> _Owned:
+    def unowned(owned: _Owned) -> _Owned:
         """Return a named tuple on loan: its fields can be read, and its arrays written."""
         # Without a compiler there is no counting.
         return owned
@@ -94,11 +94,11 @@ if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
 else:
 
     @intrinsic
-    def borrowed(_typing_context, owned):
+    def unowned(_typing_context, owned):
         """Return a named tuple on loan: its fields can be read, and its arrays written."""
 
         def codegen(context, builder, signature, arguments):
             value = _without_owner(context, builder, signature.args[0], arguments[0])
             return cgutils.alloca_once_value(builder, value)
 
-        return OnLoan(owned)(owned), codegen
+        return UnownedView(owned)(owned), codegen

@@ -8,8 +8,8 @@ from types import FunctionType
 import pytest
 
 import tcs
-from tcs.kernel.analytic.lanes import solve_lanes
 from tcs.kernel.analytic.pairs import score_pair
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.measure import isotropy_at, limit_penalty
 from tcs.placement.selection import select, shortest_tour, utility
 from tcs.placement.tables import tc_manipulability, tc_reachability
@@ -55,7 +55,7 @@ EQUATIONS = [
     score_pair,
     select,
     shortest_tour,
-    solve_lanes,
+    solve_samples,
     tc_manipulability,
     tc_reachability,
     utility,

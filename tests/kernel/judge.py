@@ -14,11 +14,11 @@ ROUNDING = 2e-6
 """Joints are float32: seven roundings of 1.2e-7 rad move a far corner by up to 1e-6 m."""
 
 
-def chain_of(seed, lowered, *, mirrored=False):
+def chain_of(seed, lowered, *, spherical_shoulder=False):
     """Return the arm of the PR2, or the Panda's if mirrored; a random one for odd seeds."""
     if seed % 2 == 0:
-        return drake_arm("panda").chain if mirrored else lowered.arrays.chain
-    chain = random_arm(np.random.default_rng(seed), mirrored=mirrored)
+        return drake_arm("panda").chain if spherical_shoulder else lowered.arrays.chain
+    chain = random_arm(np.random.default_rng(seed), spherical_shoulder=spherical_shoulder)
     # The twin walks the arcs of the free joint between limits only.
     lower, upper = chain.lower.copy(), chain.upper.copy()
     free = free_joint(chain)
@@ -30,7 +30,9 @@ def is_true(scene, grid, h, g, q):
     """Return whether the twin finds joints q at the goal, in their limits and free."""
     eased = scene._replace(
         margin=scene.margin - ROUNDING,
-        room=scene.room._replace(pad=np.maximum(scene.room.pad - ROUNDING, 0.0)),
+        environment=scene.environment._replace(
+            pad=np.maximum(scene.environment.pad - ROUNDING, 0.0)
+        ),
     )
     return reference_pairs.confirms(eased, grid, int(h), int(g), q.astype(np.float64))
 
@@ -38,15 +40,15 @@ def is_true(scene, grid, h, g, q):
 def compare(scene, grid, scores, pairs, measure="isotropy"):
     """Hold the kernel's answers against the twin's, away from contact."""
     for h, g in pairs:
-        twin = reference_pairs.score(scene, grid, int(h), int(g), measure)
+        expected = reference_pairs.score(scene, grid, int(h), int(g), measure)
         reason = int(scores.reason[h, g])
-        if reason == REACHED and twin.reason == ARM_BLOCKED:
+        if reason == REACHED and expected.reason == ARM_BLOCKED:
             # The kernel looks between two contacts as well; the twin can judge what it found.
             assert is_true(scene, grid, h, g, scores.joints[h, g])
-        elif twin.clearance > 1e-6:  # at contact, rounding decides
-            assert reason == twin.reason, (h, g)
+        elif expected.clearance > 1e-6:  # at contact, rounding decides
+            assert reason == expected.reason, (h, g)
             # Both look at the same angles; what is stored is that of joints rounded to float32.
-            assert abs(scores.isotropy[h, g] - twin.isotropy) < 1e-6, (h, g)
+            assert abs(scores.dexterity[h, g] - expected.dexterity) < 1e-6, (h, g)
 
 
 def stratified(rng, reason, number):

@@ -35,17 +35,19 @@ def right_angles(rng):
     return columns if np.linalg.det(columns) > 0 else -columns
 
 
-def placed(kind, size, R=None, p=(0.0, 0.0, 0.0), pad=0.0, body=0):
+def placed(shape_type, size, R=None, p=(0.0, 0.0, 0.0), pad=0.0, body=0):
     """Return one shape at one pose."""
     R = np.eye(3) if R is None else R
-    return Placed(kind, np.asarray(size, float), np.asarray(R), np.asarray(p, float), pad, body)
+    return Placed(
+        shape_type, np.asarray(size, float), np.asarray(R), np.asarray(p, float), pad, body
+    )
 
 
-def random_size(rng, kind):
+def random_size(rng, shape_type):
     """Return sizes between a thin plate or a needle and a big block."""
-    if kind == SPHERE:
+    if shape_type == SPHERE:
         return np.array([10 ** rng.uniform(-2.3, -0.5), 0.0, 0.0])
-    if kind == CAPSULE:
+    if shape_type == CAPSULE:
         return np.array([10 ** rng.uniform(-2.3, -0.7), 10 ** rng.uniform(-2.3, 0.3), 0.0])
     return 10 ** rng.uniform(-3.0, 0.3, 3)
 
@@ -54,7 +56,7 @@ def as_shapes(items, frame=0):
     """Return placed shapes as `Shapes` in one state."""
     n = len(items)
     return Shapes(
-        kind=np.array([item.kind for item in items], np.int8),
+        type=np.array([item.type for item in items], np.int8),
         size=np.array([item.size for item in items], float).reshape(n, 3),
         pad=np.array([item.pad for item in items], float),
         body=np.array([item.body for item in items], np.int16),
@@ -64,7 +66,7 @@ def as_shapes(items, frame=0):
     )
 
 
-def random_arm(rng, *, mirrored=False):
+def random_arm(rng, *, spherical_shoulder=False):
     """Return a random arm of the closed-form class: any twists, any other offsets.
 
     Args:
@@ -73,7 +75,7 @@ def random_arm(rng, *, mirrored=False):
     """
     R = np.array([rotation(rng) for _ in range(8)])
     p = rng.uniform(-0.3, 0.3, (8, 3))
-    p[[1, 2, 5] if mirrored else [2, 5, 6]] = 0.0
+    p[[1, 2, 5] if spherical_shoulder else [2, 5, 6]] = 0.0
     lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
     for i in range(7):
         if rng.random() < 0.75:

@@ -21,7 +21,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import lsq_linear
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
-from tcs.kernel.collide import balls_meet, closer, move, pack
+from tcs.kernel.collide import closer, move, pack, spheres_overlap
 from tcs.kernel.verification.reference import distance
 from tests.kernel.shapes import KINDS, about, as_shapes, placed, random_size, right_angles, rotation
 
@@ -58,9 +58,9 @@ def drake_distance(a, b):
     poses, ids = FramePoseVector(), []
     for name, shape in (("a", a), ("b", b)):
         frame = graph.RegisterFrame(source, GeometryFrame(name))
-        if shape.kind == SPHERE:
+        if shape.type == SPHERE:
             solid = Sphere(shape.size[0])
-        elif shape.kind == CAPSULE:
+        elif shape.type == CAPSULE:
             solid = Capsule(shape.size[0], 2 * shape.size[1])
         else:
             solid = Box(*(2 * shape.size))
@@ -113,7 +113,7 @@ def tolerance(a, b):
     All is exact up to rounding, but for two capsules less than 1e-6 rad from parallel: the kernel
     takes them as parallel, which moves a closest point by up to 1e-6 of a length.
     """
-    return 2e-6 if a.kind == b.kind == CAPSULE else 1e-9
+    return 2e-6 if a.type == b.type == CAPSULE else 1e-9
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
@@ -171,7 +171,7 @@ def test_balls_hold_their_shapes(first, second, rng):
         A, B = row(a), row(b)
         for gap in (1e-3, 0.05, gap_between(a, b) + 1e-9):
             if closer(A, 0, B, 0, gap):
-                assert balls_meet(A, 0, B, 0, gap)
+                assert spheres_overlap(A, 0, B, 0, gap)
 
 
 @pytest.mark.parametrize("first", KINDS)

@@ -17,7 +17,7 @@ SEEDS = range(10)
 
 
 def scene_of(seed, lowered):
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     return toy_scene(chain, seed, obstacles=3 + seed), toy_grid()
 
 
@@ -37,8 +37,8 @@ def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
         # Free stretches narrower than the scan's 1/32 degree are the search's own.
         assert value >= 0.0
         # 1/32 degree is 5e-4 rad, and the isotropy of these arms changes by up to 2 per radian.
-        assert value >= scores.isotropy[h, g] - 2e-3
-        shortfalls.append(value - scores.isotropy[h, g])
+        assert value >= scores.dexterity[h, g] - 2e-3
+        shortfalls.append(value - scores.dexterity[h, g])
     # Refinement makes up for what the finer scan finds, up to another peak here and there.
     assert np.median(shortfalls) < 5e-4
 
@@ -83,9 +83,9 @@ def test_nothing_is_found_too_far_away(lowered):
 
 @pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
 @pytest.mark.parametrize("samples", [2, 511, 512, 513, 514, 1025])
-def test_every_number_of_samples_is_walked_to_its_end(lowered, samples, mirrored):
-    # Lanes come in blocks of 512; a goal reached only at the last angle shows a lost block.
-    chain = chain_of(4, lowered, mirrored=mirrored)
+def test_every_number_of_samples_is_walked_to_its_end(lowered, samples, spherical_shoulder):
+    # Samples come in blocks of 512; a goal reached only at the last angle shows a lost block.
+    chain = chain_of(4, lowered, spherical_shoulder=spherical_shoulder)
     free = free_joint(chain)
     scene, grid = toy_scene(chain, 4, obstacles=0, goals=5), toy_grid()
     scores = scores_of(scene, grid)

@@ -1,4 +1,4 @@
-"""Narrow windows of the free joint that limits and contacts leave open, in the real rooms."""
+"""Narrow windows of the free joint that limits and contacts leave open, in real environments."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tcs.placement.scoring import load_job
 BETWEEN_LIMITS = [
     (663388, 1), (1126360, 1), (320451, 1), (419797, 1), (621037, 1), (680582, 0),
 ]  # fmt: skip
-# Of feeding. Every lane but those next to a limit touches something.
+# Of feeding. Every sample but those next to a limit touches something.
 NEXT_TO_A_LIMIT = [
     (86787, 3), (64777, 1), (64071, 5), (73541, 5), (80859, 5), (58945, 2), (61873, 1), (63310, 2),
     (79465, 5),
@@ -67,7 +67,7 @@ def check(problem, h, g):
     scores = Scores(
         reason=np.empty((1, goals), np.uint8),
         contact=np.empty((1, goals), np.int32),
-        isotropy=np.zeros((1, goals), np.float32),
+        dexterity=np.zeros((1, goals), np.float32),
         joints=np.zeros((1, goals, 7), np.float32),
     )
     score_slice(problem, gripper_contacts(problem), h, h + 1, scores)
@@ -76,4 +76,4 @@ def check(problem, h, g):
     assert best > 0.0
     assert scores.reason[0, g] == REACHED
     # As wide as a window is, isotropy changes by less than this across it.
-    assert scores.isotropy[0, g] == pytest.approx(best, abs=2e-3)
+    assert scores.dexterity[0, g] == pytest.approx(best, abs=2e-3)

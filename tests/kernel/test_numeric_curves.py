@@ -11,11 +11,11 @@ from tcs.kernel.numeric.curves import new_curves, point_between, slack_of, trace
 from tcs.kernel.numeric.newton import (
     FAR_TURN,
     converge,
+    evaluate,
     factorise,
-    look_at,
-    new_look,
+    new_newton_workspace,
+    null_space_direction,
     step_to_goal,
-    way_along,
 )
 from tcs.kernel.numeric.search import is_within_span
 from tcs.kernel.numeric.solutions import numeric_solutions
@@ -89,60 +89,60 @@ def test_every_start_of_the_table_is_in_its_cell(chain, rng):
 
 
 def test_a_look_sees_error_and_jacobian(chain, rng):
-    arm, look = numeric_arm(chain), new_look()
+    arm, newton = numeric_arm(chain), new_newton_workspace()
     for _ in range(20):
         q = random_joints(rng, chain)
         R, p = pose(chain, q)
         # A dozen products of rotations over an arm of about 1 m.
-        assert look_at(arm, R, p, q, look) < 1e-12
-        np.testing.assert_allclose(look.J, reference.jacobian(chain, q), atol=1e-12)
+        assert evaluate(arm, R, p, q, newton) < 1e-12
+        np.testing.assert_allclose(newton.J, reference.jacobian(chain, q), atol=1e-12)
         to = pose(chain, q + rng.normal(scale=1e-4, size=7))
-        look_at(arm, *to, q, look)
-        np.testing.assert_allclose(look.error[:3], turned_by(to[0] @ R.T), atol=1e-9)
-        np.testing.assert_allclose(look.error[3:], to[1] - p, atol=1e-12)
+        evaluate(arm, *to, q, newton)
+        np.testing.assert_allclose(newton.error[:3], turned_by(to[0] @ R.T), atol=1e-9)
+        np.testing.assert_allclose(newton.error[3:], to[1] - p, atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [0.01, 0.3, 1.0, 2.0, 3.0])
 def test_a_large_turn_is_told_by_its_angle(angle):
     chain = straight_arm(np.full(7, 3.0), 0.0)
-    arm, look = numeric_arm(chain), new_look()
+    arm, newton = numeric_arm(chain), new_newton_workspace()
     R, p = pose(chain, np.zeros(7))
-    look_at(arm, R @ reference.turn(angle), p, np.zeros(7), look)
+    evaluate(arm, R @ reference.rot_z(angle), p, np.zeros(7), newton)
     # A small one by its sine, which is all that Newton's method needs.
     told = angle if np.cos(angle) < FAR_TURN else np.sin(angle)
-    np.testing.assert_allclose(look.error, [0, 0, told, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(newton.error, [0, 0, told, 0, 0, 0], atol=1e-12)
 
 
 def test_factor_step_and_way_are_those_of_linear_algebra(chain, rng):
-    arm, look = numeric_arm(chain), new_look()
+    arm, newton = numeric_arm(chain), new_newton_workspace()
     for _ in range(20):
         q = random_joints(rng, chain)
         to = pose(chain, q + rng.normal(scale=0.01, size=7))
-        look_at(arm, *to, q, look)
-        J = look.J.copy()
-        det = factorise(look, 0.0)
+        evaluate(arm, *to, q, newton)
+        J = newton.J.copy()
+        det = factorise(newton, 0.0)
         condition = np.linalg.cond(J) ** 2
         assert det == pytest.approx(np.linalg.det(J @ J.T), rel=1e-14 * condition + 1e-9)
         moved, before = q.copy(), np.eye(7)[rng.integers(7)]
-        step_to_goal(look, moved, 10.0)
-        shortest = np.linalg.pinv(J) @ look.error
+        step_to_goal(newton, moved, 10.0)
+        shortest = np.linalg.pinv(J) @ newton.error
         np.testing.assert_allclose(moved - q, shortest, atol=1e-13 * condition + 1e-12)
-        way = np.empty(7)
-        cosine = way_along(look, before, way)
+        tangent = np.empty(7)
+        cosine = null_space_direction(newton, before, tangent)
         still = np.linalg.svd(J)[2][6]
         assert cosine == pytest.approx(abs(still @ before), abs=1e-14 * condition + 1e-9)
         if cosine > 0.1:
-            np.testing.assert_allclose(J @ way, 0.0, atol=1e-13 * condition + 1e-9)
-            assert way @ before > 0.0
+            np.testing.assert_allclose(J @ tangent, 0.0, atol=1e-13 * condition + 1e-9)
+            assert tangent @ before > 0.0
 
 
 def test_newton_comes_back_to_the_goal(chain, rng):
-    arm, look, arrived = numeric_arm(chain), new_look(), 0
+    arm, newton, arrived = numeric_arm(chain), new_newton_workspace(), 0
     for _ in range(50):
         q = random_joints(rng, chain)
         start = q + rng.uniform(-0.2, 0.2, 7)
         to = pose(chain, q)
-        if converge(arm, *to, start, look, 10, 1e-10):
+        if converge(arm, *to, start, newton, 10, 1e-10):
             arrived += 1
             R, p = pose(chain, start)
             np.testing.assert_allclose(R, to[0], atol=1e-9)
@@ -153,7 +153,7 @@ def test_newton_comes_back_to_the_goal(chain, rng):
 
 @pytest.mark.parametrize("of", [ISOTROPY, INVERSE_CONDITION], ids=["isotropy", "condition"])
 def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
-    arm, look, checked = numeric_arm(chain), new_look(), 0
+    arm, newton, checked = numeric_arm(chain), new_newton_workspace(), 0
     exact = reference.isotropy if of == ISOTROPY else reference.inverse_condition
     for _ in range(5):
         q = random_joints(rng, chain)
@@ -167,7 +167,7 @@ def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
         for k in range(count):
             for n in range(curves.first[k], curves.first[k + 1]):
                 at = curves.q[n].copy()
-                assert look_at(arm, *to, at, look) < 1e-5
+                assert evaluate(arm, *to, at, newton) < 1e-5
                 # Of the posture before the last step, 3e-4 off.
                 assert curves.value[n] == pytest.approx(
                     exact(reference.jacobian(chain, at)), abs=2e-3
@@ -176,7 +176,7 @@ def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
                     continue
                 # Where nothing bends much, a cubic over 0.2 rad is good to about 1e-5.
                 point_between(curves, n, 0.5, at)
-                assert look_at(arm, *to, at, look) < 2e-4
+                assert evaluate(arm, *to, at, newton) < 2e-4
                 assert curves.length[n] <= 0.25
                 # Each joint keeps its limits up to the last stride.
                 if n + 2 < curves.first[k + 1] and n > curves.first[k]:

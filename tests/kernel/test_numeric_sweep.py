@@ -40,7 +40,7 @@ def offset_scene(seed, *, obstacles=4):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_numeric_ik_reaches_what_the_closed_form_reaches(lowered, seed):
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed, obstacles=3), toy_grid()
     closed = scores_of(scene, grid)
     numeric = scores_of(scene, grid, numeric=True)
@@ -56,7 +56,7 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches(lowered, seed):
     assert both.sum() >= 0.99 * reached.sum()
     for h, g in np.argwhere((numeric.reason == REACHED) & ~reached):
         assert is_true(scene, grid, h, g, numeric.joints[h, g])
-    short = closed.isotropy[both] - numeric.isotropy[both]
+    short = closed.dexterity[both] - numeric.dexterity[both]
     assert np.mean(short) < 5e-4
 
 
@@ -69,7 +69,7 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches_in_the_real_scene(lower
     assert reached.sum() > 1000
     # Measured on the whole grid: all 10,702 pairs.
     assert np.sum(reached & (numeric.reason != REACHED)) <= 1
-    short = (closed.isotropy - numeric.isotropy)[reached & (numeric.reason == REACHED)]
+    short = (closed.dexterity - numeric.dexterity)[reached & (numeric.reason == REACHED)]
     assert np.mean(np.abs(short)) < 1e-3
 
 
@@ -82,7 +82,7 @@ def test_what_is_reached_is_true(seed, rng):
         q = scores.joints[h, g]
         assert is_true(scene, grid, h, g, q)
         exact = isotropy(jacobian(scene.chain, q.astype(np.float64)))
-        assert scores.isotropy[h, g] == pytest.approx(exact, abs=1e-6)
+        assert scores.dexterity[h, g] == pytest.approx(exact, abs=1e-6)
 
 
 def test_drakes_tool_is_at_the_goal():
@@ -127,7 +127,7 @@ def test_the_dense_scan_finds_what_is_reached_and_no_less_dexterous(seed, rng):
         value = dense_scan(problem, h, g, 0, q)
         assert value >= 0.0
         assert is_true(scene, grid, h, g, q)
-        found.append(value - scores.isotropy[h, g])
+        found.append(value - scores.dexterity[h, g])
     # Nothing is refined there: what it finds lies up to half a spacing beside the best.
     assert np.median(np.abs(found)) < 1e-3
 
@@ -173,7 +173,7 @@ def test_slices_do_not_matter():
     scene, grid, whole = offset_scene(1)
     size = size_of(grid)
     parts = scores_of(scene, grid, cuts=[1, 7, size // 2, size - 1])
-    for name in ("reason", "contact", "isotropy", "joints"):
+    for name in ("reason", "contact", "dexterity", "joints"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name), err_msg=name)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.ik import lane_joints, wrist_goal
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.ik import sample_joints, wrist_goal
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.measure import isotropy_at
 from tcs.kernel.verification.reference import free_joint, link_poses, solutions
@@ -30,9 +30,9 @@ def kernel_solutions(chain, X_AG, angle):
     slack, measure, found = np.empty(1), np.empty(1), []
     cosine, sine = np.cos([angle]), np.sin([angle])
     for branch in solver.branches:
-        solve_lanes(solver, goal, branch, cosine, sine, 1, slack, measure)
+        solve_samples(solver, goal, branch, cosine, sine, 1, slack, measure)
         q = np.full(7, np.nan)
-        lane_joints(solver, goal, branch, angle, q)
+        sample_joints(solver, goal, branch, angle, q)
         found.append((q, slack[0], max(measure[0], 0.0) ** (1 / 6)))
     return found
 
@@ -94,12 +94,12 @@ def test_the_solutions_are_those_of_the_twin(arm, rng):
         q = random_joints(rng, chain)
         X_AG = arm.tool_pose(q)
         angle = rng.uniform(-3.0, 3.0)
-        twin = solutions(chain, X_AG, angle)
+        expected = solutions(chain, X_AG, angle)
         branches = arm_solver(chain).branches
         for branch, (found, slack, _) in zip(
             branches, kernel_solutions(chain, X_AG, angle), strict=True
         ):
-            exact = twin[tuple(branch)]
+            exact = expected[tuple(branch)]
             if abs(exact.slack) > 1e-9:
                 assert (slack >= 0) == (exact.slack >= 0)
             if exact.slack > 1e-6:

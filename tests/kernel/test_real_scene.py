@@ -29,7 +29,7 @@ def real(lowered):
 def test_two_jobs_give_what_one_gives(real):
     small, weights, two = real
     one = sweep(small, weights, jobs=1).tables[0]
-    for name in ("isotropy", "reason", "pair", "arm_joints"):
+    for name in ("dexterity", "reason", "pair", "arm_joints"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
     assert one.pair_names == two.pair_names
 
@@ -58,10 +58,10 @@ def test_the_kernel_agrees_with_the_twin_on_real_pairs(real, number):
     @dataclasses.dataclass
     class Answers:
         reason: np.ndarray
-        isotropy: np.ndarray
+        dexterity: np.ndarray
         joints: np.ndarray
 
-    answers = Answers(scores.reason, scores.isotropy, joints)
+    answers = Answers(scores.reason, scores.dexterity, joints)
     pairs = stratified(np.random.default_rng(number), scores.reason, number)
     assert {int(scores.reason[h, g]) for h, g in pairs} == set(map(int, Reason))
     compare(small.arrays, small.grid, answers, pairs)

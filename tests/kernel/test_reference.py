@@ -10,9 +10,9 @@ from tcs.kernel.verification.reference import (
     compose,
     inverse,
     link_poses,
+    rot_z,
     shapes_of,
     solutions,
-    turn,
 )
 from tcs.model.scene.contacts import Group
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
@@ -30,7 +30,7 @@ def posed(scene, lowered, full_grid, rng):
     scene.place_base(x, y, yaw)
     scene.set_torso(levels[level])
     scene.set_arm(q)
-    X_WB = turn(yaw), np.array([x, y, 0.0])
+    X_WB = rot_z(yaw), np.array([x, y, 0.0])
     X_BA = lowered.arrays.arm_base_R[level], lowered.arrays.arm_base_p[level]
     return compose(X_WB, X_BA), X_WB, level, q
 
@@ -65,11 +65,11 @@ def test_distances_of_the_real_shapes_are_drakes_or_less(scene, lowered, full_gr
         for shape, frame in zip(shapes_of(arrays.arm, 0), arrays.arm.frame, strict=True)
     ]
     body = [shape.moved(X_WB) for shape in shapes_of(arrays.body, level)]
-    room = shapes_of(arrays.room, 0)
+    environment = shapes_of(arrays.environment, 0)
     close = 0
     for _ in range(150):
         first, ours = [(Group.ARM, arm), (Group.BODY, body)][rng.integers(2)]
-        second, theirs = [(Group.ENVIRONMENT, room), (Group.BODY, body)][rng.integers(2)]
+        second, theirs = [(Group.ENVIRONMENT, environment), (Group.BODY, body)][rng.integers(2)]
         i, j = int(rng.integers(len(ours))), int(rng.integers(len(theirs)))
         if (first, i) == (second, j):
             continue

@@ -25,8 +25,8 @@ from tcs.kernel.verification.reference import (
     isotropy,
     jacobian,
     link_poses,
+    rot_z,
     shapes_of,
-    turn,
 )
 from tcs.placement.tables import Reason
 from tests.kernel.judge import ROUNDING, chain_of, compare, is_true, stratified
@@ -41,7 +41,7 @@ from tests.kernel.toy import (
 )
 
 ROOT = Path(__file__).parents[2]
-MASKS = ("arm_vs_arm", "arm_vs_body", "arm_vs_room", "body_vs_room")
+MASKS = ("arm_vs_arm", "arm_vs_body", "arm_vs_environment", "body_vs_environment")
 
 
 # The Panda (even seeds, mirrored) has all eight branches within its limits: the twin takes seconds
@@ -56,19 +56,19 @@ MANY = [(seed, False, 6) for seed in range(100, 160)] + [
     ("seed", "mirrored", "number"),
     [*FEW, *(pytest.param(*case, marks=pytest.mark.slow) for case in MANY)],
 )
-def test_the_kernel_agrees_with_the_twin_in_random_rooms(lowered, seed, mirrored, number):
-    chain = chain_of(seed, lowered, mirrored=mirrored)
+def test_the_kernel_agrees_with_the_twin_in_random_rooms(lowered, seed, spherical_shoulder, number):
+    chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
     scene, grid = toy_scene(chain, seed, obstacles=seed % 14), toy_grid()
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(np.random.default_rng(seed), scores.reason, number))
 
 
 @pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
-def test_random_rooms_show_every_reason(lowered, mirrored):
+def test_random_rooms_show_every_reason(lowered, spherical_shoulder):
     # The tests above look at what occurs; so everything must occur.
     counts = np.zeros(len(Reason), int)
     for seed in range(8):
-        chain = chain_of(seed, lowered, mirrored=mirrored)
+        chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
         scene = toy_scene(chain, seed, obstacles=2 + seed)
         counts += np.bincount(scores_of(scene, toy_grid()).reason.ravel(), minlength=len(Reason))
     assert np.all(counts > 10), counts
@@ -76,11 +76,11 @@ def test_random_rooms_show_every_reason(lowered, mirrored):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_every_reached_pair_is_at_its_goal_and_free(lowered, seed):
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed, obstacles=seed % 10), toy_grid()
     scores = scores_of(scene, grid)
     reached = np.argwhere(scores.reason == REACHED)
-    assert np.all(scores.isotropy[scores.reason != REACHED] == 0)
+    assert np.all(scores.dexterity[scores.reason != REACHED] == 0)
     assert np.all(scores.joints[scores.reason != REACHED] == 0)
     for h, g in reached:
         q = scores.joints[h, g].astype(np.float64)
@@ -91,18 +91,20 @@ def test_every_reached_pair_is_at_its_goal_and_free(lowered, seed):
         np.testing.assert_allclose(p, X_AG[1], atol=ROUNDING)
         # One float32 rounding, and the sixth root of a determinant near zero.
         exact = isotropy(jacobian(chain, q))
-        assert scores.isotropy[h, g] == pytest.approx(exact, abs=1e-6 if exact > 0.05 else 3e-3)
+        assert scores.dexterity[h, g] == pytest.approx(exact, abs=1e-6 if exact > 0.05 else 3e-3)
     for h, g in np.random.default_rng(seed).permutation(reached)[:12]:
         assert is_true(scene, grid, h, g, scores.joints[h, g])
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_moving_room_goals_and_robot_together_changes_nothing(lowered, seed):
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed), toy_grid()
-    quarter, shift = turn(np.pi / 2), np.array([0.7, -1.3, 0.0])
+    quarter, shift = rot_z(np.pi / 2), np.array([0.7, -1.3, 0.0])
     moved = scene._replace(
-        room=scene.room._replace(R=quarter @ scene.room.R, p=scene.room.p @ quarter.T + shift),
+        environment=scene.environment._replace(
+            R=quarter @ scene.environment.R, p=scene.environment.p @ quarter.T + shift
+        ),
         goal_R=quarter @ scene.goal_R,
         goal_p=scene.goal_p @ quarter.T + shift,
     )
@@ -121,13 +123,13 @@ def test_moving_room_goals_and_robot_together_changes_nothing(lowered, seed):
         values = values.reshape(*shape, *values.shape[1:])
         return values.swapaxes(1, 2).reshape(size_of(grid), *values.shape[5:])
 
-    # Rounding of 1e-16 in other frames: it may turn a tie, or a lane at the edge of an arc.
+    # Rounding of 1e-16 in other frames: it may turn a tie, or a sample at the edge of an arc.
     different = turned(after.reason) != before.reason
     assert np.mean(different) < 0.002
     both = (turned(after.reason) == REACHED) & (before.reason == REACHED)
     assert both.any()
     # As between kernel and twin above.
-    gap = np.abs(turned(after.isotropy) - before.isotropy)[both]
+    gap = np.abs(turned(after.dexterity) - before.dexterity)[both]
     assert np.quantile(gap, 0.75) < 1e-6
     assert gap.max() < 1e-4
 
@@ -137,12 +139,12 @@ def test_an_obstacle_more_reaches_nothing_more(lowered, seed):
     # Of the verdict alone: with several convex obstacles the best measure that a search with
     # finite steps finds may even rise when an obstacle sends its refinement elsewhere.
     rng = np.random.default_rng(seed)
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed, obstacles=4), toy_grid()
-    kind = (BOX, SPHERE)[seed % 2]
+    shape_type = (BOX, SPHERE)[seed % 2]
     # Close to a goal, so that it matters.
     p = scene.goal_p[0, 0] + rng.normal(scale=0.2, size=3)
-    fuller = with_obstacle(scene, placed(kind, [0.15, 0.1, 0.2], rotation(rng), p, body=20))
+    fuller = with_obstacle(scene, placed(shape_type, [0.15, 0.1, 0.2], rotation(rng), p, body=20))
     before, after = scores_of(scene, grid), scores_of(fuller, grid)
     # Looking between two contacts depends on which contacts there are: what is new must be true.
     for h, g in np.argwhere((after.reason == REACHED) & (before.reason != REACHED)):
@@ -173,29 +175,29 @@ def test_states_of_the_environment_are_scored_each_for_itself(lowered):
     both = scores_of(scene, grid)
     half = size_of(grid) // 2
     for state in (0, 1):
-        room = scene.room._replace(
-            R=scene.room.R[state : state + 1], p=scene.room.p[state : state + 1]
+        environment = scene.environment._replace(
+            R=scene.environment.R[state : state + 1], p=scene.environment.p[state : state + 1]
         )
         alone = scene._replace(
-            room=room,
+            environment=environment,
             goal_R=scene.goal_R[state : state + 1],
             goal_p=scene.goal_p[state : state + 1],
         )
         one = scores_of(alone, toy_grid(states=1))
         rows = slice(state * half, (state + 1) * half)
         np.testing.assert_array_equal(one.reason, both.reason[rows])
-        np.testing.assert_array_equal(one.isotropy, both.isotropy[rows])
+        np.testing.assert_array_equal(one.dexterity, both.dexterity[rows])
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_slices_give_what_one_sweep_gives(lowered, seed):
     rng = np.random.default_rng(seed)
-    chain = chain_of(seed, lowered, mirrored=bool(seed & 2))
+    chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed, obstacles=9), toy_grid()
     whole = scores_of(scene, grid)
     cuts = np.sort(rng.choice(np.arange(1, size_of(grid)), 12, replace=False)).tolist()
     parts = scores_of(scene, grid, cuts)
-    for name in ("reason", "isotropy", "joints"):
+    for name in ("reason", "dexterity", "joints"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name), err_msg=name)
     # Which of several contacts names a blocked arm is the one that was found first.
     named = whole.reason != ARM_BLOCKED
@@ -205,20 +207,20 @@ def test_slices_give_what_one_sweep_gives(lowered, seed):
 
 def test_every_order_of_the_shapes_gives_the_same_verdicts(lowered, rng):
     scene, grid = toy_scene(lowered.arrays.chain, 6, obstacles=8), toy_grid()
-    order = rng.permutation(len(scene.room.kind))
-    room = scene.room
+    order = rng.permutation(len(scene.environment.type))
+    environment = scene.environment
     shuffled = scene._replace(
-        room=room._replace(
-            **{name: getattr(room, name)[order] for name in ("kind", "size", "pad", "body")},
-            R=room.R[:, order],
-            p=room.p[:, order],
+        environment=environment._replace(
+            **{name: getattr(environment, name)[order] for name in ("type", "size", "pad", "body")},
+            R=environment.R[:, order],
+            p=environment.p[:, order],
         ),
-        arm_vs_room=scene.arm_vs_room[:, order],
-        body_vs_room=scene.body_vs_room[:, order],
+        arm_vs_environment=scene.arm_vs_environment[:, order],
+        body_vs_environment=scene.body_vs_environment[:, order],
     )
     before, after = scores_of(scene, grid), scores_of(shuffled, grid)
     np.testing.assert_array_equal(after.reason, before.reason)
-    np.testing.assert_array_equal(after.isotropy, before.isotropy)
+    np.testing.assert_array_equal(after.dexterity, before.dexterity)
 
 
 def test_a_grid_of_one_value_is_one_row_of_a_larger_one(lowered):
@@ -235,15 +237,18 @@ def test_a_grid_of_one_value_is_one_row_of_a_larger_one(lowered):
 
 def test_a_room_without_shapes_blocks_nothing(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=0, states=1), toy_grid(states=1)
-    room = scene.room
+    environment = scene.environment
     empty = scene._replace(
-        room=room._replace(
-            **{name: getattr(room, name)[:0] for name in ("kind", "size", "pad", "body", "frame")},
-            R=room.R[:, :0],
-            p=room.p[:, :0],
+        environment=environment._replace(
+            **{
+                name: getattr(environment, name)[:0]
+                for name in ("type", "size", "pad", "body", "frame")
+            },
+            R=environment.R[:, :0],
+            p=environment.p[:, :0],
         ),
-        arm_vs_room=scene.arm_vs_room[:, :0],
-        body_vs_room=scene.body_vs_room[:, :0],
+        arm_vs_environment=scene.arm_vs_environment[:, :0],
+        body_vs_environment=scene.body_vs_environment[:, :0],
     )
     reasons = scores_of(empty, grid).reason
     assert not np.any(reasons == BODY_BLOCKED)
@@ -253,7 +258,7 @@ def test_a_room_without_shapes_blocks_nothing(lowered):
 @pytest.mark.parametrize("offset", [0.0, 0.1], ids=["shoulder on axis 1", "shoulder beside it"])
 def test_goals_at_singularities_are_reached_truly_or_not_at_all(offset, rng):
     # Multiples of 45 degrees put wrist, aim and elbow exactly along axes: 0/0 in the closed form,
-    # and limits of the same multiples put the first lanes of the search there.
+    # and limits of the same multiples put the first samples of the search there.
     nice = np.deg2rad(np.arange(-180, 181, 45))
     here = np.zeros(1)
     grid = GridArrays(1, here, here, here, 2)
@@ -343,7 +348,7 @@ def test_without_the_compiler_the_answers_are_the_same(lowered, tmp_path):
     np.testing.assert_array_equal(reason, whole.reason[slice(*rows)])
     assert np.any(reason == REACHED)
     # No contraction and no reordering in compiled code: only sin, cos, ... may round otherwise.
-    # Near the flat top of the measure that decides which lane wins, within the last spacing of
+    # Near the flat top of the measure that decides which sample wins, within the last spacing of
     # the refinement: 0.0125 (2/7)^3 = 3e-4 rad of joint 1, and a few times that elsewhere.
-    np.testing.assert_allclose(value, whole.isotropy[slice(*rows)], atol=1e-6)
+    np.testing.assert_allclose(value, whole.dexterity[slice(*rows)], atol=1e-6)
     np.testing.assert_allclose(joints, whole.joints[slice(*rows)], atol=1e-3)

@@ -10,7 +10,7 @@ from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
-from tcs.kernel.verification.reference import compose, inverse, link_poses, turn
+from tcs.kernel.verification.reference import compose, inverse, link_poses, rot_z
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 
 QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
@@ -54,14 +54,16 @@ def body_shapes():
     )
 
 
-def room_shapes(rng, number, states):
+def environment_shapes(rng, number, states):
     """Return boxes, capsules and balls, some padded, elsewhere in every state; and a floor."""
     parts = [placed(BOX, [3.0, 3.0, 0.05], p=[0, 0, -0.05])]
     for i in range(number):
-        kind = (BOX, CAPSULE, SPHERE)[i % 3]
-        size = rng.uniform(0.03, 0.25, 3) if kind == BOX else rng.uniform(0.03, 0.12, 3)
+        shape_type = (BOX, CAPSULE, SPHERE)[i % 3]
+        size = rng.uniform(0.03, 0.25, 3) if shape_type == BOX else rng.uniform(0.03, 0.12, 3)
         p = rng.uniform([-1, -1, 0.1], [1, 1, 1.5])
-        parts.append(placed(kind, size, rotation(rng), p, pad=0.02 * (i % 2), body=1 + i // 2))
+        parts.append(
+            placed(shape_type, size, rotation(rng), p, pad=0.02 * (i % 2), body=1 + i // 2)
+        )
     shapes = as_shapes(parts)
     moved = [
         shapes.p[0] + (s > 0) * rng.normal(scale=0.1, size=shapes.p[0].shape) for s in range(states)
@@ -83,18 +85,22 @@ def toy_grid(*, states=2):
 def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
     """Return a random scene, its goals placed such that some place of `toy_grid` may reach them."""
     rng = np.random.default_rng(seed)
-    arm, body, room = arm_shapes(chain), body_shapes(), room_shapes(rng, obstacles, states)
+    arm, body, environment = (
+        arm_shapes(chain),
+        body_shapes(),
+        environment_shapes(rng, obstacles, states),
+    )
     arm_base_p = np.array([[0.0, 0.1, 0.7], [0.0, 0.1, 1.0]])
-    arm_base_R = np.stack([turn(0.2), turn(0.2)])
+    arm_base_R = np.stack([rot_z(0.2), rot_z(0.2)])
     grid = toy_grid(states=states)
     targets = []
     for _ in range(goals):
-        X_WB = turn(rng.choice(QUARTERS)), np.array([*rng.choice(grid.base_x, 2), 0.0])
+        X_WB = rot_z(rng.choice(QUARTERS)), np.array([*rng.choice(grid.base_x, 2), 0.0])
         X_BA = arm_base_R[0], arm_base_p[rng.integers(2)]
         X_AT = link_poses(chain, random_joints(rng, chain))[-1]
         targets.append(compose(X_WB, compose(X_BA, X_AT)))
     apart = np.abs(arm.frame[:, None].astype(int) - arm.frame[None]) > 1
-    floor = np.zeros(len(room.kind), bool)
+    floor = np.zeros(len(environment.type), bool)
     floor[0] = True
     return SceneArrays(
         chain=chain,
@@ -102,12 +108,12 @@ def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
         arm_base_p=arm_base_p,
         arm=arm,
         body=body,
-        room=room,
+        environment=environment,
         arm_vs_arm=apart,
         # The upper arm starts inside the trunk.
-        arm_vs_body=np.repeat(arm.frame[:, None] > 3, len(body.kind), axis=1),
-        arm_vs_room=np.ones((len(arm.kind), len(room.kind)), bool),
-        body_vs_room=np.repeat(~floor[None], len(body.kind), axis=0),
+        arm_vs_body=np.repeat(arm.frame[:, None] > 3, len(body.type), axis=1),
+        arm_vs_environment=np.ones((len(arm.type), len(environment.type)), bool),
+        body_vs_environment=np.repeat(~floor[None], len(body.type), axis=0),
         margin=0.001,
         goal_R=np.repeat(np.array([R for R, _ in targets])[None], states, axis=0),
         goal_p=np.array([[p + 0.05 * s for _, p in targets] for s in range(states)]),
@@ -115,20 +121,22 @@ def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
 
 
 def with_obstacle(scene, shape):
-    """Return the scene with one more shape in the room, checked against everything."""
-    states = len(scene.room.p)
+    """Return the scene with one more shape in the environment, checked against everything."""
+    states = len(scene.environment.p)
     extra = as_shapes([shape])
 
     def more(mask):
         return np.concatenate([mask, np.ones((len(mask), 1), bool)], axis=1)
 
-    room = Shapes(
-        *(np.concatenate(both) for both in zip(scene.room[:5], extra[:5], strict=True)),
-        R=np.concatenate([scene.room.R, np.repeat(extra.R, states, axis=0)], axis=1),
-        p=np.concatenate([scene.room.p, np.repeat(extra.p, states, axis=0)], axis=1),
+    environment = Shapes(
+        *(np.concatenate(both) for both in zip(scene.environment[:5], extra[:5], strict=True)),
+        R=np.concatenate([scene.environment.R, np.repeat(extra.R, states, axis=0)], axis=1),
+        p=np.concatenate([scene.environment.p, np.repeat(extra.p, states, axis=0)], axis=1),
     )
     return scene._replace(
-        room=room, arm_vs_room=more(scene.arm_vs_room), body_vs_room=more(scene.body_vs_room)
+        environment=environment,
+        arm_vs_environment=more(scene.arm_vs_environment),
+        body_vs_environment=more(scene.body_vs_environment),
     )
 
 
@@ -156,7 +164,7 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
         # Values that no score has: whatever is left unfilled shows.
         reason=np.full((size, goals), 99, np.uint8),
         contact=np.full((size, goals), -9, np.int32),
-        isotropy=np.zeros((size, goals), np.float32),
+        dexterity=np.zeros((size, goals), np.float32),
         joints=np.zeros((size, goals, 7), np.float32),
     )
     grippers = gripper_contacts(problem)
@@ -177,6 +185,6 @@ def goal_in_base(scene, grid, h, goal):
         grid.torso_levels,
     )
     s, x, y, yaw, torso = np.unravel_index(h, shape)
-    X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     X_WA = compose(X_WB, (scene.arm_base_R[torso], scene.arm_base_p[torso]))
     return compose(inverse(X_WA), (scene.goal_R[s, goal], scene.goal_p[s, goal]))

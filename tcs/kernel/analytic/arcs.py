@@ -14,7 +14,7 @@ the full turn of a continuous joint once more."""
 
 INSET = 1e-9
 """How far inside the limits of free joint and elbow arcs end [rad]: a slack of about 1e-9, far
-above its rounding, which must not decide whether the outermost lane is feasible."""
+above its rounding, which must not decide whether the outermost sample is feasible."""
 
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 
@@ -83,12 +83,12 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
 
 @inner
 def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
-    """Return whether a window narrower than the spacing may hide about infeasible lane i.
+    """Return whether a window narrower than the spacing may hide about infeasible sample i.
 
     Args:
-        slack: Of neighbouring lanes, shape (>= count,).
-        i: The lane.
-        count: How many lanes there are.
+        slack: Of neighbouring samples, shape (>= count,).
+        i: The sample.
+        count: How many samples there are.
         step: Their spacing [rad].
     """
     if slack[i] >= 0.0 or slack[i] <= -PEAK_SLOPE * step:
@@ -100,17 +100,17 @@ def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
 
 @jit
 def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, found: int) -> int:
-    """Append the stretches of a row of lanes in which feasible angles lie or may hide.
+    """Append the stretches of a row of samples in which feasible angles lie or may hide.
 
-    A stretch is a run of feasible lanes with its two neighbours, or the two neighbours of an
-    infeasible lane that comes closer to feasible than both: a window narrower than the spacing
+    A stretch is a run of feasible samples with its two neighbours, or the two neighbours of an
+    infeasible sample that comes closer to feasible than both: a window narrower than the spacing
     shows as such a peak.
 
     Args:
-        slack: Of neighbouring lanes, shape (>= count,).
-        count: How many lanes there are.
+        slack: Of neighbouring samples, shape (>= count,).
+        count: How many samples there are.
         step: Their spacing [rad].
-        windows: Filled with (first, last) as lane indices, shape (room, 2).
+        windows: Filled with (first, last) as sample indices, shape (most windows, 2).
         found: How many windows are there already.
 
     Returns:
@@ -137,4 +137,4 @@ PEAK_SLOPE = 10.0
 """How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
 difference of cosines of joint angles, which move a few radians per radian of the free joint, and
 up to 13 where one limit is left just as another is met. A peak lies at most half a spacing from
-its best lane, so this allows for slopes of 20."""
+its best sample, so this allows for slopes of 20."""

@@ -15,7 +15,7 @@ from tcs.kernel.cache import inner, jit
 
 @jit
 def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatArray) -> None:
-    """Express a tool goal as the lanes need it: all in the frame that joint 1 turns about.
+    """Express a tool goal as the samples need it: all in the frame that joint 1 turns about.
 
     Args:
         arm: The arm.
@@ -51,10 +51,10 @@ def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatAr
 
 
 @jit
-def lane_joints(
+def sample_joints(
     arm: ArmSolver, goal: FloatArray, branch: IntArray, q1: float, q: FloatArray
 ) -> None:
-    """Fill the seven joint angles of one lane [rad], each turned into its limits.
+    """Fill the seven joint angles of one sample [rad], each turned into its limits.
 
     Args:
         arm: The arm.
@@ -66,43 +66,43 @@ def lane_joints(
     R = arm.R
     v, z, x = goal[0].copy(), goal[1].copy(), goal[2].copy()
     q[0] = q1
-    _unturn(q1, v)
-    _unturn(q1, z)
-    _unturn(q1, x)
+    _inverse_rot_z(q1, v)
+    _inverse_rot_z(q1, z)
+    _inverse_rot_z(q1, x)
     for i in range(3):
         v[i] -= arm.p[1, i]
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    _unrotate(R[1], v)
+    _inverse_rotate(R[1], v)
     k = min(max((square - arm.reach[0]) / arm.reach[1], -1.0), 1.0)
     q[3] = arm.reach[2] + np.arctan2(branch[0] * np.sqrt(1.0 - k * k), k)
     c4, s4 = np.cos(q[3]), np.sin(q[3])
     ux = arm.u0[0] + arm.uc[0] * c4 + arm.us[0] * s4
     uy = arm.u0[1] + arm.uc[1] * c4 + arm.us[1] * s4
     uz = arm.u0[2] + arm.uc[2] * c4 + arm.us[2] * s4
-    q[2] = _turn_to_height(R[2], ux, uy, uz, v[2], branch[1])
+    q[2] = _angle_to_height(R[2], ux, uy, uz, v[2], branch[1])
     c3, s3 = np.cos(q[2]), np.sin(q[2])
     rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
     kx = R[2, 0, 0] * rx + R[2, 0, 1] * ry + R[2, 0, 2] * uz
     ky = R[2, 1, 0] * rx + R[2, 1, 1] * ry + R[2, 1, 2] * uz
     q[1] = np.arctan2(kx * v[1] - ky * v[0], kx * v[0] + ky * v[1])
     for j in range(1, 4):
-        _unrotate(R[j], z)
-        _unturn(q[j], z)
-        _unrotate(R[j], x)
-        _unturn(q[j], x)
-    _unrotate(R[4], z)
-    _unrotate(R[4], x)
+        _inverse_rotate(R[j], z)
+        _inverse_rot_z(q[j], z)
+        _inverse_rotate(R[j], x)
+        _inverse_rot_z(q[j], x)
+    _inverse_rotate(R[4], z)
+    _inverse_rotate(R[4], x)
     fx, fy, fz = R[6, 0, 2], R[6, 1, 2], R[6, 2, 2]
-    q[5] = _turn_to_height(R[5], fx, fy, fz, z[2], branch[2])
+    q[5] = _angle_to_height(R[5], fx, fy, fz, z[2], branch[2])
     c6, s6 = np.cos(q[5]), np.sin(q[5])
     rx, ry = c6 * fx - s6 * fy, s6 * fx + c6 * fy
     kx = R[5, 0, 0] * rx + R[5, 0, 1] * ry + R[5, 0, 2] * fz
     ky = R[5, 1, 0] * rx + R[5, 1, 1] * ry + R[5, 1, 2] * fz
     q[4] = np.arctan2(kx * z[1] - ky * z[0], kx * z[0] + ky * z[1])
-    _unturn(q[4], x)
-    _unrotate(R[5], x)
-    _unturn(q[5], x)
-    _unrotate(R[6], x)
+    _inverse_rot_z(q[4], x)
+    _inverse_rotate(R[5], x)
+    _inverse_rot_z(q[5], x)
+    _inverse_rotate(R[6], x)
     q[6] = np.arctan2(x[1], x[0])
     if arm.free == LAST:
         for j in range(3):
@@ -127,7 +127,9 @@ def within(angle: float, lower: float, upper: float) -> float:
 
 
 @inner
-def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, sign: int) -> float:
+def _angle_to_height(
+    R: FloatArray, x: float, y: float, z: float, height: float, sign: int
+) -> float:
     """Return the turn about z after which R (x, y, z) has the z component `height`."""
     P = R[2, 0] * x + R[2, 1] * y
     Q = R[2, 1] * x - R[2, 0] * y
@@ -137,14 +139,14 @@ def _turn_to_height(R: FloatArray, x: float, y: float, z: float, height: float, 
 
 
 @inner
-def _unturn(angle: float, v: FloatArray) -> None:
+def _inverse_rot_z(angle: float, v: FloatArray) -> None:
     """Turn v by -angle about z, in place."""
     c, s = np.cos(angle), np.sin(angle)
     v[0], v[1] = c * v[0] + s * v[1], -s * v[0] + c * v[1]
 
 
 @inner
-def _unrotate(R: FloatArray, v: FloatArray) -> None:
+def _inverse_rotate(R: FloatArray, v: FloatArray) -> None:
     """Replace v by R^T v, in place."""
     x, y, z = v[0], v[1], v[2]
     v[0] = R[0, 0] * x + R[1, 0] * y + R[2, 0] * z

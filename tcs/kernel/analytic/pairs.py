@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.ik import lane_joints
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.ik import sample_joints
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.search import (
     MAX_CANDIDATES,
     Search,
     best_of,
-    fill_lanes,
+    fill_samples,
     find_candidates,
-    put_in_order,
+    sort_candidates,
 )
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import inner, whole
+from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -32,14 +32,15 @@ REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
 """Reasons, the numbers of `tcs.placement.tables.Reason`."""
 
-ONE_LANE, NOTHING = whole(1), whole(-1)
+ONE_SAMPLE, NOTHING = int_constant(1), int_constant(-1)
 
 REFINEMENTS = 3
-"""Rounds in which the neighbourhood of the best solution is divided by REFINE_LANES / 2."""
-REFINE_LANES = whole(8)
-SQUEEZES = 8
-"""Halvings of the room between two contacts: down to FINE_STEP / 256, below the dense scan's."""
-SQUEEZE_PARTS = 16.0
+"""Rounds in which the neighbourhood of the best solution is divided by REFINE_SAMPLES / 2."""
+REFINE_SAMPLES = int_constant(8)
+BISECTIONS = 8
+"""Bisections of the interval between two contacts: down to FINE_STEP / 256, below the spacing of
+the dense scan."""
+BISECTION_PARTS = 16.0
 """How finely the neighbourhood of an angle found by halving is refined."""
 END_HALVINGS = 12
 """Halvings towards the end of a feasible stretch: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
@@ -49,15 +50,15 @@ seen; the hundredth is for rounding."""
 
 
 @inner
-def lanes_measure(problem: Problem) -> bool:
-    """Return whether what the lanes are filled with, isotropy, is the measure that counts."""
+def samples_hold_measure(problem: Problem) -> bool:
+    """Return whether what the samples are filled with, isotropy, is the measure that counts."""
     return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
 
 
 @inner
 def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
     """Return the measure that counts at an angle of the free joint on branch b; fills `q`."""
-    lane_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
+    sample_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
     return measure_at(problem, search.q)
 
 
@@ -78,11 +79,11 @@ def best_free(
         if rank == 1:
             for n in range(found):
                 search.key[n] = -search.found_measure[n]
-            put_in_order(search, found)
+            sort_candidates(search, found)
         if rank:
             top = search.order[rank]
         branch = problem.arm.branches[search.found_branch[top]]
-        lane_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
+        sample_joints(problem.arm, search.goal, branch, search.found_angle[top], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             return top, first_contact
@@ -92,7 +93,7 @@ def best_free(
 
 
 @inner
-def squeeze(
+def bisect_contacts(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> int:
     """Look for a free angle where every candidate touches something.
@@ -100,7 +101,7 @@ def squeeze(
     A free stretch narrower than the spacing lies where one contact has ended and another not
     begun, or where a contact has ended and a joint limit is about to be passed. So the very ends
     of the feasible stretches join the candidates, all are walked in the order of their angles, and
-    where the pair in contact changes, halving finds whether there is room between the two.
+    where the pair in contact changes, bisection finds whether a free interval separates the two.
 
     Returns:
         Index of the candidate that now holds a free angle, or -1.
@@ -114,7 +115,7 @@ def squeeze(
     for rank in range(found):
         n = order[rank]
         b = search.found_branch[n]
-        lane_joints(arm, search.goal, arm.branches[b], search.found_angle[n], search.q)
+        sample_joints(arm, search.goal, arm.branches[b], search.found_angle[n], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             return n
@@ -126,7 +127,7 @@ def squeeze(
             if np.isfinite(angle):
                 search.found_angle[n] = angle
                 search.found_measure[n] = _measure_if_feasible(problem, search, b, angle)
-                search.found_step[n] = width / SQUEEZE_PARTS
+                search.found_step[n] = width / BISECTION_PARTS
                 return n
         partner, i, j = work.last[0], work.last[1], work.last[2]
     return -1
@@ -138,7 +139,7 @@ def _by_angle(search: Search, found: int) -> None:
     for n in range(found):
         # No angle of the free joint is anywhere near this far from zero.
         search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
-    put_in_order(search, found)
+    sort_candidates(search, found)
 
 
 @inner
@@ -210,10 +211,10 @@ def _between(
     other, k, m = work.last[0], work.last[1], work.last[2]
     answer = np.nan
     low, high = 0.0, 1.0
-    for _ in range(SQUEEZES):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         angle = first + middle * width
-        lane_joints(arm, search.goal, arm.branches[b], angle, search.q)
+        sample_joints(arm, search.goal, arm.branches[b], angle, search.q)
         place_links(problem.chain_R, problem.chain_p, search.q, work.link_R, work.link_p)
         if pair_touches(problem, work, body_A, partner, i, j):
             low = middle
@@ -235,13 +236,17 @@ def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float)
     """Return what a candidate at this angle on branch b is worth, or -1 if it is none."""
     arm = problem.arm
     search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
-    solve_lanes(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, ONE_LANE,
+    solve_samples(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, ONE_SAMPLE,
         search.slack, search.measure,
     )  # fmt: skip
     if search.slack[0] < 0.0:
         return -1.0
-    return search.measure[0] if lanes_measure(problem) else measure_of(problem, search, b, angle)
+    return (
+        search.measure[0]
+        if samples_hold_measure(problem)
+        else measure_of(problem, search, b, angle)
+    )
 
 
 @inner
@@ -250,31 +255,31 @@ def refine(
 ) -> None:
     """Climb from a collision-free candidate to the best angle nearby; fills `search.best`.
 
-    Each round spreads lanes over one spacing to either side, takes the best one that is feasible
+    Each round spreads samples over one spacing to either side, takes the best one that is feasible
     and free, and narrows the spacing.
     """
     arm = problem.arm
     branch = arm.branches[search.found_branch[winner]]
     centre, step = search.found_angle[winner], search.found_step[winner]
     value = search.found_measure[winner]
-    lane_joints(arm, search.goal, branch, centre, search.best)
+    sample_joints(arm, search.goal, branch, centre, search.best)
     for _ in range(REFINEMENTS):
-        fine = fill_lanes(search, centre - step, centre + step, REFINE_LANES)
-        solve_lanes(
-            arm, search.goal, branch, search.cosine, search.sine, REFINE_LANES,
+        fine = fill_samples(search, centre - step, centre + step, REFINE_SAMPLES)
+        solve_samples(
+            arm, search.goal, branch, search.cosine, search.sine, REFINE_SAMPLES,
             search.slack, search.measure,
         )  # fmt: skip
-        for i in range(REFINE_LANES):
+        for i in range(REFINE_SAMPLES):
             if search.slack[i] < 0.0:
                 search.measure[i] = -1.0
-            elif not lanes_measure(problem):
+            elif not samples_hold_measure(problem):
                 b, angle = search.found_branch[winner], search.angle[i]
                 search.measure[i] = measure_of(problem, search, b, angle)
-        for _ in range(REFINE_LANES):
-            i = best_of(search.measure, REFINE_LANES)
+        for _ in range(REFINE_SAMPLES):
+            i = best_of(search.measure, REFINE_SAMPLES)
             if search.measure[i] <= value:
                 break
-            lane_joints(arm, search.goal, branch, search.angle[i], search.q)
+            sample_joints(arm, search.goal, branch, search.angle[i], search.q)
             contact = arm_contact(problem, work, body_A, search.q)
             if contact == NO_CONTACT and at_goal(problem, work):
                 centre, value = search.angle[i], search.measure[i]
@@ -293,7 +298,7 @@ def score_pair(
 
     Args:
         problem: The scene.
-        work: Room, base and gripper are placed.
+        work: Environment, base and gripper are placed.
         body_A: The robot's other shapes in A at the torso level in hand.
         search: `goal` and `arcs` are set; `best` gets filled with joint angles [rad] when reached.
         arcs: How many arcs there are.
@@ -304,13 +309,13 @@ def score_pair(
     found = find_candidates(problem.arm, search, arcs)
     if found == 0:
         return JOINT_LIMITS, NO_CONTACT
-    if not lanes_measure(problem):
+    if not samples_hold_measure(problem):
         for n in range(found):
             b, angle = search.found_branch[n], search.found_angle[n]
             search.found_measure[n] = measure_of(problem, search, b, angle)
     winner, contact = best_free(problem, work, body_A, search, found)
     if winner < 0:
-        winner = squeeze(problem, work, body_A, search, found)
+        winner = bisect_contacts(problem, work, body_A, search, found)
     if winner < 0:
         return ARM_BLOCKED, contact
     refine(problem, work, body_A, search, winner)

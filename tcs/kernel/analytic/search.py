@@ -7,32 +7,32 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.analytic.arcs import MAX_ARCS, PEAK_SLOPE, is_peak, windows_of
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner, jit, whole
+from tcs.kernel.cache import inner, int_constant, jit
 
-FIRST_LANES = 48
-"""Lanes over all arcs together in the first look: enough to find the feasible windows."""
+FIRST_SAMPLES = 48
+"""Samples over all arcs together in the first look: enough to find the feasible windows."""
 FINE_STEP = 0.0125
 """Spacing [rad] of the second look inside the windows. Chosen by measurement: recall against a
 dense scan of 11,520 samples (benchmarks/)."""
-LEAST_LANES = whole(8)
-"""Lanes that even the smallest window or arc gets: one vector of the processor."""
-FINEST_LANES = whole(8)
-"""Lanes at each end of a feasible stretch, and about a peak that is closed in on."""
-PEAK_LOOKS = 4
-"""How often lanes close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
+MIN_SAMPLES = int_constant(8)
+"""Samples that even the smallest window or arc gets: one vector of the processor."""
+FINE_SAMPLES = int_constant(8)
+"""Samples at each end of a feasible stretch, and about a peak that is closed in on."""
+PEAK_REFINEMENTS = 4
+"""How often samples close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
 rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
 as the two happen to let them be."""
 STRAIGHT = 0.05
 """Squared sine of the wrist's bend below which joints 5 and 7 (of a mirrored arm, 1 and 3) swing by
 half a turn within a few hundredths of a radian, past the window in which both keep their limits."""
-NONE = whole(0)
-STRAIGHT_LOOKS = 5
-"""How often lanes close in on a straight wrist, each time to 2/7 of their spacing: from 0.05 rad
+NONE = int_constant(0)
+STRAIGHT_REFINEMENTS = 5
+"""How often samples close in on a straight wrist, each time to 2/7 of their spacing: from 0.05 rad
 down to 1e-4 rad."""
-MAX_LANES = 512
+MAX_SAMPLES = 512
 MAX_WINDOWS = 32
 MAX_CANDIDATES = 4096
 
@@ -49,7 +49,7 @@ class Search(NamedTuple):
     """Infeasible angles that are nearer to feasible than their neighbours [rad], shape
     (MAX_WINDOWS,)."""
     straight: FloatArray
-    """Where the wrist is straightest: angle [rad], spacing of the lanes [rad] and branch, shape
+    """Where the wrist is straightest: angle [rad], spacing of the samples [rad] and branch, shape
     (MAX_WINDOWS, 3)."""
     angle: FloatArray
     cosine: FloatArray
@@ -59,7 +59,7 @@ class Search(NamedTuple):
     found_angle: FloatArray
     """Free joint of each candidate [rad], shape (MAX_CANDIDATES,)."""
     found_step: FloatArray
-    """Spacing [rad] of the lanes it was found with."""
+    """Spacing [rad] of the samples it was found with."""
     found_measure: FloatArray
     """Its isotropy to the sixth power, or another measure if one was asked for; -1 once it was
     found to collide."""
@@ -70,7 +70,7 @@ class Search(NamedTuple):
     order: IntArray
     """Indices of the candidates in that order."""
     spare: IntArray
-    """Room to sort in."""
+    """Scratch of the merge sort."""
     q: FloatArray
     """Joint angles in hand, shape (7,)."""
     best: FloatArray
@@ -86,11 +86,11 @@ def new_search() -> Search:
         np.empty((MAX_WINDOWS, 2)),
         np.empty(MAX_WINDOWS),
         np.empty((MAX_WINDOWS, 3)),
-        np.empty(MAX_LANES),
-        np.empty(MAX_LANES),
-        np.empty(MAX_LANES),
-        np.empty(MAX_LANES),
-        np.empty(MAX_LANES),
+        np.empty(MAX_SAMPLES),
+        np.empty(MAX_SAMPLES),
+        np.empty(MAX_SAMPLES),
+        np.empty(MAX_SAMPLES),
+        np.empty(MAX_SAMPLES),
         np.empty(MAX_CANDIDATES),
         np.empty(MAX_CANDIDATES),
         np.empty(MAX_CANDIDATES),
@@ -104,8 +104,8 @@ def new_search() -> Search:
 
 
 @inner
-def fill_lanes(search: Search, first: float, last: float, count: int) -> float:
-    """Spread `count` >= 2 lanes evenly from first to last, ends included; return their spacing.
+def fill_samples(search: Search, first: float, last: float, count: int) -> float:
+    """Spread `count` >= 2 samples evenly from first to last, ends included; return their spacing.
 
     Cosines and sines follow by turning the first ones on: 512 turns lose about 1e-13, and the
     joint angles of a solution are computed anew from its angle.
@@ -131,7 +131,7 @@ def best_of(measure: FloatArray, count: int) -> int:
 
 
 @inner
-def put_in_order(search: Search, count: int) -> None:
+def sort_candidates(search: Search, count: int) -> None:
     """Fill `order` with the first candidates by ascending `key`, equal ones as they come.
 
     A merge sort of our own: numpy's costs the compiler three seconds.
@@ -174,12 +174,12 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     found = straight = NONE
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
-        share = FIRST_LANES * (last - first) / length if length > 0.0 else 0.0
-        # Rounded: cut off, rounding errors would decide over a lane where arcs mirror each other.
-        count = max(LEAST_LANES, int(share + 0.5))
+        share = FIRST_SAMPLES * (last - first) / length if length > 0.0 else 0.0
+        # Rounded: cut off, rounding errors would decide over a sample where arcs mirror each other.
+        count = max(MIN_SAMPLES, int(share + 0.5))
         for b in range(len(arm.branches)):
-            step = fill_lanes(search, first, last, count)
-            solve_lanes(
+            step = fill_samples(search, first, last, count)
+            solve_samples(
                 arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
                 search.slack, search.measure,
             )  # fmt: skip
@@ -187,22 +187,22 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
             for w in range(windows):
                 start = first + search.windows[w, 0] * step
                 stop = first + search.windows[w, 1] * step
-                found = _look_closer(arm, search, b, start, stop, found)
+                found = _refine_window(arm, search, b, start, stop, found)
             if found == 0:
-                straight = _note_straight(search, b, count, step, first, straight)
+                straight = _record_straight(search, b, count, step, first, straight)
     if found == 0:
         for n in range(straight):
-            found = _close_in_straight(arm, search, n, found)
+            found = _refine_straight(arm, search, n, found)
     return found
 
 
 @inner
-def _note_straight(
+def _record_straight(
     search: Search, b: int, count: int, step: float, first: float, straight: int
 ) -> int:
-    """Append the lanes at which the wrist is straighter than at both their neighbours.
+    """Append the samples at which the wrist is straighter than at both their neighbours.
 
-    No lane is feasible, so `measure` tells of the bend.
+    No sample is feasible, so `measure` tells of the bend.
     """
     bend = search.measure
     for i in range(count):
@@ -218,34 +218,34 @@ def _note_straight(
 
 
 @inner
-def _close_in_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
+def _refine_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
     """Append feasible angles about one at which the wrist is all but straight, if there are any."""
     middle, step = search.straight[n, 0], search.straight[n, 1]
     b = int(search.straight[n, 2])
-    for _ in range(STRAIGHT_LOOKS):
-        step = fill_lanes(search, middle - step, middle + step, FINEST_LANES)
-        solve_lanes(
-            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES,
+    for _ in range(STRAIGHT_REFINEMENTS):
+        step = fill_samples(search, middle - step, middle + step, FINE_SAMPLES)
+        solve_samples(
+            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES,
             search.slack, search.measure,
         )  # fmt: skip
         before = found
-        for i in range(FINEST_LANES):
+        for i in range(FINE_SAMPLES):
             if search.slack[i] >= 0.0:
                 found = _add(search, b, i, step, found)
         if found > before:
             break
-        middle = search.angle[best_of(search.measure, FINEST_LANES)]
+        middle = search.angle[best_of(search.measure, FINE_SAMPLES)]
     return found
 
 
 @inner
-def _look_closer(
+def _refine_window(
     arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
 ) -> int:
     """Append the feasible angles of one window on branch b; return how many there are now."""
-    count = min(max(LEAST_LANES, int((last - first) / FINE_STEP) + 1), MAX_LANES)
-    step = fill_lanes(search, first, last, count)
-    solve_lanes(
+    count = min(max(MIN_SAMPLES, int((last - first) / FINE_STEP) + 1), MAX_SAMPLES)
+    step = fill_samples(search, first, last, count)
+    solve_samples(
         arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
         search.slack, search.measure,
     )  # fmt: skip
@@ -265,14 +265,14 @@ def _look_closer(
             search.peaks[peaks] = search.angle[i]
             peaks += 1
     for e in range(ends):
-        found = _look_between(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
+        found = _refine_end(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
     for k in range(peaks):
-        found = _close_in(arm, search, b, search.peaks[k], step, first, last, found)
+        found = _refine_peak(arm, search, b, search.peaks[k], step, first, last, found)
     return found
 
 
 @inner
-def _close_in(
+def _refine_peak(
     arm: ArmSolver,
     search: Search,
     b: int,
@@ -283,18 +283,18 @@ def _close_in(
     found: int,
 ) -> int:
     """Append feasible angles about an infeasible peak, within first .. last, if there are any."""
-    for _ in range(PEAK_LOOKS):
+    for _ in range(PEAK_REFINEMENTS):
         low, high = max(middle - step, first), min(middle + step, last)
-        step = fill_lanes(search, low, high, FINEST_LANES)
-        solve_lanes(
-            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES,
+        step = fill_samples(search, low, high, FINE_SAMPLES)
+        solve_samples(
+            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES,
             search.slack, search.measure,
         )  # fmt: skip
         before = found
-        for i in range(FINEST_LANES):
+        for i in range(FINE_SAMPLES):
             if search.slack[i] >= 0.0:
                 found = _add(search, b, i, step, found)
-        peak = best_of(search.slack, FINEST_LANES)
+        peak = best_of(search.slack, FINE_SAMPLES)
         if found > before or search.slack[peak] < -PEAK_SLOPE * step:
             break
         middle = search.angle[peak]
@@ -302,19 +302,19 @@ def _close_in(
 
 
 @inner
-def _look_between(
+def _refine_end(
     arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
 ) -> int:
-    """Append feasible angles between two neighbouring lanes, themselves left out.
+    """Append feasible angles between two neighbouring samples, themselves left out.
 
     Close to a joint limit, where a feasible stretch ends, the best measure often is.
     """
-    step = fill_lanes(search, outer, inner, FINEST_LANES)
-    solve_lanes(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINEST_LANES - 1,
+    step = fill_samples(search, outer, inner, FINE_SAMPLES)
+    solve_samples(
+        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES - 1,
         search.slack, search.measure,
     )  # fmt: skip
-    for i in range(1, FINEST_LANES - 1):
+    for i in range(1, FINE_SAMPLES - 1):
         if search.slack[i] >= 0.0:
             found = _add(search, b, i, abs(step), found)
     return found
@@ -322,7 +322,7 @@ def _look_between(
 
 @inner
 def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
-    """Append lane i as a candidate on branch b; return how many there are now."""
+    """Append sample i as a candidate on branch b; return how many there are now."""
     if found == MAX_CANDIDATES:
         return found
     search.found_angle[found] = search.angle[i]

@@ -11,35 +11,35 @@ from typing import NamedTuple
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner, jit, whole
+from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.measure import inverse_condition
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.newton import (
-    Look,
+    NewtonWorkspace,
     converge,
+    evaluate,
     factorise,
-    look_at,
-    new_look,
+    new_newton_workspace,
+    null_space_direction,
     step_to_goal,
-    way_along,
 )
 
 TURN_BACK = 6.283185307179586
 LEAST_STRIDE = 1e-3
 """Shortest stride along a curve [rad, as a norm of the joints]: where it would have to be shorter,
 next to a singularity, the curve is given up."""
-EASY_BEND = 0.2
+EASY_ANGLE = 0.2
 """How far the direction may turn from point to point [rad] before strides become shorter."""
-HARD_BEND = 0.5
+HARD_ANGLE = 0.5
 """Beyond this [rad] the stride is taken back."""
-LONG_WAY_BACK = 3e-3
+LONG_CORRECTION = 3e-3
 """Longest step [rad, as a norm] after which the tool is at the goal within 1e-5."""
-OFF_GOAL = 3e-4
+MAX_CORRECTED_ERROR = 3e-4
 """Greatest error [rad and m] that may be left after one step."""
-LOST = 3e-2
+MAX_PREDICTED_ERROR = 3e-2
 """Error after a stride [rad and m] with which the stride is taken back."""
-SETTLING = whole(4)
+CORRECTIONS = int_constant(4)
 """Looks that a place on a cubic gets to come to the goal; it takes 2."""
 SAME_CURVE = 0.04
 """How far beside a known curve [rad, as a norm] a solution may lie and count as on it: points are
@@ -51,7 +51,7 @@ class Curves(NamedTuple):
 
     q: FloatArray
     """Joint angles [rad], not turned into limits: neighbours are near, shape (points, 7)."""
-    way: FloatArray
+    tangent: FloatArray
     """Unit directions along the curve, shape (points, 7)."""
     length: FloatArray
     """From each point to the next one of its curve [rad, as a norm], shape (points,)."""
@@ -61,10 +61,10 @@ class Curves(NamedTuple):
     """How far the worst joint is from its limits [rad], negative beyond, shape (points,)."""
     first: IntArray
     """Where each curve begins, and where the last one ends, shape (curves + 1,)."""
-    look: Look
+    newton: NewtonWorkspace
     q_now: FloatArray
     """Joints in hand, shape (7,)."""
-    way_now: FloatArray
+    tangent_now: FloatArray
     trial: FloatArray
 
 
@@ -78,7 +78,7 @@ def new_curves(points: int, curves: int) -> Curves:
         np.empty(points),
         np.empty(points),
         np.zeros(curves + 1, np.int64),
-        new_look(),
+        new_newton_workspace(),
         np.empty(7),
         np.empty(7),
         np.empty(7),
@@ -122,7 +122,7 @@ def is_known(curves: Curves, count: int, q: FloatArray, beside: float) -> bool:
                 off = q[i] - curves.q[n, i]
                 off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
                 square += off * off
-                along += off * curves.way[n, i]
+                along += off * curves.tangent[n, i]
                 if square > reach * reach:
                     break
             if square <= reach * reach and square - along * along <= beside * beside:
@@ -156,13 +156,13 @@ def trace(
     Returns:
         How many curves there are now.
     """
-    room = len(curves.first) - 1
+    most = len(curves.first) - 1
     for side in range(2):
-        if count >= room:
+        if count >= most:
             return count
         start = curves.first[count]
         sense = 1.0 - 2.0 * side
-        stop, closed = _walk(arm, R_AG, p_AG, curves, start, sense, beyond, stride, of)
+        stop, closed = _trace_side(arm, R_AG, p_AG, curves, start, sense, beyond, stride, of)
         if stop - start >= 2 or (stop > start and side == 0):
             count += 1
             curves.first[count] = stop
@@ -172,9 +172,11 @@ def trace(
 
 
 @inner
-def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int) -> float:
+def _append_point(
+    arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int
+) -> float:
     """Write the joints and the direction in hand as point n of a curve; return its slack."""
-    J = curves.look.J
+    J = curves.newton.J
     if of == ISOTROPY:
         total = 0.0
         for i in range(6):
@@ -186,7 +188,7 @@ def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: i
     square = 0.0
     for i in range(7):
         curves.q[n, i] = curves.q_now[i]
-        curves.way[n, i] = curves.way_now[i]
+        curves.tangent[n, i] = curves.tangent_now[i]
         if n > start:
             off = curves.q[n, i] - curves.q[n - 1, i]
             square += off * off
@@ -198,7 +200,7 @@ def _keep(arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: i
 
 
 @inner
-def _walk(
+def _trace_side(
     arm: NumericArm,
     R_AG: FloatArray,
     p_AG: FloatArray,
@@ -214,21 +216,21 @@ def _walk(
     Returns:
         One after the last point, and whether the walk has come back to its start.
     """
-    q, way, look = curves.q_now, curves.way_now, curves.look
+    q, tangent, newton = curves.q_now, curves.tangent_now, curves.newton
     if start >= len(curves.slack):
         return start, False
-    look_at(arm, R_AG, p_AG, q, look)
-    det = factorise(look, 0.0)
+    evaluate(arm, R_AG, p_AG, q, newton)
+    det = factorise(newton, 0.0)
     # The joint that takes part in the motion most gives the walk its sense.
     best = 0.0
     for i in range(7):
         curves.trial[:] = 0.0
         curves.trial[i] = side
-        part = way_along(look, curves.trial, look.step)
+        part = null_space_direction(newton, curves.trial, newton.step)
         if part > best:
             best = part
-            way[:] = look.step
-    _keep(arm, curves, start, start, det, of)
+            tangent[:] = newton.step
+    _append_point(arm, curves, start, start, det, of)
     n = start + 1
     h = 0.5 * stride
     travelled = 0.0
@@ -239,30 +241,30 @@ def _walk(
         if last > start:
             bend = 0.5 * h * h / curves.length[last - 1]
         for i in range(7):
-            q[i] = curves.q[last, i] + h * curves.way[last, i]
+            q[i] = curves.q[last, i] + h * curves.tangent[last, i]
             if bend > 0.0:
-                q[i] += bend * (curves.way[last, i] - curves.way[last - 1, i])
-        worst = look_at(arm, R_AG, p_AG, q, look)
-        good = worst < LOST
+                q[i] += bend * (curves.tangent[last, i] - curves.tangent[last - 1, i])
+        worst = evaluate(arm, R_AG, p_AG, q, newton)
+        good = worst < MAX_PREDICTED_ERROR
         if good:
-            det = factorise(look, 0.0)
-            if step_to_goal(look, q, h) > LONG_WAY_BACK:
-                worst = look_at(arm, R_AG, p_AG, q, look)
-                good = worst < OFF_GOAL
-                det = factorise(look, 0.0)
-                step_to_goal(look, q, h)
+            det = factorise(newton, 0.0)
+            if step_to_goal(newton, q, h) > LONG_CORRECTION:
+                worst = evaluate(arm, R_AG, p_AG, q, newton)
+                good = worst < MAX_CORRECTED_ERROR
+                det = factorise(newton, 0.0)
+                step_to_goal(newton, q, h)
         cosine = 0.0
         if good:
             for i in range(7):
-                curves.trial[i] = curves.way[last, i]
-            cosine = way_along(look, curves.trial, way)
-            good = cosine > np.cos(HARD_BEND)
+                curves.trial[i] = curves.tangent[last, i]
+            cosine = null_space_direction(newton, curves.trial, tangent)
+            good = cosine > np.cos(HARD_ANGLE)
         if not good:
             h *= 0.5
             if h < LEAST_STRIDE:
                 break
             continue
-        slack = _keep(arm, curves, n, start, det, of)
+        slack = _append_point(arm, curves, n, start, det, of)
         travelled += h
         n += 1
         if slack < -beyond:
@@ -271,7 +273,7 @@ def _walk(
             curves.q_now[:] = curves.q[start]
             return n, True
         angle = np.arccos(min(cosine, 1.0))
-        h = min(stride, h * min(max(EASY_BEND / max(angle, 1e-3), 0.5), 1.6))
+        h = min(stride, h * min(max(EASY_ANGLE / max(angle, 1e-3), 0.5), 1.6))
     curves.q_now[:] = curves.q[start]
     return n, False
 
@@ -293,27 +295,27 @@ def _has_closed(curves: Curves, start: int, n: int) -> bool:
 
 
 @jit
-def point_between(curves: Curves, n: int, share: float, q: FloatArray) -> None:
+def point_between(curves: Curves, n: int, fraction: float, q: FloatArray) -> None:
     """Fill joint angles between points n and n + 1, as a cubic has them.
 
     Args:
         curves: The curves.
         n: A point that is not the last of its curve.
-        share: How far on the way, 0 to 1.
+        fraction: Fraction of the stretch from point n to n + 1, 0 to 1.
         q: Filled [rad], shape (7,).
     """
     length = curves.length[n]
-    u, v = share, 1.0 - share
+    u, v = fraction, 1.0 - fraction
     a, b = v * v * (1.0 + 2.0 * u), u * u * (1.0 + 2.0 * v)
     c, d = length * u * v * v, -length * u * u * v
     for i in range(7):
         q[i] = a * curves.q[n, i] + b * curves.q[n + 1, i]
-        q[i] += c * curves.way[n, i] + d * curves.way[n + 1, i]
+        q[i] += c * curves.tangent[n, i] + d * curves.tangent[n + 1, i]
 
 
 @jit
-def settle(
+def correct(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, curves: Curves, exact: float
 ) -> bool:
     """Bring `q_now`, close to the goal already, to it; return whether that succeeded."""
-    return converge(arm, R_AG, p_AG, curves.q_now, curves.look, SETTLING, exact)
+    return converge(arm, R_AG, p_AG, curves.q_now, curves.newton, CORRECTIONS, exact)

@@ -25,7 +25,7 @@ FAR_TURN = 0.9
 """Cosine of a turn below which its sine is no longer taken for the angle."""
 
 
-class Look(NamedTuple):
+class NewtonWorkspace(NamedTuple):
     """Scratch of one look at a posture."""
 
     z: FloatArray
@@ -47,9 +47,9 @@ class Look(NamedTuple):
 
 
 @jit
-def new_look() -> Look:
+def new_newton_workspace() -> NewtonWorkspace:
     """Return scratch memory."""
-    return Look(
+    return NewtonWorkspace(
         np.empty((7, 3)),
         np.empty((7, 3)),
         np.empty((2, 3, 3)),
@@ -62,12 +62,12 @@ def new_look() -> Look:
 
 
 @jit
-def look_at(
-    arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, q: FloatArray, look: Look
+def evaluate(
+    arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, q: FloatArray, newton: NewtonWorkspace
 ) -> float:
     """Fill error and Jacobian at joint angles q; return the greatest entry of the error."""
-    S, T = look.S[0], look.S[1]
-    z, o, J, error = look.z, look.o, look.J, look.error
+    S, T = newton.S[0], newton.S[1]
+    z, o, J, error = newton.z, newton.o, newton.J, newton.error
     x0, x1, x2 = 0.0, 0.0, 0.0
     for r in range(3):
         for c in range(3):
@@ -116,9 +116,9 @@ def look_at(
 
 
 @jit
-def factorise(look: Look, damping: float) -> float:
+def factorise(newton: NewtonWorkspace, damping: float) -> float:
     """Fill the Cholesky factor of J J^T + damping; return its determinant."""
-    J, G = look.J, look.G
+    J, G = newton.J, newton.G
     det = 1.0
     for i in range(6):
         for j in range(i + 1):
@@ -139,9 +139,9 @@ def factorise(look: Look, damping: float) -> float:
 
 
 @inner
-def _solve(look: Look) -> None:
+def _solve(newton: NewtonWorkspace) -> None:
     """Replace x by the solution of (J J^T) y = x."""
-    G, x = look.G, look.x
+    G, x = newton.G, newton.x
     for i in range(6):
         total = x[i]
         for k in range(i):
@@ -155,12 +155,12 @@ def _solve(look: Look) -> None:
 
 
 @jit
-def step_to_goal(look: Look, q: FloatArray, longest: float) -> float:
+def step_to_goal(newton: NewtonWorkspace, q: FloatArray, longest: float) -> float:
     """Take the shortest step to the goal, cut to length `longest`; return its full length."""
-    J, x, step = look.J, look.x, look.step
+    J, x, step = newton.J, newton.x, newton.step
     for i in range(6):
-        x[i] = look.error[i]
-    _solve(look)
+        x[i] = newton.error[i]
+    _solve(newton)
     square = 0.0
     for k in range(7):
         total = 0.0
@@ -169,42 +169,42 @@ def step_to_goal(look: Look, q: FloatArray, longest: float) -> float:
         step[k] = total
         square += total * total
     length = np.sqrt(square)
-    share = 1.0 if length <= longest else longest / length
+    fraction = 1.0 if length <= longest else longest / length
     for k in range(7):
-        q[k] += share * step[k]
+        q[k] += fraction * step[k]
     return length
 
 
 @jit
-def way_along(look: Look, before: FloatArray, way: FloatArray) -> float:
+def null_space_direction(newton: NewtonWorkspace, before: FloatArray, tangent: FloatArray) -> float:
     """Fill the unit direction in which the tool stands still, on the side of `before`.
 
     Args:
-        look: Factorised.
+        newton: Factorised.
         before: A unit vector, shape (7,).
-        way: Filled, shape (7,).
+        tangent: Filled, shape (7,).
 
     Returns:
         The cosine between the two; 0 where `before` has no part in that direction.
     """
-    J, x = look.J, look.x
+    J, x = newton.J, newton.x
     for i in range(6):
         total = 0.0
         for k in range(7):
             total += J[i, k] * before[k]
         x[i] = total
-    _solve(look)
+    _solve(newton)
     square = 0.0
     for k in range(7):
         total = before[k]
         for i in range(6):
             total -= J[i, k] * x[i]
-        way[k] = total
+        tangent[k] = total
         square += total * total
     length = np.sqrt(square)
     if length > 0.0:
         for k in range(7):
-            way[k] /= length
+            tangent[k] /= length
     return length
 
 
@@ -214,8 +214,8 @@ def converge(
     R_AG: FloatArray,
     p_AG: FloatArray,
     q: FloatArray,
-    look: Look,
-    looks: int,
+    newton: NewtonWorkspace,
+    iterations: int,
     exact: float,
 ) -> bool:
     """Bring the tool to the goal from joint angles q, in place.
@@ -228,17 +228,17 @@ def converge(
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
         q: Joint angles to start from [rad]; changed, shape (7,).
-        look: Scratch; holds the last look.
-        looks: How many looks at most.
+        newton: Workspace; holds the last evaluation.
+        iterations: Greatest number of iterations.
         exact: Greatest error that will do [rad and m].
 
     Returns:
         Whether the tool is at the goal.
     """
-    for _ in range(looks):
-        worst = look_at(arm, R_AG, p_AG, q, look)
+    for _ in range(iterations):
+        worst = evaluate(arm, R_AG, p_AG, q, newton)
         if worst < exact:
             return True
-        factorise(look, DAMPING * worst * worst)
-        step_to_goal(look, q, LONGEST_STEP)
+        factorise(newton, DAMPING * worst * worst)
+        step_to_goal(newton, q, LONGEST_STEP)
     return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tcs.kernel.analytic.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.analytic.search import best_of
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import inner, whole
+from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -16,11 +16,11 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.measure import measure_at
 from tcs.kernel.numeric.arm import NumericArm
-from tcs.kernel.numeric.curves import point_between, settle, slack_of
+from tcs.kernel.numeric.curves import correct, point_between, slack_of
 from tcs.kernel.numeric.search import (
+    LAST_FRACTION,
     SPACING,
-    WHOLE,
-    Hunt,
+    CurveSearch,
     find_candidates,
     find_curves,
     turn_into_limits,
@@ -31,11 +31,11 @@ EXACT = 1e-9
 """Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""
 FIRST_TRIES = 6
 """Candidates tried before all are walked."""
-REFINEMENTS, REFINE_LANES = 3, 8
+REFINEMENTS, REFINE_SAMPLES = 3, 8
 """As in `pairs`."""
-SQUEEZES = 8
-"""Halvings of the room between two contacts, down to SPACING / 256."""
-ROUGH, SOLVED = whole(0), whole(1)
+BISECTIONS = 8
+"""Bisections of the interval between two contacts, down to SPACING / 256."""
+APPROXIMATE, SOLVED = int_constant(0), int_constant(1)
 """Joints as the cubic has them; joints of a solution."""
 NO_SOLUTION = -2
 """In place of a contact: there is no solution within the limits."""
@@ -47,17 +47,17 @@ least, and the limits may lie between."""
 
 
 @inner
-def solve_at(arm: NumericArm, work: Workspace, hunt: Hunt, at: float) -> bool:
+def solve_at(arm: NumericArm, work: Workspace, search: CurveSearch, at: float) -> bool:
     """Fill `q_now` with the solution at a place on the curves; return whether it keeps limits."""
-    curves = hunt.curves
+    curves = search.curves
     point_between(curves, int(at), at - int(at), curves.q_now)
-    arrived = settle(arm, work.R_AG, work.p_AG, curves, EXACT)
+    arrived = correct(arm, work.R_AG, work.p_AG, curves, EXACT)
     return arrived and slack_of(arm, curves.q_now) >= 0.0
 
 
 @inner
 def contact_at(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch,
     at: float, first: int, last: int, least: float,
 ) -> int:  # fmt: skip
     """Return the contact at a place on the curves, NO_CONTACT or NO_SOLUTION.
@@ -65,25 +65,25 @@ def contact_at(
     Args:
         problem: The scene.
         arm: Its arm.
-        work: Room, base, gripper and goal are placed.
+        work: Environment, base, gripper and goal are placed.
         body_A: The robot's other shapes in A.
-        hunt: `q_now` gets filled with the joint angles looked at last [rad].
+        search: `q_now` gets filled with the joint angles looked at last [rad].
         at: The place.
         first: ROUGH or SOLVED, what to look at first: the cubic's joints, 1e-5 rad off, or those
             of a solution. What touches something roughly is not worth a solution.
         last: What to look at last.
         least: A solution whose measure is not above this counts as none.
     """
-    q, contact = hunt.curves.q_now, NO_CONTACT
-    for look in range(first, last + 1):
-        if look == SOLVED:
-            if not solve_at(arm, work, hunt, at):
+    q, contact = search.curves.q_now, NO_CONTACT
+    for newton in range(first, last + 1):
+        if newton == SOLVED:
+            if not solve_at(arm, work, search, at):
                 return NO_SOLUTION
             turn_into_limits(problem, q)
             if least >= 0.0 and measure_at(problem, q) <= least:
                 return NO_SOLUTION
         else:
-            point_between(hunt.curves, int(at), at - int(at), q)
+            point_between(search.curves, int(at), at - int(at), q)
         contact = arm_contact(problem, work, body_A, q)
         if contact != NO_CONTACT:
             return contact
@@ -94,7 +94,12 @@ def contact_at(
 
 @inner
 def choose(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
+    problem: Problem,
+    arm: NumericArm,
+    work: Workspace,
+    body_A: FloatArray,
+    search: CurveSearch,
+    found: int,
 ) -> tuple[float, int]:
     """Find the best collision-free candidate, or any free place between two of them.
 
@@ -112,61 +117,68 @@ def choose(
             for n in range(found):
                 work.last[0] = NO_CONTACT if n == 0 else work.last[0]
                 contact = contact_at(
-                    problem, arm, work, body_A, hunt, hunt.at[n], ROUGH, ROUGH, -1.0
+                    problem, arm, work, body_A, search, search.at[n], APPROXIMATE, APPROXIMATE, -1.0
                 )
-                hunt.pair[n] = work.last
+                search.pair[n] = work.last
                 if contact == NO_CONTACT:
-                    hunt.pair[n, 0] = -1
+                    search.pair[n, 0] = -1
                 else:
-                    hunt.measure[n] = TRIED
+                    search.measure[n] = TRIED
         tries += 1
-        top = best_of(hunt.measure, found)
-        if hunt.measure[top] == TRIED:
+        top = best_of(search.measure, found)
+        if search.measure[top] == TRIED:
             if walked:
                 break
             continue
-        at = hunt.at[top]
-        contact = contact_at(problem, arm, work, body_A, hunt, at, ROUGH, SOLVED, -1.0)
+        at = search.at[top]
+        contact = contact_at(problem, arm, work, body_A, search, at, APPROXIMATE, SOLVED, -1.0)
         if contact == NO_CONTACT:
             return at, contact
         if first_contact == NO_SOLUTION:
             first_contact = contact
-        hunt.measure[top] = TRIED
+        search.measure[top] = TRIED
     return NOWHERE, first_contact
 
 
 @inner
-def squeeze(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt, found: int
+def bisect_contacts(
+    problem: Problem,
+    arm: NumericArm,
+    work: Workspace,
+    body_A: FloatArray,
+    search: CurveSearch,
+    found: int,
 ) -> float:
     """Look for a free place between neighbouring candidates that all touch something.
 
-    As `pairs.squeeze`: where the pair in contact changes from one candidate to the next, halving
-    finds whether there is room between the two.
+    As `analytic.pairs.bisect_contacts`: where the pair in contact changes from one candidate
+    to the next, bisection finds whether a free interval separates the two.
 
     Returns:
         The place or NOWHERE.
     """
     for n in range(1, found):
-        partner, i, j = hunt.pair[n - 1, 0], hunt.pair[n - 1, 1], hunt.pair[n - 1, 2]
-        other, k, m = hunt.pair[n, 0], hunt.pair[n, 1], hunt.pair[n, 2]
-        low, high = hunt.at[n - 1], hunt.at[n]
+        partner, i, j = search.pair[n - 1, 0], search.pair[n - 1, 1], search.pair[n - 1, 2]
+        other, k, m = search.pair[n, 0], search.pair[n, 1], search.pair[n, 2]
+        low, high = search.at[n - 1], search.at[n]
         changed = other != partner or k != i or m != j
         if not changed or partner < 0 or other < 0 or high - low > NEIGHBOURS:
             continue
-        for _ in range(SQUEEZES):
+        for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             point = int(middle)
-            point_between(hunt.curves, point, middle - point, hunt.curves.q_now)
+            point_between(search.curves, point, middle - point, search.curves.q_now)
             place_links(
-                problem.chain_R, problem.chain_p, hunt.curves.q_now, work.link_R, work.link_p
+                problem.chain_R, problem.chain_p, search.curves.q_now, work.link_R, work.link_p
             )
             if pair_touches(problem, work, body_A, partner, i, j):
                 low = middle
             elif pair_touches(problem, work, body_A, other, k, m):
                 high = middle
             else:
-                contact = contact_at(problem, arm, work, body_A, hunt, middle, SOLVED, SOLVED, -1.0)
+                contact = contact_at(
+                    problem, arm, work, body_A, search, middle, SOLVED, SOLVED, -1.0
+                )
                 if contact == NO_CONTACT:
                     return middle
                 break
@@ -175,62 +187,62 @@ def squeeze(
 
 @inner
 def refine(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt,
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch,
     count: int, centre: float, spacing: float,
 ) -> None:  # fmt: skip
-    """Climb from a collision-free place to the best one nearby; fills `hunt.best`.
+    """Climb from a collision-free place to the best one nearby; fills `search.best`.
 
     Its solution is in `q_now`. Each round spreads places over one spacing to either side.
     """
-    curves = hunt.curves
-    hunt.best[:] = curves.q_now
-    value = measure_at(problem, hunt.best)
+    curves = search.curves
+    search.best[:] = curves.q_now
+    value = measure_at(problem, search.best)
     point = int(centre)
     low, high = 0.0, 0.0
     for k in range(count):
         if curves.first[k] <= point < curves.first[k + 1]:
-            low, high = float(curves.first[k]), curves.first[k + 1] - 2.0 + WHOLE
+            low, high = float(curves.first[k]), curves.first[k + 1] - 2.0 + LAST_FRACTION
     step = min(spacing / max(curves.length[point], spacing), 0.5)
     for _ in range(REFINEMENTS):
-        fine = 2.0 * step / (REFINE_LANES - 1)
+        fine = 2.0 * step / (REFINE_SAMPLES - 1)
         start, best_at = centre - step, centre
-        for lane in range(REFINE_LANES):
-            at = min(max(start + lane * fine, low), high)
-            contact = contact_at(problem, arm, work, body_A, hunt, at, SOLVED, SOLVED, value)
+        for sample in range(REFINE_SAMPLES):
+            at = min(max(start + sample * fine, low), high)
+            contact = contact_at(problem, arm, work, body_A, search, at, SOLVED, SOLVED, value)
             if contact == NO_CONTACT:
                 value, best_at = measure_at(problem, curves.q_now), at
-                hunt.best[:] = curves.q_now
+                search.best[:] = curves.q_now
         centre, step = best_at, fine
 
 
 @inner
 def score_numeric_pair(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, hunt: Hunt
+    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch
 ) -> tuple[int, int]:
     """Score one goal within reach; base and gripper are free already.
 
     Args:
         problem: The scene.
         arm: Its arm.
-        work: Room, base, gripper and goal are placed.
+        work: Environment, base, gripper and goal are placed.
         body_A: The robot's other shapes in A at the torso level in hand.
-        hunt: Scratch; `best` gets filled with joint angles [rad] when reached.
+        search: Scratch; `best` gets filled with joint angles [rad] when reached.
 
     Returns:
         Reason and contact code.
     """
-    count = find_curves(arm, work.R_AG, work.p_AG, hunt, problem.measure.of)
+    count = find_curves(arm, work.R_AG, work.p_AG, search, problem.measure.of)
     if count == 0:
         return JOINT_LIMITS, NO_CONTACT
-    found = find_candidates(problem, arm, hunt, count, SPACING)
+    found = find_candidates(problem, arm, search, count, SPACING)
     if found == 0:
         return JOINT_LIMITS, NO_CONTACT
-    at, contact = choose(problem, arm, work, body_A, hunt, found)
+    at, contact = choose(problem, arm, work, body_A, search, found)
     if at == NOWHERE and contact == NO_SOLUTION:
         return JOINT_LIMITS, NO_CONTACT
     if at == NOWHERE:
-        at = squeeze(problem, arm, work, body_A, hunt, found)
+        at = bisect_contacts(problem, arm, work, body_A, search, found)
     if at == NOWHERE:
         return ARM_BLOCKED, contact
-    refine(problem, arm, work, body_A, hunt, count, at, SPACING)
+    refine(problem, arm, work, body_A, search, count, at, SPACING)
     return REACHED, NO_CONTACT

@@ -12,7 +12,7 @@ import numpy as np
 
 from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.cache import inner, jit, whole
+from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.dexterity import UNLIMITED
 from tcs.kernel.measure import limit_penalty
 from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at
@@ -37,7 +37,7 @@ BEYOND = 0.6
 come back, and a start may converge a little beyond."""
 STARTS = 96
 """Postures of the table that are brought to the goal, at most."""
-LOOKS = whole(10)
+ITERATIONS = int_constant(10)
 """Looks that a start gets; most take 4."""
 ON_CURVE = 1e-5
 """Error [rad and m] of a start that has arrived."""
@@ -50,14 +50,14 @@ HALVINGS = 8
 """Of the way to the last place within the limits: down to SPACING / 256."""
 GOLDEN = 0.381966
 """Share of a bracket at which a golden section cuts it."""
-WHOLE = 1.0 - 1e-12
+LAST_FRACTION = 1.0 - 1e-12
 """Greatest share of the way from a point to the next: a whole one would be the next point, which
 the last of a curve has not got."""
 NEAREST = np.array([0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15])
 """Neighbours of a cell as sets of the figures in which they differ, those in few first."""
 
 
-class Hunt(NamedTuple):
+class CurveSearch(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     curves: Curves
@@ -75,9 +75,9 @@ class Hunt(NamedTuple):
 
 
 @jit
-def new_hunt(points: int, curves: int, candidates: int) -> Hunt:
+def new_curve_search(points: int, curves: int, candidates: int) -> CurveSearch:
     """Return scratch memory."""
-    return Hunt(
+    return CurveSearch(
         new_curves(points, curves),
         np.empty(4),
         np.empty(candidates),
@@ -112,14 +112,16 @@ def is_within_span(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray) -> bool:
 
 
 @jit
-def find_curves(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, hunt: Hunt, of: int) -> int:
+def find_curves(
+    arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, search: CurveSearch, of: int
+) -> int:
     """Trace all curves of solutions that the table leads to.
 
     Args:
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        hunt: `curves` gets filled.
+        search: `curves` gets filled.
         of: ISOTROPY or INVERSE_CONDITION, what to evaluate along them.
 
     Returns:
@@ -144,11 +146,11 @@ def find_curves(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, hunt: Hunt,
             for k in range(3):
                 R_F7[r, c] += arm.R[0, k, r] * R_A7[k, c]
     ax, ay, az = R_F7[0, 2], R_F7[1, 2], R_F7[2, 2]
-    azimuth = figures_at(p_F[0], p_F[1], p_F[2], ax, ay, az, hunt.figures)
+    azimuth = figures_at(p_F[0], p_F[1], p_F[2], ax, ay, az, search.figures)
     index, side = np.empty(4, np.int64), np.empty(4, np.int64)
     sizes = np.array([ACROSS, UP, TILTS, TURNS])
     for k in range(4):
-        place = (hunt.figures[k] - arm.cell[k, 0]) / arm.cell[k, 1]
+        place = (search.figures[k] - arm.cell[k, 0]) / arm.cell[k, 1]
         index[k] = int(np.floor(place))
         side[k] = 1 if place - index[k] >= 0.5 else -1
     count = starts = 0
@@ -169,21 +171,21 @@ def find_curves(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, hunt: Hunt,
         for n in range(arm.first[flat], arm.first[flat + 1]):
             if starts >= STARTS:
                 return count
-            if not _start(arm, hunt, n, azimuth, R_F7):
+            if not _start(arm, search, n, azimuth, R_F7):
                 continue
             starts += 1
-            count = hunt_from(arm, R_AG, p_AG, hunt, count, BEYOND, STRIDE, LOOKS, of)
+            count = trace_from(arm, R_AG, p_AG, search, count, BEYOND, STRIDE, ITERATIONS, of)
     return count
 
 
 @inner
-def _start(arm: NumericArm, hunt: Hunt, n: int, azimuth: float, R_F7: FloatArray) -> bool:
+def _start(arm: NumericArm, search: CurveSearch, n: int, azimuth: float, R_F7: FloatArray) -> bool:
     """Fill `q_now` with posture n of the table, joints 1 and 7 turned to the goal.
 
     Returns:
         Whether these two keep their limits, or nearly so.
     """
-    q = hunt.curves.q_now
+    q = search.curves.q_now
     for i in range(5):
         q[i + 1] = arm.postures[n, i]
     q[0] = azimuth - arm.azimuth[n]
@@ -191,9 +193,9 @@ def _start(arm: NumericArm, hunt: Hunt, n: int, azimuth: float, R_F7: FloatArray
     if abs(q[0] - arm.middle[0]) > arm.half[0] + BEYOND:
         return False
     q[6] = 0.0
-    look = hunt.curves.look
-    place_last(arm, q, look.S)
-    S = look.S[0]
+    newton = search.curves.newton
+    place_last(arm, q, newton.S)
+    S = newton.S[0]
     cosine = sine = 0.0
     for r in range(3):
         cosine += S[r, 0] * R_F7[r, 0] + S[r, 1] * R_F7[r, 1]
@@ -224,15 +226,15 @@ def place_last(arm: NumericArm, q: FloatArray, both: FloatArray) -> None:
 
 
 @inner
-def hunt_from(
+def trace_from(
     arm: NumericArm,
     R_AG: FloatArray,
     p_AG: FloatArray,
-    hunt: Hunt,
+    search: CurveSearch,
     count: int,
     beyond: float,
     stride: float,
-    looks: int,
+    iterations: int,
     of: int,
 ) -> int:
     """Bring `q_now` to the goal and trace the curve found there, unless it is known.
@@ -241,19 +243,19 @@ def hunt_from(
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        hunt: `curves.q_now` is where to start; `curves` gets filled.
+        search: `curves.q_now` is where to start; `curves` gets filled.
         count: How many curves there are.
         beyond: How far beyond its limits a joint is followed [rad].
         stride: Longest stride along a curve [rad].
-        looks: How many looks the start gets.
+        iterations: Greatest number of Newton iterations.
         of: ISOTROPY or INVERSE_CONDITION.
 
     Returns:
         How many curves there are now.
     """
-    curves = hunt.curves
+    curves = search.curves
     q = curves.q_now
-    if not converge(arm, R_AG, p_AG, q, curves.look, looks, ON_CURVE):
+    if not converge(arm, R_AG, p_AG, q, curves.newton, iterations, ON_CURVE):
         return count
     if slack_of(arm, q) < -beyond or is_known(curves, count, q, SAME_CURVE):
         return count
@@ -262,13 +264,13 @@ def hunt_from(
 
 @jit
 def find_candidates(
-    problem: Problem, arm: NumericArm, hunt: Hunt, count: int, spacing: float
+    problem: Problem, arm: NumericArm, search: CurveSearch, count: int, spacing: float
 ) -> int:
     """Spread candidates over what of the curves keeps all limits; return how many there are.
 
     They come in the order of their places.
     """
-    curves, found = hunt.curves, 0
+    curves, found = search.curves, 0
     q = curves.q_now
     for k in range(count):
         for n in range(curves.first[k], curves.first[k + 1] - 1):
@@ -279,31 +281,31 @@ def find_candidates(
                 continue
             parts = max(2, int(np.ceil(curves.length[n] / spacing)))
             if n == curves.first[k] and curves.slack[n] >= INSIDE:
-                found = _add(problem, hunt, n, 0.0, found)
+                found = _add(problem, search, n, 0.0, found)
             if either - length >= 2.0 * INSIDE:
                 for j in range(1, parts + 1):
-                    found = _add(problem, hunt, n, j / parts, found)
+                    found = _add(problem, search, n, j / parts, found)
                 continue
             before, early = curves.slack[n], -np.inf
             for j in range(1, parts + 1):
-                share = j / parts
-                point_between(curves, n, share, q)
+                fraction = j / parts
+                point_between(curves, n, fraction, q)
                 slack = slack_of(arm, q)
                 if (slack >= INSIDE) != (before >= INSIDE):
                     # The last place that keeps the limits.
-                    inner, outer = share, (j - 1) / parts
+                    inner, outer = fraction, (j - 1) / parts
                     if slack < INSIDE:
                         inner, outer = outer, inner
-                    found = _at_limit(problem, arm, hunt, n, inner, outer, found)
+                    found = _at_limit(problem, arm, search, n, inner, outer, found)
                 elif early < before < INSIDE and before >= slack and before > -length / parts:
                     # Nearer to the limits than both neighbours: a short stretch may hide here.
                     low = max((j - 2) / parts, 0.0)
-                    found = _at_peak(problem, arm, hunt, n, low, share, found)
+                    found = _at_peak(problem, arm, search, n, low, fraction, found)
                 elif j == parts and before < slack < INSIDE and slack > -length / parts:
                     # Or on the way to the next point, beyond which it falls again.
-                    found = _at_peak(problem, arm, hunt, n, (j - 1) / parts, share, found)
+                    found = _at_peak(problem, arm, search, n, (j - 1) / parts, fraction, found)
                 if slack >= INSIDE:
-                    found = _add(problem, hunt, n, share, found)
+                    found = _add(problem, search, n, fraction, found)
                 early, before = before, slack
     return found
 
@@ -312,64 +314,70 @@ def find_candidates(
 def _at_limit(
     problem: Problem,
     arm: NumericArm,
-    hunt: Hunt,
+    search: CurveSearch,
     n: int,
     inner: float,
     outer: float,
     found: int,
 ) -> int:
     """Append the outermost place between two that keeps the limits."""
-    q = hunt.curves.q_now
+    q = search.curves.q_now
     for _ in range(HALVINGS):
         middle = 0.5 * (inner + outer)
-        point_between(hunt.curves, n, middle, q)
+        point_between(search.curves, n, middle, q)
         if slack_of(arm, q) >= INSIDE:
             inner = middle
         else:
             outer = middle
-    return _add(problem, hunt, n, inner, found)
+    return _add(problem, search, n, inner, found)
 
 
 @inner
 def _at_peak(
-    problem: Problem, arm: NumericArm, hunt: Hunt, n: int, low: float, high: float, found: int
+    problem: Problem,
+    arm: NumericArm,
+    search: CurveSearch,
+    n: int,
+    low: float,
+    high: float,
+    found: int,
 ) -> int:
     """Append the place between two that is farthest inside the limits, if it may be inside."""
-    q, before, after = hunt.curves.q_now, -np.inf, -np.inf
+    q, before, after = search.curves.q_now, -np.inf, -np.inf
     for _ in range(2 * HALVINGS):
         first, second = low + GOLDEN * (high - low), high - GOLDEN * (high - low)
-        point_between(hunt.curves, n, first, q)
+        point_between(search.curves, n, first, q)
         before = slack_of(arm, q)
-        point_between(hunt.curves, n, second, q)
+        point_between(search.curves, n, second, q)
         after = slack_of(arm, q)
         if before >= INSIDE:
-            return _add(problem, hunt, n, first, found)
+            return _add(problem, search, n, first, found)
         if after >= INSIDE:
-            return _add(problem, hunt, n, second, found)
+            return _add(problem, search, n, second, found)
         if before > after:
             high = second
         else:
             low = first
     # The cubic cannot tell: whoever takes the candidate has to find a solution that keeps limits.
     if max(before, after) >= -INSIDE:
-        found = _add(problem, hunt, n, 0.5 * (low + high), found)
+        found = _add(problem, search, n, 0.5 * (low + high), found)
     return found
 
 
 @inner
-def _add(problem: Problem, hunt: Hunt, n: int, share: float, found: int) -> int:
+def _add(problem: Problem, search: CurveSearch, n: int, fraction: float, found: int) -> int:
     """Append a candidate; its measure is that of the points about it, interpolated."""
-    if found == len(hunt.at):
+    if found == len(search.at):
         return found
-    curves = hunt.curves
-    hunt.at[found] = n + min(share, WHOLE)
-    value = (1.0 - share) * curves.value[n] + share * curves.value[n + 1]
+    curves = search.curves
+    search.at[found] = n + min(fraction, LAST_FRACTION)
+    value = (1.0 - fraction) * curves.value[n] + fraction * curves.value[n + 1]
     if problem.measure.penalty != UNLIMITED:
-        point_between(curves, n, share, hunt.best)
-        turn_into_limits(problem, hunt.best)
+        point_between(curves, n, fraction, search.best)
+        turn_into_limits(problem, search.best)
         lower, upper = problem.arm.lower, problem.arm.upper
-        value *= limit_penalty(hunt.best, lower, upper, problem.measure.penalty)
-    hunt.measure[found] = value
+        value *= limit_penalty(search.best, lower, upper, problem.measure.penalty)
+    search.measure[found] = value
     return found + 1
 
 

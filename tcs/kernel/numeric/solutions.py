@@ -8,14 +8,14 @@ from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.numeric.arm import numeric_arm
-from tcs.kernel.numeric.curves import settle
+from tcs.kernel.numeric.curves import correct
 from tcs.kernel.numeric.search import (
     MOST_CANDIDATES,
     MOST_CURVES,
     MOST_POINTS,
     find_curves,
     is_within_span,
-    new_hunt,
+    new_curve_search,
 )
 
 ARRIVED = 1e-9
@@ -35,16 +35,16 @@ def numeric_solutions(chain: Chain, R_AG: FloatArray, p_AG: FloatArray) -> Float
     Returns:
         Joint angles within the limits [rad], shape (n, 7); n is 0 where nothing was found.
     """
-    arm, hunt = numeric_arm(chain), new_hunt(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
+    arm, search = numeric_arm(chain), new_curve_search(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
     R, p = np.array(R_AG, dtype=np.float64, order="C"), np.array(p_AG, dtype=np.float64)
     if not is_within_span(arm, R, p):
         return np.empty((0, 7))
-    curves = hunt.curves
-    count = find_curves(arm, R, p, hunt, ISOTROPY)
+    curves = search.curves
+    count = find_curves(arm, R, p, search, ISOTROPY)
     found = []
     for n in np.flatnonzero(curves.slack[: curves.first[count]] >= 0.0):
         curves.q_now[:] = curves.q[n]
-        if not settle(arm, R, p, curves, ARRIVED):
+        if not correct(arm, R, p, curves, ARRIVED):
             continue
         joints = zip(curves.q_now, chain.lower, chain.upper, strict=True)
         turned = [within(*joint) for joint in joints]

@@ -12,11 +12,12 @@ from tcs.kernel.analytic.pairs import (
     TOO_FAR,
 )
 from tcs.kernel.arrays import IntArray
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
+    BASE_FIXED,
     NO_CONTACT,
-    RIDES,
-    STAYS,
+    TORSO_MOUNTED,
     Workspace,
     base_contact,
     gripper_body_contact,
@@ -28,14 +29,13 @@ from tcs.kernel.numeric.search import (
     MOST_CANDIDATES,
     MOST_CURVES,
     MOST_POINTS,
-    Hunt,
+    CurveSearch,
     is_within_span,
-    new_hunt,
+    new_curve_search,
 )
 from tcs.kernel.problem import Problem
-from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
 from tcs.kernel.sweep import Scores, keep
-from tcs.kernel.views import borrowed
+from tcs.kernel.views import unowned
 
 
 def score_numeric_slice(
@@ -44,8 +44,11 @@ def score_numeric_slice(
     """Score the configurations start <= h < stop, as `sweep.score_slice`."""
     arm = numeric_arm_of(problem)
     # Made here, where they outlive the call: the compiled code only borrows them.
-    work, hunt = new_workspace(problem), new_hunt(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
-    _score_numeric_slice(problem, arm, work, hunt, grippers, start, stop, scores)
+    work, search = (
+        new_workspace(problem),
+        new_curve_search(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES),
+    )
+    _score_numeric_slice(problem, arm, work, search, grippers, start, stop, scores)
 
 
 @jit
@@ -53,25 +56,25 @@ def _score_numeric_slice(
     owned_problem: Problem,
     owned_arm: NumericArm,
     owned_work: Workspace,
-    owned_hunt: Hunt,
+    owned_search: CurveSearch,
     grippers: IntArray,
     start: int,
     stop: int,
     owned_scores: Scores,
 ) -> None:
-    problem, arm = borrowed(owned_problem), borrowed(owned_arm)
-    work, hunt, scores = borrowed(owned_work), borrowed(owned_hunt), borrowed(owned_scores)
+    problem, arm = unowned(owned_problem), unowned(owned_arm)
+    work, search, scores = unowned(owned_work), unowned(owned_search), unowned(owned_scores)
     rounded = np.empty(7)
     place, base_code, state = -1, NO_CONTACT, 0
     for h in range(start, stop):
         row, torso = h - start, h % problem.torso_levels
         if h // problem.torso_levels != place:
             place = h // problem.torso_levels
-            state = stand(problem, work, place)
-            base_code = base_contact(problem, work, STAYS, STAYS)
+            state = place_base(problem, work, place)
+            base_code = base_contact(problem, work, BASE_FIXED, BASE_FIXED)
         code = base_code
         if code == NO_CONTACT:
-            code = base_contact(problem, work, torso, RIDES)
+            code = base_contact(problem, work, torso, TORSO_MOUNTED)
         if code != NO_CONTACT:
             scores.reason[row] = BODY_BLOCKED
             scores.contact[row] = code
@@ -79,7 +82,7 @@ def _score_numeric_slice(
         body_A = problem.body_A[torso]
         # What blocks here must not depend on what was scored before.
         work.last[0] = -1
-        room_placed = False
+        environment_placed = False
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
             if grippers[state, g] != NO_CONTACT:
@@ -95,11 +98,11 @@ def _score_numeric_slice(
                 scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
                 scores.contact[row, g] = code
                 continue
-            if not room_placed:
-                room_in_arm_base(problem, work, torso)
-                room_placed = True
-            reason, code = score_numeric_pair(problem, arm, work, body_A, hunt)
+            if not environment_placed:
+                environment_in_arm_base(problem, work, torso)
+                environment_placed = True
+            reason, code = score_numeric_pair(problem, arm, work, body_A, search)
             scores.reason[row, g] = reason
             scores.contact[row, g] = code
             if reason == REACHED:
-                keep(problem, hunt.best, rounded, scores, row, g)
+                keep(problem, search.best, rounded, scores, row, g)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.ik import lane_joints, wrist_goal
-from tcs.kernel.analytic.lanes import solve_lanes
-from tcs.kernel.analytic.pairs import lanes_measure, measure_of
-from tcs.kernel.analytic.search import MAX_LANES, Search, fill_lanes, new_search
+from tcs.kernel.analytic.ik import sample_joints, wrist_goal
+from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
+from tcs.kernel.analytic.samples import solve_samples
+from tcs.kernel.analytic.search import MAX_SAMPLES, Search, fill_samples, new_search
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
@@ -21,8 +22,7 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.measure import measure_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
-from tcs.kernel.views import borrowed
+from tcs.kernel.views import unowned
 
 DENSE_SAMPLES = 11_520
 """Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
@@ -64,16 +64,16 @@ def _dense_scan(
     samples: int,
     joints: FloatArray,
 ) -> float:
-    problem, work, search = borrowed(owned_problem), borrowed(owned_work), borrowed(owned_search)
+    problem, work, search = unowned(owned_problem), unowned(owned_work), unowned(owned_search)
     arm = problem.arm
     torso = configuration % problem.torso_levels
-    state = stand(problem, work, configuration // problem.torso_levels)
+    state = place_base(problem, work, configuration // problem.torso_levels)
     goal_in_arm_base(problem, work, state, torso, goal)
     wrist_goal(arm, work.R_AG, work.p_AG, search.goal)
     body_A = problem.body_A[torso]
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
         return -1.0
-    room_in_arm_base(problem, work, torso)
+    environment_in_arm_base(problem, work, torso)
     first, last = arm.lower[arm.free], arm.upper[arm.free]
     if not np.isfinite(first):
         first, last = -np.pi, np.pi
@@ -82,11 +82,11 @@ def _dense_scan(
     measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     found = 0
     for b in range(len(arm.branches)):
-        for start in range(0, samples, MAX_LANES):
-            count = min(MAX_LANES, samples - start)
+        for start in range(0, samples, MAX_SAMPLES):
+            count = min(MAX_SAMPLES, samples - start)
             stop = start + max(count, 2) - 1
-            fill_lanes(search, first + start * step, first + stop * step, stop - start + 1)
-            solve_lanes(
+            fill_samples(search, first + start * step, first + stop * step, stop - start + 1)
+            solve_samples(
                 arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
                 search.slack, search.measure,
             )  # fmt: skip
@@ -94,11 +94,11 @@ def _dense_scan(
                 if search.slack[i] >= 0.0:
                     angles[found], branches[found] = search.angle[i], b
                     measures[found] = search.measure[i]
-                    if not lanes_measure(problem):
+                    if not samples_hold_measure(problem):
                         measures[found] = measure_of(problem, search, b, search.angle[i])
                     found += 1
     for i in np.argsort(-measures[:found], kind="mergesort"):
-        lane_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
+        sample_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
         if contact == NO_CONTACT and at_goal(problem, work):
             joints[:] = search.q

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
-from tcs.kernel.cache import jit, whole
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.cache import int_constant, jit
 from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
 from tcs.kernel.measure import measure_at
 from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of, spread
-from tcs.kernel.numeric.pairs import NOWHERE, choose, squeeze
-from tcs.kernel.numeric.search import Hunt, find_candidates, hunt_from, new_hunt
+from tcs.kernel.numeric.pairs import NOWHERE, bisect_contacts, choose
+from tcs.kernel.numeric.search import CurveSearch, find_candidates, new_curve_search, trace_from
 from tcs.kernel.problem import Problem
-from tcs.kernel.stand import goal_in_arm_base, room_in_arm_base, stand
-from tcs.kernel.views import borrowed
+from tcs.kernel.views import unowned
 
 STARTS = 400
 """Postures spread over the joint limits, each brought to the goal."""
-LOOKS = whole(60)
+ITERATIONS = int_constant(60)
 """Looks that a start gets: it may be half a turn and a whole arm off."""
 STRIDE, SPACING = 0.08, 0.0125
 """As in `numeric_pairs`, but finer [rad]."""
@@ -46,8 +46,8 @@ def numeric_dense_scan(
     low, high = joint_ranges(problem.arm.lower, problem.arm.upper)
     postures = low + spread(starts, 7) * (high - low)
     # Made here, where they outlive the call: the compiled code only borrows them.
-    work, hunt = new_workspace(problem), new_hunt(POINTS, CURVES, CANDIDATES)
-    return float(_scan(problem, arm, work, hunt, configuration, goal, postures, joints))
+    work, search = new_workspace(problem), new_curve_search(POINTS, CURVES, CANDIDATES)
+    return float(_scan(problem, arm, work, search, configuration, goal, postures, joints))
 
 
 @jit
@@ -55,34 +55,42 @@ def _scan(
     owned_problem: Problem,
     owned_arm: NumericArm,
     owned_work: Workspace,
-    owned_hunt: Hunt,
+    owned_search: CurveSearch,
     configuration: int,
     goal: int,
     postures: FloatArray,
     joints: FloatArray,
 ) -> float:
-    problem, arm = borrowed(owned_problem), borrowed(owned_arm)
-    work, hunt = borrowed(owned_work), borrowed(owned_hunt)
+    problem, arm = unowned(owned_problem), unowned(owned_arm)
+    work, search = unowned(owned_work), unowned(owned_search)
     torso = configuration % problem.torso_levels
-    state = stand(problem, work, configuration // problem.torso_levels)
+    state = place_base(problem, work, configuration // problem.torso_levels)
     goal_in_arm_base(problem, work, state, torso, goal)
     body_A = problem.body_A[torso]
     if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
         return -1.0
-    room_in_arm_base(problem, work, torso)
+    environment_in_arm_base(problem, work, torso)
     count = 0
     for n in range(len(postures)):
-        hunt.curves.q_now[:] = postures[n]
-        count = hunt_from(
-            arm, work.R_AG, work.p_AG, hunt, count, EVERYWHERE, STRIDE, LOOKS, problem.measure.of
+        search.curves.q_now[:] = postures[n]
+        count = trace_from(
+            arm,
+            work.R_AG,
+            work.p_AG,
+            search,
+            count,
+            EVERYWHERE,
+            STRIDE,
+            ITERATIONS,
+            problem.measure.of,
         )
-    found = find_candidates(problem, arm, hunt, count, SPACING)
+    found = find_candidates(problem, arm, search, count, SPACING)
     if found == 0:
         return -1.0
-    at, _ = choose(problem, arm, work, body_A, hunt, found)
+    at, _ = choose(problem, arm, work, body_A, search, found)
     if at == NOWHERE:
-        at = squeeze(problem, arm, work, body_A, hunt, found)
+        at = bisect_contacts(problem, arm, work, body_A, search, found)
     if at == NOWHERE:
         return -1.0
-    joints[:] = hunt.curves.q_now
+    joints[:] = search.curves.q_now
     return measure_at(problem, joints)

@@ -1,7 +1,7 @@
 """The kernel's mathematics once more, in plain loops: written to be read, never to be tuned.
 
 Tests hold the compiled kernel against this twin, and this twin against Drake. Nothing else uses
-it. Where the kernel has a shortcut (packed rows, lanes, a determinant by minors, contacts in the
+it. Where the kernel has a shortcut (packed rows, samples, a determinant by minors, contacts in the
 order of likelihood) the twin takes the definition.
 """
 
@@ -32,7 +32,7 @@ def inverse(X_AB: Pose) -> Pose:
     return X_AB[0].T, -X_AB[0].T @ X_AB[1]
 
 
-def turn(angle: float) -> FloatArray:
+def rot_z(angle: float) -> FloatArray:
     """Return the rotation by `angle` [rad] about z, shape (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -43,7 +43,7 @@ def link_poses(chain: Chain, q: FloatArray) -> list[Pose]:
     X: Pose = (np.eye(3), np.zeros(3))
     poses = []
     for i in range(7):
-        X = compose(compose(X, (chain.R[i], chain.p[i])), (turn(q[i]), np.zeros(3)))
+        X = compose(compose(X, (chain.R[i], chain.p[i])), (rot_z(q[i]), np.zeros(3)))
         poses.append(X)
     poses.append(compose(X, (chain.R[7], chain.p[7])))
     return poses
@@ -95,7 +95,7 @@ def measured(
 # --- inverse kinematics -----------------------------------------------------------------------
 
 
-def turns_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float, list[float]]:
+def angles_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float, list[float]]:
     """Return the turns t about z for which R Rz(t) v has the z component `height`.
 
     Returns:
@@ -123,48 +123,52 @@ class Solution:
     """Squared sine of how far the wrist (of a mirrored arm, the shoulder) is bent."""
 
 
-def is_mirrored(chain: Chain) -> bool:
+def has_spherical_shoulder(chain: Chain) -> bool:
     """Return whether axes 1, 2 and 3 meet, and 5 and 6, but not also 5, 6 and 7."""
     return bool(np.any(np.abs(chain.p[[2, 5, 6]]) > MEETING_TOLERANCE))
 
 
 def free_joint(chain: Chain) -> int:
     """Return the index of the joint whose angle is chosen: the first, or the last if mirrored."""
-    return 6 if is_mirrored(chain) else 0
+    return 6 if has_spherical_shoulder(chain) else 0
 
 
 def solutions(chain: Chain, X_AG: Pose, angle: float) -> dict[tuple[int, int, int], Solution]:
     """Return the solutions at an angle of the free joint by branch: signs of elbow, aim, wrist."""
-    solve = mirrored_solutions if is_mirrored(chain) else upright_solutions
+    solve = (
+        spherical_shoulder_solutions if has_spherical_shoulder(chain) else spherical_wrist_solutions
+    )
     return solve(chain, X_AG, angle)
 
 
-def upright_solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, int, int], Solution]:
+def spherical_wrist_solutions(
+    chain: Chain, X_AG: Pose, q1: float
+) -> dict[tuple[int, int, int], Solution]:
     """Return the solutions of an arm with a spherical wrist, from its base outward."""
     R_A7 = X_AG[0] @ chain.R[7].T
     wrist = X_AG[1] - R_A7 @ chain.p[7]
-    X_AL1 = compose((chain.R[0], chain.p[0]), (turn(q1), np.zeros(3)))
+    X_AL1 = compose((chain.R[0], chain.p[0]), (rot_z(q1), np.zeros(3)))
     v = inverse(X_AL1)[0] @ (wrist - X_AL1[1]) - chain.p[1]
     elbow_left, cosine, phase = elbow(chain, float(v @ v))
     v = chain.R[1].T @ v
     found = {}
     for elbow_sign in (1, -1):
         q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
-        u = chain.p[3] + chain.R[3] @ turn(q4) @ chain.p[4]
-        aim_left, aims = turns_to_height(chain.R[2], u, v[2])
+        u = chain.p[3] + chain.R[3] @ rot_z(q4) @ chain.p[4]
+        aim_left, aims = angles_to_height(chain.R[2], u, v[2])
         for aim_sign, q3 in zip((1, -1), aims, strict=True):
-            k = chain.R[2] @ turn(q3) @ u
+            k = chain.R[2] @ rot_z(q3) @ u
             q2 = math.atan2(v[1], v[0]) - math.atan2(k[1], k[0])
             R = X_AL1[0]
             for i, angle in ((1, q2), (2, q3), (3, q4)):
-                R = R @ chain.R[i] @ turn(angle)
+                R = R @ chain.R[i] @ rot_z(angle)
             M = (R @ chain.R[4]).T @ R_A7
             f = chain.R[6][:, 2]
-            wrist_left, flexes = turns_to_height(chain.R[5], f, M[2, 2])
+            wrist_left, flexes = angles_to_height(chain.R[5], f, M[2, 2])
             for wrist_sign, q6 in zip((1, -1), flexes, strict=True):
-                e = chain.R[5] @ turn(q6) @ f
+                e = chain.R[5] @ rot_z(q6) @ f
                 q5 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
-                N = (turn(q5) @ chain.R[5] @ turn(q6) @ chain.R[6]).T @ M
+                N = (rot_z(q5) @ chain.R[5] @ rot_z(q6) @ chain.R[6]).T @ M
                 q7 = math.atan2(N[1, 0], N[0, 0])
                 left = min(elbow_left, aim_left, wrist_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
@@ -172,13 +176,15 @@ def upright_solutions(chain: Chain, X_AG: Pose, q1: float) -> dict[tuple[int, in
     return found
 
 
-def mirrored_solutions(chain: Chain, X_AG: Pose, q7: float) -> dict[tuple[int, int, int], Solution]:
+def spherical_shoulder_solutions(
+    chain: Chain, X_AG: Pose, q7: float
+) -> dict[tuple[int, int, int], Solution]:
     """Return the solutions of an arm with a spherical shoulder, from its tool inward.
 
     The arm is not turned round here: joint 7 fixes the frame L6 and with it the wrist W, where
     axes 5 and 6 meet; S is where axes 1, 2 and 3 meet, and stands still.
     """
-    X_67 = compose((chain.R[6], chain.p[6]), (turn(q7), np.zeros(3)))
+    X_67 = compose((chain.R[6], chain.p[6]), (rot_z(q7), np.zeros(3)))
     X_A6 = compose(compose(X_AG, inverse((chain.R[7], chain.p[7]))), inverse(X_67))
     s = inverse(X_A6)[0] @ (chain.p[0] - X_A6[1])
     elbow_left, cosine, phase = elbow(chain, float(s @ s))
@@ -186,22 +192,22 @@ def mirrored_solutions(chain: Chain, X_AG: Pose, q7: float) -> dict[tuple[int, i
     for elbow_sign in (1, -1):
         q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
         # From W to S as seen by what joint 5 turns against.
-        X_34 = compose((chain.R[3], chain.p[3]), (turn(q4), np.zeros(3)))
+        X_34 = compose((chain.R[3], chain.p[3]), (rot_z(q4), np.zeros(3)))
         X_35 = compose(X_34, (chain.R[4], chain.p[4]))
         k = inverse(X_35)[1]
-        aim_left, aims = turns_to_height(chain.R[5].T, k, s[2])
+        aim_left, aims = angles_to_height(chain.R[5].T, k, s[2])
         for aim_sign, q5 in zip((1, -1), (-t for t in aims), strict=True):
-            n = chain.R[5].T @ turn(-q5) @ k
+            n = chain.R[5].T @ rot_z(-q5) @ k
             q6 = math.atan2(n[1], n[0]) - math.atan2(s[1], s[0])
-            R_36 = X_35[0] @ turn(q5) @ chain.R[5] @ turn(q6)
+            R_36 = X_35[0] @ rot_z(q5) @ chain.R[5] @ rot_z(q6)
             M = chain.R[0].T @ X_A6[0] @ R_36.T
             f = chain.R[2][:, 2]
-            shoulder_left, lifts = turns_to_height(chain.R[1], f, M[2, 2])
+            shoulder_left, lifts = angles_to_height(chain.R[1], f, M[2, 2])
             for lift_sign, q2 in zip((1, -1), lifts, strict=True):
                 # From the inside out, as the kernel: it matters to the slack where there is none.
-                R_13 = chain.R[1] @ turn(q2) @ chain.R[2]
+                R_13 = chain.R[1] @ rot_z(q2) @ chain.R[2]
                 q3 = math.atan2(R_13[2, 1], R_13[2, 0]) - math.atan2(M[2, 1], M[2, 0])
-                N = M @ (R_13 @ turn(q3)).T
+                N = M @ (R_13 @ rot_z(q3)).T
                 q1 = math.atan2(-N[0, 1], N[0, 0])
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
@@ -221,7 +227,7 @@ def limited(chain: Chain, angles: list[float], left: float, bend: float) -> Solu
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
     """Return, for |SW|^2 = square, 1 - cos(q4 - phase)^2, cos(q4 - phase), and the phase [rad]."""
     least, most = (
-        [float(np.sum((chain.p[3] + chain.R[3] @ turn(a) @ chain.p[4]) ** 2)) for a in (0.0, t)]
+        [float(np.sum((chain.p[3] + chain.R[3] @ rot_z(a) @ chain.p[4]) ** 2)) for a in (0.0, t)]
         for t in (math.pi / 2, math.pi)
     )
     # |SW|^2 = c + a cos(q4) + b sin(q4): three values of q4 give c, a and b.
@@ -249,7 +255,7 @@ def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]
 class Placed:
     """One shape at one pose."""
 
-    kind: int
+    type: int
     size: FloatArray
     R: FloatArray
     p: FloatArray
@@ -259,38 +265,38 @@ class Placed:
     def moved(self, X: Pose) -> Placed:
         """Return the shape at X times its pose."""
         R, p = compose(X, (self.R, self.p))
-        return Placed(self.kind, self.size, R, p, self.pad, self.body)
+        return Placed(self.type, self.size, R, p, self.pad, self.body)
 
     @property
     def radius(self) -> float:
         """What the core is grown by [m]."""
-        return 0.0 if self.kind == BOX else float(self.size[0])
+        return 0.0 if self.type == BOX else float(self.size[0])
 
     @property
-    def ball(self) -> float:
+    def sphere(self) -> float:
         """Radius of a ball about the centre that holds the shape [m]."""
         return float(np.linalg.norm(self.half)) + self.radius
 
     @property
     def half(self) -> FloatArray:
         """Half sizes of the core along the shape's axes [m]: of a point, a segment or a box."""
-        if self.kind == BOX:
+        if self.type == BOX:
             return np.asarray(self.size)
-        return np.array([0.0, 0.0, self.size[1] if self.kind == CAPSULE else 0.0])
+        return np.array([0.0, 0.0, self.size[1] if self.type == CAPSULE else 0.0])
 
 
 def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
     """Return the shapes in one state, unpacked."""
     return [
         Placed(
-            int(shapes.kind[i]),
+            int(shapes.type[i]),
             shapes.size[i],
             shapes.R[state, i],
             shapes.p[state, i],
             float(shapes.pad[i]),
             int(shapes.body[i]),
         )
-        for i in range(len(shapes.kind))
+        for i in range(len(shapes.type))
     ]
 
 

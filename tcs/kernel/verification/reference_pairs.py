@@ -1,9 +1,10 @@
-"""The plain-loop twin of scoring: one configuration against one goal, from `reference`'s pieces.
+"""The plain-loop reference of scoring: one configuration against one goal, built on `reference`.
 
 It looks at the same angles of the free joint as the kernel, so that verdicts can be compared one
 by one; how many of them the kernel needs is another question (see `dense`). One thing it leaves
-out: where every angle touches something, the kernel halves its way between two contacts
-(`pairs.squeeze`) and may find room that the twin calls ARM_BLOCKED. There `confirms` judges.
+out: where every angle touches something, the kernel bisects the interval between two contacts
+(`pairs.bisect_contacts`) and may find a free angle where the reference returns ARM_BLOCKED; then
+`confirms` checks the angle found.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from tcs.kernel.analytic.pairs import (
     GRIPPER_BLOCKED_BY_ROBOT,
     JOINT_LIMITS,
     REACHED,
-    REFINE_LANES,
+    REFINE_SAMPLES,
     REFINEMENTS,
     TOO_FAR,
 )
 from tcs.kernel.analytic.search import (
+    FINE_SAMPLES,
     FINE_STEP,
-    FINEST_LANES,
-    FIRST_LANES,
-    LEAST_LANES,
-    PEAK_LOOKS,
+    FIRST_SAMPLES,
+    MIN_SAMPLES,
+    PEAK_REFINEMENTS,
     STRAIGHT,
-    STRAIGHT_LOOKS,
+    STRAIGHT_REFINEMENTS,
 )
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
@@ -44,14 +45,14 @@ from tcs.kernel.verification.reference import (
     distance,
     elbow,
     free_joint,
+    has_spherical_shoulder,
     inverse,
-    is_mirrored,
     jacobian,
     link_poses,
     measured,
+    rot_z,
     shapes_of,
     solutions,
-    turn,
 )
 
 Branch = tuple[int, int, int]
@@ -62,7 +63,7 @@ class Verdict:
     """What `score` finds."""
 
     reason: int
-    isotropy: float = 0.0
+    dexterity: float = 0.0
     """The measure, isotropy if no other was asked for."""
     q: FloatArray | None = None
     clearance: float = math.inf
@@ -70,11 +71,11 @@ class Verdict:
 
 
 @dataclass
-class Stand:
+class PlacedScene:
     """A scene with the robot at one configuration, everything in the arm base A."""
 
     scene: SceneArrays
-    room: list[Placed]
+    environment: list[Placed]
     body: list[Placed]
     X_AG: Pose
     clearance: float = math.inf
@@ -83,7 +84,7 @@ class Stand:
         """Return whether two shapes are closer than they may be, and note how clear that is."""
         required = max(self.scene.margin, a.pad + b.pad)
         # Balls that are well apart spare the exact distance; they cannot decide a verdict.
-        if float(np.linalg.norm(a.p - b.p)) - a.ball - b.ball > required + 0.01:
+        if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + 0.01:
             return False
         excess = distance(a, b) - required
         self.clearance = min(self.clearance, abs(excess))
@@ -96,10 +97,10 @@ class Stand:
         return [s.moved(poses[f - 1]) for s, f in zip(shapes, self.scene.arm.frame, strict=True)]
 
     def gripper_touches(self, with_body: bool) -> bool:
-        """Return whether the gripper at the goal touches the room, or the robot's own body."""
+        """Return whether the gripper at the goal touches the environment, or the robot's body."""
         X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
-        others = self.body if with_body else self.room
-        checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_room
+        others = self.body if with_body else self.environment
+        checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_environment
         shapes = shapes_of(self.scene.arm, 0)
         return any(
             self.touches(shapes[i].moved(X_A7), others[j])
@@ -110,16 +111,19 @@ class Stand:
         )
 
     def arm_touches(self, q: FloatArray) -> bool:
-        """Return whether the arm at q touches the room, the body or itself.
+        """Return whether the arm at q touches the environment, the body or itself.
 
-        The gripper against room and body is left out: it has been looked at.
+        The gripper against environment and body is left out: it has been looked at.
         """
         arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
         pairs = [
             (arm[i], other)
             for i in range(len(arm))
             if frame[i] < 7
-            for others, checked in ((self.room, scene.arm_vs_room), (self.body, scene.arm_vs_body))
+            for others, checked in (
+                (self.environment, scene.arm_vs_environment),
+                (self.body, scene.arm_vs_body),
+            )
             for j, other in enumerate(others)
             if checked[i, j]
         ]
@@ -132,7 +136,9 @@ class Stand:
         return any(self.touches(a, b) for a, b in pairs)
 
 
-def stand_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> tuple[Stand, bool]:
+def placed_scene(
+    scene: SceneArrays, grid: GridArrays, h: int, goal: int
+) -> tuple[PlacedScene, bool]:
     """Return the scene with the robot at configuration h, and whether base or body touch."""
     shape = (
         grid.environment_states,
@@ -142,45 +148,45 @@ def stand_at(scene: SceneArrays, grid: GridArrays, h: int, goal: int) -> tuple[S
         grid.torso_levels,
     )
     state, x, y, yaw, torso = (int(i) for i in np.unravel_index(h, shape))
-    X_WB = turn(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
+    X_WB = rot_z(grid.base_yaw[yaw]), np.array([grid.base_x[x], grid.base_y[y], 0.0])
     X_BA = scene.arm_base_R[torso], scene.arm_base_p[torso]
     X_AW = inverse(compose(X_WB, X_BA))
     X_AB = inverse(X_BA)
-    stand = Stand(
+    placed = PlacedScene(
         scene=scene,
-        room=[s.moved(X_AW) for s in shapes_of(scene.room, state)],
+        environment=[s.moved(X_AW) for s in shapes_of(scene.environment, state)],
         body=[s.moved(X_AB) for s in shapes_of(scene.body, torso)],
         X_AG=compose(X_AW, (scene.goal_R[state, goal], scene.goal_p[state, goal])),
     )
     blocked = any(
-        stand.touches(stand.body[i], stand.room[j])
-        for i in range(len(stand.body))
-        for j in range(len(stand.room))
-        if scene.body_vs_room[i, j]
+        placed.touches(placed.body[i], placed.environment[j])
+        for i in range(len(placed.body))
+        for j in range(len(placed.environment))
+        if scene.body_vs_environment[i, j]
     )
-    return stand, blocked
+    return placed, blocked
 
 
 def score(
     scene: SceneArrays, grid: GridArrays, h: int, goal: int, measure: str = DEFAULT_MEASURE
 ) -> Verdict:
     """Return what the kernel should say about configuration h and one goal, by a measure."""
-    stand, blocked = stand_at(scene, grid, h, goal)
+    placed, blocked = placed_scene(scene, grid, h, goal)
 
     def verdict(reason: int, value: float = 0.0, q: FloatArray | None = None) -> Verdict:
-        return Verdict(reason, value, q, stand.clearance)
+        return Verdict(reason, value, q, placed.clearance)
 
     if blocked:
         return verdict(BODY_BLOCKED)
-    if stand.gripper_touches(with_body=False):
+    if placed.gripper_touches(with_body=False):
         return verdict(GRIPPER_BLOCKED_BY_ENVIRONMENT)
     chain = scene.chain
-    arcs, possible = elbow_arcs(chain, stand.X_AG)
+    arcs, possible = elbow_arcs(chain, placed.X_AG)
     if not arcs:
         return verdict(JOINT_LIMITS if possible else TOO_FAR)
-    if stand.gripper_touches(with_body=True):
+    if placed.gripper_touches(with_body=True):
         return verdict(GRIPPER_BLOCKED_BY_ROBOT)
-    candidates = find_candidates(chain, stand.X_AG, arcs)
+    candidates = find_candidates(chain, placed.X_AG, arcs)
     if not candidates:
         return verdict(JOINT_LIMITS)
 
@@ -189,8 +195,8 @@ def score(
         return measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
 
     for candidate in sorted(candidates, key=value, reverse=True):
-        if not stand.arm_touches(candidate.q):
-            best = climb(stand, candidate, value)
+        if not placed.arm_touches(candidate.q):
+            best = climb(placed, candidate, value)
             return verdict(REACHED, value(best), best.q)
     return verdict(ARM_BLOCKED)
 
@@ -208,7 +214,7 @@ def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], boo
     """Return the arcs of the free joint at which the elbow spans the way, and whether any would."""
     near, far = elbow_spans(chain)
     X_A7 = compose(X_AG, inverse((chain.R[7], chain.p[7])))
-    if is_mirrored(chain):
+    if has_spherical_shoulder(chain):
         # Seen from L7 the shoulder stands still, and joint 7 turns the wrist backwards.
         w = inverse((chain.R[6], chain.p[6]))[1]
         s = inverse(X_A7)[0] @ (chain.p[0] - X_A7[1])
@@ -244,7 +250,7 @@ def elbow_spans(chain: Chain) -> tuple[float, float]:
     turning = [phase + k * math.pi for k in range(-4, 5)]
     angles = [a for a in turning if chain.lower[3] <= a <= chain.upper[3]]
     angles += [a for a in (chain.lower[3], chain.upper[3]) if math.isfinite(a)]
-    spans = [float(np.sum((chain.p[3] + chain.R[3] @ turn(a) @ chain.p[4]) ** 2)) for a in angles]
+    spans = [float(np.sum((chain.p[3] + chain.R[3] @ rot_z(a) @ chain.p[4]) ** 2)) for a in angles]
     return min(spans), max(spans)
 
 
@@ -254,32 +260,32 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
     found: list[Candidate] = []
     straight: list[tuple[Branch, float, float]] = []
     for first, last in arcs:
-        share = FIRST_LANES * (last - first) / length if length else 0
-        count = max(LEAST_LANES, int(share + 0.5))
+        share = FIRST_SAMPLES * (last - first) / length if length else 0
+        count = max(MIN_SAMPLES, int(share + 0.5))
         angles = [first + i * (last - first) / (count - 1) for i in range(count)]
         looks = [solutions(chain, X_AG, angle) for angle in angles]
         for branch in looks[0]:
             slack = [look[branch].slack for look in looks]
             step = (last - first) / (count - 1)
             for i, j in windows_of(slack, step):
-                found += look_closer(chain, X_AG, branch, angles[i], angles[j])
+                found += refine_window(chain, X_AG, branch, angles[i], angles[j])
             bend = [math.inf, *(look[branch].bend for look in looks), math.inf]
             for i in range(1, count + 1):
                 if bend[i] < STRAIGHT and bend[i] <= bend[i - 1] and bend[i] < bend[i + 1]:
                     straight.append((branch, angles[i - 1], step))
     if not found:
         for branch, middle, step in straight:
-            found += close_in_straight(chain, X_AG, branch, middle, step)
+            found += refine_straight(chain, X_AG, branch, middle, step)
     return found
 
 
-def close_in_straight(
+def refine_straight(
     chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
 ) -> list[Candidate]:
     """Return the feasible angles about one at which the wrist is all but straight."""
-    for _ in range(STRAIGHT_LOOKS):
-        low, step = middle - step, 2 * step / (FINEST_LANES - 1)
-        angles = [low + i * step for i in range(FINEST_LANES)]
+    for _ in range(STRAIGHT_REFINEMENTS):
+        low, step = middle - step, 2 * step / (FINE_SAMPLES - 1)
+        angles = [low + i * step for i in range(FINE_SAMPLES)]
         found = candidates_at(chain, X_AG, branch, angles, step)
         if found:
             return found
@@ -288,7 +294,7 @@ def close_in_straight(
 
 
 def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
-    """Return the stretches of lanes in which feasible angles lie or may hide."""
+    """Return the stretches of samples in which feasible angles lie or may hide."""
     last = len(slack) - 1
     inside = [i for i, left in enumerate(slack) if left >= 0]
     windows = []
@@ -301,7 +307,7 @@ def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
 
 
 def peaks_of(slack: list[float], step: float) -> list[int]:
-    """Return the infeasible lanes about which a window narrower than the spacing may hide."""
+    """Return the infeasible samples about which a window narrower than the spacing may hide."""
     last = len(slack) - 1
     peaks = []
     for i, left in enumerate(slack):
@@ -311,11 +317,11 @@ def peaks_of(slack: list[float], step: float) -> list[int]:
     return peaks
 
 
-def look_closer(
+def refine_window(
     chain: Chain, X_AG: Pose, branch: Branch, first: float, last: float
 ) -> list[Candidate]:
     """Return the feasible angles of one window on one branch."""
-    count = max(LEAST_LANES, int((last - first) / FINE_STEP) + 1)
+    count = max(MIN_SAMPLES, int((last - first) / FINE_STEP) + 1)
     step = (last - first) / (count - 1)
     angles = [first + i * step for i in range(count)]
     slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
@@ -324,20 +330,20 @@ def look_closer(
     for i in range(1, count):
         if inside[i] != inside[i - 1]:
             outer, inner = (i - 1, i) if inside[i] else (i, i - 1)
-            found += look_between(chain, X_AG, branch, angles[outer], angles[inner])
+            found += refine_end(chain, X_AG, branch, angles[outer], angles[inner])
     for i in peaks_of(slack, step):
-        found += close_in(chain, X_AG, branch, angles[i], step, (first, last))
+        found += refine_peak(chain, X_AG, branch, angles[i], step, (first, last))
     return found
 
 
-def close_in(
+def refine_peak(
     chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float, ends: tuple[float, float]
 ) -> list[Candidate]:
     """Return the feasible angles about an infeasible peak, found by ever narrower looks."""
-    for _ in range(PEAK_LOOKS):
+    for _ in range(PEAK_REFINEMENTS):
         low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
-        step = (high - low) / (FINEST_LANES - 1)
-        angles = [low + i * step for i in range(FINEST_LANES)]
+        step = (high - low) / (FINE_SAMPLES - 1)
+        angles = [low + i * step for i in range(FINE_SAMPLES)]
         found = candidates_at(chain, X_AG, branch, angles, step)
         slack = [solutions(chain, X_AG, angle)[branch].slack for angle in angles]
         if found or max(slack) < -PEAK_SLOPE * step:
@@ -346,12 +352,12 @@ def close_in(
     return []
 
 
-def look_between(
+def refine_end(
     chain: Chain, X_AG: Pose, branch: Branch, outer: float, inner: float
 ) -> list[Candidate]:
-    """Return the feasible angles between two neighbouring lanes, themselves left out."""
-    fine = (inner - outer) / (FINEST_LANES - 1)
-    near = [outer + k * fine for k in range(1, FINEST_LANES - 1)]
+    """Return the feasible angles between two neighbouring samples, themselves left out."""
+    fine = (inner - outer) / (FINE_SAMPLES - 1)
+    near = [outer + k * fine for k in range(1, FINE_SAMPLES - 1)]
     return candidates_at(chain, X_AG, branch, near, abs(fine))
 
 
@@ -369,32 +375,34 @@ def candidates_at(
 
 def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:
     """Return whether the arm at joint angles q reaches the goal from h and touches nothing."""
-    stand, blocked = stand_at(scene, grid, h, goal)
+    placed, blocked = placed_scene(scene, grid, h, goal)
     R, p = link_poses(scene.chain, q)[-1]
     # Joints are float32: seven roundings of 1.2e-7 rad at up to 1 m from the tool.
-    at_goal = np.allclose(R, stand.X_AG[0], atol=2e-6) and np.allclose(p, stand.X_AG[1], atol=2e-6)
+    at_goal = np.allclose(R, placed.X_AG[0], atol=2e-6) and np.allclose(
+        p, placed.X_AG[1], atol=2e-6
+    )
     within = bool(np.all((q >= scene.chain.lower) & (q <= scene.chain.upper)))
-    gripper = stand.gripper_touches(with_body=False) or stand.gripper_touches(with_body=True)
-    return at_goal and within and not (blocked or gripper or stand.arm_touches(q))
+    gripper = placed.gripper_touches(with_body=False) or placed.gripper_touches(with_body=True)
+    return at_goal and within and not (blocked or gripper or placed.arm_touches(q))
 
 
-def climb(stand: Stand, best: Candidate, value: Callable[[Candidate], float]) -> Candidate:
+def climb(placed: PlacedScene, best: Candidate, value: Callable[[Candidate], float]) -> Candidate:
     """Return the best solution near a collision-free one, as the kernel refines it.
 
     Args:
-        stand: The scene.
+        placed: The scene.
         best: Where to start.
         value: The measure of a solution.
     """
-    chain, step = stand.scene.chain, best.step
+    chain, step = placed.scene.chain, best.step
     for _ in range(REFINEMENTS):
-        fine = 2 * step / (REFINE_LANES - 1)
+        fine = 2 * step / (REFINE_SAMPLES - 1)
         near, angle = [], best.q[free_joint(chain)]
-        for i in range(REFINE_LANES):
-            solution = solutions(chain, stand.X_AG, angle - step + i * fine)[best.branch]
+        for i in range(REFINE_SAMPLES):
+            solution = solutions(chain, placed.X_AG, angle - step + i * fine)[best.branch]
             if solution.slack >= 0:
                 near.append(Candidate(solution.q, best.branch, fine))
         better = [c for c in sorted(near, key=value, reverse=True) if value(c) > value(best)]
-        best = next((c for c in better if not stand.arm_touches(c.q)), best)
+        best = next((c for c in better if not placed.arm_touches(c.q)), best)
         step = fine
     return best

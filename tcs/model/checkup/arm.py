@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from tcs.errors import ArmClassError
-from tcs.kernel.analytic.ik import lane_joints, wrist_goal
+from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.numeric.solutions import numeric_solutions
@@ -173,7 +173,7 @@ def _branches(solver: ArmSolver, X_AG: RigidTransform, free: float) -> list[Floa
     wrist_goal(solver, R_AG, np.array(X_AG.translation()), goal)
     for branch in solver.branches:
         q = np.zeros(7)
-        lane_joints(solver, goal, branch, free, q)
+        sample_joints(solver, goal, branch, free, q)
         found.append(q)
     return found
 

@@ -36,14 +36,14 @@ class LoweredScene:
         arrays: Everything the kernel needs to score one configuration.
         grid: The configurations to score.
         robot_bodies: Names that `body` of the arm's and the robot's shapes refers to.
-        room_bodies: Names that `body` of the room's shapes refers to.
+        environment_bodies: Names that `body` of the room's shapes refers to.
         goals: Names of the goals, in order.
     """
 
     arrays: SceneArrays
     grid: GridArrays
     robot_bodies: tuple[str, ...]
-    room_bodies: tuple[str, ...]
+    environment_bodies: tuple[str, ...]
     goals: tuple[str, ...]
 
     def digest(self) -> str:
@@ -61,7 +61,7 @@ class LoweredScene:
                 array = array.astype("<i8")
             sha.update(repr(array.shape).encode())
             sha.update(array.tobytes())
-        sha.update(repr((self.robot_bodies, self.room_bodies, self.goals)).encode())
+        sha.update(repr((self.robot_bodies, self.environment_bodies, self.goals)).encode())
         return sha.hexdigest()
 
 
@@ -103,7 +103,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     body = [part for part in built.parts if part.group is Group.BODY]
     room = [part for part in built.parts if part.group is Group.ENVIRONMENT]
     robot_bodies = _names([*arm, *body])
-    room_bodies = _names(room)
+    environment_bodies = _names(room)
 
     scene.place_base(0.0, 0.0, 0.0)
     scene.set_arm(np.zeros(len(built.arm_joints)))
@@ -120,11 +120,11 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         arm_base_p=_origins(_matrices([arm_base]))[0],
         arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
         body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
-        room=_shapes(scene, room, room_bodies, room_poses),
+        environment=_shapes(scene, room, environment_bodies, room_poses),
         arm_vs_arm=_checked(rule, arm, arm),
         arm_vs_body=_checked(rule, arm, body),
-        arm_vs_room=_checked(rule, arm, room),
-        body_vs_room=_checked(rule, body, room),
+        arm_vs_environment=_checked(rule, arm, room),
+        body_vs_environment=_checked(rule, body, room),
         margin=scene.spec.environment.contact_margin,
         goal_R=_rotations(poses_of_goals),
         goal_p=_origins(poses_of_goals),
@@ -141,7 +141,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
             )
         ),
         robot_bodies=robot_bodies,
-        room_bodies=room_bodies,
+        environment_bodies=environment_bodies,
         goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
     )
 
@@ -224,9 +224,9 @@ def environment_at(
         room_poses, poses_of_goals = _environment_states(scene, room, task, states)
     finally:
         scene.restore(before)
-    moved = lowered.arrays.room._replace(R=_rotations(room_poses), p=_origins(room_poses))
+    moved = lowered.arrays.environment._replace(R=_rotations(room_poses), p=_origins(room_poses))
     return lowered.arrays._replace(
-        room=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
+        environment=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
     )
 
 
@@ -291,11 +291,11 @@ def _names(parts: list[Part]) -> tuple[str, ...]:
 def _shapes(scene: Scene, parts: list[Part], names: tuple[str, ...], states: FloatArray) -> Shapes:
     """Return shapes at poses of shape (states, parts, 3, 4)."""
     inspector = scene.built.scene_graph.model_inspector()
-    kinds_and_sizes = [shape_of(inspector, part) for part in parts]
+    types_and_sizes = [shape_of(inspector, part) for part in parts]
     index = {name: i for i, name in enumerate(names)}
     return Shapes(
-        kind=np.array([kind for kind, _ in kinds_and_sizes], dtype=np.int8),
-        size=np.array([size for _, size in kinds_and_sizes], dtype=np.float64).reshape(-1, 3),
+        type=np.array([code for code, _ in types_and_sizes], dtype=np.int8),
+        size=np.array([size for _, size in types_and_sizes], dtype=np.float64).reshape(-1, 3),
         pad=np.array([part.pad for part in parts], dtype=np.float64),
         body=np.array([index[part.name] for part in parts], dtype=np.int16),
         frame=np.array([part.carrier for part in parts], dtype=np.int8),

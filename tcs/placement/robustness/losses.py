@@ -85,7 +85,7 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     blocked = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
     hopeless = np.all([found.reason == blocked for found in outcomes], axis=0)
     robot = trials.lowered.robot_bodies
-    others = (*trials.lowered.room_bodies, *robot)
+    others = (*trials.lowered.environment_bodies, *robot)
     found = []
     for goal in np.flatnonzero(lost.any(axis=0)).tolist():
         rows = lost[:, goal]

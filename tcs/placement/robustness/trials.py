@@ -287,7 +287,7 @@ class Trials:
         )
         arrays = environment_at(self.lowered, self.scene, self.job.task, states)
         if not self.checks_base:
-            arrays = arrays._replace(body_vs_room=np.zeros_like(arrays.body_vs_room))
+            arrays = arrays._replace(body_vs_environment=np.zeros_like(arrays.body_vs_environment))
         torso_levels = len(arrays.arm_base_p)
         origin = np.zeros(1)
         grid = GridArrays(columns.size, origin, origin, origin, torso_levels)

@@ -199,7 +199,7 @@ def _grouped(
         start=start,
         state=state[number],
         xy=spaced_places(rule, cell_xy),
-        isotropy=dexterity,
+        dexterity=dexterity,
         reached=reached,
         single=single,
         peak=np.maximum.reduceat(dexterity, start[:-1], axis=0) if len(number) else dexterity,

@@ -89,7 +89,7 @@ def sweep(
         delayed(_slice)(problem, grippers, start, min(start + SLICE, size)) for start in starts
     ):
         rows = slice(done, done + len(part.reason))
-        reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.isotropy
+        reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.dexterity
         # Only the joints of reached pairs are worth keeping: one pair in ten.
         joints.append(part.joints[part.reason == 0])
         done += len(part.reason)
@@ -140,7 +140,7 @@ def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int)
     scores = Scores(
         reason=np.empty(shape, np.uint8),
         contact=np.empty(shape, np.int32),
-        isotropy=np.zeros(shape, np.float32),
+        dexterity=np.zeros(shape, np.float32),
         joints=np.zeros((*shape, 7), np.float32),
     )
     score_slice(problem, grippers, start, stop, scores)
@@ -151,8 +151,8 @@ def _name_contacts(
     contact: NDArray[np.int32], lowered: LoweredScene, problem: Problem
 ) -> tuple[tuple[str, str], ...]:
     """Turn contact codes, in place, into indices of the returned pairs of names."""
-    others = problem.room_bodies + problem.robot_bodies
-    both = (*lowered.room_bodies, *lowered.robot_bodies)
+    others = problem.environment_bodies + problem.robot_bodies
+    both = (*lowered.environment_bodies, *lowered.robot_bodies)
     # A place for every code, NO_CONTACT (-1) last, where a negative index finds it.
     there = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
     there[contact] = True

@@ -1,4 +1,4 @@
-"""The arcs of the free joint and the windows in a row of lanes."""
+"""The arcs of the free joint and the windows in a row of samples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tcs.kernel.analytic.arcs import (
     windows_of,
 )
 from tcs.kernel.analytic.ik import wrist_goal
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.search import MAX_WINDOWS
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.verification import reference_pairs
@@ -75,9 +75,9 @@ def chain(request, lowered):
         return lowered.arrays.chain
     if request.param == "panda":
         return drake_arm("panda").chain
-    mirrored = isinstance(request.param, str)
-    seed = int(request.param.split()[1]) if mirrored else request.param
-    return random_arm(np.random.default_rng(seed), mirrored=mirrored)
+    spherical_shoulder = isinstance(request.param, str)
+    seed = int(request.param.split()[1]) if spherical_shoulder else request.param
+    return random_arm(np.random.default_rng(seed), spherical_shoulder=spherical_shoulder)
 
 
 def test_arcs_are_what_a_dense_scan_finds(chain):
@@ -111,7 +111,7 @@ def test_feasible_angles_lie_in_the_arcs(chain):
     for X_AG in goals(rng, chain, 40):
         goal, arcs, reach = arcs_of(arm, X_AG)
         for branch in arm.branches:
-            solve_lanes(arm, goal, branch, np.cos(angles), np.sin(angles), DENSE, slack, measure)
+            solve_samples(arm, goal, branch, np.cos(angles), np.sin(angles), DENSE, slack, measure)
             feasible = angles[slack >= 0]
             seen += len(feasible)
             assert reach == IN_REACH or len(feasible) == 0
@@ -122,9 +122,9 @@ def test_feasible_angles_lie_in_the_arcs(chain):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("seed", range(15))
-def test_out_of_reach_and_out_of_limits_are_told_apart(seed, mirrored):
+def test_out_of_reach_and_out_of_limits_are_told_apart(seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
-    chain = random_arm(rng, mirrored=mirrored)
+    chain = random_arm(rng, spherical_shoulder=spherical_shoulder)
     free = free_joint(chain)
     lower, upper = chain.lower.copy(), chain.upper.copy()
     lower[free], upper[free] = 0.3, 0.9
@@ -201,7 +201,7 @@ def test_windows_are_those_of_the_twin(seed):
 
 
 def test_no_row_of_the_first_look_has_more_windows_than_fit():
-    # 48 lanes, every other one feasible: the most windows there can be.
+    # 48 samples, every other one feasible: the most windows there can be.
     slack = np.tile([1.0, -1.0], 24)
     windows = np.empty((MAX_WINDOWS, 2))
     assert windows_of(slack, 48, 0.1, windows, 0) == 24

@@ -14,8 +14,8 @@ from tcs.kernel.verification.reference import free_joint
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import goal_in_base, size_of, toy_grid, toy_scene
 
-# Arm and room, configuration, goal: here rounding used to decide how many lanes an arc gets
-# (103, 151), whether its outermost lane is feasible (119), and whether two arcs are one (the rest).
+# Seed of arm and environment, configuration, goal. Rounding decides how many samples an arc gets
+# (103, 151), whether its outermost sample is feasible (119), whether two arcs are one (the rest).
 TIES = [(103, 6, 4), (151, 45, 1), (119, 131, 3), (69, 124, 4), (127, 8, 4), (213, 32, 1)]
 
 
@@ -26,27 +26,29 @@ def angles_of_both(chain, X_AG):
     count, _ = elbow_arcs(arm, search.goal, search.arcs)
     found = find_candidates(arm, search, count)
     arcs, _ = reference_pairs.elbow_arcs(chain, X_AG)
-    twin = reference_pairs.find_candidates(chain, X_AG, arcs)
+    expected = reference_pairs.find_candidates(chain, X_AG, arcs)
     free = free_joint(chain)
     assert count == len(arcs)
-    return np.sort(search.found_angle[:found]), np.sort([candidate.q[free] for candidate in twin])
+    return np.sort(search.found_angle[:found]), np.sort(
+        [candidate.q[free] for candidate in expected]
+    )
 
 
 @pytest.mark.parametrize(("seed", "h", "g"), TIES, ids=str)
 def test_ties_are_not_left_to_rounding(lowered, seed, h, g):
     chain = chain_of(seed, lowered)
     scene = toy_scene(chain, seed, obstacles=seed % 14)
-    kernel, twin = angles_of_both(chain, goal_in_base(scene, toy_grid(), h, g))
+    kernel, expected = angles_of_both(chain, goal_in_base(scene, toy_grid(), h, g))
     # Ends of arcs as arc cosines, 1e-16 becomes 1e-8 in its angle where the cosine is flat.
-    np.testing.assert_allclose(kernel, twin, atol=1e-7)
+    np.testing.assert_allclose(kernel, expected, atol=1e-7)
 
 
 @pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
 @pytest.mark.parametrize("seed", range(1, 41, 2))
-def test_the_kernel_looks_where_the_twin_looks(lowered, seed, mirrored):
+def test_the_kernel_looks_where_the_twin_looks(lowered, seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
-    chain = chain_of(seed, lowered, mirrored=mirrored)
+    chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
     scene, grid = toy_scene(chain, seed, obstacles=0), toy_grid()
     for h, g in zip(rng.integers(size_of(grid), size=3), rng.integers(5, size=3), strict=True):
-        kernel, twin = angles_of_both(chain, goal_in_base(scene, grid, h, g))
-        np.testing.assert_allclose(kernel, twin, atol=1e-7)
+        kernel, expected = angles_of_both(chain, goal_in_base(scene, grid, h, g))
+        np.testing.assert_allclose(kernel, expected, atol=1e-7)

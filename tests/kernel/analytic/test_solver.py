@@ -16,7 +16,7 @@ from tcs.kernel.analytic.solver import (
     cos_range,
     reversed_chain,
 )
-from tcs.kernel.verification.reference import compose, elbow, free_joint, link_poses, turn
+from tcs.kernel.verification.reference import compose, elbow, free_joint, link_poses, rot_z
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, straight_arm
 
@@ -52,18 +52,18 @@ def test_baxter_is_outside_and_the_message_says_by_how_much():
     # Its URDF: shoulder 0.069 m from axis 1, wrist bend 0.01 m from the forearm's axis.
     with pytest.raises(ArmClassError) as caught:
         arm_solver(drake_arm("baxter").chain)
-    upright, mirrored = str(caught.value).split("Its mirror image")
+    upright, spherical_shoulder = str(caught.value).split("Its mirror image")
     assert "5, 6 and 7 in one point, but axes 5 and 6 pass each other 0.01 m apart" in upright
-    assert "axes 1 and 2 pass each other 0.069 m apart" in mirrored
-    assert "axes 5 and 6 pass each other 0.01 m apart" in mirrored
+    assert "axes 1 and 2 pass each other 0.069 m apart" in spherical_shoulder
+    assert "axes 5 and 6 pass each other 0.01 m apart" in spherical_shoulder
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("seed", range(10))
-def test_axes_that_pass_each_other_are_refused_with_their_distance(seed, mirrored):
+def test_axes_that_pass_each_other_are_refused_with_their_distance(seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
-    chain = random_arm(rng, mirrored=mirrored)
-    i = int(rng.choice([1, 2, 5] if mirrored else [2, 5, 6]))
+    chain = random_arm(rng, spherical_shoulder=spherical_shoulder)
+    i = int(rng.choice([1, 2, 5] if spherical_shoulder else [2, 5, 6]))
     p = chain.p.copy()
     p[i] = rng.normal(scale=0.01, size=3)
     chain = chain._replace(p=p)
@@ -78,12 +78,12 @@ def test_axes_that_pass_each_other_are_refused_with_their_distance(seed, mirrore
 
 
 @pytest.mark.parametrize(("mirrored", "row"), [(False, 5), (False, 6), (True, 1), (True, 2)])
-def test_three_axes_that_meet_in_two_points_are_refused(mirrored, row, rng):
-    chain = random_arm(rng, mirrored=mirrored)
+def test_three_axes_that_meet_in_two_points_are_refused(spherical_shoulder, row, rng):
+    chain = random_arm(rng, spherical_shoulder=spherical_shoulder)
     p = chain.p.copy()
     # Along the middle one of the three axes.
     p[row] = 0.004 * (np.eye(3)[2] if row in (2, 6) else chain.R[row][:, 2])
-    first, middle, last = (1, 2, 3) if mirrored else (5, 6, 7)
+    first, middle, last = (1, 2, 3) if spherical_shoulder else (5, 6, 7)
     expected = rf"axis {middle} meets {first} and {last} 0\.004 m apart"
     with pytest.raises(ArmClassError, match=expected):
         arm_solver(chain._replace(p=p))
@@ -92,7 +92,7 @@ def test_three_axes_that_meet_in_two_points_are_refused(mirrored, row, rng):
 def test_parallel_axes_are_refused(rng):
     chain = random_arm(rng)
     R = chain.R.copy()
-    R[5] = turn(0.4)
+    R[5] = rot_z(0.4)
     with pytest.raises(ArmClassError, match="axes 5 and 6 are parallel"):
         arm_solver(chain._replace(R=R))
 
@@ -108,7 +108,7 @@ def test_link_frames_beside_the_meeting_point_are_refused(rng):
 @pytest.mark.parametrize("seed", range(10))
 def test_the_reversed_arm_sees_its_base_where_the_tool_does(seed):
     rng = np.random.default_rng(seed)
-    chain = random_arm(rng, mirrored=bool(seed % 2))
+    chain = random_arm(rng, spherical_shoulder=bool(seed % 2))
     back = reversed_chain(chain)
     for q in rng.uniform(-3, 3, (10, 7)):
         R, p = compose(link_poses(chain, q)[-1], link_poses(back, q[::-1])[-1])
@@ -134,7 +134,7 @@ def test_reach_is_the_distance_from_shoulder_to_wrist(seed):
     chain = random_arm(rng)
     arm = arm_solver(chain)
     for q4 in rng.uniform(-np.pi, np.pi, 20):
-        square = float(np.sum((chain.p[3] + chain.R[3] @ turn(q4) @ chain.p[4]) ** 2))
+        square = float(np.sum((chain.p[3] + chain.R[3] @ rot_z(q4) @ chain.p[4]) ** 2))
         # A handful of products of numbers below 1: rounding stays at 1e-16 each.
         cosine = np.cos(q4 - arm.reach[2])
         assert square == pytest.approx(arm.reach[0] + arm.reach[1] * cosine, abs=1e-14)

@@ -80,9 +80,9 @@ class FloatingGripper:
 
 def drake_shape(shapes, i):
     a, b, c = shapes.size[i]
-    if shapes.kind[i] == BOX:
+    if shapes.type[i] == BOX:
         return Box(2 * a, 2 * b, 2 * c)
-    return Capsule(a, 2 * b) if shapes.kind[i] == CAPSULE else Sphere(a)
+    return Capsule(a, 2 * b) if shapes.type[i] == CAPSULE else Sphere(a)
 
 
 class Comparison:

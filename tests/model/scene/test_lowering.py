@@ -73,7 +73,7 @@ def test_arrays_put_every_shape_and_the_tool_where_drake_does(scene, lowered, fu
         assert_same_pose(R_WG, p_WG, query.GetPoseInWorld(part.geometry))
     for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
         X_WG = query.GetPoseInWorld(part.geometry)
-        assert_same_pose(arrays.room.R[0, i], arrays.room.p[0, i], X_WG)
+        assert_same_pose(arrays.environment.R[0, i], arrays.environment.p[0, i], X_WG)
 
 
 def test_each_joint_turns_the_link_that_drake_turns(scene, lowered):
@@ -113,21 +113,21 @@ def test_shapes_are_drakes_own(scene, lowered):
     for group, shapes in (
         (Group.ARM, lowered.arrays.arm),
         (Group.BODY, lowered.arrays.body),
-        (Group.ENVIRONMENT, lowered.arrays.room),
+        (Group.ENVIRONMENT, lowered.arrays.environment),
     ):
         parts = of_group(scene, group)
-        assert len(parts) == len(shapes.kind)
+        assert len(parts) == len(shapes.type)
         for i, part in enumerate(parts):
             shape = inspector.GetShape(part.geometry)
-            assert shapes.kind[i] == kinds[type(shape).__name__]
-            if shapes.kind[i] == BOX:
+            assert shapes.type[i] == kinds[type(shape).__name__]
+            if shapes.type[i] == BOX:
                 size = [shape.width() / 2, shape.depth() / 2, shape.height() / 2]
-            elif shapes.kind[i] == CAPSULE:
+            elif shapes.type[i] == CAPSULE:
                 size = [shape.radius(), shape.length() / 2, 0.0]
             else:
                 size = [shape.radius(), 0.0, 0.0]
             assert shapes.size[i].tolist() == size
-    assert {CAPSULE, BOX} <= set(lowered.arrays.room.kind)
+    assert {CAPSULE, BOX} <= set(lowered.arrays.environment.type)
 
 
 def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchair):
@@ -135,13 +135,13 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
     for shapes, names, group in (
         (arrays.arm, lowered.robot_bodies, Group.ARM),
         (arrays.body, lowered.robot_bodies, Group.BODY),
-        (arrays.room, lowered.room_bodies, Group.ENVIRONMENT),
+        (arrays.environment, lowered.environment_bodies, Group.ENVIRONMENT),
     ):
         assert [names[i] for i in shapes.body] == [part.name for part in of_group(scene, group)]
     assert len(set(lowered.robot_bodies)) == len(lowered.robot_bodies)
     room = {
-        lowered.room_bodies[i]: pad
-        for i, pad in zip(arrays.room.body, arrays.room.pad, strict=True)
+        lowered.environment_bodies[i]: pad
+        for i, pad in zip(arrays.environment.body, arrays.environment.pad, strict=True)
     }
     assert room["person::head_center"] == wheelchair.padding["person::head_center"]
     assert room["wheelchair::seat"] == wheelchair.padding["wheelchair::base_link"]
@@ -149,8 +149,8 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
     assert not arrays.arm.pad.any()
     assert arrays.margin == wheelchair.contact_margin
     # A user reads these: parts of the chair one by one, parts of the body as a whole.
-    assert "wheelchair::rear wheel left" in lowered.room_bodies
-    assert sum(name.startswith("person::") for name in lowered.room_bodies) == 17
+    assert "wheelchair::rear wheel left" in lowered.environment_bodies
+    assert sum(name.startswith("person::") for name in lowered.environment_bodies) == 17
 
 
 def test_the_pairs_are_those_that_drake_checks(scene, lowered):
@@ -160,8 +160,8 @@ def test_the_pairs_are_those_that_drake_checks(scene, lowered):
     for first, second, matrix in (
         (Group.ARM, Group.ARM, arrays.arm_vs_arm),
         (Group.ARM, Group.BODY, arrays.arm_vs_body),
-        (Group.ARM, Group.ENVIRONMENT, arrays.arm_vs_room),
-        (Group.BODY, Group.ENVIRONMENT, arrays.body_vs_room),
+        (Group.ARM, Group.ENVIRONMENT, arrays.arm_vs_environment),
+        (Group.BODY, Group.ENVIRONMENT, arrays.body_vs_environment),
     ):
         assert matrix.shape == (len(groups[first]), len(groups[second]))
         assert matrix.any()
@@ -207,14 +207,14 @@ def test_an_axis_of_the_environment_moves_its_joint(scene, shaving, wheelchair):
     shifts = {"unit": "m", "start": 0, "step": 0.1, "count": 2}
     grid = Grid.from_spec({"head_tilt": tilts, "wheelchair_y": shifts, **wheelchair.grid})
     arrays = lower(scene, shaving, grid).arrays
-    assert arrays.room.p.shape[0] == arrays.goal_p.shape[0] == 6
+    assert arrays.environment.p.shape[0] == arrays.goal_p.shape[0] == 6
     for state, (tilt, shift) in enumerate(itertools.product(np.radians([-10, 0, 10]), [0.0, 0.1])):
         scene.set_joint("head_tilt", tilt)
         scene.set_joint("wheelchair_y", shift)
         query = scene.query_object()
         for i, part in enumerate(of_group(scene, Group.ENVIRONMENT)):
             X_WG = query.GetPoseInWorld(part.geometry)
-            assert_same_pose(arrays.room.R[state, i], arrays.room.p[state, i], X_WG)
+            assert_same_pose(arrays.environment.R[state, i], arrays.environment.p[state, i], X_WG)
         for i, X_WG in enumerate(goal_poses(scene, shaving)):
             assert_same_pose(arrays.goal_R[state, i], arrays.goal_p[state, i], X_WG)
     unknown = Grid.from_spec({"bed_height": shifts, **wheelchair.grid})
@@ -247,12 +247,12 @@ def test_an_unknown_body_frame_names_task_goal_and_environment(scene, shaving, f
 def test_contacts_that_a_task_allows_are_not_checked(scene, shaving, full_grid, lowered):
     pair = ("l_gripper_l_finger_tip_link", "person::head_center")
     allowing = lower(scene, dataclasses.replace(shaving, allowed_contacts=(pair,)), full_grid)
-    changed = allowing.arrays.arm_vs_room != lowered.arrays.arm_vs_room
+    changed = allowing.arrays.arm_vs_environment != lowered.arrays.arm_vs_environment
     for i, j in zip(*np.nonzero(changed), strict=True):
         assert allowing.robot_bodies[allowing.arrays.arm.body[i]] == pair[0]
-        assert allowing.room_bodies[allowing.arrays.room.body[j]] == pair[1]
+        assert allowing.environment_bodies[allowing.arrays.environment.body[j]] == pair[1]
     assert changed.any()
-    assert not allowing.arrays.arm_vs_room[changed].any()
+    assert not allowing.arrays.arm_vs_environment[changed].any()
     wrong = dataclasses.replace(shaving, allowed_contacts=(("l_finger", "person::head_center"),))
     with pytest.raises(UnknownNameError, match=r"task 'shaving'.*robot body 'l_finger'"):
         lower(scene, wrong, full_grid)
@@ -278,6 +278,6 @@ def test_the_digest_changes_with_what_is_scored_and_with_nothing_else(
 
 
 def test_the_arrays_cannot_be_written_to(lowered):
-    for array in (lowered.arrays.chain.p, lowered.arrays.room.R, lowered.grid.base_x):
+    for array in (lowered.arrays.chain.p, lowered.arrays.environment.R, lowered.grid.base_x):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0

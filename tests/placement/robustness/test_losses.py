@@ -97,7 +97,7 @@ def by_hand():
     trials = SimpleNamespace(
         outcome=lambda h, offsets: outcomes[h],
         lowered=SimpleNamespace(
-            robot_bodies=("base", "hand"), room_bodies=("bed", "person", "chair")
+            robot_bodies=("base", "hand"), environment_bodies=("bed", "person", "chair")
         ),
         job=SimpleNamespace(task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3)),
     )

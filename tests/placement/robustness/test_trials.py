@@ -167,7 +167,7 @@ def test_the_twin_confirms_solutions_in_displaced_rooms(trials, rng):
                 arm_base_R=arrays.arm_base_R[only],
                 arm_base_p=arrays.arm_base_p[only],
                 body=arrays.body._replace(R=arrays.body.R[only], p=arrays.body.p[only]),
-                body_vs_room=np.zeros_like(arrays.body_vs_room),
+                body_vs_environment=np.zeros_like(arrays.body_vs_environment),
             )
             at = (np.array([v]) for v in (place.base_x, place.base_y, place.base_yaw))
             grid = GridArrays(1, *at, 1)

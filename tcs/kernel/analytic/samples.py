@@ -1,6 +1,6 @@
 """Inverse kinematics of many values of the free joint at once.
 
-One straight-line loop over "lanes", each a value of joint 1 on one branch: no test inside, so the
+One straight-line loop over "samples", each a value of joint 1 on one branch: no test inside, so the
 compiler turns it into vector instructions. Joints 1 .. 7 are those of the arm as it is solved: of
 a mirrored arm, those of the reversed one.
 """
@@ -14,14 +14,14 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
 
 TINY = 1e-300
-"""Keeps 0/0 at a singularity finite; such lanes are infeasible."""
+"""Keeps 0/0 at a singularity finite; such samples are infeasible."""
 SHARP = 1e14
 """Inverse of the squared sine of the angle to an axis below which a direction lies along it. An
 angle of 1e-7 rad still determines the joint to 1e-9 rad."""
 
 
 @jit
-def solve_lanes(
+def solve_samples(
     arm: ArmSolver,
     goal: FloatArray,
     branch: IntArray,
@@ -31,7 +31,7 @@ def solve_lanes(
     slack: FloatArray,
     measure: FloatArray,
 ) -> None:
-    """Fill slack and isotropy of each lane.
+    """Fill slack and isotropy of each sample.
 
     Args:
         arm: The arm.
@@ -39,7 +39,7 @@ def solve_lanes(
         branch: Three signs, one row of `arm.branches`.
         cosines: cos(q1) for the values of the free joint, shape (>= count,).
         sines: sin(q1), likewise.
-        count: How many lanes to fill.
+        count: How many samples to fill.
         slack: Filled: >= 0 where the branch exists and every joint keeps its limits. It measures
             the worst condition, as a difference of cosines, and varies continuously with q1.
         measure: Filled: kinematic isotropy to the sixth power where slack >= 0; elsewhere, from
@@ -92,7 +92,7 @@ def solve_lanes(
     zx, zy, zz = goal[1, 0], goal[1, 1], goal[1, 2]
     xx, xy, xz = goal[2, 0], goal[2, 1], goal[2, 2]
     tx, ty, tz = goal[3, 0], goal[3, 1], goal[3, 2]
-    # Wrist: g_z = P6 cos q6 + Q6 sin q6 + const, the same for every lane.
+    # Wrist: g_z = P6 cos q6 + Q6 sin q6 + const, the same for every sample.
     P6 = e20 * f02 + e21 * f12
     Q6 = e21 * f02 - e20 * f12
     N6 = P6 * P6 + Q6 * Q6 + TINY

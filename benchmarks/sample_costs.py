@@ -1,4 +1,4 @@
-"""How much of the lanes' time the measure takes, by compiling their loop without it."""
+"""How much of the samples' time the measure takes, by compiling their loop without it."""
 
 from __future__ import annotations
 
@@ -13,53 +13,55 @@ import numpy as np
 from peer_problems import Pair
 
 from tcs.kernel.analytic.ik import wrist_goal
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import FloatArray
 
-LANES = 48
+SAMPLES = 48
 ROUNDS = 20
 """Passes over all goals in one timing: milliseconds, so that the clock is fine enough."""
 
 
 def measure_shares(arm: ArmSolver, pairs: tuple[Pair, ...], repeats: int) -> list[float]:
-    """Return which share of the lanes' time goes into the measure, once for each repeat.
+    """Return which share of the samples' time goes into the measure, once for each repeat.
 
     Empty if the loop does not store the measure in a way that can be taken out.
     """
-    bare = lanes_without_measure()
+    bare = samples_without_measure()
     if bare is None:
         return []
     goals = np.empty((len(pairs), 4, 3))
     for pair, goal in zip(pairs, goals, strict=True):
         wrist_goal(arm, pair.X_AG[:3, :3].copy(), pair.X_AG[:3, 3].copy(), goal)
-    for function in (bare, solve_lanes):
-        _run(function, arm, goals, LANES, 1)
+    for function in (bare, solve_samples):
+        _run(function, arm, goals, SAMPLES, 1)
     shares = []
     for _ in range(repeats):
         used = []
-        for function in (bare, solve_lanes):
+        for function in (bare, solve_samples):
             begun = time.process_time()
-            _run(function, arm, goals, LANES, ROUNDS)
+            _run(function, arm, goals, SAMPLES, ROUNDS)
             used.append(time.process_time() - begun)
         shares.append(1.0 - used[0] / used[1])
     return shares
 
 
-def lanes_without_measure() -> Callable[..., None] | None:
-    """Return the loop over the lanes compiled without storing the measure, None if it cannot be.
+def samples_without_measure() -> Callable[..., None] | None:
+    """Return the loop over the samples compiled without storing the measure, None if it cannot be.
 
     The compiler then drops by itself all that only the measure needs.
     """
-    function = solve_lanes.py_func
+    function = solve_samples.py_func
     stripper = _Stripper()
     tree = stripper.visit(ast.parse(textwrap.dedent(inspect.getsource(function))))
     if not stripper.removed:
         return None
     tree.body[0].decorator_list = []
     names = dict(function.__globals__)
-    exec(compile(ast.fix_missing_locations(tree), "lanes without measure", "exec"), names)
-    compiled: Callable[..., None] = numba.jit(**solve_lanes.targetoptions)(names[function.__name__])
+    exec(compile(ast.fix_missing_locations(tree), "samples without measure", "exec"), names)
+    compiled: Callable[..., None] = numba.jit(**solve_samples.targetoptions)(
+        names[function.__name__]
+    )
     return compiled
 
 
@@ -80,15 +82,15 @@ class _Stripper(ast.NodeTransformer):
 
 @numba.njit(nogil=True)
 def _run(
-    function: Callable[..., None], arm: ArmSolver, goals: FloatArray, lanes: int, rounds: int
+    function: Callable[..., None], arm: ArmSolver, goals: FloatArray, samples: int, rounds: int
 ) -> None:
-    """Solve lanes spread over a full turn for every goal and branch."""
-    cosines, sines = np.empty(lanes), np.empty(lanes)
-    for i in range(lanes):
-        angle = 2.0 * np.pi * i / lanes
+    """Solve samples spread over a full turn for every goal and branch."""
+    cosines, sines = np.empty(samples), np.empty(samples)
+    for i in range(samples):
+        angle = 2.0 * np.pi * i / samples
         cosines[i], sines[i] = np.cos(angle), np.sin(angle)
-    slack, measure = np.empty(lanes), np.empty(lanes)
+    slack, measure = np.empty(samples), np.empty(samples)
     for _ in range(rounds):
         for k in range(len(goals)):
             for b in range(len(arm.branches)):
-                function(arm, goals[k], arm.branches[b], cosines, sines, lanes, slack, measure)
+                function(arm, goals[k], arm.branches[b], cosines, sines, samples, slack, measure)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.collide import BALL, CENTRE, TURN, move
+from tcs.kernel.collide import BOUND, CENTRE, ROTATION, move
 from tcs.kernel.contacts import Workspace
 from tcs.kernel.problem import Problem
 
 
 @jit
-def stand(problem: Problem, work: Workspace, place: int) -> int:
-    """Put the base at a place of the grid and move the room into its frame.
+def place_base(problem: Problem, work: Workspace, place: int) -> int:
+    """Put the base at a place of the grid and move the environment into its frame.
 
     Args:
         problem: The scene and its grid.
-        work: `R_BW`, `p_BW` and `room_B` get filled.
+        work: `R_BW`, `p_BW` and `environment_B` get filled.
         place: Flat index over (environment state, base x, base y, base yaw).
 
     Returns:
@@ -31,9 +31,9 @@ def stand(problem: Problem, work: Workspace, place: int) -> int:
     R, p = work.R_BW, work.p_BW
     R[0, 0], R[0, 1], R[1, 0], R[1, 1] = c, s, -s, c
     p[0], p[1] = -(c * x + s * y), s * x - c * y
-    room = problem.room[state]
-    for j in range(len(room)):
-        move(R, p, room, j, work.room_B, j)
+    environment = problem.environment[state]
+    for j in range(len(environment)):
+        move(R, p, environment, j, work.environment_B, j)
     return state
 
 
@@ -62,30 +62,30 @@ def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, 
 
 
 @inner
-def room_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
-    """Move the room from B to A and list the shapes that the arm could touch at all."""
+def environment_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
+    """Move the environment from B to A and list the shapes that the arm could touch at all."""
     A, a = problem.base_R[torso], problem.base_p[torso]
-    room_B, room_A = work.room_B, work.room_A
+    environment_B, environment_A = work.environment_B, work.environment_A
     count = 0
-    for j in range(len(room_B)):
+    for j in range(len(environment_B)):
         square = 0.0
         for r in range(3):
             along = 0.0
             for m in range(3):
-                along += A[m, r] * (room_B[j, CENTRE + m] - a[m])
-            room_A[j, CENTRE + r] = along
+                along += A[m, r] * (environment_B[j, CENTRE + m] - a[m])
+            environment_A[j, CENTRE + r] = along
             square += along * along
-        reach = problem.arm_radius + room_B[j, BALL]
+        reach = problem.arm_radius + environment_B[j, BOUND]
         if square > reach * reach:
             continue
         work.near[count] = j
         count += 1
         for c in range(CENTRE):
-            room_A[j, c] = room_B[j, c]
+            environment_A[j, c] = environment_B[j, c]
         for r in range(3):
             for c in range(3):
                 total = 0.0
                 for m in range(3):
-                    total += A[m, r] * room_B[j, TURN + 3 * m + c]
-                room_A[j, TURN + 3 * r + c] = total
+                    total += A[m, r] * environment_B[j, ROTATION + 3 * m + c]
+                environment_A[j, ROTATION + 3 * r + c] = total
     work.near_count[0] = count

@@ -1,12 +1,12 @@
-"""The closed form in lanes: against forward kinematics and against the plain-loop twin."""
+"""The closed form in samples: against forward kinematics and against the plain-loop twin."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.ik import lane_joints, within, wrist_goal
-from tcs.kernel.analytic.lanes import solve_lanes
+from tcs.kernel.analytic.ik import sample_joints, within, wrist_goal
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian, link_poses, solutions
 from tests.kernel.arms import drake_arm
@@ -22,9 +22,9 @@ def chain(request, lowered):
         return lowered.arrays.chain
     if request.param in ("tiago", "panda"):
         return drake_arm(request.param).chain
-    mirrored = isinstance(request.param, str)
-    seed = int(request.param.split()[1]) if mirrored else request.param
-    return random_arm(np.random.default_rng(seed), mirrored=mirrored)
+    spherical_shoulder = isinstance(request.param, str)
+    seed = int(request.param.split()[1]) if spherical_shoulder else request.param
+    return random_arm(np.random.default_rng(seed), spherical_shoulder=spherical_shoulder)
 
 
 def goal_of(arm, X_AG):
@@ -37,7 +37,7 @@ def lanes_at(arm, goal, branch, angles):
     """Return slack and measure of each angle of the free joint."""
     angles = np.atleast_1d(angles)
     slack, measure = np.full(len(angles), np.nan), np.full(len(angles), np.nan)
-    solve_lanes(arm, goal, branch, np.cos(angles), np.sin(angles), len(angles), slack, measure)
+    solve_samples(arm, goal, branch, np.cos(angles), np.sin(angles), len(angles), slack, measure)
     return slack, measure
 
 
@@ -61,7 +61,7 @@ def test_some_branch_returns_the_joints_that_made_the_goal(chain, rng):
         for branch in arm.branches:
             slack, _ = lanes_at(arm, goal, branch, q[free])
             joints = np.empty(7)
-            lane_joints(arm, goal, branch, q[free], joints)
+            sample_joints(arm, goal, branch, q[free], joints)
             # At a limit the slack is a difference of cosines, off by some 1e-12 at most.
             if slack[0] >= -1e-12:
                 errors.append(np.max(np.abs(around(joints - q))))
@@ -83,7 +83,7 @@ def test_every_feasible_lane_reaches_the_goal_within_the_limits(chain, rng):
             slack, measure = lanes_at(arm, goal, branch, angles)
             for angle, value in zip(angles[slack >= 0], measure[slack >= 0], strict=True):
                 q = np.empty(7)
-                lane_joints(arm, goal, branch, angle, q)
+                sample_joints(arm, goal, branch, angle, q)
                 R, p = link_poses(chain, q)[-1]
                 # Forward kinematics of angles good to 1e-10 over arms of about 2 m.
                 np.testing.assert_allclose(R, X_AG[0], atol=1e-9)
@@ -102,10 +102,10 @@ def test_lanes_agree_with_the_twin_branch_by_branch(chain, rng):
         X_AG = rotation(rng), rng.uniform(-0.7, 0.7, 3)
         goal = goal_of(arm, X_AG)
         for angle in rng.uniform(-np.pi, np.pi, 6):
-            twin = solutions(chain, X_AG, angle)
+            expected = solutions(chain, X_AG, angle)
             for branch in arm.branches:
                 slack, _ = lanes_at(arm, goal, branch, angle)
-                exact = twin[tuple(branch)]
+                exact = expected[tuple(branch)]
                 # Differences of cosines, each good to some 1e-15, and the same out of reach, where
                 # the search for narrow windows follows them. Where the elbow would be stretched
                 # straight along axis 3, the slack is one rounding error over another, below -1e30.
@@ -115,15 +115,15 @@ def test_lanes_agree_with_the_twin_branch_by_branch(chain, rng):
                     assert (slack[0] >= 0) == (exact.slack >= 0)
                 if exact.slack > 1e-6:
                     q = np.empty(7)
-                    lane_joints(arm, goal, branch, angle, q)
+                    sample_joints(arm, goal, branch, angle, q)
                     np.testing.assert_allclose(around(q - exact.q), 0.0, atol=1e-8)
-    missing = [signs for signs in twin if list(signs) not in arm.branches.tolist()]
+    missing = [signs for signs in expected if list(signs) not in arm.branches.tolist()]
     # Branches that were left out have no solution within the limits, ever.
     for _ in range(50):
-        twin = solutions(
+        expected = solutions(
             chain, link_poses(chain, random_joints(rng, chain))[-1], rng.uniform(-3, 3)
         )
-        assert all(twin[signs].slack < 1e-9 for signs in missing)
+        assert all(expected[signs].slack < 1e-9 for signs in missing)
 
 
 def test_slack_is_negative_out_of_reach(chain, rng):
