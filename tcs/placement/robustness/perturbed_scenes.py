@@ -63,7 +63,7 @@ class PerturbedScenes(NamedTuple):
             base_p=problem.base_p[only],
             body=problem.body[only],
             body_A=problem.body_A[only],
-            body_balls=problem.body_balls[only],
+            body_spheres=problem.body_spheres[only],
             torso_levels=1,
         )
 
@@ -74,7 +74,7 @@ class PerturbedScenes(NamedTuple):
         scores = Scores(
             reason=np.empty(shape, np.uint8),
             contact=np.empty(shape, np.int32),
-            isotropy=np.zeros(shape, np.float32),
+            dexterity=np.zeros(shape, np.float32),
             joints=np.zeros((*shape, 7), np.float32),
         )
         score_slice(problem, self.grippers, run.start, run.stop, scores)
