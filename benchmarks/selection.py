@@ -1,10 +1,10 @@
-"""Measure choosing a set from random places of the robot, and check it against brute force.
+"""Measure selection of a set from random states, and check it against exhaustive search.
 
 Usage: python benchmarks/selection.py [FILE ...] [--places 1000] [--checked 20] [--seed 0]
 
-Without a FILE (made by `tcs score`) a made-up table as large as a bed's is measured: 242,064
-configurations, 14 goals, some 5,000 of which reach a goal. Machines are shared and noisy: times
-are those of one thread's processor beside those of the clock. Nothing here is a test.
+Without a FILE (made by `tcs score`) a synthetic table of the size of a bed's is measured: 242,064
+configurations, 14 goals, some 5,000 configurations that reach a goal. On shared machines the clock
+is noisy, so the processor time of the thread is printed beside it. This is a benchmark, not a test.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def sources(files: list[Path]) -> Iterator[tuple[str, SelectionTables]]:
 
 
 def travels(grid: Grid) -> dict[str, TravelWeights]:
-    """Return the ways of charging for travel that are measured, by name."""
+    """Return the travel weights that are measured, by name."""
     axes = tuple(
         (axis.name, 2.0 if axis.held_unit == "m" else 0.5) for axis in grid.environment_axes
     )
@@ -106,7 +106,7 @@ def measure(
         try:
             choice = select(tables, here, travel=travel, max_members=2)
         except SelectionError:
-            # In the middle of the bed: there is no way from there.
+            # Inside the furniture: no path starts there.
             refused += 1
             continue
         processor_time.append(time.thread_time() - begun)
@@ -119,7 +119,7 @@ def measure(
         f"  {what}",
         f"p50 {1e3 * p50:.2f}, p99 {1e3 * p99:.2f}, max {1e3 * max(processor_time):.2f} ms "
         f"(clock {1e3 * clock_p50:.2f}, {1e3 * clock_p99:.2f}, {1e3 * max(clock):.2f}), "
-        f"{refused} places refused, {wrong} wrong",
+        f"{refused} positions refused, {wrong} wrong",
     )
     return wrong
 
@@ -127,7 +127,7 @@ def measure(
 def best_of_all(
     tables: SelectionTables, here: InitialConfiguration, travel: TravelWeights
 ) -> tuple[int, ...]:
-    """Return the first best of all kept sets of one and two, going through all of them."""
+    """Return the best of all kept sets of one and two, the first among equals, exhaustively."""
     sets, weights = tables.sets, UtilityWeights()
     distances = tables.index.distances[travel.route]
     legs = legs_from(here, tables.grid, sets.candidates, sets.cell, distances, travel)
@@ -138,7 +138,7 @@ def best_of_all(
     for begin in range(0, everyone.size, CANDIDATES_AT_ONCE):
         a = everyone[begin : begin + CANDIDATES_AT_ONCE, None]
         values = utility_of_pairs(sets, legs, weights, a, everyone[None, :])
-        # Rows are in order and so are columns: argmax finds the first of the best.
+        # Rows and columns are in order, so argmax finds the first of the best.
         i, j = np.unravel_index(int(np.argmax(values)), values.shape)
         if values[i, j] > best:
             best, members = values[i, j], (int(a[i, 0]), int(j))
@@ -166,7 +166,7 @@ def utility_of_pairs(sets: SetTable, legs, weights, a, b):
 
 
 def bed_grid() -> Grid:
-    """Return the paper's grid round the bed."""
+    """Return the paper's grid around the bed."""
     return Grid.from_spec(
         {
             "bed_height": {"unit": "m", "start": 0.0, "step": 0.1, "count": 4},
@@ -195,10 +195,10 @@ def bed_like_scores(grid: Grid) -> ScoreTable:
     rng = np.random.default_rng(0)
     dexterity = np.zeros((grid.size, GOALS), dtype=np.float32)
     for g, along in enumerate(np.linspace(0.15, 1.75, GOALS)):
-        lifted = np.sin(at["head_rest"]) * (along < 0.9)
-        goal_x = along + rng.uniform(-0.05, 0.05) - 0.15 * lifted
+        raised_rest = np.sin(at["head_rest"]) * (along < 0.9)
+        goal_x = along + rng.uniform(-0.05, 0.05) - 0.15 * raised_rest
         goal_y = (0.22 if g % 2 else -0.22) * rng.uniform(0.3, 1.0)
-        height = 0.75 + 0.05 * rng.standard_normal() + at["bed_height"] + 0.35 * lifted
+        height = 0.75 + 0.05 * rng.standard_normal() + at["bed_height"] + 0.35 * raised_rest
         up = height - 0.78 - at["torso"]
         reach = np.sqrt((goal_x - shoulder_x) ** 2 + (goal_y - shoulder_y) ** 2 + up**2)
         turn = np.arctan2(goal_y - shoulder_y, goal_x - shoulder_x) - yaw - 0.5

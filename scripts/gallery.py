@@ -1,8 +1,8 @@
-"""Make the pictures and the text of docs/gallery.md: Figures 1 and 6 of the TCS paper, re-made.
+"""Make the pictures and the text of docs/gallery.md: Figures 1 and 6 of the TCS paper.
 
     python scripts/gallery.py --scores out/scores
 
-Score files are taken from the folder named by --scores; rows that are not there are scored first.
+Score files are read from the folder --scores; missing rows are scored first.
 """
 
 from __future__ import annotations
@@ -54,25 +54,24 @@ LETTERS = {
 INTRODUCTION = """\
 # Gallery
 
-Every picture here is drawn by tcs from score files, without a display; `python scripts/gallery.py`
-scores what is missing and makes this page and its pictures again. The robot is drawn as the shapes
-that contacts are checked with, which enclose its links. Yellow arrows are the goals, each ending
-where the tool has to be; the red one is the goal that the arm is at. What is drawn can be looked at
-from all sides with `tcs view FILE`, and `tcs report FILE --out page.html` tells all about it.
+Every picture on this page is drawn by tcs from score files, without a display. `python
+scripts/gallery.py` scores missing rows and makes the page and its pictures. The robot is drawn as
+its collision primitives, which enclose its links. Yellow arrows are the goals and end at the
+position of the tool; the red arrow is the goal at which the arm is drawn. `tcs view FILE` shows the
+same scenes interactively, and `tcs report FILE --out page.html` describes the results in full.
 
 The person, the furniture, the goals and the grids are those of the TCS paper (Kapusta, Park and
-Kemp, IROS 2015), as [the scene](scene.md) has them; the arm is solved by our own inverse
-kinematics, and contacts are checked with shapes instead of meshes, so places differ from the
-paper's. Shown is the set with the greatest P_R + P_M, wherever the robot is now. The
-paper shows a second place for shaving and bathing on the bed only: by its printed rule two places
-are kept when their P_M is greater than that of one, by however little, but its code asked for a
-hundredth more (`tcs score --rules code2015`).
+Kemp, IROS 2015), see [the scene](scene.md). Inverse kinematics and collision checks are those of
+tcs, with primitives instead of meshes, so base poses differ from the paper's. The pictures show the
+set with the greatest P_R + P_M, regardless of travel. The paper shows a second base pose only for
+shaving and bathing on the bed: by its printed rule a pair is kept if its P_M is greater than that
+of the best single, but its code requires a hundredth more (`tcs score --rules code2015`).
 """
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A picture of the gallery, and what is said of it."""
+    """A picture of the gallery with its text."""
 
     name: str
     figure: Figure
@@ -80,7 +79,7 @@ class Drawn:
     heading: str
     text: str
     alternative: str
-    """What is to be seen, for who cannot see it."""
+    """Alternative text for readers who cannot see the picture."""
 
 
 def main() -> int:
@@ -94,12 +93,12 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scores", type=Path, default=Path("out/scores"), help="score files")
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of gallery.md")
-    parser.add_argument("--jobs", type=int, default=2, help="threads, where a row is scored")
+    parser.add_argument("--jobs", type=int, default=2, help="number of threads for scoring")
     return parser.parse_args()
 
 
 def run(options: argparse.Namespace) -> int:
-    """Score what is missing, draw, write the page."""
+    """Score missing rows, draw the pictures, write the page."""
     images = options.out / "images"
     make_folder(images)
     make_folder(options.scores)
@@ -111,16 +110,16 @@ def run(options: argparse.Namespace) -> int:
         content = as_png(one.figure, one.dpi, colours=None if one.dpi == _MAP_DPI else 256)
         write(images / f"{one.name}.png", content)
         sizes.append(len(content))
-        said = in_lines(one.text)
+        text_lines = in_lines(one.text)
         picture = f"![{one.alternative}](images/{one.name}.png)"
-        text += f"\n## {one.heading}\n\n{picture}\n\n{said}\n"
+        text += f"\n## {one.heading}\n\n{picture}\n\n{text_lines}\n"
     write(options.out / "gallery.md", text.encode())
     print(f"wrote {options.out / 'gallery.md'} and {len(drawn)} pictures, {sum(sizes):,} bytes")
     return 0
 
 
 def in_lines(text: str) -> str:
-    """Return a paragraph in lines of at most 100 letters; a command stays in one.
+    """Return a paragraph in lines of at most 100 characters, with commands unbroken.
 
     >>> in_lines("x" * 90 + " `tcs list --json`").splitlines()[1]
     '`tcs list --json`'
@@ -130,7 +129,7 @@ def in_lines(text: str) -> str:
 
 
 def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
-    """Return the score file of a row, scored now if it is not there."""
+    """Return the score file of a row; a missing row is scored first."""
     path = options.scores / default_path(*row, ROBOT)
     if not path.exists():
         with terminal.progress_bar(f"configurations, {path.stem}") as on_progress:
@@ -162,7 +161,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
         'shaving poses well from behind the bed with the head rest lying flat". Here, without a '
         f"wall, the best single place is {where}, with the head rest {rest} ({where_exactly}); "
         f"from it {alone[0]:.0%} of the goals are reached, P_M {alone[1]:.3f}. With the wall that "
-        f"place is lost, and the best single place reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
+        f"base pose is blocked, and the best single reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
     )
     return Drawn(
         "gallery-figure-1",
@@ -175,7 +174,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
 
 
 def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
-    """Return a row of Figure 6: the robot at each place of the set with the best scores."""
+    """Return a row of Figure 6: the robot at each base pose of the best set."""
     shown = ShownSet.of(file, None)
     sets = file.nominal.sets
     reachability, manipulability = sets.scores_of(tuple(sorted(shown.indices)))
@@ -185,7 +184,7 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
     )
     single = sets.scores_of(sets.best_single)
     beside = (
-        f" The best single place reaches {single[0]:.0%}, P_M {single[1]:.3f}."
+        f" The best single base pose reaches {single[0]:.0%}, P_M {single[1]:.3f}."
         if len(shown.members) > 1
         else ""
     )
@@ -199,12 +198,12 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
         _DPI,
         f"Figure 6 ({LETTERS[row]}): {title}, {row[1]}",
         text,
-        f"The robot at each place of the best set for {title.lower()}, its arm at a goal.",
+        f"The robot at each base pose of the best set for {title.lower()}, its arm at a goal.",
     )
 
 
 def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
-    """Return the pictures from above: the README's map, and one for each state of the bed."""
+    """Return the maps: the one of the README, and one for each state of the bed."""
     chair, bed = files["shaving", "wheelchair"], files["bathing", "bed"]
     chosen = ShownSet.of(chair, HERE)
     command = "tcs map shaving-wheelchair-pr2.tcs --out map.png --here 1.4 -1.2 180"
@@ -215,11 +214,10 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
             _MAP_DPI,
             "From above",
             f"Shaving in the wheelchair, drawn by `{command}`. Bases are to scale, their arrows "
-            "are the headings. A place shows the best that a robot standing there can do by "
-            "itself: two places together do more. Colours are told apart with any kind of "
-            "colour vision; tests simulate protanopia, deuteranopia and tritanopia.",
-            "A wheelchair and the person in it from above, with the places where the robot can "
-            "stand coloured by what they are worth.",
+            "are the headings. The colour of a base position is the greatest score of a single "
+            "configuration there; pairs reach more. The colours are distinguishable under colour "
+            "vision deficiencies; tests simulate protanopia, deuteranopia and tritanopia.",
+            "A wheelchair and the person in it from above, with base positions coloured by score.",
         ),
         Drawn(
             "states",
@@ -227,17 +225,17 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
             _MAP_DPI,
             "For each state of the bed",
             "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed height "
-            "by head rest, in one colour scale. Both stops want the same state, and are marked in "
+            "by head rest, in one colour scale. Both stops use the same state and are marked in "
             "its panel."
-            if _want_one_state(bed)
+            if _share_a_state(bed)
             else "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed "
-            "height by head rest, in one colour scale. Each stop is marked in the panel it wants.",
+            "height by head rest, in one colour scale. Each stop is marked in the panel of its state.",
             "Twelve maps of the floor around a bed, one for each bed height and head rest.",
         ),
     ]
 
 
-def _want_one_state(file: ScoreFile) -> bool:
+def _share_a_state(file: ScoreFile) -> bool:
     return len({at.environment for at in ShownSet.of(file, None).members}) == 1
 
 

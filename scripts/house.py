@@ -116,10 +116,11 @@ def sizes(folder: str, files: list[Path]) -> None:
             for node in ast.walk(ast.parse(text))
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.end_lineno
         ]
-    if modules:
+    if modules and functions:
         print(f"{folder}: {len(modules)} modules, {sum(modules)} lines; {len(functions)} functions")
         for name, lengths in (("module", modules), ("function", functions)):
-            median, ninth = statistics.median(lengths), statistics.quantiles(lengths, n=10)[-1]
+            median = statistics.median(lengths)
+            ninth = statistics.quantiles(lengths, n=10)[-1] if len(lengths) > 1 else lengths[0]
             print(f"{folder}: {name} length: median {median:g}, 90th percentile {ninth:g} lines")
 
 

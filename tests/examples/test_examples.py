@@ -16,7 +16,7 @@ PRINTED = {
     "03_own_task": r"3 goals, weights \[0.25, 0.25, 0.5\].*\[True, True, True\]",
     "04_another_robot": r"pr2: 75%.*pr2_spoon: \d+%.*panda: \d+%",
     "05_observed_person": r"used \{'person_y': 0.0\}.*used \{'person_y': 0.1\}.*is 0.010 m from "
-    r"where it is at the shift \{'person_y': -0.1\}",
+    r"its position at the shift \{'person_y': -0.1\}",
     "06_robustness": r"single: [67]\d\.\d%.*best: 9\d\.\d%.*: (9\d\.\d|100\.0)% estimated",
     "07_explain": r"goal 0: arm_blocked, l_upper_arm_link would touch .* Raise the torso 15 cm"
     r".*goal 3: reached\ngoal 4: too_far\.",

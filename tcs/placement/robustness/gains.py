@@ -33,7 +33,7 @@ class Gain:
     scored: Evaluation
     """The set with the greatest P_R + P_M."""
     paired: Difference
-    """Fraction of goals reached by the former minus that of the latter, signed rank test."""
+    """Fraction of goals reached by the robust minus that by the scored set, signed rank test."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain containers."""

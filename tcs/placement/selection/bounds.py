@@ -121,7 +121,7 @@ class Bounds:
 
     @cached_property
     def _levels(self) -> FloatArray:
-        """Gamma times the least cost of all but driving with each candidate, shape (C,).
+        """Gamma times the least cost other than driving with each candidate, shape (C,).
 
         Changes of heading, torso and bed obey the triangle inequality: a tour costs at least the
         direct change from the current state to each of its members.

@@ -1,4 +1,4 @@
-"""The script that makes the robustness report."""
+"""The script that writes the robustness report."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def run(*words, cwd):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--rows", "shavin/bed"), "unknown row 'shavin/bed'"),
         (("--samples", 0, "--rows", "shaving/bed"), "samples is 0"),
         (("--jobs", 0), "--jobs is 0"),
     ],
 )
-def test_what_cannot_be_is_told_in_a_line_before_the_work(tmp_path, words, said):
+def test_invalid_options_are_refused_in_one_line_before_the_work(tmp_path, words, message):
     done = run(*words, cwd=tmp_path)
     assert done.returncode == 1
-    assert said in done.stderr
+    assert message in done.stderr
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 

@@ -1,4 +1,4 @@
-"""Real but small rows: a few places beside the wheelchair and the bed."""
+"""Small rows of real scenes: a few base poses beside the wheelchair and the bed."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ BED = {
     "base_yaw": (0, 90, 4),
     "torso": (0.15, 0.15, 2),
 }
-FOUND = {"person_y": (0, 0.05, 2)}
+OBSERVED = {"person_y": (0, 0.05, 2)}
 
 
 @pytest.fixture(scope="session")
-def rooms(tmp_path_factory):
+def environments(tmp_path_factory):
     """Paths of two environment files of the user's own, by name."""
     folder = tmp_path_factory.mktemp("environments")
     return {
         "chair": write_environment(folder, "small-chair", BESIDE),
-        "bed": write_environment(folder, "small-bed", BED, based_on="bed", observed=FOUND),
+        "bed": write_environment(folder, "small-bed", BED, based_on="bed", observed=OBSERVED),
     }
 
 
 @pytest.fixture(scope="session")
-def chair_file(rooms):
-    """Shaving in the wheelchair, from a few places."""
-    return score("shaving", rooms["chair"])
+def chair_file(environments):
+    """Shaving in the wheelchair, from a few base poses."""
+    return score("shaving", environments["chair"])
 
 
 @pytest.fixture(scope="session")
-def bed_file(rooms):
-    """Bathing on the bed, from a few places, for two shifts of the person."""
-    return score("bathing", rooms["bed"])
+def bed_file(environments):
+    """Bathing on the bed, from a few base poses, for two shifts of the person."""
+    return score("bathing", environments["bed"])
 
 
 @pytest.fixture(scope="session")
@@ -53,5 +53,5 @@ def bed_trials(bed_file):
 
 @pytest.fixture(scope="session", params=["chair", "bed"])
 def trials(request):
-    """Both, one after the other."""
+    """Both rows, one after the other."""
     return request.getfixturevalue(f"{request.param}_trials")

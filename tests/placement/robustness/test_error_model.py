@@ -1,4 +1,4 @@
-"""The sampler: moments, named streams, and what it refuses."""
+"""The error model: moments, named streams and refused input."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_errors_of_the_environments_are_table_ii(chair_trials, bed_trials):
 @pytest.mark.parametrize("name", MODEL.errors)
 def test_moments(many, name):
     drawn, sd = many[name], MODEL.errors[name].standard_deviation
-    # Four standard errors of each moment: a fair sampler is past one of them once in 10,000.
+    # Four standard errors of each moment, exceeded once in 10,000 by a correct sampler.
     assert abs(drawn.mean()) < 4 * sd / math.sqrt(MANY)
     assert abs(drawn.std() / sd - 1) < 4 / math.sqrt(2 * MANY)
     assert abs(stats.skew(drawn)) < 4 * math.sqrt(6 / MANY)
@@ -52,14 +52,14 @@ def test_moments(many, name):
 def test_distributions(many):
     tilt = stats.kstest(many["head_tilt"] / math.radians(5.0), "norm")
     even = stats.kstest(many["wheelchair_y"], stats.uniform(-0.02, 0.04).cdf)
-    # A fair sampler is below 0.001 once in a thousand, and the seed is fixed.
+    # p below 0.001 occurs once in a thousand for a correct sampler; the seed is fixed.
     assert min(tilt.pvalue, even.pvalue) > 1e-3
     assert np.abs(many["wheelchair_y"]).max() <= 0.02
 
 
 def test_joints_and_neighbours_in_a_stream_are_independent(many):
     names = list(many)
-    least = 4 / math.sqrt(MANY)  # four standard errors of a correlation of none
+    least = 4 / math.sqrt(MANY)  # four standard errors of zero correlation
     for i, first in enumerate(names):
         for second in names[i + 1 :]:
             assert abs(np.corrcoef(many[first], many[second])[0, 1]) < least
@@ -78,24 +78,24 @@ def test_fewer_samples_are_the_first_of_more(many):
     assert all(np.array_equal(few[name], many[name][:100]) for name in few)
 
 
-def test_adding_a_joint_leaves_the_others_alone(many):
+def test_adding_a_joint_does_not_change_the_others(many):
     more = ErrorModel({"person_y": NORMAL, **MODEL.errors}, "made up").draw(MANY, 0)
     assert all(np.array_equal(more[name], many[name]) for name in many)
 
 
-def test_names_that_begin_alike_have_streams_of_their_own():
+def test_names_with_a_common_prefix_have_separate_streams():
     names = ["", "a", "aa", "aaaaaaaa", "aaaa", "b", "/a", "a/", "person_x", "person_xx"]
     first = {float(named_generator(0, name).standard_normal()) for name in names}
     assert len(first) == len(names)
 
 
-def test_names_of_one_checksum_have_streams_of_their_own():
-    # Two words that CRC-32 does not tell apart.
+def test_names_with_equal_checksums_have_separate_streams():
+    # Two words with the same CRC-32.
     one, other = (named_generator(0, name).standard_normal() for name in ("plumless", "buckeroo"))
     assert one != other
 
 
-def test_a_file_takes_the_place_of_the_environments_errors(chair_trials, tmp_path):
+def test_a_file_replaces_the_errors_of_the_environment(chair_trials, tmp_path):
     path = tmp_path / "errors.yaml"
     path.write_text(
         "source: measured\n"
@@ -111,7 +111,7 @@ def test_a_file_takes_the_place_of_the_environments_errors(chair_trials, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("text", "error", "said"),
+    ("text", "error", "message"),
     [
         (
             "errors: {persn_x: {distribution: normal, std: 0.1}}",
@@ -130,10 +130,10 @@ def test_a_file_takes_the_place_of_the_environments_errors(chair_trials, tmp_pat
     ],
     ids=lambda value: value if isinstance(value, str) and ":" in value else "",
 )
-def test_bad_files_are_refused_in_one_line(chair_trials, tmp_path, text, error, said):
+def test_bad_files_are_refused_in_one_line(chair_trials, tmp_path, text, error, message):
     path = tmp_path / "errors.yaml"
     path.write_text(text)
-    with pytest.raises(error, match=said) as caught:
+    with pytest.raises(error, match=message) as caught:
         ErrorModel.of(chair_trials.scene, path)
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)
@@ -150,6 +150,6 @@ def test_numbers_out_of_range_are_refused(samples, seed):
         MODEL.draw(samples, seed)
 
 
-def test_an_environment_without_errors_asks_for_some(chair_trials):
+def test_an_environment_without_errors_is_refused(chair_trials):
     with pytest.raises(TcsError, match="error file"):
         ErrorModel.of(chair_trials.scene, {}).draw(10, 0)

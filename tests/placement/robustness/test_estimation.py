@@ -1,4 +1,4 @@
-"""Estimates for a real row: those of the samples, whatever the jobs, and better than P_M's."""
+"""Estimates for a small row: equal to evaluations, and independent of the number of jobs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_every_table_gets_estimates_of_singles_and_pairs(chair_file, done):
         sets, success = table.sets, table.success
         assert 0 < success.of_size(1).size
         assert 0 < success.of_size(2).size <= 100
-        # The sets with the best scores are among them: there is something to compare with.
+        # The sets with the best scores are among them, for comparison.
         assert success.row_of(tuple(sorted(sets.best))) is not None
         assert success.row_of(sets.best_single) is not None
         assert set(success.samples.tolist()) <= {64, 128}
@@ -34,8 +34,8 @@ def test_every_table_gets_estimates_of_singles_and_pairs(chair_file, done):
 
 
 @pytest.mark.parametrize("many", [250, 50])
-def test_sets_that_reach_as_much_as_the_best_are_in_question(rng, many):
-    """All of them and nobody else; where they are few, the next best join them."""
+def test_sets_equal_in_reachability_to_the_best_contend(rng, many):
+    """All of them and no others; if they are few, the next best are added."""
     reachability = np.where(np.arange(400) < many, 1.0, 0.9)
     manipulability = rng.uniform(0.0, 0.05, 400)
     rows = np.arange(400)[:, None]
@@ -61,14 +61,14 @@ def test_only_configurations_of_the_best_sets_are_screened(monkeypatch):
     )
     found = estimation._screened(trials, pool, 3, seed=0, jobs=1)
     assert tried == [0, 1, 2, 3]
-    # Equal success of all, so the best scores go first.
+    # All are equally successful, so the best scores go first.
     assert found.tolist() == [[0, 1], [2, 3], [1, 2]]
 
 
 def test_estimates_are_means_of_evaluations(done):
     trials = Trials.of(done)
     success = trials.scored.success
-    offsets = trials.errors.draw(128, 0, stream="race")
+    offsets = trials.errors.draw(128, 0, stream=estimation._STREAM)
     for row in (0, int(np.argmax(success.success)), len(success.success) - 1):
         reached = trials.reached(success.set_at(row), offsets).any(axis=0)
         fractions = reached[: success.samples[row]] @ trials.weights
@@ -82,12 +82,12 @@ def test_same_numbers_for_any_number_of_jobs(chair_file, done):
         assert np.array_equal(one.success.success, other.success.success)
 
 
-def test_the_chosen_set_does_no_worse_on_samples_it_has_not_seen(done):
+def test_the_most_robust_set_does_no_worse_on_fresh_samples(done):
     robust = evaluate(done, select="robust", samples=200, seed=7)
     best = evaluate(done, select="best", samples=200, seed=7)
-    off = robust.fractions - best.fractions
+    difference = robust.fractions - best.fractions
     # Four standard errors of the mean paired difference.
-    assert off.mean() > -4 * off.std() / np.sqrt(200)
+    assert difference.mean() > -4 * difference.std() / np.sqrt(200)
 
 
 @pytest.mark.slow
@@ -99,7 +99,7 @@ def test_one_table_alone(bed_file):
         evaluate(done, select="robust", table=0)
     (table,) = success_summary(done)["tables"]
     assert table["observed"] == {"person_y": 0.05}
-    # Each table keeps the record of how it was estimated.
+    # Each table keeps the settings of its estimates.
     both = robustify(done, samples=65, sets=10, check_base=True, tables=[0])
     assert [made["samples"] for made in both.metadata["robustness"]] == [65, 64]
     assert [table["settings"]["check_base"] for table in success_summary(both)["tables"]] == [
@@ -108,7 +108,7 @@ def test_one_table_alone(bed_file):
     ]
 
 
-def test_choosing_weighs_the_estimates(done):
+def test_selection_weighs_the_estimates(done):
     here = tcs.InitialConfiguration(base_x=0.5, base_y=-1.0, base_yaw=0.0, torso=0.0)
     weights = tcs.UtilityWeights(reachability=0, manipulability=0, travel=0, success=1)
     choice = tcs.select(done, here, weights=weights)
@@ -117,9 +117,9 @@ def test_choosing_weighs_the_estimates(done):
 
 
 def test_summary_and_progress(chair_file):
-    seen = []
-    done = robustify(chair_file, samples=70, sets=8, on_progress=lambda *step: seen.append(step))
-    assert seen == [(i + 1, 6) for i in range(6)]
+    steps = []
+    done = robustify(chair_file, samples=70, sets=8, on_progress=lambda *step: steps.append(step))
+    assert steps == [(i + 1, 6) for i in range(6)]
     (table,) = success_summary(done)["tables"]
     assert table["observed"] == {}
     assert [best["sets"] for best in table["best"]] == [2, 8]

@@ -1,4 +1,4 @@
-"""Evaluations: no error gives the offline score, any member counts, the same seed the same."""
+"""Evaluations: without error the offline score, any member counts, reproducible by seed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOTHING = {"person_x": ErrorDistribution(distribution="normal", std=0.0)}
 
 
 def drawn_sets(file, rng, count):
-    """Random pairs of candidates, kept or not: the law holds for any set."""
+    """Random pairs of candidates, kept or not: the property holds for any set."""
     candidates = file.nominal.sets.candidates
     return rng.choice(candidates, (count, 2)).tolist()
 
@@ -38,7 +38,7 @@ def test_without_error_the_score_is_the_offline_score(which, request, rng):
     ]
 
 
-def test_each_drawn_set_meets_the_one_sample_that_is_its_own(bed_trials):
+def test_each_drawn_set_is_evaluated_on_its_own_sample(bed_trials):
     found = evaluate(bed_trials, samples=12, select="uniform", members=2)
     assert found.sets.shape == (12, 2)
     for i, members in enumerate(found.sets):
@@ -55,7 +55,7 @@ def test_a_goal_counts_when_any_member_reaches_it(bed_trials):
     either = alone[0].reached | alone[1].reached
     assert np.array_equal(both.reached, either)
     assert np.array_equal(both.fractions, tc_reachability(either, both.weights))
-    # Each adds something: the law is not tried on an idle second member.
+    # Each member adds goals, so the property is not tested on an idle second member.
     assert all(np.any(either & ~one.reached) for one in alone)
 
 
@@ -66,7 +66,7 @@ def test_growing_a_set_never_lowers_it(chair_trials, rng):
     assert np.all(two.fractions >= one.fractions)
 
 
-def test_the_same_seed_gives_the_same_for_any_number_of_jobs(bed_file):
+def test_results_do_not_depend_on_the_number_of_jobs(bed_file):
     results = [
         evaluate(bed_file, samples=30, seed=4, jobs=jobs, select=select).to_json()
         for jobs in (1, 2)
@@ -79,7 +79,7 @@ def test_the_same_seed_gives_the_same_for_any_number_of_jobs(bed_file):
     assert not np.array_equal(other.offsets["person_x"], evaluate(bed_file, samples=30).offsets)
 
 
-def test_methods_meet_the_same_samples(bed_trials):
+def test_methods_share_the_samples(bed_trials):
     best = evaluate(bed_trials, samples=20)
     single = evaluate(bed_trials, samples=20, select="single")
     other = evaluate(bed_trials, samples=20, stream="by itself")
@@ -88,7 +88,7 @@ def test_methods_meet_the_same_samples(bed_trials):
         assert not np.array_equal(values, other.offsets[name])
 
 
-def test_larger_errors_leave_less(chair_file):
+def test_larger_errors_reduce_the_mean(chair_file):
     def mean(sd):
         errors = {"person_x": ErrorDistribution(distribution="normal", std=sd)}
         return evaluate(chair_file, samples=200, errors=errors).summary.mean
@@ -114,7 +114,7 @@ def test_figures_are_those_of_the_samples(bed_trials):
         found.reached[0] = True
 
 
-def test_the_person_may_be_believed_elsewhere(bed_file):
+def test_other_tables_have_other_observed_states(bed_file):
     here = evaluate(bed_file, samples=20, table=0)
     there = evaluate(bed_file, samples=20, table=1)
     assert here.observed == {"person_y": 0.0}
@@ -135,7 +135,7 @@ def test_one_and_two_with_and_without(bed_trials):
 
 
 @pytest.mark.parametrize(
-    ("options", "error", "said"),
+    ("options", "error", "message"),
     [
         ({"samples": 0}, TcsError, "samples is 0; must be a whole number, 1"),
         ({"samples": 1.5}, TcsError, "samples is 1.5"),
@@ -149,13 +149,13 @@ def test_one_and_two_with_and_without(bed_trials):
     ],
     ids=str,
 )
-def test_what_makes_no_sense_is_refused(chair_trials, options, error, said):
-    with pytest.raises(error, match=said) as caught:
+def test_invalid_options_are_refused(chair_trials, options, error, message):
+    with pytest.raises(error, match=message) as caught:
         evaluate(chair_trials, **options)
     assert "\n" not in str(caught.value)
 
 
-def test_nothing_reached_is_nothing_to_evaluate(bed_trials):
+def test_a_table_without_candidates_is_refused(bed_trials):
     import dataclasses
 
     none = dataclasses.replace(bed_trials, table=0)

@@ -1,4 +1,4 @@
-"""Gains of choosing by success, and how well P_M predicts it, on a real but small row."""
+"""Gains of selecting by success, and how well P_M predicts it, on a small row."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy import stats
 
 from tcs.errors import SelectionError, TcsError
 from tcs.placement.robustness import Trials, predictions, robust_gains, robustify
+from tcs.placement.robustness.estimation import _STREAM
 from tcs.placement.robustness.gains import _rank_correlation, _stratified
 
 
@@ -18,16 +19,16 @@ def robust(chair_file):
     return Trials.of(robustify(chair_file, samples=128, sets=100))
 
 
-def test_gains_are_paired_and_on_samples_of_their_own(robust):
+def test_gains_are_paired_and_on_fresh_samples(robust):
     gains = robust_gains(robust, samples=100, seed=0)
     assert [gain.members for gain in gains] == [1, 2]
-    unseen = robust.errors.draw(100, 0, stream="race")
+    estimation = robust.errors.draw(100, 0, stream=_STREAM)
     for gain in gains:
-        off = gain.robust.fractions - gain.scored.fractions
-        assert gain.paired.mean == pytest.approx(off.mean())
+        difference = gain.robust.fractions - gain.scored.fractions
+        assert gain.paired.mean == pytest.approx(difference.mean())
         for name, values in gain.robust.offsets.items():
             assert np.array_equal(values, gain.scored.offsets[name])
-            assert not np.intersect1d(values, unseen[name]).size
+            assert not np.intersect1d(values, estimation[name]).size
     success, sets = robust.scored.success, robust.scored.sets
     assert tuple(gains[1].robust.sets[0]) == success.most_robust(sets)
     assert tuple(gains[1].scored.sets[0]) == sets.best
@@ -39,10 +40,10 @@ def test_gains_need_estimates(chair_trials):
         robust_gains(chair_trials)
 
 
-def test_predictions_of_all_four_kinds(chair_trials):
+def test_predictions_of_all_four_cases(chair_trials):
     found = predictions(chair_trials, sets=20, samples=20)
-    kinds = [(one.members, one.equal_reach) for one in found]
-    assert kinds == [(1, False), (1, True), (2, False), (2, True)]
+    cases = [(one.members, one.equal_reach) for one in found]
+    assert cases == [(1, False), (1, True), (2, False), (2, True)]
     sets = chair_trials.scored.sets
     assert found[0].population == len(sets.candidates)
     assert found[2].population == sets.kept_pairs
@@ -50,7 +51,7 @@ def test_predictions_of_all_four_kinds(chair_trials):
         assert one.sets == min(20, one.population)
         if one.rho is not None:
             assert one.ci95[0] <= one.rho <= one.ci95[1]
-    # Who reaches more goals has more of both: the law everybody would expect.
+    # Both P_M and success grow with the number of goals reached.
     assert found[0].rho > 0.5
     assert json.dumps([one.to_json() for one in found])
     again = predictions(chair_trials, sets=20, samples=20, jobs=1)
@@ -59,7 +60,7 @@ def test_predictions_of_all_four_kinds(chair_trials):
         predictions(chair_trials, sets=9)
 
 
-def test_strata_are_drawn_from_evenly(rng):
+def test_draws_are_even_over_the_strata(rng):
     values, pool = rng.uniform(size=1000), np.arange(0, 1000, 2)
     drawn = _stratified(rng, pool, values, 50)
     assert np.unique(drawn).size == 50
@@ -73,7 +74,7 @@ def test_the_interval_of_a_rank_correlation_by_hand():
     first = np.arange(8.0)
     second = first[[1, 0, 3, 2, 5, 4, 7, 6]]
     rho, ci95, _ = _rank_correlation(first, second)
-    # Every rank is one off: 1 - 6 * 8 / (8 * 63).
+    # Every rank differs by one: 1 - 6 * 8 / (8 * 63).
     assert rho == pytest.approx(1 - 48 / 504)
     # Fisher's transformation; Bonett and Wright's variance (1 + rho^2 / 2) / (8 - 3); 97.5 % of a
     # normal is at 1.96.
@@ -83,7 +84,7 @@ def test_the_interval_of_a_rank_correlation_by_hand():
     )
 
 
-def test_rank_correlation_is_spearmans_and_its_interval_holds(rng):
+def test_the_rank_correlation_is_spearmans_and_its_interval_has_its_coverage(rng):
     first = rng.normal(size=60)
     rho, (low, high), p = _rank_correlation(first, first + rng.normal(size=60))
     assert low < rho < high
@@ -95,7 +96,7 @@ def test_rank_correlation_is_spearmans_and_its_interval_holds(rng):
         first = rng.normal(size=60)
         _, (low, high), _ = _rank_correlation(first, first + rng.normal(size=60))
         held += low <= truth <= high
-    # Four standard errors of a share of 0.95 in 300.
+    # Four standard errors of a proportion of 0.95 in 300.
     assert held / 300 > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 300)
     assert _rank_correlation(first, np.ones(60)) == (None, None, None)
     assert _rank_correlation(first, 3 * first)[0] == stats.spearmanr(first, first).statistic

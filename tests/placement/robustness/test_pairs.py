@@ -1,4 +1,4 @@
-"""Going through kept sets: against a plain loop over all pairs."""
+"""Kept pairs, enumerated and drawn, against a plain loop over all pairs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def table(seed=1, **options):
 
 
 def by_hand(sets):
-    """Every kept pair, one by one, from the definition."""
+    """Every kept pair with its scores, from the definition."""
     limits, xy = sets.limits, sets.cell_xy[sets.cell]
     for a, b in itertools.combinations(range(len(sets.candidates)), 2):
         if np.hypot(*(xy[a] - xy[b])) < sets.min_distance - 1e-9:
@@ -49,7 +49,7 @@ def test_all_kept_pairs(options, chunk, monkeypatch):
 
 
 @pytest.mark.parametrize("what", ["least_reachability", "least_sum"])
-def test_only_those_that_score_as_much(what):
+def test_only_pairs_with_the_least_scores(what):
     sets = table()
     scores = sorted({r if what == "least_reachability" else r + m for _, _, r, m in by_hand(sets)})
     least = {what: scores[len(scores) // 2]}
@@ -64,7 +64,7 @@ def test_only_those_that_score_as_much(what):
 
 
 @pytest.mark.parametrize("members", [1, 2])
-def test_sets_are_drawn_evenly_from_all_that_reach_as_much(members):
+def test_sets_are_drawn_uniformly_from_all_of_equal_reachability(members):
     sets = table()
     count = 20_000
     drawn, choices = uniform_sets(sets, members, count, 0)
@@ -73,18 +73,18 @@ def test_sets_are_drawn_evenly_from_all_that_reach_as_much(members):
     if members == 1:
         pool = [((a,), r) for a, r in singles]
     greatest = max(r for _, r in (singles if members == 1 else [*singles, *pool]))
-    able = {
+    expected = {
         tuple(int(sets.candidates[i]) for i in rows) for rows, r in pool if r >= 0.98 * greatest
     }
-    seen, often = np.unique(drawn, axis=0, return_counts=True)
-    assert {tuple(map(int, row)) for row in seen} == able
-    assert choices == len(able) > 1
-    # A fair draw is below 0.001 once in a thousand, and the seed is fixed.
-    assert stats.chisquare(often).pvalue > 1e-3
+    sampled, counts = np.unique(drawn, axis=0, return_counts=True)
+    assert {tuple(map(int, row)) for row in sampled} == expected
+    assert choices == len(expected) > 1
+    # p below 0.001 occurs once in a thousand for a uniform draw; the seed is fixed.
+    assert stats.chisquare(counts).pvalue > 1e-3
     assert np.array_equal(uniform_sets(sets, members, count, 0)[0], drawn)
 
 
-def test_where_no_pair_was_kept_none_is_drawn():
+def test_without_kept_pairs_none_is_drawn():
     sets = table(max_members=1)
     assert Pairs.joined(kept_pairs(sets)).first.size == 0
     with pytest.raises(SelectionError, match="No set of 2"):

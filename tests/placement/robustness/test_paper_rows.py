@@ -1,4 +1,4 @@
-"""Every row of Table I: without error, evaluations are the offline scores, goal by goal."""
+"""Every row of Table I: without error, evaluations equal the offline scores, goal by goal."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_without_error_every_row_gives_its_offline_score(task, environment, rng)
     members = rng.choice(sets.candidates, 200, replace=False)
     reached = trials.reached(members, trials.errors.draw(1, 0))[:, 0]
     assert np.array_equal(reached, sets.reached[np.searchsorted(sets.candidates, members)])
-    # Configurations whose base is blocked reach nothing offline, and here when it is checked.
+    # Configurations with a blocked base reach nothing offline, nor here if the base is checked.
     everywhere = rng.choice(trials.job.grid.size, 2000, replace=False)
     checked = Trials.of(file, errors=trials.errors.errors, check_base=True)
     again = checked.reached(everywhere, trials.errors.draw(1, 0))[:, 0]

@@ -1,4 +1,4 @@
-"""Successive rejection: it finds the best, wastes no samples, and its intervals hold."""
+"""Successive halving finds the best sets with few samples, and its intervals have coverage."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ WEIGHTS = np.array([0.5, 0.25, 0.25])
 
 
 class Field:
-    """Members that reach goals with known probabilities, and share the luck of a sample."""
+    """Members that reach goals with known probabilities, correlated within a sample."""
 
     def __init__(self, rng, members=60, samples=1024):
         self.chance = rng.uniform(0.1, 0.9, (members, 3))
         shared = rng.uniform(size=(1, samples, 1))
         own = rng.uniform(size=(members, samples, 3))
-        # Half of the luck is the sample's: what common random numbers live from.
+        # Half of the random numbers are common to the sample, so that differences vary less.
         self.reached = (
             np.where(rng.uniform(size=own.shape) < 0.5, shared, own) < (self.chance[:, None])
         )
@@ -61,26 +61,26 @@ def test_estimates_are_those_of_the_samples_each_set_has_had(field, sets):
         assert (found.low[k], found.high[k]) == pytest.approx((low[0], high[0]), abs=1e-6)
 
 
-def test_the_race_is_cheaper_than_trying_everything_and_finds_the_best(field, sets):
+def test_halving_needs_fewer_samples_and_finds_the_best(field, sets):
     found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
     truth = field.fractions(sets).mean(axis=1)
     assert found.survivors.size
     assert np.all(found.samples[found.survivors] == 1024)
-    # The better half goes on: what survives is at the top, by a hair of luck at most.
+    # The better half continues, so the survivors are at most slightly worse than the best.
     assert truth.max() - truth[found.survivors].max() < 0.01
-    assert field.tried.max() == 1  # nothing is tried twice
+    assert field.tried.max() == 1  # no pair is evaluated twice
     assert field.tried.sum() < 0.5 * field.tried.size
     assert np.count_nonzero(found.samples == 1024) < len(sets) / 15
 
 
-def test_no_set_behind_beyond_doubt_goes_on(rng):
+def test_significantly_worse_sets_are_rejected(rng):
     field = Field(rng, members=3)
     field.reached[0], field.reached[1], field.reached[2] = True, False, True
     found = successive_halving(np.array([[0], [1], [2]]), WEIGHTS, 256, field.attempt)
     assert found.samples.tolist() == [256, 64, 128]
     assert found.mean.tolist() == [1.0, 0.0, 1.0]
     assert found.survivors.tolist() == [0]
-    # Among equals those that come first go on.
+    # Ties go to the first.
     assert 0.0 < found.high[1] < 3.7 / 64
 
 
@@ -104,25 +104,25 @@ def halved_by_loops(fractions, sizes):
 
 
 @pytest.mark.parametrize("ahead", [0.02, 0.1, 0.2, 0.3])
-def test_who_is_rejected_when_agrees_with_plain_loops(rng, ahead):
-    """A leader ahead of the others by more or less, so that some are behind beyond doubt."""
+def test_rejections_agree_with_plain_loops(rng, ahead):
+    """A leader with different leads, so that some sets are significantly worse."""
     sets = np.arange(40)[:, None]
     field = Field(rng, members=40)
     field.chance[:] = rng.uniform(0.4, 0.6, field.chance.shape)
     field.chance[7] = 0.6 + ahead
-    luck = np.where(
+    random = np.where(
         rng.uniform(size=field.reached.shape) < 0.5,
         rng.uniform(size=(1, 1024, 1)), rng.uniform(size=field.reached.shape),
     )  # fmt: skip
-    field.reached = luck < field.chance[:, None]
+    field.reached = random < field.chance[:, None]
     found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
     had, alive = halved_by_loops(field.fractions(sets), round_sizes(1024))
     assert found.samples.tolist() == had
     assert found.survivors.tolist() == alive
 
 
-def test_intervals_of_survivors_hold(rng):
-    # The truth of the field is known: the chance that a pair reaches a goal.
+def test_intervals_have_their_coverage(rng):
+    # The true success is known: the probability that a member reaches a goal.
     held = count = 0
     for _ in range(20):
         field = Field(rng, members=20, samples=256)
@@ -131,7 +131,7 @@ def test_intervals_of_survivors_hold(rng):
         truth = field.chance @ WEIGHTS
         held += np.count_nonzero((found.low <= truth) & (truth <= found.high))
         count += len(sets)
-    # 95 % each; sets that share their luck fail together, hence the room.
+    # 95 % each; sets are correlated, hence the wider tolerance.
     assert held / count > 0.88
 
 

@@ -1,4 +1,4 @@
-"""Trials: no error changes nothing, and Drake confirms every solution in a displaced room."""
+"""Trials: equal to the scores without error, and confirmed by Drake in perturbed environments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def some(rng, trials, count):
     return np.sort(rng.choice(trials.scored.sets.candidates, count, replace=False))
 
 
-def test_without_error_every_candidate_reaches_what_it_was_scored_to(trials):
+def test_without_error_every_candidate_reaches_its_scored_goals(trials):
     for table in range(len(trials.file.tables)):
         here = trials.at_table(table)
         sets = here.scored.sets
@@ -58,7 +58,7 @@ def test_a_blocked_base_counts_only_where_it_is_checked(chair_file, chair_trials
 
 
 def test_checking_the_base_never_adds_a_goal(chair_file, chair_trials, rng):
-    # The chair comes at the robot from aside: a base that stood free no longer does.
+    # The chair moves sideways into the robot, so a free base may become blocked.
     members, offsets = some(rng, chair_trials, 30), {"wheelchair_y": np.linspace(-0.4, 0.4, 20)}
     free = chair_trials.reached(members, offsets)
     checked = Trials.of(chair_file, check_base=True).reached(members, offsets)
@@ -66,7 +66,7 @@ def test_checking_the_base_never_adds_a_goal(chair_file, chair_trials, rng):
     assert np.count_nonzero(checked) < np.count_nonzero(free)
 
 
-def test_neither_threads_nor_batches_change_anything(trials, rng, monkeypatch):
+def test_results_do_not_depend_on_threads_or_batches(trials, rng, monkeypatch):
     members, offsets = some(rng, trials, 30), trials.errors.draw(25, 0)
     found = trials.reached(members, offsets, jobs=1)
     assert np.array_equal(trials.reached(members, offsets, jobs=3), found)
@@ -77,7 +77,7 @@ def test_neither_threads_nor_batches_change_anything(trials, rng, monkeypatch):
     assert np.array_equal(trials.reached(members[::-1], offsets)[::-1], found)
 
 
-def test_each_in_its_own_sample_is_the_diagonal_of_all(trials, rng):
+def test_configurations_on_their_own_samples_are_the_diagonal(trials, rng):
     members, offsets = some(rng, trials, 30), trials.errors.draw(30, 0)
     every = trials.reached(members, offsets)
     each = trials.reached_each(members, offsets)
@@ -87,14 +87,14 @@ def test_each_in_its_own_sample_is_the_diagonal_of_all(trials, rng):
 
 
 def test_progress_ends_with_everything_done(bed_trials, rng):
-    seen = []
+    steps = []
     members, offsets = some(rng, bed_trials, 5), bed_trials.errors.draw(4, 0)
-    bed_trials.reached(members, offsets, on_progress=lambda *step: seen.append(step))
-    assert seen[-1] == (20, 20)
-    assert [done for done, _ in seen] == sorted({done for done, _ in seen})
+    bed_trials.reached(members, offsets, on_progress=lambda *step: steps.append(step))
+    assert steps[-1] == (20, 20)
+    assert [done for done, _ in steps] == sorted({done for done, _ in steps})
 
 
-def test_an_interrupt_in_the_middle_gets_through(bed_trials, rng):
+def test_an_interrupt_is_passed_on(bed_trials, rng):
     def stop(_done, _total):
         raise KeyboardInterrupt
 
@@ -105,18 +105,18 @@ def test_an_interrupt_in_the_middle_gets_through(bed_trials, rng):
 
 
 def put(trials, member, offsets, sample):
-    """Set the live scene as the sample has it, by hand: robot, bed, and every joint that is off."""
+    """Set robot, bed and every joint with an error in the live scene as in one sample."""
     scene, place = trials.scene, trials.job.grid.configuration(int(member))
     scene.place_base(place.base_x, place.base_y, place.base_yaw)
     scene.set_torso(place.torso)
-    believed = {**trials.file.observed_states[trials.table], **dict(place.environment)}
-    for name, value in {**dict.fromkeys(offsets, 0.0), **believed}.items():
-        off = offsets[name][sample] if name in offsets else 0.0
-        scene.set_joint(name, value + off)
+    nominal = {**trials.file.observed_states[trials.table], **dict(place.environment)}
+    for name, value in {**dict.fromkeys(offsets, 0.0), **nominal}.items():
+        error = offsets[name][sample] if name in offsets else 0.0
+        scene.set_joint(name, value + error)
 
 
-def test_drake_confirms_solutions_in_displaced_rooms(trials, rng):
-    """Random samples and members: the tool is at the displaced goal, and nothing touches."""
+def test_drake_confirms_solutions_in_perturbed_environments(trials, rng):
+    """Random samples and members: the tool is at the displaced goal, without collisions."""
     scene = trials.scene
     offsets = trials.errors.draw(6, 11)
     before, judged = scene.positions(), 0
@@ -130,9 +130,9 @@ def test_drake_confirms_solutions_in_displaced_rooms(trials, rng):
             assert X_TG.rotation().ToAngleAxis().angle() < ROTATION_BAR
             for first, second, distance in scene.violations():
                 slack = scene.required_clearance(first, second) - CLEARANCE_ROUNDING
-                base_and_room = is_of_base(scene, first) and is_of_room(scene, second)
-                # The base is not checked, on purpose.
-                assert base_and_room or distance >= slack, (first, second, distance)
+                of_base = is_of_base(scene, first) and is_of_environment(scene, second)
+                # Contacts of the base are deliberately not checked.
+                assert of_base or distance >= slack, (first, second, distance)
             judged += 1
     scene.restore(before)
     assert judged > 50
@@ -142,13 +142,13 @@ def is_of_base(scene, name):
     return any(part.name == name and part.group.name == "BODY" for part in scene.built.parts)
 
 
-def is_of_room(scene, name):
+def is_of_environment(scene, name):
     return any(part.name == name and part.group.name == "ROOM" for part in scene.built.parts)
 
 
 @pytest.mark.slow
-def test_the_twin_confirms_solutions_in_displaced_rooms(trials, rng):
-    """The plain-loop twin, on arrays of one displaced room, with the base let through."""
+def test_the_reference_confirms_solutions_in_perturbed_environments(trials, rng):
+    """The plain-loop reference, on one perturbed environment, without contacts of the base."""
     offsets = trials.errors.draw(2, 5)
     judged = 0
     for member in some(rng, trials, 3):
@@ -177,7 +177,7 @@ def test_the_twin_confirms_solutions_in_displaced_rooms(trials, rng):
     assert judged > 2
 
 
-def test_a_joint_stops_at_its_limit(bed_file):
+def test_a_joint_stays_at_its_limit(bed_file):
     errors = {"head_rest": ErrorDistribution(distribution="uniform", half_width_deg=20.0)}
     trials = Trials.of(bed_file, errors=errors)
     sets = trials.scored.sets
@@ -192,7 +192,7 @@ def test_a_joint_stops_at_its_limit(bed_file):
     assert np.array_equal(found[0], found[2])
 
 
-def test_a_joint_that_is_stopped_counts_whatever_the_others_do(bed_trials):
+def test_a_joint_at_its_limit_counts_regardless_of_others(bed_trials):
     member = bed_trials.scored.sets.candidates[None, :1].astype(int)
     beyond, within = np.radians([200.0, 0.0, -200.0]), np.array([0.01, 0.01, 0.01])
     for offsets in (
@@ -202,8 +202,8 @@ def test_a_joint_that_is_stopped_counts_whatever_the_others_do(bed_trials):
         assert bed_trials.clipped(member, offsets) == 2
 
 
-def test_a_joint_a_rounding_beyond_its_limit_stays_where_it_is(bed_trials):
-    """The last step of a grid may be; to move it back would be an error that nobody drew."""
+def test_a_joint_beyond_its_limit_by_rounding_is_not_moved(bed_trials):
+    """The last value of a grid may be; moving it back would add an error that was not drawn."""
     believed = bed_trials._positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
     limits = (believed + 1e-12, believed + 1.0)
     joints = SimpleNamespace(limits=lambda name: limits)
@@ -214,7 +214,7 @@ def test_a_joint_a_rounding_beyond_its_limit_stays_where_it_is(bed_trials):
     assert stopped.tolist() == [False, False, True, True]
 
 
-def test_what_is_not_there_is_refused(bed_file, bed_trials):
+def test_missing_configurations_tables_and_samples_are_refused(bed_file, bed_trials):
     offsets = no_error(bed_trials, 1)
     with pytest.raises(GridError, match="no configuration 10000000"):
         bed_trials.reached([10_000_000], offsets)

@@ -340,7 +340,7 @@ def test_an_unknown_axis_is_named(tables):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"torso": 5.0}, "torso is 5 m, out of range: the scores cover 0 to 0.15 m"),
         ({"torso": -0.08}, "torso is -0.08 m"),
@@ -351,11 +351,11 @@ def test_an_unknown_axis_is_named(tables):
     ids=str,
 )
 @pytest.mark.parametrize("weight", [0.0, 1.0])
-def test_a_torso_or_bed_out_of_range_is_refused(tables, weight, changes, said):
+def test_a_torso_or_bed_out_of_range_is_refused(tables, weight, changes, message):
     robot = {name: value for name, value in changes.items() if name == "torso"}
     bed = (("bed_height", changes.get("bed_height", 0.0)),)
     travel = TravelWeights(torso=weight, environment=(("bed_height", weight),))
-    with pytest.raises(SelectionError, match=said) as caught:
+    with pytest.raises(SelectionError, match=message) as caught:
         select(tables, state(**robot, environment=bed, environment_units=("m",)), travel=travel)
     assert "\n" not in str(caught.value)
 
