@@ -62,7 +62,7 @@ def sources(files: list[Path]) -> Iterator[tuple[str, SelectionTables]]:
         begun = time.perf_counter()
         sets = build_sets(scores, grid)
         row("building the sets", f"{time.perf_counter() - begun:.2f} s, compiling included")
-        yield "made up", SelectionTables(sets, grid)
+        yield "synthetic", SelectionTables(sets, grid)
     for path in files:
         file = load_scores(path)
         for number in range(len(file.tables)):
@@ -86,7 +86,7 @@ def travels(grid: Grid) -> dict[str, TravelWeights]:
 def measure(
     tables: SelectionTables, what: str, travel: TravelWeights, options: argparse.Namespace
 ) -> int:
-    """Choose from random places and print the times; return how many answers were wrong."""
+    """Select from random states and print the times; return the number of wrong results."""
     rng = np.random.default_rng(options.seed)
     units = tuple(axis.held_unit for axis in tables.grid.environment_axes)
     clock, processor_time, wrong, refused = [], [], 0, 0
@@ -180,10 +180,10 @@ def bed_grid() -> Grid:
 
 
 def bed_like_scores(grid: Grid) -> ScoreTable:
-    """Return made-up scores: goals along a bed, reached best from an arm's length beside them.
+    """Return synthetic scores: goals along a bed, reached best from an arm's length beside it.
 
     Dexterity falls off smoothly with the distance from the shoulder, the height difference and the
-    turn, with ripples so that no two places are alike.
+    rotation, with ripples so that no two positions are equal.
     """
     at = grid.values(np.arange(grid.size))
     x, y, yaw = at["base_x"], at["base_y"], at["base_yaw"]

@@ -54,9 +54,9 @@ LETTERS = {
 INTRODUCTION = """\
 # Gallery
 
-Every picture on this page is drawn by tcs from score files, without a display. `python
-scripts/gallery.py` scores missing rows and makes the page and its pictures. The robot is drawn as
-its collision primitives, which enclose its links. Yellow arrows are the goals and end at the
+Every picture on this page is drawn by tcs from score files, without a display.
+`python scripts/gallery.py` scores missing rows and makes the page and its pictures. The robot is
+drawn as its collision primitives, which enclose its links. Yellow arrows are the goals and end at the
 position of the tool; the red arrow is the goal at which the arm is drawn. `tcs view FILE` shows the
 same scenes interactively, and `tcs report FILE --out page.html` describes the results in full.
 
@@ -229,7 +229,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
             "its panel."
             if _share_a_state(bed)
             else "Bathing, drawn by `tcs map bathing-bed-pr2.tcs --states --out states.png`: bed "
-            "height by head rest, in one colour scale. Each stop is marked in the panel of its state.",
+            "height by head rest, in one colour scale. Each stop is marked in its panel.",
             "Twelve maps of the floor around a bed, one for each bed height and head rest.",
         ),
     ]
