@@ -56,9 +56,9 @@ INTRODUCTION = """\
 
 Every picture on this page is drawn by tcs from score files, without a display.
 `python scripts/gallery.py` scores missing rows and makes the page and its pictures. The robot is
-drawn as its collision primitives, which enclose its links. Yellow arrows are the goals and end at the
-position of the tool; the red arrow is the goal at which the arm is drawn. `tcs view FILE` shows the
-same scenes interactively, and `tcs report FILE --out page.html` describes the results in full.
+drawn as its collision primitives, which enclose its links. Yellow arrows are the goals and end at
+the position of the tool; the red arrow is the goal at which the arm is drawn. `tcs view FILE` shows
+the same scenes interactively, and `tcs report FILE --out page.html` describes the results in full.
 
 The person, the furniture, the goals and the grids are those of the TCS paper (Kapusta, Park and
 Kemp, IROS 2015), see [the scene](scene.md). Inverse kinematics and collision checks are those of
@@ -159,7 +159,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
     text = (
         'The paper: "when trying to shave a user in a configurable bed, the robot can reach '
         'shaving poses well from behind the bed with the head rest lying flat". Here, without a '
-        f"wall, the best single place is {where}, with the head rest {rest} ({where_exactly}); "
+        f"wall, the best single base pose is {where}, with the head rest {rest} ({where_exactly}); "
         f"from it {alone[0]:.0%} of the goals are reached, P_M {alone[1]:.3f}. With the wall that "
         f"base pose is blocked, and the best single reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
     )
