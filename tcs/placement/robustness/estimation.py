@@ -32,7 +32,7 @@ SCREENED = 32
 again, so that the selection does not bias its estimates."""
 MOST_SCREENED = 800
 """Greatest number of configurations evaluated on these samples, those with the best scores."""
-_STREAM = "race"
+ESTIMATION_STREAM = "race"
 """Name of the random stream of the estimates. Another name would give other numbers."""
 
 
@@ -160,7 +160,7 @@ def success_of(
         step: Called after the screening and after each round, for each size.
     """
     table = trials.scored.sets
-    offsets = trials.errors.draw(samples, seed, stream=_STREAM)
+    offsets = trials.errors.draw(samples, seed, stream=ESTIMATION_STREAM)
 
     def attempt(rows: IntArray, start: int, stop: int) -> NDArray[np.bool_]:
         part = {name: values[start:stop] for name, values in offsets.items()}

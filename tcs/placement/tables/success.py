@@ -1,4 +1,4 @@
-"""Estimates of how much of a task sets of configurations do when the room is a little off."""
+"""Table of the estimated success under error of sets of configurations."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class SuccessTable(ArrayTable):
     """Estimated success of K sets under error; read-only.
 
     The success of a set is the probability that a goal, drawn by its weight, is reached by any
-    member in a room that is off by a random error: the mean of P_R under error, as Table I of the
-    TCS paper gives it.
+    member in a randomly perturbed environment: the mean of P_R under error, as in Table I of the
+    TCS paper.
 
     Order of the sets: singles by configuration index, then pairs in lexicographic order, then
     triples, as in `SetTable`.
@@ -92,15 +92,15 @@ class SuccessTable(ArrayTable):
         return np.flatnonzero(self.sizes == members)
 
     def most_robust(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
-        """Return the configuration indices of the surest set; () where there is none.
+        """Return the configuration indices of the most robust set; () if there is none.
 
-        The surest has the greatest lower end of its interval: by its mean alone a lucky set of a
-        few samples would be ahead of a good one of many. Of equals the one with the greatest
-        P_R + P_M counts, then the first.
+        The most robust set has the greatest lower confidence bound on its success: by the mean
+        alone, a set with few, favourable samples could outrank a good set with many. Ties go to
+        the greatest P_R + P_M, then to the first.
 
         Args:
             sets: The sets that these are estimates for.
-            max_members: Sets of at most so many members.
+            max_members: Greatest number of members of the set.
         """
         rows = np.flatnonzero(self.sizes <= max_members)
         if not rows.size:

@@ -68,7 +68,7 @@ def test_only_configurations_of_the_best_sets_are_screened(monkeypatch):
 def test_estimates_are_means_of_evaluations(done):
     trials = Trials.of(done)
     success = trials.scored.success
-    offsets = trials.errors.draw(128, 0, stream=estimation._STREAM)
+    offsets = trials.errors.draw(128, 0, stream=estimation.ESTIMATION_STREAM)
     for row in (0, int(np.argmax(success.success)), len(success.success) - 1):
         reached = trials.reached(success.set_at(row), offsets).any(axis=0)
         fractions = reached[: success.samples[row]] @ trials.weights

@@ -10,7 +10,7 @@ from scipy import stats
 
 from tcs.errors import SelectionError, TcsError
 from tcs.placement.robustness import Trials, predictions, robust_gains, robustify
-from tcs.placement.robustness.estimation import _STREAM
+from tcs.placement.robustness.estimation import ESTIMATION_STREAM
 from tcs.placement.robustness.gains import _rank_correlation, _stratified
 
 
@@ -22,7 +22,7 @@ def robust(chair_file):
 def test_gains_are_paired_and_on_fresh_samples(robust):
     gains = robust_gains(robust, samples=100, seed=0)
     assert [gain.members for gain in gains] == [1, 2]
-    estimation = robust.errors.draw(100, 0, stream=_STREAM)
+    estimation = robust.errors.draw(100, 0, stream=ESTIMATION_STREAM)
     for gain in gains:
         difference = gain.robust.fractions - gain.scored.fractions
         assert gain.paired.mean == pytest.approx(difference.mean())

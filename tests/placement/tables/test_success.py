@@ -30,7 +30,7 @@ def test_sets_by_size_and_by_members():
         table.success[0] = 1.0
 
 
-def test_the_surest_set_is_not_the_luckiest():
+def test_the_most_robust_set_has_the_greatest_lower_bound():
     grid = small_grid(nx=6, ny=4, bed=2)
     sets = build_sets(random_scores(grid, 5, seed=1, share=0.4), grid)
     a, b, c, d = (int(h) for h in sets.candidates[:4])
