@@ -18,7 +18,7 @@ from tcs.placement.robustness.successive_halving import Estimates, round_sizes, 
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import SetTable, SuccessTable, tc_reachability
-from tcs.placement.tables.rules import SHARE_TOLERANCE
+from tcs.placement.tables.rules import FRACTION_TOLERANCE
 from tcs.placement.tables.success import NO_MEMBER
 
 IntArray = NDArray[np.int64]
@@ -208,7 +208,7 @@ def _singles(table: SetTable) -> IntArray:
 def _pairs(table: SetTable) -> IntArray:
     """Return the contending pairs, best scores first, shape (K, 2)."""
     greatest = float(table.pair_reachability.max(initial=0.0))
-    least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
+    least = EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE
     pairs = Pairs.joined(kept_pairs(table, least_reachability=least))
     if pairs.first.size < MIN_CONTENDERS:
         pairs = Pairs.joined(kept_pairs(table))
@@ -222,7 +222,7 @@ def _contenders(
     """Return the sets equal in P_R to the best, or the MIN_CONTENDERS best; best scores first."""
     order = np.argsort(-(reachability + manipulability), kind="stable")
     greatest = float(reachability.max(initial=0.0))
-    contends = reachability[order] >= EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
+    contends = reachability[order] >= EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE
     contends[:MIN_CONTENDERS] |= np.count_nonzero(contends) < MIN_CONTENDERS
     return np.asarray(rows[order][contends])
 

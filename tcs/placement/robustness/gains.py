@@ -16,7 +16,7 @@ from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.statistics import CONFIDENCE, Difference, signed_rank
 from tcs.placement.robustness.trials import Trials
 from tcs.placement.tables import tc_reachability
-from tcs.placement.tables.rules import SHARE_TOLERANCE
+from tcs.placement.tables.rules import FRACTION_TOLERANCE
 
 STRATA = 10
 """Number of equal strata of P_M, from each of which the same number of sets is drawn."""
@@ -149,7 +149,7 @@ def predictions(
     ):
         greatest = float(reachability.max(initial=0.0))
         for equal in (False, True):
-            least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE if equal else 0.0
+            least = EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE if equal else 0.0
             pool = np.flatnonzero(reachability >= least)
             rng = named_generator(seed, f"strata {rows.shape[1]} {equal}")
             drawn = _stratified(rng, pool, manipulability, sets)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.placement.robustness.error_model import named_generator
 from tcs.placement.tables import SetTable
-from tcs.placement.tables.rules import SHARE_TOLERANCE
+from tcs.placement.tables.rules import FRACTION_TOLERANCE
 
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
@@ -71,7 +71,7 @@ def kept_pairs(
     """
     if sets.max_members < 2:
         return
-    margin = SHARE_TOLERANCE
+    margin = FRACTION_TOLERANCE
     groups = (sets.pair_reachability >= least_reachability - margin) & (
         sets.pair_sum >= least_sum - margin
     )
@@ -149,10 +149,12 @@ def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[I
     greatest = float(singles.max(initial=0.0))
     rng = named_generator(seed, f"sets of {members}")
     if members == 1:
-        pool = np.flatnonzero(singles >= EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE)[:, None]
+        pool = np.flatnonzero(singles >= EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE)[
+            :, None
+        ]
     else:
         greatest = max(greatest, float(sets.pair_reachability.max(initial=0.0)))
-        least = EQUAL_REACHABILITY * greatest - SHARE_TOLERANCE
+        least = EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE
         pairs = Pairs.joined(kept_pairs(sets, least_reachability=least))
         pool = np.stack([pairs.first, pairs.second], axis=1)
     if not len(pool):

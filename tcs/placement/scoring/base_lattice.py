@@ -1,4 +1,4 @@
-"""Where the base can drive, read off the scores: between places where the body is not blocked."""
+"""The lattice of base positions of a grid, with the moves that the scores show to be free."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from tcs.placement.tables import BaseLattice, Reason, ScoreTable
 from tcs.placement.tables.base_lattice import MOVES
 
 BORDER = 0.6
-"""What blocks the base at the border of the grid is taken to go on for so long [m]. The grid says
-nothing about the floor beyond it, and the paper's ends where the foot end of the bed does: half a
-PR2 and a bed's end are 0.6 m."""
+"""Distance by which obstacles at the border of the grid are extended beyond it [m]. The grid has
+no data there, and the paper's grid ends at the foot end of the bed: half a PR2 and the end of the
+bed are 0.6 m."""
 
 STEP = 0.1
-"""Distance of neighbours along an axis that the grid holds still [m]."""
+"""Distance of neighbours along an axis on which the grid has a single value [m]."""
 
 
 def lattice_of(scores: ScoreTable, grid: Grid) -> BaseLattice:
-    """Return where the base can drive between the places of a grid, and around it.
+    """Return the lattice of the base positions of a grid and its surroundings.
 
-    The base can move from a place to a neighbour when in some state of the environment, with some
-    heading and torso level, it is blocked at neither; diagonally when also at neither of the two
-    places beside the way. The robot may turn, lift its torso and have the environment set where
-    it stands. Places are checked, not the way between them.
+    The base can move to a neighbour if, in some state of the environment and with some heading and
+    torso height, its body is free of contact at both positions; diagonally if also at the two
+    positions beside the diagonal. At each position the robot may turn, move its torso and have the
+    environment set. Positions are checked, not the path between them.
 
     Args:
         scores: Scores of every configuration of the grid.
@@ -39,9 +39,9 @@ def lattice_of(scores: ScoreTable, grid: Grid) -> BaseLattice:
     axes = [grid.axis(name) for name in ("base_x", "base_y")]
     known = [axis.step for axis in axes if axis.count > 1] or [STEP]
     step = [axis.step if axis.count > 1 else known[0] for axis in axes]
-    border = [math.ceil(BORDER / s - 1e-9) for s in step]  # 0.6 / 0.1 is a little less than 6
+    border = [math.ceil(BORDER / s - 1e-9) for s in step]  # 0.6 / 0.1 rounds to less than 6
     free = np.pad(free, ((0, 0), (border[0],) * 2, (border[1],) * 2), mode="edge")
-    # Everything is free beyond: one ring of places stands for it.
+    # Beyond that everything is free, which one ring of positions represents.
     free = np.pad(free, ((0, 0), (1, 1), (1, 1)), constant_values=True)
     shape = free.shape[-2:]
     moves = np.zeros((len(MOVES), *shape), dtype=np.bool_)

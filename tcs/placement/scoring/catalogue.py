@@ -10,27 +10,30 @@ from tcs.model.tasks import load_task, task_names
 
 
 def task_environment_pairs(environment: str | None = None) -> tuple[tuple[str, str], ...]:
-    """Return the names of task and environment of every row that ships with `tcs`.
+    """Return the names of task and environment of every row that `tcs` ships.
 
     Args:
-        environment: Only the rows in this environment.
+        environment: Return only the rows in this environment.
 
     Returns:
-        One environment after the other, tasks sorted within it.
+        The rows, one environment after the other, with sorted tasks.
 
     Raises:
         UnknownNameError: If there is no such environment.
-        TaskError: If no task was written for it.
+        TaskError: If no task has goals in it.
     """
     if environment is not None:
         load_environment(environment)
-    rows = [(load_task(name).environments, name) for name in task_names()]
-    known = environment_names() if environment is None else (environment,)
-    found = tuple((task, room) for room in known for rooms, task in rows if room in rooms)
+    tasks = {name: load_task(name).environments for name in task_names()}
+    environments = environment_names() if environment is None else (environment,)
+    found = tuple(
+        (task, name) for name in environments for task, allowed in tasks.items() if name in allowed
+    )
     if not found:
+        known = sorted({name for allowed in tasks.values() for name in allowed})
         raise TaskError(
             f"No task has goals in environment '{environment}'. "
-            f"There are tasks for: {', '.join(sorted({r for rooms, _ in rows for r in rooms}))}."
+            f"There are tasks for: {', '.join(known)}."
         )
     return found
 
@@ -43,7 +46,7 @@ def default_path(task: str, environment: str, robot: str) -> Path:
         environment: Name or path of an environment.
         robot: Name or path of a robot.
 
-    >>> str(default_path("shaving", "rooms/kitchen.yaml", "pr2"))
+    >>> str(default_path("shaving", "environments/kitchen.yaml", "pr2"))
     'shaving-kitchen-pr2.tcs'
     """
     return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")

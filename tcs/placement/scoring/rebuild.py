@@ -1,4 +1,4 @@
-"""Build again what a score file was scored from."""
+"""The job and scene of a score file, built again from the installed models."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene,
 
     Args:
         file: A score file.
-        meshes: Whether to load the robot's visual meshes, for show; they cost seconds.
+        meshes: Whether to load the robot's visual meshes, for display; this takes seconds.
 
     Raises:
-        UnknownNameError: If its task, environment or robot is not known here.
+        UnknownNameError: If its task, environment or robot does not exist.
         DataFileError: If a file that it names cannot be used.
-        StoreMismatchError: If the models are not those the file was made from.
+        StoreMismatchError: If the models differ from those the file was made from.
     """
     job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
-    # The file knows for which states it was scored: a scene scored as it was observed has its own.
+    # A file that was scored live has an observed state of its own.
     job = dataclasses.replace(job, observed=file.observed_axes)
     scene = job.scene(meshes=meshes)
     lowered = job.lowered(scene)

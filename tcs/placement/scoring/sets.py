@@ -1,4 +1,4 @@
-"""Build the sets of configurations worth choosing from, tau in the TCS paper."""
+"""The sets of configurations to choose from, tau in the TCS paper."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ from tcs.placement.tables.rules import (
 from tcs.placement.tables.sets import DISTANCE_TOLERANCE, MOST_MEMBERS
 
 CELLS_PER_SLICE = 16
-"""Small enough to share the work evenly (early cells have more partners than late ones) and to
-keep the buffers of a slice small; large enough that a slice takes much longer than its hand-out."""
+"""Small enough for an even load (early cells have more partners than late ones) and small buffers;
+large enough that a slice takes much longer than its scheduling."""
 
 
 class SetOptions(TypedDict, total=False):
-    """Which sets are kept; whatever takes `**sets` takes these."""
+    """Options of the kept sets, for every function with `**sets`."""
 
     rule: str
     """One of `tcs.placement.tables.rules.RULES`. "paper", the default: singles that reach a goal,
     pairs whose P_M is greater than the best P_M of a single, and triples whose P_M is greater than
-    the best P_M of a pair and of a single. "code2015": as hrl_base_selection did, without triples.
-    """
+    the best P_M of a pair and of a single. "code2015": the rules of hrl_base_selection,
+    without triples."""
     same_environment: bool
-    """Whether the members of a set must share the state of the environment; by default not."""
+    """Whether the members of a set must share the state of the environment; False by default."""
     max_members: int
-    """1 to keep singles only, 2, the default, to keep pairs too, 3 for triples. Triples take some
-    ten seconds for 5,000 candidates, 100 MB, and more for more."""
+    """1 for singles only, 2, the default, for pairs too, 3 for triples too. For 5,000 candidates,
+    triples take some ten seconds and 100 MB."""
     min_distance: float
     """Least base x-y distance between two members of a set [m], 0.40 by default. The paper gives
-    no figure; this is that of hrl_base_selection in gt-ros-pkg/hrl-assistive."""
+    no value; this is the one of hrl_base_selection in gt-ros-pkg/hrl-assistive."""
 
 
 def build_sets(
@@ -61,10 +61,10 @@ def build_sets(
         scores: Scores of every configuration of the grid.
         grid: The grid.
         jobs: Number of threads.
-        **options: Which sets are kept, see `SetOptions`.
+        **options: Options of the kept sets, see `SetOptions`.
 
     Returns:
-        The sets; without any candidate when no goal is reached anywhere.
+        The sets; empty if no configuration reaches a goal.
 
     Raises:
         UnknownNameError: If there is no such rule.
@@ -137,17 +137,17 @@ def checked_options(
     max_members: int = 2,
     min_distance: float = 0.40,
 ) -> SetOptions:
-    """Return all options, the default for those not given, before anything is scored.
+    """Return all options, checked, with defaults for those not given.
 
     Raises:
         UnknownNameError: If there is no such rule.
-        TcsError: If a number is out of range, or the rule has no sets of so many.
+        TcsError: If a number is out of range, or the rule has no sets of `max_members`.
     """
     check_rule(rule)
     if not 1 <= max_members <= MOST_MEMBERS:
         raise TcsError(f"Sets: max_members is {max_members}; must be 1 to {MOST_MEMBERS}.")
     if rule == "code2015" and max_members > 2:
-        raise TcsError("Sets: rule 'code2015' has sets of one and two; for three take 'paper'.")
+        raise TcsError("Sets: rule 'code2015' keeps sets of one and two; for three use 'paper'.")
     if not 0.0 <= min_distance < math.inf:
         raise TcsError(f"Sets: min_distance is {min_distance} m; must be finite and >= 0.")
     return {
@@ -163,7 +163,7 @@ def base_cells(
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the base cell of each candidate, shape (C,), and the cells' x, y, shape (N, 2).
 
-    Only cells with a candidate are counted, in the order of base x, then base y.
+    Only cells with a candidate are included, in the order of base x, then base y.
     """
     names = list(ROBOT_AXES)
     along = grid.indices(candidates)[:, -len(names) :]
@@ -187,7 +187,7 @@ def _grouped(
     rule: str,
     min_distance: float,
 ) -> SetArrays:
-    """Return what the kernel needs, candidates sorted by cell."""
+    """Return the kernel's arrays, with the candidates sorted by cell."""
     number = np.argsort(cell, kind="stable").astype(np.int64)
     start = np.searchsorted(cell[number], np.arange(len(cell_xy) + 1)).astype(np.int64)
     dexterity = scores.dexterity[candidates[number]].astype(np.float64)
@@ -213,11 +213,11 @@ def _grouped(
 
 
 def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
-    """Return what is kept between all cells by so many threads; nothing with none.
+    """Return the kept pairs between all cells, found by `jobs` threads; none for 0.
 
     Returns:
-        The pairs of cells with a kept pair, lexicographic, shape (K, 2); what is kept between
-        them, arrays of shape (K,); the kept pairs of each candidate, by its number; and the
+        The pairs of cells with a kept pair, lexicographic, shape (K, 2); counts and bounds of
+        their kept pairs, shape (K,); the kept pairs of each candidate, by its number; and the
         best pair of each cell.
     """
     cells = arrays.start.size - 1 if jobs else 0
@@ -228,7 +228,7 @@ def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, Memb
     found = Parallel(n_jobs=max(jobs, 1), prefer="threads")(
         delayed(_bound_slice)(arrays, begin, end) for begin, end in slices
     )
-    # Slices one after the other are in lexicographic order.
+    # Slices come in lexicographic order.
     pair_cells, between, members, best = zip(*found, strict=True)
     # Sorted by number: the inverse of how the candidates were sorted by cell.
     rows = np.argsort(arrays.number)
@@ -243,11 +243,11 @@ def _kept_pairs(arrays: SetArrays, jobs: int) -> tuple[IntArray, CellPairs, Memb
 def _bound_slice(
     arrays: SetArrays, begin: int, end: int
 ) -> tuple[IntArray, CellPairs, MemberPairs, BestPairs]:
-    """Return what is kept between cells begin..end-1 and every cell not before them.
+    """Return the kept pairs between cells begin..end-1 and every cell from there on.
 
     Returns:
-        The pairs of cells with a kept pair, lexicographic, shape (k, 2); what is kept between
-        them, arrays of shape (k,); the kept pairs of each candidate; and the best pair of each
+        The pairs of cells with a kept pair, lexicographic, shape (k, 2); counts and bounds of
+        their kept pairs, shape (k,); the kept pairs of each candidate; and the best pair of each
         cell of the slice.
     """
     shape = (end - begin, arrays.start.size - 1)
@@ -285,7 +285,7 @@ def _best_sets(
         return best_single, best_single
     a, b = pairs.members.T
     pair = np.lexsort((b, a, -pairs.keys[:, 1], -pairs.keys[:, 0]))[0]
-    # Singles come before pairs, so a pair has to be better, not as good.
+    # Singles come before pairs, so an equally good pair does not replace one.
     if tuple(pairs.keys[pair]) > (keys[0][single], keys[1][single]):
         return best_single, tuple(int(h) for h in candidates[pairs.members[pair]])
     return best_single, best_single
@@ -308,7 +308,7 @@ def _with_triples(
     reached = np.logical_or.reduce(scores.reached[list(best)], axis=0)
     dexterity = np.maximum.reduce(scores.dexterity[list(best)], axis=0)
     so_far = tc_reachability(reached, scores.weights) + tc_manipulability(dexterity, scores.weights)
-    # Smaller sets come first, so a triple has to be better, not as good.
+    # Smaller sets come first, so an equally good triple does not replace one.
     if total > so_far:
         best = tuple(int(h) for h in candidates[list(members)])
     return triples, best

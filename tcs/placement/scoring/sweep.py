@@ -1,4 +1,4 @@
-"""Score a lowered scene: the kernel over slices of the grid, on several threads."""
+"""Scoring of a lowered scene: the kernel runs over slices of the grid in several threads."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from tcs.model.scene import LoweredScene
 from tcs.placement.tables import ScoreTable
 
 SLICE = 1024
-"""Configurations in a slice: some milliseconds of work, so that threads end together and a bar
-moves, and scratch memory that stays in the processor's cache."""
+"""Configurations per slice: some milliseconds of work, so that threads finish together and progress
+is visible, with scratch memory that stays in the processor's cache."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
-"""How inverse kinematics was solved: in closed form, or by Newton's method from many starts."""
+"""Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
 _ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "sweep._score_numeric_slice"}
-"""Modules and functions of the kernel that all the rest is compiled into."""
+"""Kernel entry points into which everything else is compiled, as module and function."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The scores of a grid, and what they cost."""
+    """The scores of a grid, and the time they took."""
 
     tables: tuple[ScoreTable, ...]
-    """The grid's configurations, cut into as many tables as were asked for."""
+    """The scores, divided into the requested number of tables."""
     compile_seconds: float
-    """Compiling the kernel, or loading its machine code."""
+    """Time to compile the kernel, or to load its machine code [s]."""
     scoring_seconds: float
-    """Scoring alone, machine code at hand."""
+    """Time of the scoring alone [s]."""
     ik: str
-    """How the arm is solved: ANALYTIC or NUMERIC."""
+    """Inverse kinematics of the arm: ANALYTIC or NUMERIC."""
 
 
 def sweep(
@@ -58,19 +58,19 @@ def sweep(
     Args:
         lowered: The scene.
         weights: Weights of the goals, sum 1, shape (goals,).
-        tables: How many equal parts to cut the scores into, e.g. one for each observed state
-            when the observed axes are the outermost of the grid.
+        tables: Number of equal parts to divide the scores into, e.g. one for each observed state
+            if the observed axes are the outermost of the grid.
         measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
         jobs: Number of threads; the scores do not depend on it.
-        on_progress: Called with configurations done and in all.
-        on_compile: Called first, when no earlier run has left machine code on this machine.
+        on_progress: Called with the number of scored configurations and their total.
+        on_compile: Called first, if there is no cached machine code.
 
     Returns:
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
 
     Raises:
         UnknownNameError: If there is no measure of that name.
-        TcsError: If there is to be no thread.
+        TcsError: If `jobs` is less than 1.
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
@@ -90,7 +90,7 @@ def sweep(
     ):
         rows = slice(done, done + len(part.reason))
         reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.dexterity
-        # Only the joints of reached pairs are worth keeping: one pair in ten.
+        # Only reached pairs, about one in ten, have joints to keep.
         joints.append(part.joints[part.reason == 0])
         done += len(part.reason)
         if on_progress is not None:
@@ -115,12 +115,12 @@ def sweep(
 
 
 def ik_of(problem: Problem) -> str:
-    """Return how the problem's arm is solved: ANALYTIC or NUMERIC."""
+    """Return the inverse kinematics of the problem's arm: ANALYTIC or NUMERIC."""
     return NUMERIC if is_outside(problem.arm) else ANALYTIC
 
 
 def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> float:
-    """Have the kernel's machine code at hand; return the seconds it took."""
+    """Compile the kernel or load its machine code; return the time this took [s]."""
     if on_compile is not None and not is_compiled(_ENTRIES[ik_of(problem)]):
         on_compile()
     begun = time.perf_counter()
@@ -129,9 +129,9 @@ def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> f
 
 
 def _size(problem: Problem) -> int:
-    """Return how many configurations the grid has."""
-    places = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
-    return int(problem.environment_states * places * problem.torso_levels)
+    """Return the number of configurations of the grid."""
+    base_poses = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
+    return int(problem.environment_states * base_poses * problem.torso_levels)
 
 
 def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int) -> Scores:
@@ -150,14 +150,14 @@ def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int)
 def _name_contacts(
     contact: NDArray[np.int32], lowered: LoweredScene, problem: Problem
 ) -> tuple[tuple[str, str], ...]:
-    """Turn contact codes, in place, into indices of the returned pairs of names."""
+    """Replace contact codes, in place, by indices into the returned pairs of names."""
     others = problem.environment_bodies + problem.robot_bodies
     both = (*lowered.environment_bodies, *lowered.robot_bodies)
-    # A place for every code, NO_CONTACT (-1) last, where a negative index finds it.
-    there = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
-    there[contact] = True
-    codes = np.flatnonzero(there[:-1])
-    index = np.full(there.size, -1, dtype=np.int32)
+    # One entry per code; NO_CONTACT (-1) indexes the last one.
+    occurs = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
+    occurs[contact] = True
+    codes = np.flatnonzero(occurs[:-1])
+    index = np.full(occurs.size, -1, dtype=np.int32)
     index[codes] = np.arange(codes.size, dtype=np.int32)
     np.take(index, contact, out=contact, mode="wrap")
     return tuple((lowered.robot_bodies[code // others], both[code % others]) for code in codes)

@@ -1,4 +1,4 @@
-"""Build the sets of three configurations: all whose P_M beats that of every smaller set."""
+"""The sets of three configurations: all whose P_M is greater than that of every smaller set."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from tcs.placement.tables.groups import Groups
 from tcs.placement.tables.rounding import float32_above
 
 MOST_CANDIDATES = 16_000
-"""Beyond this the P_M of all pairs, of which the search makes use, takes more than 1 GB."""
+"""Greatest number of candidates: the search keeps the P_M of all pairs, 1 GB for this many."""
 
 MOST_GROUPS = 2_000_000
-"""Most triples of base cells with a kept set: a file holds some 8 bytes for each."""
+"""Greatest number of triples of base cells with a kept set; each takes some 8 bytes in a file."""
 
 BUFFER = 1 << 20
-"""Triples that a thread collects before it sums them up by their cells."""
+"""Number of triples that a thread collects before it reduces them by their cells."""
 
 ROWS_PER_SLICE = 64
-"""Small enough to share the work evenly, large enough to hand out rarely."""
+"""Small enough for an even load, large enough for a small overhead."""
 
 
 def kept_triples(
@@ -42,22 +42,22 @@ def kept_triples(
         jobs: Number of threads.
 
     Returns:
-        The sets, and P_R + P_M and candidate numbers of the best one; -1 and () without any.
+        The sets; and P_R + P_M and candidate numbers of the best one, -1 and () if there is none.
 
     Raises:
-        TcsError: If there are too many candidates, or too many triples of places.
+        TcsError: If there are too many candidates, or too many triples of base cells.
     """
     count = arrays.number.size
     if count > MOST_CANDIDATES:
         raise TcsError(
             f"Sets of three: {count:,} candidates, but at most {MOST_CANDIDATES:,} are allowed. "
-            "Take a coarser grid, or sets of two."
+            "Use a coarser grid, or sets of two."
         )
     pairs = np.empty((count, count), dtype=np.float32)
     slices = [(b, min(b + ROWS_PER_SLICE, count)) for b in range(0, count, ROWS_PER_SLICE)]
     pool = Parallel(n_jobs=jobs, prefer="threads")
     pool(delayed(fill_pairs)(arrays, cell, begin, end, pairs) for begin, end in slices)
-    # One worker's rows are spread evenly: those with a great P_M of their own take longest.
+    # Interleaved rows balance the load: rows with a great P_M of their own take longest.
     found = pool(
         delayed(_triples_of)(arrays, cell, pairs, least, range(worker, count, jobs))
         for worker in range(jobs)
@@ -88,24 +88,24 @@ def kept_triples(
     )
 
 
-_Summed = tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]
-"""Number of each triple of cells, ascending; how many sets there are; their greatest P_R, P_M and
+_Reduced = tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]
+"""Number of each triple of cells, ascending; number of its sets; their greatest P_R, P_M and
 P_R + P_M."""
 
 
 def _triples_of(
     arrays: SetArrays, cell: IntArray, pairs: NDArray[np.float32], least: float, rows: range
-) -> tuple[list[_Summed], MemberPairs, BestPairs]:
-    """Return the kept triples whose member with the greatest P_M is one of some rows."""
+) -> tuple[list[_Reduced], MemberPairs, BestPairs]:
+    """Return the kept triples whose member of greatest P_M is in these rows."""
     count, cells = arrays.number.size, arrays.start.size - 1
     members = MemberPairs(np.zeros(count), np.zeros(count), np.zeros(count))
     best = BestPairs(np.zeros((1, 2)), np.full((1, 3), count, dtype=np.int64))
-    parts: list[_Summed] = []
+    parts: list[_Reduced] = []
     for batch in _batches(arrays, cell, pairs, least, rows, members, best):
         number = np.ravel_multi_index(tuple(batch.cells.T), (cells,) * 3)
         ones = np.ones(number.size, dtype=np.int64)
         total = batch.reachability + batch.manipulability
-        parts.append(_summed((number, ones, batch.reachability, batch.manipulability, total)))
+        parts.append(_reduced((number, ones, batch.reachability, batch.manipulability, total)))
         if sum(part[0].size for part in parts) > MOST_GROUPS:
             parts = [_merged(parts, cells)]
     return parts, members, best
@@ -120,7 +120,7 @@ def _batches(
     members: MemberPairs,
     best: BestPairs,
 ) -> Iterator[KeptTriples]:
-    """Yield kept triples, at most a buffer at a time."""
+    """Yield kept triples in batches of at most one buffer."""
     size = BUFFER + arrays.number.size
     out = KeptTriples(np.empty((size, 3), dtype=np.int64), np.empty(size), np.empty(size))
     filled = 0
@@ -138,14 +138,14 @@ def _batches(
 
 
 def _part(triples: KeptTriples, begin: int, end: int) -> KeptTriples:
-    """Return a view of some of the triples."""
+    """Return a view of a range of triples."""
     return KeptTriples(
         triples.cells[begin:end], triples.reachability[begin:end], triples.manipulability[begin:end]
     )
 
 
-def _merged(parts: list[_Summed], cells: int) -> _Summed:
-    """Return several sums as one.
+def _merged(parts: list[_Reduced], cells: int) -> _Reduced:
+    """Return the reductions of several parts as one.
 
     Raises:
         TcsError: If there are too many triples of cells.
@@ -156,17 +156,18 @@ def _merged(parts: list[_Summed], cells: int) -> _Summed:
     number, kept, reachability, manipulability, total = (
         np.concatenate(columns) for columns in zip(*parts, strict=True)
     )
-    merged = _summed((number, kept, reachability, manipulability, total))
+    merged = _reduced((number, kept, reachability, manipulability, total))
     if merged[0].size > MOST_GROUPS:
         raise TcsError(
-            f"Sets of three: kept at more than {MOST_GROUPS:,} triples of places (of {cells:,} "
-            "places). Take a greater min_distance, one state of the environment, or sets of two."
+            f"Sets of three: kept at more than {MOST_GROUPS:,} triples of base cells (of "
+            f"{cells:,} cells). Use a greater min_distance, one state of the environment, or sets "
+            "of two."
         )
     return merged
 
 
-def _summed(triples: _Summed) -> _Summed:
-    """Return triples with the same number as one."""
+def _reduced(triples: _Reduced) -> _Reduced:
+    """Return one entry for all triples of the same number."""
     number, kept, *scores = triples
     order = np.argsort(number, kind="stable")
     number = number[order]

@@ -1,4 +1,4 @@
-"""Re-check stored answers with Drake, and look for answers that the search has missed."""
+"""Re-check of stored solutions with Drake, and dense scans for solutions that the search missed."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from tcs.placement.tables import Reason
 
 POSITION_BAR = 1e-6
 """Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
-the tool by up to 1.2e-7 rad x 1 m for each of the seven joints, 4e-7 m in practice."""
+the tool by up to 1.2e-7 rad x 1 m for each of seven joints, 4e-7 m in practice."""
 ROTATION_BAR = 2e-6
 """Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
-8.4e-7, and reading an angle off a rotation matrix near the identity loses as much again."""
+8.4e-7, and the angle of a rotation matrix near the identity loses as much again."""
 DEXTERITY_BAR = 1e-6
-"""Greatest difference of a stored measure from that of Drake's Jacobian. Float32 keeps 6e-8; a
+"""Greatest difference of a stored dexterity from that of Drake's Jacobian. Float32 keeps 6e-8; a
 least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
 CLEARANCE_ROUNDING = 2e-6
-"""How much closer than required a pair may be [m] when Drake measures it: rounding of the joints
-moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is good to 1e-6 m."""
+"""Tolerance of a clearance measured by Drake [m]: rounding of the joints
+moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is accurate to 1e-6 m."""
 UNREACHED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
-"""Strata of the dense scan: base and gripper are free and the goal is within reach."""
+"""Strata of the dense scan: body and gripper are free of contact, the goal within reach."""
 CONFIDENCE = 0.95
 
 
@@ -131,24 +131,24 @@ def verify(
     seed: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Verification:
-    """Check answers of a score file against Drake and against a dense scan.
+    """Check a score file against Drake and against a dense scan.
 
     Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
-    every checked contact, the dexterity measure the file was made with. Random unreached pairs,
-    stratified over those whose base and gripper are free and whose goal is within reach, are
-    scanned densely, and so are random reached pairs, for the dexterity the search left behind: with
-    11,520 values of the free joint, or, for an arm that no closed form solves, from 400 starts all
-    over its limits. Drake has to confirm every solution the scan finds where none is stored.
+    contacts, and dexterity by the file's measure. Random unreached pairs, stratified over those
+    whose body and gripper are free of contact and whose goal is within reach, are scanned densely;
+    so are random reached pairs, for dexterity that the search missed. A dense scan tries 11,520
+    values of the free joint or, for an arm without a closed form, 400 starts over its joint limits.
+    Drake must confirm each solution that the scan finds at an unreached pair.
 
     Args:
         file: A score file.
-        pairs: How many reached pairs to re-check.
-        dense: How many unreached and how many reached pairs to scan densely.
-        seed: Seed of the random choice.
-        on_progress: Called with pairs done and in all.
+        pairs: Number of reached pairs to re-check.
+        dense: Number of unreached, and of reached, pairs to scan densely.
+        seed: Seed of the random samples.
+        on_progress: Called with the number of checked pairs and their total.
 
     Raises:
-        StoreMismatchError: If the models are not those the file was made from.
+        StoreMismatchError: If the models differ from those the file was made from.
         TcsError: If a number is negative.
     """
     if pairs < 0 or dense < 0:
@@ -157,7 +157,7 @@ def verify(
     rng = np.random.default_rng(seed)
     reason = np.concatenate([table.scores.reason for table in file.tables])
     reached = _sample(rng, reason == Reason.REACHED, pairs)
-    unreached = [_sample(rng, reason == r, n) for r, n in _shares(reason, dense).items()]
+    unreached = [_sample(rng, reason == r, n) for r, n in _scan_counts(reason, dense).items()]
     again = _sample(rng, reason == Reason.REACHED, dense)
     total = len(reached) + sum(map(len, unreached)) + len(again)
     count = itertools.count(1)
@@ -168,10 +168,10 @@ def verify(
 
     measure = file.metadata["measure"]
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
-    findings = check.stored(reached, step)
-    hits = [check.hits(part, step) for part in unreached]
-    shortfall = check.shortfall(again, step)
+    checker = _FileChecker(file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure))
+    findings = checker.stored(reached, step)
+    hits = [checker.hits(part, step) for part in unreached]
+    shortfall = checker.shortfall(again, step)
     scanned, missed = [len(part) for part in unreached], [sum(part) for part in hits]
     sizes = [int(np.count_nonzero(reason == r)) for r in UNREACHED]
     recall, interval = estimated_recall(
@@ -197,64 +197,64 @@ def verify(
 
 
 def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -> list[Finding]:
-    """Return what Drake says of the stored solutions of certain reached pairs.
+    """Return Drake's findings on the stored solutions of certain reached pairs.
 
     Args:
         file: A score file.
-        table: Number of the table.
-        pairs: Configurations of that table, each with a goal that it reaches.
+        table: Number of the observed state.
+        pairs: Configurations of its tables, each with a goal that it reaches.
 
     Raises:
-        StoreMismatchError: If the models are not those the file was made from.
+        StoreMismatchError: If the models differ from those the file was made from.
     """
     job, scene, lowered = rebuild_scene(file)
     measure = file.metadata["measure"]
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    check = _Check(file.tables, job.grid.size, problem, _Judge(job, scene, measure))
-    return check.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
+    checker = _FileChecker(file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure))
+    return checker.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
 
 
 Pairs = list[tuple[int, int]]
-"""Configurations of all tables, counted on from one to the next, and goals: (h, g)."""
+"""Configurations, numbered through all tables, and goals: (h, g)."""
 
 
 @dataclass(frozen=True)
-class _Check:
-    """The three kinds of checks on the scores of a file."""
+class _FileChecker:
+    """The three types of checks on the scores of a file."""
 
     tables: tuple[StateTables, ...]
     size: int
-    """Configurations in a table."""
+    """Number of configurations per table."""
     problem: Problem
-    judge: _Judge
+    drake: _DrakeChecker
 
     def dexterity(self, h: int, g: int) -> float:
-        """Return the stored measure."""
+        """Return the stored dexterity."""
         table, row = divmod(h, self.size)
         return float(self.tables[table].scores.dexterity[row, g])
 
     def stored(self, pairs: Pairs, step: Callable[[], None]) -> list[Finding]:
-        """Return what Drake says of the stored solutions of reached pairs."""
+        """Return Drake's findings on the stored solutions of reached pairs."""
         findings = []
         for h, g in pairs:
             table, row = divmod(h, self.size)
             q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
-            findings.append(self.judge.check(h, g, q, self.dexterity(h, g)))
+            findings.append(self.drake.check(h, g, q, self.dexterity(h, g)))
             step()
         return findings
 
     def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool]:
-        """Return, for each solution a dense scan finds at unreached pairs, Drake's verdict."""
+        """Return whether Drake confirms each solution of a dense scan at unreached pairs."""
         found, q = [], np.empty(7)
         for h, g in pairs:
             value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
             if value >= 0.0:
-                found.append(self.judge.check(h, g, q, value).is_true)
+                found.append(self.drake.check(h, g, q, value).is_true)
             step()
         return found
 
     def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
-        """Return how much better the dense scan's measure is at reached pairs."""
+        """Return how much greater the dexterity of the dense scan is at reached pairs."""
         short, q = [], np.empty(7)
         for h, g in pairs:
             value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
@@ -306,23 +306,23 @@ def estimated_recall(
     )
 
 
-def _shares(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
-    """Return how many pairs of each stratum to scan: in proportion, none of them left out."""
+def _scan_counts(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
+    """Return the number of pairs of each stratum to scan, in proportion and not 0."""
     sizes = {r: int(np.count_nonzero(reason == r)) for r in UNREACHED}
     total = sum(sizes.values())
     if total == 0 or dense == 0:
         return dict.fromkeys(UNREACHED, 0)
     first, second = UNREACHED
     least = min(dense // 2, sizes[first], max(1, dense // 10)) if sizes[first] else 0
-    share = min(max(round(dense * sizes[first] / total), least), dense)
-    rest = min(dense - share, sizes[second])
+    count = min(max(round(dense * sizes[first] / total), least), dense)
+    rest = min(dense - count, sizes[second])
     if sizes[second]:
         rest = max(rest, min(max(1, dense // 10), sizes[second]))
     return {first: min(dense - rest, sizes[first]), second: rest}
 
 
 def _sample(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int) -> Pairs:
-    """Return up to `count` different random (h, g) at which `chosen` is true."""
+    """Return up to `count` distinct random (h, g) at which `chosen` is true."""
     flat = np.flatnonzero(chosen)
     picked = rng.choice(flat, size=min(count, len(flat)), replace=False)
     goals = chosen.shape[1]
@@ -331,13 +331,18 @@ def _sample(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int) -> 
 
 @dataclass(frozen=True)
 class Finding:
-    """What Drake says of one solution."""
+    """Drake's finding on one solution."""
 
     position_error: float
+    """Distance of the tool from its goal [m]."""
     rotation_error: float
+    """Rotation of the tool from its goal [rad]."""
     dexterity_error: float
+    """Absolute difference of the stored dexterity from that of Drake's Jacobian."""
     limit_violations: int
+    """Number of joints beyond their limits."""
     contacts: int
+    """Number of pairs of bodies closer than required."""
 
     @property
     def is_true(self) -> bool:
@@ -350,8 +355,8 @@ class Finding:
         )
 
 
-class _Judge:
-    """Drake's verdict on solutions of one job."""
+class _DrakeChecker:
+    """Checks solutions of one job with Drake."""
 
     def __init__(self, job: Job, scene: Scene, measure: str) -> None:
         self._job, self._scene, self._measure = job, scene, measure
@@ -360,7 +365,7 @@ class _Judge:
         self._axes = [axis.name for axis in self._grid.environment_axes]
 
     def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
-        """Return what Drake finds at configuration h, goal g and joint angles q."""
+        """Return the finding for configuration h, goal g and joint angles q."""
         scene = self._scene
         at = self._grid.values(np.array([h]))
         scene.place_base(*(float(at[name][0]) for name in ("base_x", "base_y", "base_yaw")))

@@ -1,4 +1,8 @@
-"""Plain data of placement: scores, sets, success under error, maps of places (numpy only)."""
+"""Tables of placement: scores, sets, success under error, the base lattice, place maps.
+
+In: arrays from scoring, estimation or a score file. Out: frozen tables with checked, read-only
+arrays, and the equations over them; numpy only.
+"""
 
 from __future__ import annotations
 

@@ -10,29 +10,29 @@ from numpy.typing import NDArray
 from tcs.placement.tables.checks import ArrayTable, require
 
 MOVES = ((1, 0), (0, 1), (1, 1), (1, -1))
-"""Steps along x and y of the four kinds of moves; each also goes backward."""
+"""Steps along x and y of the four types of moves; each also goes backward."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BaseLattice(ArrayTable):
-    """Where the base can drive: X by Y places, and the straight moves between neighbours.
+    """X by Y base positions, and the straight moves between neighbours.
 
-    The lattice reaches beyond the grid of base places. The area beyond the lattice is free.
+    The lattice extends beyond the base positions of the grid. The area beyond the lattice is free.
     """
 
     start: tuple[float, float]
-    """x and y of the first place in W [m]."""
+    """x and y of the first position in W [m]."""
     step: tuple[float, float]
     """Distance of neighbours along x and along y [m]; positive."""
     moves: NDArray[np.bool_]
-    """Whether the base can move from place (i, j) by each of `MOVES`, shape (4, X, Y)."""
+    """Whether the base can move from position (i, j) by each of `MOVES`, shape (4, X, Y)."""
 
     def __post_init__(self) -> None:
         """Check the lattice and make its array read-only.
 
         Raises:
             TcsError: If a number is not finite, a step not positive, there are fewer than two
-                places along an axis, or a move leads out of the lattice.
+                positions along an axis, or a move leaves the lattice.
         """
         self._check_arrays("base lattice", {"moves": (np.bool_, (len(MOVES), None, None))})
         numbers = (*self.start, *self.step)
@@ -42,13 +42,13 @@ class BaseLattice(ArrayTable):
             and min(self.step) > 0.0,
             "base lattice: start and step must be two finite numbers each, the steps positive.",
         )
-        require(min(self.shape) >= 2, "base lattice: needs at least two places along each axis.")
+        require(min(self.shape) >= 2, "base lattice: needs at least two positions along each axis.")
         for along, (dx, dy) in zip(self.moves, MOVES, strict=True):
             leaving = np.ones(self.shape, dtype=np.bool_)
             leaving[: self.shape[0] - dx, max(0, -dy) : self.shape[1] - max(0, dy)] = False
-            require(not np.any(along & leaving), "base lattice: a move leads out of the lattice.")
+            require(not np.any(along & leaving), "base lattice: a move leaves the lattice.")
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many places there are along x and y."""
+        """Number of positions along x and y."""
         return self.moves.shape[1], self.moves.shape[2]

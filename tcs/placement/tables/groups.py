@@ -22,7 +22,7 @@ class Groups(ArrayTable):
     cells: NDArray[np.int32]
     """Cells of the members, ascending, with at least one kept set; lexicographic, shape (K, m)."""
     count: NDArray[np.int64]
-    """How many sets are kept in each group, shape (K,)."""
+    """Number of kept sets in each group, shape (K,)."""
     reachability: NDArray[np.float64]
     """Greatest P_R of those sets, exact, shape (K,)."""
     manipulability: NDArray[np.float32]
@@ -60,13 +60,13 @@ class Groups(ArrayTable):
         require(0.0 <= self.least < np.inf, "groups of sets: least must be finite and >= 0.")
 
     def check(self, size: NDArray[np.int64]) -> None:
-        """Refuse groups out of order, of cells that do not exist, or with too many sets.
+        """Check the groups against the number of candidates of each cell.
 
         Args:
-            size: How many candidates each cell has, shape (N,).
+            size: Number of candidates of each cell, shape (N,).
 
         Raises:
-            TcsError: If they do not fit.
+            TcsError: If groups are out of order, of cells that do not exist, or have too many sets.
         """
         cells = self.cells.astype(np.int64)
         number = np.zeros(len(cells), dtype=np.int64)

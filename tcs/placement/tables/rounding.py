@@ -1,4 +1,4 @@
-"""Rounding that keeps an upper bound one."""
+"""Rounding of upper bounds to single precision."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 WEIGHT_SUM_TOLERANCE = 1e-9
-"""Weights must sum to 1; dividing by the sum leaves 1e-16 per goal, this leaves room for
+"""Weights must sum to 1; dividing by the sum leaves 1e-16 per goal; this tolerates
 millions of goals and still refuses weights that were never normalised."""
 
 
@@ -40,7 +40,7 @@ class ScoreTable(ArrayTable):
     """
 
     dexterity: NDArray[np.float32]
-    """Best measure over all collision-free solutions, 0 where not reached, shape (H, G)."""
+    """Greatest dexterity over all collision-free solutions, 0 where not reached, shape (H, G)."""
     reason: NDArray[np.uint8]
     """A `Reason` for each pair of configuration and goal, shape (H, G)."""
     pair: NDArray[np.int32]
@@ -48,7 +48,8 @@ class ScoreTable(ArrayTable):
     pair_names: tuple[tuple[str, str], ...]
     """Names of two bodies in contact."""
     arm_joints: NDArray[np.float32]
-    """Winning arm joints [rad] of the R reached pairs, row-major in (h, g), shape (R, 7)."""
+    """Arm joints [rad] of the best solution of each of the R reached pairs, row-major in (h, g),
+    shape (R, 7)."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
 
@@ -71,7 +72,7 @@ class ScoreTable(ArrayTable):
         self._check_ranges()
 
     def _check_ranges(self) -> None:
-        """Refuse values that no scoring could have produced."""
+        """Check the ranges of the values."""
         weights, reached = self.weights, self.reached
         require(
             weights.size > 0
@@ -98,7 +99,7 @@ class ScoreTable(ArrayTable):
         require(
             len(self.arm_joints) == np.count_nonzero(reached),
             f"score table: {len(self.arm_joints)} rows of arm joints for "
-            f"{np.count_nonzero(reached)} reached pairs; must be as many.",
+            f"{np.count_nonzero(reached)} reached pairs; the numbers must be equal.",
         )
         require(bool(np.all(np.isfinite(self.arm_joints))), "score table: arm joints not finite.")
 
@@ -133,12 +134,12 @@ class ScoreTable(ArrayTable):
         return tc_manipulability(self.dexterity, self.weights)
 
     def reason_counts(self) -> dict[str, int]:
-        """Return how many pairs of configuration and goal have each reason, by its name."""
+        """Return the number of pairs of configuration and goal with each reason, by its name."""
         counts = np.bincount(self.reason.ravel(), minlength=len(Reason))
         return {reason.name.lower(): int(counts[reason]) for reason in Reason}
 
     def joints_of(self, h: int, g: int) -> NDArray[np.float32] | None:
-        """Return the winning arm joints [rad], shape (7,), or None where not reached.
+        """Return the arm joints of the best solution [rad], shape (7,), or None if not reached.
 
         Args:
             h: Flat index of the initial configuration.

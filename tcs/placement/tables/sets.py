@@ -1,9 +1,9 @@
-"""The set table: every set of initial configurations worth choosing from.
+"""The set table: every set of initial configurations to choose from.
 
 Pairs of configurations come in tens of millions, so they are not listed. They
 are grouped by the two base cells (x-y places) of their members, and for each
 pair of cells the table holds how many pairs were kept and upper bounds on
-their scores. That is enough to find the best pair exactly (see `tcs.select`),
+their scores. This is sufficient to find the best pair exactly (see `tcs.select`),
 because the score of a pair follows from the dexterity of its two members.
 """
 
@@ -22,7 +22,7 @@ from tcs.placement.tables.groups import Groups
 from tcs.placement.tables.rules import RULES, PairLimits, pair_limits
 
 MOST_MEMBERS = 3
-"""Most members a set may have."""
+"""Greatest number of members of a set."""
 
 _BOUNDS = tuple(
     f"{of}_{what}"
@@ -31,8 +31,8 @@ _BOUNDS = tuple(
 )
 
 DISTANCE_TOLERANCE = 1e-9
-"""Grid steps such as 0.05 are no binary fractions: 8 of them can come out 1e-16 short of 0.40 m,
-or 1e-15 far from the origin. Places that differ by a nanometre are the same place."""
+"""Tolerance of distances [m]. Grid steps such as 0.05 are not binary fractions: 8 of them can be
+1e-16 short of 0.40 m, or 1e-15 far from the origin."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,13 +46,13 @@ class SetTable(ArrayTable):
     rule: str
     """Which sets are kept: one of `RULES`."""
     max_members: int
-    """Sets of one to so many members are held."""
+    """Greatest number of members of the kept sets."""
     min_distance: float
     """Least base x-y distance between two members of a set [m]."""
     same_environment: bool
     """Whether all members of a set share the state of the environment, e.g. the bed's height."""
     state_size: int
-    """How many configurations each state of the environment has: h // state_size is its number."""
+    """Number of configurations per state of the environment: h // state_size is the state."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
     candidates: NDArray[np.int32]
@@ -69,7 +69,7 @@ class SetTable(ArrayTable):
     pair_cells: NDArray[np.int32]
     """Two cells, first <= second, with at least one kept pair; lexicographic, shape (K, 2)."""
     pair_count: NDArray[np.int64]
-    """How many pairs are kept between the two cells, shape (K,)."""
+    """Number of kept pairs between the two cells, shape (K,)."""
     pair_reachability: NDArray[np.float64]
     """Greatest P_R of those pairs, exact, shape (K,)."""
     pair_manipulability: NDArray[np.float32]
@@ -83,12 +83,12 @@ class SetTable(ArrayTable):
     member_sum: NDArray[np.float32]
     """Greatest P_R + P_M of those pairs, rounded upward, shape (C,)."""
     triples: Groups | None
-    """Kept sets of three; None where `max_members` is less."""
+    """Kept sets of three; None if `max_members` is less."""
     best: tuple[int, ...]
     """Configuration indices of the best set: greatest P_R + P_M, or P_R before P_M by the rule
     "code2015"; () without candidates."""
     best_single: tuple[int, ...]
-    """The same among sets of one."""
+    """Configuration index of the best set of one; () without candidates."""
     lattice: BaseLattice
     """Where the base can drive."""
 
@@ -134,13 +134,13 @@ class SetTable(ArrayTable):
             isinstance(self.triples, Groups) and self.triples.cells.shape[1] == MOST_MEMBERS
             if self.max_members == MOST_MEMBERS
             else self.triples is None,
-            "set table: triples must be there where max_members is 3, and only there.",
+            "set table: triples must be given if max_members is 3, and only then.",
         )
         if self.triples is not None:
             self.triples.check(np.diff(self.cell_start))
 
     def _check_candidates(self) -> None:
-        """Refuse candidates or cells that do not exist, and a best set of other members."""
+        """Check candidates, cells and best sets."""
         increasing = bool(np.all(np.diff(self.candidates) > 0)) and np.all(self.candidates >= 0)
         require(increasing, "set table: candidates must be ascending and >= 0.")
         require(
@@ -151,10 +151,10 @@ class SetTable(ArrayTable):
         require(bool(np.all(np.isfinite(self.cell_xy))), "set table: cell_xy must be finite.")
         along = (self.cell_xy - self.lattice.start) / self.lattice.step
         inside = (np.rint(along) >= 0) & (np.rint(along) < self.lattice.shape)
-        # A millionth of a step: what rounding leaves of some dozen steps, and to spare.
+        # A millionth of a step is far above the rounding of some dozen steps.
         require(
             bool(np.all(inside & (np.abs(along - np.rint(along)) < 1e-6))),
-            "set table: cell_xy must be places of the lattice.",
+            "set table: cell_xy must be positions of the lattice.",
         )
         for name, size in (("best", self.max_members), ("best_single", 1)):
             members = getattr(self, name)
@@ -167,7 +167,7 @@ class SetTable(ArrayTable):
             )
 
     def _check_pairs(self) -> None:
-        """Refuse an index of cell pairs that is out of order or out of range."""
+        """Check the order and range of the pairs of cells and of their bounds."""
         first, second = self.pair_cells.T.astype(np.int64)
         cells = len(self.cell_xy)
         require(
@@ -210,7 +210,7 @@ class SetTable(ArrayTable):
 
     @cached_property
     def limits(self) -> PairLimits:
-        """What the scores of a pair must come up to, to be kept."""
+        """The least scores of a kept pair."""
         return pair_limits(self.rule, self.single_reachability, self.single_manipulability)
 
     @cached_property
@@ -245,13 +245,13 @@ class SetTable(ArrayTable):
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
     def scores_of(self, members: tuple[int, ...]) -> tuple[float, float]:
-        """Return P_R and P_M of a set, TCS eq. (1) and (4): per goal, its best member counts.
+        """Return P_R and P_M of a set, TCS eq. (1) and (4), with the best member at each goal.
 
         Args:
             members: Flat configuration indices, all of them candidates.
 
         Raises:
-            TcsError: If the set is empty or a member is no candidate.
+            TcsError: If the set is empty or a member is not a candidate.
         """
         rows = np.searchsorted(self.candidates, members)
         require(

@@ -11,7 +11,7 @@ from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.sets import MOST_MEMBERS, SetTable
 
 NO_MEMBER = -1
-"""Stands where a set has fewer members than others in the table."""
+"""Fills the rows of sets with fewer members than others."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,11 +31,11 @@ class SuccessTable(ArrayTable):
     success: NDArray[np.float64]
     """Mean over the samples, shape (K,)."""
     low: NDArray[np.float64]
-    """Lower end of its 95 % interval, shape (K,)."""
+    """Lower end of the 95 % interval of the mean, shape (K,)."""
     high: NDArray[np.float64]
     """Upper end, shape (K,)."""
     samples: NDArray[np.int32]
-    """How many samples it is the mean of, shape (K,)."""
+    """Number of samples of the mean, shape (K,)."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -64,13 +64,13 @@ class SuccessTable(ArrayTable):
         self._check_members()
 
     def _check_members(self) -> None:
-        """Refuse sets that are none, or out of order."""
+        """Check that sets are non-empty and in order."""
         members = self.members.astype(np.int64)
-        there = members != NO_MEMBER
-        ascending = (members[:, :-1] < members[:, 1:]) | ~there[:, 1:]
-        gapless = there[:, :-1] | ~there[:, 1:]
+        is_member = members != NO_MEMBER
+        ascending = (members[:, :-1] < members[:, 1:]) | ~is_member[:, 1:]
+        gapless = is_member[:, :-1] | ~is_member[:, 1:]
         require(
-            bool(np.all(members >= NO_MEMBER) and np.all(there[:, 0]))
+            bool(np.all(members >= NO_MEMBER) and np.all(is_member[:, 0]))
             and bool(np.all(ascending) and np.all(gapless)),
             "success table: members of a set must be ascending configuration indices.",
         )
@@ -80,15 +80,15 @@ class SuccessTable(ArrayTable):
         for key in keys:
             earlier |= tied & (key[:-1] < key[1:])
             tied &= key[:-1] == key[1:]
-        require(bool(np.all(earlier)), "success table: sets must be in order, each of them once.")
+        require(bool(np.all(earlier)), "success table: sets must be in order, without duplicates.")
 
     @property
     def sizes(self) -> NDArray[np.int64]:
-        """How many members each set has, shape (K,)."""
+        """Number of members of each set, shape (K,)."""
         return np.asarray(np.count_nonzero(self.members != NO_MEMBER, axis=1), dtype=np.int64)
 
     def of_size(self, members: int) -> NDArray[np.int64]:
-        """Return the rows of the sets with so many members."""
+        """Return the rows of the sets with this number of members."""
         return np.flatnonzero(self.sizes == members)
 
     def most_robust(self, sets: SetTable, *, max_members: int = MOST_MEMBERS) -> tuple[int, ...]:
@@ -99,7 +99,7 @@ class SuccessTable(ArrayTable):
         the greatest P_R + P_M, then to the first.
 
         Args:
-            sets: The sets that these are estimates for.
+            sets: The sets whose success is estimated here.
             max_members: Greatest number of members of the set.
         """
         rows = np.flatnonzero(self.sizes <= max_members)

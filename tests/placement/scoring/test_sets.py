@@ -135,7 +135,7 @@ def test_triples_agree_with_plain_loops(table, min_distance, bed, same_environme
 
 def test_the_code_of_2015_has_no_triples():
     grid = small_grid()
-    with pytest.raises(TcsError, match="'code2015' has sets of one and two"):
+    with pytest.raises(TcsError, match="'code2015' keeps sets of one and two"):
         build_sets(random_scores(grid, 2, seed=0), grid, rule="code2015", max_members=3)
 
 
@@ -150,7 +150,7 @@ def test_too_many_triples_of_places(monkeypatch):
     grid = small_grid(nx=6)
     scores = random_scores(grid, 5, seed=0)
     monkeypatch.setattr(triples, "MOST_GROUPS", 3)
-    with pytest.raises(TcsError, match="more than 3 triples of places"):
+    with pytest.raises(TcsError, match="more than 3 triples of base cells"):
         build_sets(scores, grid, max_members=3)
 
 

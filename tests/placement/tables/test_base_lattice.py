@@ -30,10 +30,10 @@ WRONG = {
     "integers": ({"start": (0, 1)}, "finite numbers"),
     "three kinds": ({"moves": np.zeros((3, 2, 3), dtype=np.bool_)}, "shape"),
     "a single row": ({"moves": np.zeros((4, 1, 3), dtype=np.bool_)}, "at least two"),
-    "out along x": (leaving(0, 1, 0), "leads out"),
-    "out along y": (leaving(1, 0, 2), "leads out"),
-    "out at a corner": (leaving(2, 0, 2), "leads out"),
-    "out at the other": (leaving(3, 0, 0), "leads out"),
+    "out along x": (leaving(0, 1, 0), "leaves the lattice"),
+    "out along y": (leaving(1, 0, 2), "leaves the lattice"),
+    "out at a corner": (leaving(2, 0, 2), "leaves the lattice"),
+    "out at the other": (leaving(3, 0, 0), "leaves the lattice"),
 }
 
 

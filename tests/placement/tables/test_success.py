@@ -53,7 +53,7 @@ def test_the_most_robust_set_has_the_greatest_lower_bound():
         ("members", [[3, -1], [9, -1], [4, 1], [3, 9]], "ascending"),
         ("members", [[3, -1], [9, -1], [4, 4], [5, 9]], "ascending"),
         ("members", [[-1, 3], [9, -1], [1, 4], [3, 9]], "ascending"),
-        ("members", [[3, -1], [9, -1], [1, 4], [1, 4]], "each of them once"),
+        ("members", [[3, -1], [9, -1], [1, 4], [1, 4]], "without duplicates"),
         ("members", [[1, 4], [9, -1], [3, -1], [3, 9]], "in order"),
         ("members", [[3, -2], [9, -1], [1, 4], [3, 9]], "ascending"),
         ("success", [0.5, 0.25, 1.1, 0.75], "low <= success"),
