@@ -1,10 +1,11 @@
-"""Measure scoring a room as it is observed: its time, and what it gains over stored shifts.
+"""Measure live scoring: its time, and its gain over the stored shifts of the person.
 
 Usage: python benchmarks/live.py [--repeats 5] [--rows shaving/bed ...] [--between 0.025]
 
-Times are of the wheelchair tasks, scene and machine code at hand. The gain is that of the bed: the
-person lies between two stored shifts; the best set of the nearest table and the best set scored
-live are both judged in the room as it is. Nothing here is a test: tests never depend on time.
+Times are those of the wheelchair tasks, with scene and machine code ready. The gain is that on the
+bed: the person lies between two stored shifts, and the best set of the nearest table and the best
+set scored live are both evaluated in the observed scene. Nothing here is a test: tests never
+depend on time.
 """
 
 from __future__ import annotations
@@ -26,26 +27,26 @@ def main() -> None:
     """Measure and print everything."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="observations of each task")
-    parser.add_argument("--rows", nargs="*", metavar="TASK/ROOM", help="only these rows")
+    parser.add_argument("--rows", nargs="*", metavar="TASK/ENVIRONMENT", help="only these rows")
     parser.add_argument(
-        "--between", type=float, default=0.025, help="how far from a stored shift [m]"
+        "--between", type=float, default=0.025, help="distance from a stored shift [m]"
     )
     options = parser.parse_args()
     header()
     rows = [
         one for one in task_environment_pairs() if not options.rows or "/".join(one) in options.rows
     ]
-    for task, room in rows:
-        if room == WHEELCHAIR:
+    for task, environment in rows:
+        if environment == WHEELCHAIR:
             times(task, options.repeats)
     print()
-    for task, room in rows:
-        if room != WHEELCHAIR:
-            gains(task, room, options.between)
+    for task, environment in rows:
+        if environment != WHEELCHAIR:
+            gains(task, environment, options.between)
 
 
 def times(task: str, repeats: int) -> None:
-    """Measure how long one observation takes, by the wall and by the processor."""
+    """Measure wall and processor time of one observation."""
     begun = time.perf_counter()
     scorer = LiveScorer(task)
     row(f"{task}: scene and machine code", f"{time.perf_counter() - begun:.2f} s, once")
@@ -65,10 +66,10 @@ def times(task: str, repeats: int) -> None:
     row("  processor time, two threads", spread(cpu))
 
 
-def gains(task: str, room: str, between: float) -> None:
-    """Print what the set chosen live has over the one of the nearest stored shift."""
-    stored = score(task, room)
-    scorer = LiveScorer(task, room)
+def gains(task: str, environment: str, between: float) -> None:
+    """Print the gain of the best set scored live over that of the nearest stored shift."""
+    stored = score(task, environment)
+    scorer = LiveScorer(task, environment)
     steps = stored.observed_axes[0].values
     places = [float(y) + between for y in steps[:-1]]
     differences = []
@@ -77,10 +78,12 @@ def gains(task: str, room: str, between: float) -> None:
         for y in places:
             live = scorer.score({"person_y": y, "person_x": x})
             near = stored.tables[nearest_table(stored, observed={"person_y": y}).index].sets.best
-            found.append(np.subtract(judged(live, live.nominal.sets.best), judged(live, near)))
+            found.append(
+                np.subtract(scores_of(live, live.nominal.sets.best), scores_of(live, near))
+            )
         differences.append(np.array(found))
     for x, found in zip((0.0, 0.05), differences, strict=True):
-        name = f"{task}, {room}" if x == 0.0 else f"  and {100 * x:.0f} cm towards the feet"
+        name = f"{task}, {environment}" if x == 0.0 else f"  and {100 * x:.0f} cm towards the feet"
         reach, sums = found[:, 0], found.sum(axis=1)
         row(
             name,
@@ -91,8 +94,8 @@ def gains(task: str, room: str, between: float) -> None:
         )
 
 
-def judged(live: ScoreFile, members: tuple[int, ...]) -> tuple[float, float]:
-    """Return P_R and P_M of a set in the room as it is."""
+def scores_of(live: ScoreFile, members: tuple[int, ...]) -> tuple[float, float]:
+    """Return P_R and P_M of a set in the observed scene."""
     scores = live.nominal.scores
     rows = list(members)
     reached = scores.reached[rows].any(axis=0)

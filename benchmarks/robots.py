@@ -1,10 +1,10 @@
-"""Measure every robot that ships at the same tasks: time, what it reaches, and what it missed.
+"""Measure every shipped robot at the same tasks: time, reached goals, and missed goals.
 
 Usage: python benchmarks/robots.py [--robots pr2,panda] [--tasks shaving,feeding] [--repeats 5]
                                    [--pairs 500] [--dense 1000]
 
-Each robot does each task in the wheelchair on the paper's grid; a robot without a lift has a third
-of the configurations. The robots take turns, so that a busy moment hits none of them alone. Nothing
+Each robot does each task in the wheelchair on the paper's grid; a robot without a torso joint has a
+third of the configurations. The robots alternate, so that a load peak affects all of them. Nothing
 here is a test: tests never depend on time.
 """
 
@@ -22,7 +22,7 @@ from tcs.placement.scoring import load_job, score, sweep, verify
 
 ENVIRONMENT = "wheelchair"
 RECALL = 0.998
-"""What every arm is meant to come up to."""
+"""Least recall expected of every arm."""
 
 
 def main() -> int:
@@ -40,14 +40,14 @@ def main() -> int:
     row("seed, threads", f"{options.seed}, {options.jobs}")
     works = list(itertools.product(options.tasks.split(","), options.robots.split(",")))
     times(works, options.repeats, options.jobs)
-    # A list, so that one false answer does not keep the others from being looked for.
+    # A list, so that one false answer does not hide the others.
     sound = all([verification(*work, options) for work in works])
     save(options)
     return 0 if sound else 1
 
 
 def times(works: list[tuple[str, str]], repeats: int, jobs: int) -> None:
-    """Measure the scoring of every task with every robot, and print what it found."""
+    """Measure the scoring of every task with every robot, and print the reasons."""
     lowered = {}
     for task, robot in works:
         job = load_job(task, ENVIRONMENT, robot)

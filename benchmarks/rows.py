@@ -2,8 +2,8 @@
 
 Usage: python benchmarks/rows.py [--out DIR] [--pairs 500] [--dense 200] [--repeats 3]
 
-`tcs score --all` runs once as a process of its own, machine code at hand; bathing on the bed is
-scored again a few times for its spread. The files stay in DIR, if one is named, for
+`tcs score --all` runs once as a process of its own, with machine code ready; bathing on the bed is
+scored again a few times for its spread. The files stay in DIR, if given, for
 `benchmarks/selection.py`. Nothing here is a test: tests never depend on time.
 """
 
@@ -88,7 +88,7 @@ def loads(rows: list[dict[str, object]]) -> None:
             _ = table.scores
         decoding.append(time.perf_counter() - begun)
     row("largest file", f"{path.name}, {path.stat().st_size / 1e6:.2f} MB")
-    row("loaded, ready to choose", spread(loading))
+    row("loaded, ready for selection", spread(loading))
     row("all its scores decoded", spread(decoding))
 
 

@@ -1,4 +1,4 @@
-"""Measure what the README promises, on this machine, and print it as one table.
+"""Measure the figures of the README on this machine and print them as one table.
 
 Usage: python benchmarks/run.py [--task shaving] [--repeats 5] [--pairs 2000] [--dense 1000]
 
@@ -131,7 +131,7 @@ def select_times(path: Path, seed: int) -> None:
 
 
 def process_times(task: str, path: Path, repeats: int) -> None:
-    """Measure `tcs score` as a whole process, machine code at hand."""
+    """Measure `tcs score` as a whole process, with machine code ready."""
     command = [sys.executable, "-m", "tcs", "score", task, "--environment", "wheelchair"]
     taken = []
     for _ in range(repeats):

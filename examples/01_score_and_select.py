@@ -1,7 +1,7 @@
-"""Score a task once, keep the scores in a file, and choose from it where to stand.
+"""Score a task once, save the scores, and select base poses from the file.
 
-Scoring looks at every place, heading and torso height of a grid. Choosing reads what was stored and
-takes milliseconds: neither simulator nor compiler is needed for it.
+Scoring evaluates every base pose and torso height of a grid. Selection reads the stored sets and
+takes milliseconds; it needs neither simulator nor compiler.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import tcs
 
 
 def main(folder: Path = Path("out/examples")) -> None:
-    """Score feeding in the wheelchair and choose for two places where the robot may be."""
+    """Score feeding in the wheelchair and select for two current base poses."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "feeding.tcs"
 
-    # The offline part: 89,304 initial configurations x 7 goals, in about a second.
+    # Offline: 89,304 initial configurations x 7 goals, in about a second.
     tcs.save(path, tcs.score("feeding", environment="wheelchair", robot="pr2"))
 
-    # The online part: where is the robot now? x and y [m] and heading [rad] in the room's frame;
-    # `tcs list` says where its origin is.
+    # Online: the current base pose, x and y [m] and yaw [rad] in the environment frame;
+    # `tcs list` describes its origin.
     file = tcs.load(path)
     for x, y in [(2.0, 1.0), (2.0, -1.0)]:
         here = tcs.InitialConfiguration(base_x=x, base_y=y, base_yaw=math.pi, torso=0.0)

@@ -1,7 +1,7 @@
-"""Score the room as it is found, in place of taking the nearest state that was scored.
+"""Score the scene as it is observed, instead of using the nearest state that was scored.
 
-The scene is built once; each observation then costs the scoring alone, which is quick enough to do
-when the robot comes in and sees the person.
+The scene is built once; each observation then takes the time of the scoring alone, which is short
+enough to do when the robot has arrived and observes the person.
 """
 
 from __future__ import annotations
@@ -13,22 +13,23 @@ import tcs
 
 
 def main() -> None:
-    """Score feeding for two observations of the room."""
+    """Score feeding for two observations of the environment."""
     scorer = tcs.LiveScorer("feeding", "wheelchair")
     here = tcs.InitialConfiguration(base_x=2.0, base_y=-1.0, base_yaw=math.pi, torso=0.0)
     observations: dict[str, tcs.Observation | dict[str, float]] = {
-        # The person sits 4 cm further forward than expected: person_x counts backward [m].
-        "told by a joint": {"person_x": -0.04},
-        # A camera sees the head; which joints explain that is found by least squares.
-        "seen by a camera": tcs.Observation(frames={"head": (0.47, 0.02, 1.23)}),
+        # The person sits 4 cm further forward than expected: person_x points backward [m].
+        "observed joint": {"person_x": -0.04},
+        # A camera detects the head; the joints that explain it are found by least squares.
+        "observed frame": tcs.Observation(frames={"head": (0.47, 0.02, 1.23)}),
     }
-    for how, observation in observations.items():
+    for source, observation in observations.items():
         begun = time.perf_counter()
         file = scorer.score(observation)
         choice = tcs.select(file, here)
         seconds = time.perf_counter() - begun
         print(
-            f"{how}: {choice.reachability:.0%} of the goals, scored and chosen in {seconds:.1f} s"
+            f"{source}: {choice.reachability:.0%} of the goals, scored and selected in "
+            f"{seconds:.1f} s"
         )
         print("  ", [member.to_json() for member in choice.members])
 

@@ -24,7 +24,7 @@ class ExplainedConfiguration:
     configuration: InitialConfiguration
     """The configuration, as it was scored."""
     stated: InitialConfiguration
-    """The configuration that was asked for: it need not be one of the grid."""
+    """The requested configuration; it need not be one of the grid."""
     reason: Reason
     """`REACHED`, or the reason why the goal is not reached."""
     pair: tuple[str, str] | None

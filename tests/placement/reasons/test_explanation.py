@@ -164,7 +164,7 @@ def test_way_around_the_furniture(room):
     assert (around.route, around.driving) == ("around", pytest.approx(0.6))
 
 
-def test_detour_is_told():
+def test_detour_is_refused():
     grid = small_grid(nx=10, ny=10, yaws=1, torsos=1)
     file = made(grid, lambda h: bed_between(h, here_side=5))
     fix = tcs.explain(file, 0, 3 * 10 + 2).fix

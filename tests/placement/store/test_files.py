@@ -113,7 +113,7 @@ def test_a_failure_leaves_the_old_file_and_no_half_one(path, file, monkeypatch, 
     assert [found.name for found in path.parent.iterdir()] == [path.name]
 
 
-def test_a_full_disk_is_told(path, file):
+def test_a_full_disk_is_refused(path, file):
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
@@ -125,7 +125,7 @@ def test_a_full_disk_is_told(path, file):
 
 
 @pytest.mark.parametrize("folder", ["missing", "a file"])
-def test_an_impossible_folder_is_told(tmp_path, file, folder):
+def test_an_impossible_folder_is_refused(tmp_path, file, folder):
     (tmp_path / "a file").write_text("x")
     with pytest.raises(OutputError, match="existing, writable folder"):
         save_scores(tmp_path / folder / "shaving.tcs", file)
@@ -137,7 +137,7 @@ def test_a_folder_is_no_target(tmp_path, file):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_unwritable_folder_is_told(path, file, monkeypatch):
+def test_an_unwritable_folder_is_refused(path, file, monkeypatch):
     # Permissions do not stop root, who runs many a container; a refusal by the system does.
     def refuse(*_arguments, **_options):
         raise PermissionError(errno.EACCES, "Permission denied")
@@ -148,7 +148,7 @@ def test_an_unwritable_folder_is_told(path, file, monkeypatch):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_missing_file_is_told(path):
+def test_a_missing_file_is_refused(path):
     with pytest.raises(StoreError, match="cannot be read: No such file"):
         load_scores(path)
 
@@ -162,7 +162,7 @@ def test_a_folder_or_pipe_is_no_file(tmp_path):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.9, 0.999])
-def test_a_truncated_file_is_told(path, file, share):
+def test_a_truncated_file_is_refused(path, file, share):
     save_scores(path, file)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
@@ -171,7 +171,7 @@ def test_a_truncated_file_is_told(path, file, share):
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
-def test_a_truncated_uncompressed_file_is_told(path, file, share):
+def test_a_truncated_uncompressed_file_is_refused(path, file, share):
     joblib.dump(encode(file), path)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
@@ -179,7 +179,7 @@ def test_a_truncated_uncompressed_file_is_told(path, file, share):
         load_scores(path)
 
 
-def test_a_flipped_bit_is_told(path, file):
+def test_a_flipped_bit_is_refused(path, file):
     save_scores(path, file)
     whole = bytearray(path.read_bytes())
     whole[len(whole) // 2] ^= 1
@@ -193,7 +193,7 @@ def test_flipped_bytes_never_crash(tmp_path, file):
     joblib.dump(encode(file), tmp_path / "whole")
     whole = (tmp_path / "whole").read_bytes()
     rng = np.random.default_rng(0)
-    told = []
+    messages = []
     for _ in range(400):
         broken = bytearray(whole)
         for position in rng.integers(0, len(whole), 3):
@@ -202,9 +202,9 @@ def test_flipped_bytes_never_crash(tmp_path, file):
         try:
             load_scores(tmp_path / "broken")
         except StoreError as error:
-            told.append(str(error))
-    assert len(told) > 100
-    assert not any("\n" in message for message in told)
+            messages.append(str(error))
+    assert len(messages) > 100
+    assert not any("\n" in message for message in messages)
 
 
 @pytest.mark.parametrize(
@@ -212,7 +212,7 @@ def test_flipped_bytes_never_crash(tmp_path, file):
     [b"Dear reader,\n", b"\x1f\x8b\x08\x00 gzip", b"PK\x03\x04", b"\x80", b"\x80\x04.", bytes(100)],
     ids=["text", "gzip", "zip", "one byte", "empty pickle", "zeros"],
 )
-def test_a_foreign_file_is_told(path, content):
+def test_a_foreign_file_is_refused(path, content):
     path.write_bytes(content)
     with pytest.raises(StoreFormatError):
         load_scores(path)
@@ -220,20 +220,20 @@ def test_a_foreign_file_is_told(path, content):
 
 @pytest.mark.parametrize("content", [[1, 2], {"a": np.zeros(3)}, None, {"format": "other"}, "x"])
 @pytest.mark.parametrize("compress", [0, 3])
-def test_another_joblib_file_is_told(path, content, compress):
+def test_another_joblib_file_is_refused(path, content, compress):
     joblib.dump(content, path, compress=compress)
     with pytest.raises(StoreFormatError, match="tcs"):
         load_scores(path)
 
 
-def test_a_longer_file_is_told(path, file):
+def test_a_longer_file_is_refused(path, file):
     save_scores(path, file)
     path.write_bytes(path.read_bytes() + b"more")
     with pytest.raises(StoreFormatError, match="continues after its end"):
         load_scores(path)
 
 
-def test_a_file_from_the_future_is_told(path, file):
+def test_a_newer_file_is_refused(path, file):
     joblib.dump(encode(file) | {"format_version": FORMAT_VERSION + 1}, path)
     message = "written by a newer tcs, and this program reads version 3: update tcs"
     with pytest.raises(StoreFormatError, match=message):
@@ -370,7 +370,7 @@ def test_a_folded_array_may_not_swell(path, file):
 
 
 @pytest.mark.parametrize("section", ["metadata", "task", "grid", "observed", "tables"])
-def test_a_missing_section_is_told(path, file, section):
+def test_a_missing_section_is_refused(path, file, section):
     content = encode(file)
     del content[section]
     joblib.dump(content, path)
@@ -379,7 +379,7 @@ def test_a_missing_section_is_told(path, file, section):
 
 
 @pytest.mark.parametrize("section", ["scores", "sets"])
-def test_a_missing_half_of_a_table_is_told(path, file, section):
+def test_a_missing_half_of_a_table_is_refused(path, file, section):
     content = encode(file)
     del content["tables"][0][section]
     joblib.dump(content, path)
