@@ -1,38 +1,51 @@
-"""Run files: CSV or Parquet."""
+"""Run files: CSV or Parquet, one row per sample.
+
+The columns of the arm's joints bear the joints' names and hold radians, so that
+`tcs capability record RUN.csv` makes a capability map of a run file.
+"""
 
 from __future__ import annotations
 
 import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tcs.errors import DataFileError, OutputError
 from tcs.files.writing import whole_file
-from tcs.teleop.runs.run import ARRAYS, Run
+from tcs.kernel.arrays import FloatArray
+from tcs.teleop.runs.run import ARRAYS, IntArray, Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FORMATS = (".csv", ".parquet")
+VERSION = 2
+"""Version of the columns and of the metadata's keys."""
+_VERSION_KEY = "run_format"
 _XYZ = ("x", "y", "z")
 _WXYZ = ("qw", "qx", "qy", "qz")
 _METADATA = "metadata"
+_INTEGERS = ("group", "sign", "limits")
+_BOOLEANS = ("clutch", "singular", "stopped")
 
 
 def save_run(path: Path, run: Run) -> None:
-    """Write a run, as CSV or as Parquet by the ending of its name; whole or not at all.
+    """Write a run as CSV or Parquet, by the suffix of the path; whole or not at all.
 
     CSV keeps ten digits, Parquet all of them.
 
     Raises:
-        OutputError: If it cannot be written there, has another ending, or Parquet's library is not
-            installed.
+        OutputError: If the file cannot be written, its suffix is unknown, or the library for
+            Parquet is not installed.
     """
     check_format(path)
-    frame = _as_frame(run)
+    frame = _to_frame(run)
     if path.suffix == ".csv":
-        # Ten digits: 1e-9 rad and 1e-10 m, far below any encoder, in half the room of all digits.
+        # Ten digits: 1e-9 rad and 1e-10 m, far below any encoder, at half the size.
         content = frame.to_csv(index=False, float_format="%.10g").encode()
     else:
         buffer = io.BytesIO()
@@ -43,10 +56,10 @@ def save_run(path: Path, run: Run) -> None:
 
 
 def check_format(path: Path) -> None:
-    """Refuse a file that no run could be written to.
+    """Refuse a path that no run can be written to.
 
     Raises:
-        OutputError: If its name ends otherwise, or Parquet's library is not installed.
+        OutputError: If its suffix is unknown, or the library for Parquet is not installed.
     """
     if path.suffix not in FORMATS:
         raise OutputError(f"'{path}' ends in '{path.suffix}'; a run is {' or '.join(FORMATS)}.")
@@ -61,11 +74,26 @@ def load_run(path: Path) -> Run:
     """Return the run in a file that `save_run` wrote.
 
     Raises:
-        DataFileError: If it cannot be read, or is no run.
+        DataFileError: If the file cannot be read, has another format version, is cut short, or
+            holds an invalid sample.
+    """
+    where = f"run '{path}'"
+    frame = _read(path, where)
+    try:
+        return _from_frame(frame)
+    except DataFileError as error:
+        # These messages begin with "run": name the file there.
+        raise DataFileError(f"{where}{str(error).removeprefix('run')}") from None
+
+
+def _read(path: Path, where: str) -> pd.DataFrame:
+    """Return the table in a file.
+
+    Raises:
+        DataFileError: If there is none.
     """
     import pandas as pd
 
-    where = f"run '{path}'"
     if path.suffix not in FORMATS:
         raise DataFileError(f"{where} ends in '{path.suffix}'; must be {' or '.join(FORMATS)}.")
     if path.suffix == ".parquet" and not _has_parquet():
@@ -73,20 +101,25 @@ def load_run(path: Path) -> Run:
             f"{where} needs a library that is not installed: pip install 'tcs[parquet]'."
         )
     try:
-        if path.suffix == ".csv":
-            frame = pd.read_csv(path, keep_default_na=False)
-        else:
-            frame = pd.read_parquet(path, engine="pyarrow")
+        if path.suffix == ".parquet":
+            return pd.read_parquet(path, engine="pyarrow")
+        content = path.read_bytes()
+        frame = pd.read_csv(io.BytesIO(content), keep_default_na=False, low_memory=False)
     except OSError as error:
-        raise DataFileError(f"{where} cannot be read: {error.strerror or error}.") from None
-    # pandas and its engines raise what they like on a broken file.
+        reason = error.strerror or str(error).splitlines()[0]
+        raise DataFileError(f"{where} cannot be read: {reason}.") from None
+    # pandas and its engines raise various exceptions on a broken file.
     except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise DataFileError(f"{where} is no table: {said}.") from None
-    try:
-        return _from_frame(frame)
-    except DataFileError as error:
-        raise DataFileError(f"{where}: {error}") from None
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise DataFileError(f"{where} is not a table: {reason}.") from None
+    # pandas fills up a row that ends early.
+    last = content.rstrip(b"\r\n").rsplit(b"\n", 1)[-1]
+    if len(frame) > 1 and last.count(b",") < len(frame.columns) - 1:
+        raise DataFileError(
+            f"{where}, sample {len(frame) - 1}: the row is cut short. Delete it, or record the run "
+            "again."
+        )
+    return frame
 
 
 def _has_parquet() -> bool:
@@ -95,7 +128,7 @@ def _has_parquet() -> bool:
     return find_spec("pyarrow") is not None
 
 
-def _as_frame(run: Run) -> pd.DataFrame:
+def _to_frame(run: Run) -> pd.DataFrame:
     import pandas as pd
 
     columns: dict[str, Any] = {"time": run.time}
@@ -108,14 +141,24 @@ def _as_frame(run: Run) -> pd.DataFrame:
     columns |= {"mode": run.mode.astype(object)}
     columns |= _split([f"{name}_limit" for name in run.joint_names], run.limits)
     columns |= {"singular": run.singular.astype(int), "stopped": run.stopped.astype(int)}
-    # One cell: a table has no other place for it that every reader of CSV passes over.
-    columns[_METADATA] = [json.dumps(dict(run.metadata), sort_keys=True)] + [""] * (len(run) - 1)
+    # One cell: no other place in a table is passed over by every reader of CSV.
+    metadata = json.dumps({**run.metadata, _VERSION_KEY: VERSION}, sort_keys=True)
+    columns[_METADATA] = [metadata] + [""] * (len(run) - 1)
     return pd.DataFrame(columns)
 
 
+def _split(names: Sequence[str], table: FloatArray | IntArray) -> dict[str, Any]:
+    return {name: table[:, i] for i, name in enumerate(names)}
+
+
 def _from_frame(frame: pd.DataFrame) -> Run:
+    """Return the run in a table.
+
+    Raises:
+        DataFileError: If a column is missing, or a value is invalid.
+    """
     names = tuple(
-        name.removesuffix("_rate") for name in frame.columns if str(name).endswith("_rate")
+        str(name).removesuffix("_rate") for name in frame.columns if str(name).endswith("_rate")
     )
     wide = {
         "joints": list(names),
@@ -126,31 +169,70 @@ def _from_frame(frame: pd.DataFrame) -> Run:
         "angular": [f"angular_{axis}" for axis in _XYZ],
         "limits": [f"{name}_limit" for name in names],
     }
-    single = [name for name in ARRAYS if name not in wide]
-    needed = [name for part in wide.values() for name in part] + [*single, _METADATA]
+    columns = {name: wide.get(name, [name]) for name in ARRAYS}
+    needed = [column for group in columns.values() for column in group] + [_METADATA]
     missing = [name for name in needed if name not in frame.columns]
     if missing or not names:
         listed = ", ".join(missing[:5]) or "JOINT_rate"
-        raise DataFileError(f"column {listed} is missing. Give a file that `tcs teleop` saved.")
-    kinds = {"group": int, "sign": int, "limits": int, "mode": str}
-    kinds |= dict.fromkeys(("clutch", "singular", "stopped"), bool)
-    arrays: dict[str, Any] = {}
-    for name in ARRAYS:
-        columns = wide.get(name, name)
-        kind: Any = kinds.get(name, float)
-        try:
-            values = frame[columns].to_numpy()
-            arrays[name] = values.astype(int).astype(bool) if kind is bool else values.astype(kind)
-        except (ValueError, TypeError):
-            raise DataFileError(f"'{name}' holds something that is no number.") from None
-    try:
-        metadata = json.loads(str(frame[_METADATA].iloc[0])) if len(frame) else {}
-    except json.JSONDecodeError:
-        raise DataFileError("'metadata' of the first sample is no JSON object.") from None
-    if not isinstance(metadata, dict):
-        raise DataFileError("'metadata' of the first sample is no JSON object.")
+        raise DataFileError(
+            f"run: column {listed} is missing. Give a file that `tcs teleop` saved."
+        )
+    metadata = _metadata(frame)
+    arrays = {name: _values(frame, name, columns[name]) for name in ARRAYS}
+    arrays |= {name: array[:, 0] for name, array in arrays.items() if name not in wide}
     return Run(names, **arrays, metadata=metadata)
 
 
-def _split(names: Any, table: Any) -> dict[str, Any]:
-    return {name: table[:, i] for i, name in enumerate(names)}
+def _metadata(frame: pd.DataFrame) -> dict[str, Any]:
+    """Return the metadata, without the format version.
+
+    Raises:
+        DataFileError: If it is not a JSON object, or the file has another format version.
+    """
+    try:
+        metadata = json.loads(str(frame[_METADATA].iloc[0])) if len(frame) else {}
+    except (ValueError, RecursionError):
+        metadata = None
+    if not isinstance(metadata, dict):
+        raise DataFileError("run: 'metadata' of the first sample is not a JSON object.")
+    version = metadata.pop(_VERSION_KEY, 1)
+    if version != VERSION and len(frame):
+        raise DataFileError(
+            f"run: it has format {version}; this version of tcs reads format {VERSION}. Record the "
+            "run again."
+        )
+    return metadata
+
+
+def _values(frame: pd.DataFrame, name: str, columns: list[str]) -> Any:
+    """Return the array of some columns, shape (n, columns).
+
+    Raises:
+        DataFileError: If a value does not fit the column.
+    """
+    import pandas as pd
+
+    if name == "mode":
+        return frame[columns].to_numpy().astype(str)
+    values = np.column_stack(
+        [pd.to_numeric(frame[column], errors="coerce").to_numpy(np.float64) for column in columns]
+    )
+    # Infinite and too large values are left to the run's own checks.
+    valid = ~np.isnan(values)
+    required = "a number"
+    if name in _INTEGERS:
+        valid &= np.abs(values) < 1e9
+        valid &= values == np.floor(values)
+        required = "an integer"
+    elif name in _BOOLEANS:
+        valid &= (values == 0.0) | (values == 1.0)
+        required = "0 or 1"
+    if not valid.all():
+        row, column = (int(i) for i in np.argwhere(~valid)[0])
+        text = str(frame[columns[column]].iloc[row])[:40]
+        raise DataFileError(
+            f"run, sample {row}: '{columns[column]}' is '{text}'; must be {required}."
+        )
+    if name in _INTEGERS:
+        return values.astype(np.int64)
+    return values.astype(np.bool_) if name in _BOOLEANS else values

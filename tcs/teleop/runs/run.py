@@ -1,8 +1,4 @@
-"""A run: what the operator commanded and what the arm did, sample by sample, and its file.
-
-A run's CSV file has a row of names and a row per sample. The arm's joints stand in columns of their
-own names, in radians, so that `tcs capability record RUN.csv` makes a map of it as it is.
-"""
+"""A run: commands and arm states of a teleoperation session, sample by sample."""
 
 from __future__ import annotations
 
@@ -19,11 +15,20 @@ from tcs.teleop.control.settings import Mode
 
 IntArray = NDArray[np.int64]
 NO_GROUP = -1
-"""Stands where no joint group was asked for."""
+"""Value of `Run.group` where no joint group was commanded."""
 _UNIT_SLACK = 1e-6
-"""How far from 1 a quaternion read from a file may be long: ten digits are written."""
-_FARTHEST = 1000.0
-"""A joint farther from zero than this [rad], 160 turns, is a broken file's."""
+"""Tolerance of a quaternion's length: files hold ten digits."""
+_FARTHEST = {
+    "time": (1e7, "s"),
+    "joints": (1e3, "rad"),
+    "rates": (1e3, "rad/s"),
+    "position": (1e3, "m"),
+    "linear": (1e3, "m/s"),
+    "angular": (1e3, "rad/s"),
+}
+"""Greatest magnitude and unit of plausible values: beyond it the file is broken."""
+_MOST_GROUPS = 100
+"""Joint groups that settings may define; the paper has four."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,33 +53,32 @@ class Run:
     group: IntArray
     """Commanded joint group, counted from 0, shape (n,); `NO_GROUP` for none."""
     sign: IntArray
-    """The way it was to turn: -1, 0 or 1, shape (n,)."""
+    """Commanded direction of the group: -1, 0 or 1, shape (n,)."""
     clutch: BoolArray
-    """Whether the clutch was pressed, which parts arm and hand, shape (n,)."""
+    """Whether the clutch decoupled master and slave, shape (n,)."""
     mode: NDArray[np.str_]
     """Name of the control mode, shape (n,)."""
     limits: IntArray
     """-1 where a joint was at its lower limit, 1 at its upper one, else 0, shape (n, 7)."""
     singular: BoolArray
-    """Whether the arm was next to a singularity, shape (n,)."""
+    """Whether the task was singular, shape (n,)."""
     stopped: BoolArray
-    """Whether the arm refused to move on, shape (n,)."""
+    """Whether the arm did not follow the command, shape (n,)."""
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    """Robot, condition, seed and whatever else tells where it is from: plain containers."""
+    """Origin of the run, such as robot, condition and seed: values that JSON can hold."""
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only.
 
         Raises:
-            DataFileError: If the arrays do not belong together, a number is not finite, a mode is
-                not known, a joint is turned beyond reason, the time does not rise, or a quaternion
-                is not of length 1.
+            DataFileError: If shapes do not match, a number is not finite or out of its range, a
+                mode is unknown, the time does not rise, or a quaternion is not of length 1.
         """
         n, m = len(self.time), len(self.joint_names)
         wide = {"joints": m, "rates": m, "limits": m, "quaternion": 4}
         wide |= dict.fromkeys(("position", "linear", "angular"), 3)
         if n < 2:
-            raise DataFileError(f"a run of {n} samples; it takes two at least.")
+            raise DataFileError(f"run: it has {n} samples; at least 2 are needed.")
         for name in ARRAYS:
             array = getattr(self, name)
             expected = (n, wide[name]) if name in wide else (n,)
@@ -83,28 +87,39 @@ class Run:
                     f"run: '{name}' has shape {array.shape}; with {n} times and {m} joints it must "
                     f"be {expected}."
                 )
-            if array.dtype.kind == "f" and not np.isfinite(array).all():
-                row = int(np.argmax(~np.isfinite(array.reshape(n, -1)).all(axis=1)))
-                raise DataFileError(f"run, sample {row}: '{name}' is not finite.")
             array.flags.writeable = False
-        known = set(Mode)
-        for row, mode in enumerate(self.mode):
-            if mode not in known:
-                raise DataFileError(
-                    f"run, sample {row}: mode '{mode}' is none of {', '.join(Mode)}."
+            if array.dtype.kind == "f":
+                self._check(np.isfinite(array), f"'{name}' is not finite")
+            if name in _FARTHEST:
+                farthest, unit = _FARTHEST[name]
+                self._check(
+                    np.abs(array) <= farthest, f"'{name}' must be within {farthest:g} {unit}"
                 )
-        far = np.abs(self.joints) > _FARTHEST
-        if far.any():
-            row = int(np.argmax(far.any(axis=1)))
-            raise DataFileError(
-                f"run, sample {row}: a joint at {np.abs(self.joints[row]).max():g} rad; must be "
-                f"within {_FARTHEST:g}."
-            )
-        if np.any(np.diff(self.time) <= 0.0):
-            row = int(np.argmax(np.diff(self.time) <= 0.0)) + 1
-            raise DataFileError(f"run, sample {row}: the time {self.time[row]:g} s does not rise.")
-        if np.any(np.abs(np.linalg.norm(self.quaternion, axis=1) - 1.0) > _UNIT_SLACK):
-            raise DataFileError("run: the tool's quaternions (qw, qx, qy, qz) must have length 1.")
+        self._check(np.isin(self.mode, list(Mode)), f"'mode' must be one of {', '.join(Mode)}")
+        for name in ("sign", "limits"):
+            self._check(np.isin(getattr(self, name), (-1, 0, 1)), f"'{name}' must be -1, 0 or 1")
+        self._check(
+            (self.group >= NO_GROUP) & (self.group < _MOST_GROUPS),
+            f"'group' must be {NO_GROUP} (none) to {_MOST_GROUPS - 1}",
+        )
+        rising = np.diff(self.time, prepend=self.time[0] - 1.0) > 0.0
+        self._check(rising, "'time' must rise from sample to sample")
+        length = np.linalg.norm(self.quaternion, axis=1)
+        self._check(np.abs(length - 1.0) <= _UNIT_SLACK, "'quaternion' must have length 1")
+
+    def _check(self, valid: BoolArray, requirement: str) -> None:
+        """Refuse the first sample that is not valid.
+
+        Args:
+            valid: Shape (n,) or (n, k).
+            requirement: What is required, for the message.
+
+        Raises:
+            DataFileError: If a sample is not valid.
+        """
+        rows = valid.reshape(len(valid), -1).all(axis=1)
+        if not rows.all():
+            raise DataFileError(f"run, sample {int(np.argmin(rows))}: {requirement}.")
 
     def __len__(self) -> int:
         return len(self.time)
@@ -115,10 +130,10 @@ class Run:
         return float(self.time[-1] - self.time[0]) / (len(self) - 1)
 
     def hand(self) -> tuple[FloatArray, FloatArray]:
-        """Return where the hand went while it was coupled to the tool.
+        """Return the path of the operator's hand while it was coupled to the tool.
 
-        Commanded velocities are summed up from the origin; while the hand is not coupled it counts
-        as at rest, as the paper reads effort off the controlled path only.
+        The path is the sum of the commanded velocities, from the origin. A decoupled hand counts
+        as at rest, as the paper computes effort from the controlled path only.
 
         Returns:
             Positions [m], shape (n, 3), and roll, pitch, yaw [rad], shape (n, 3), in the frame of

@@ -90,11 +90,16 @@ def test_without_its_library_parquet_says_what_to_install(tmp_path, monkeypatch)
     ("changes", "said"),
     [
         ({"rates": np.zeros((40, 6))}, "'rates' has shape"),
-        ({"time": np.zeros(40)}, "sample 1: the time 0 s does not rise"),
+        ({"time": np.zeros(40)}, "sample 1: 'time' must rise"),
+        ({"time": np.arange(40) * 1e6}, r"sample 11: 'time' must be within 1e\+07 s"),
+        ({"position": np.full((40, 3), 1e9)}, "sample 0: 'position' must be within 1000 m"),
+        ({"group": np.full(40, -2)}, r"sample 0: 'group' must be -1 \(none\) to 99"),
+        ({"sign": np.full(40, 7)}, "sample 0: 'sign' must be -1, 0 or 1"),
+        ({"limits": np.full((40, 7), 9)}, "sample 0: 'limits' must be -1, 0 or 1"),
         ({"position": np.full((40, 3), np.nan)}, "sample 0: 'position' is not finite"),
-        ({"quaternion": np.ones((40, 4))}, "must have length 1"),
-        ({"mode": np.full(40, "xyz")}, "sample 0: mode 'xyz' is none of end-effector, null-space"),
-        ({"joints": np.full((40, 7), 1e9)}, r"sample 0: a joint at 1e\+09 rad; must be within"),
+        ({"quaternion": np.ones((40, 4))}, "sample 0: 'quaternion' must have length 1"),
+        ({"mode": np.full(40, "xyz")}, "sample 0: 'mode' must be one of end-effector, null-"),
+        ({"joints": np.full((40, 7), 1e9)}, "sample 0: 'joints' must be within 1000 rad"),
     ],
 )
 def test_arrays_that_do_not_belong_together_are_refused(changes, said):
@@ -108,10 +113,10 @@ def test_files_that_hold_no_run_are_refused(tmp_path):
     with pytest.raises(DataFileError, match=r"must be \.csv or \.parquet"):
         load_run(tmp_path / "run.txt")
     (tmp_path / "empty.csv").write_text("")
-    with pytest.raises(DataFileError, match="is no table"):
+    with pytest.raises(DataFileError, match="is not a table"):
         load_run(tmp_path / "empty.csv")
     (tmp_path / "broken.parquet").write_bytes(b"PAR1 no more")
-    with pytest.raises(DataFileError, match="is no table"):
+    with pytest.raises(DataFileError, match="is not a table"):
         load_run(tmp_path / "broken.parquet")
     save_run(tmp_path / "run.csv", made())
     frame = pd.read_csv(tmp_path / "run.csv", keep_default_na=False)
@@ -119,11 +124,65 @@ def test_files_that_hold_no_run_are_refused(tmp_path):
     with pytest.raises(DataFileError, match="column qw is missing"):
         load_run(tmp_path / "less.csv")
     frame.astype({"x": object}).assign(x="here").to_csv(tmp_path / "words.csv", index=False)
-    with pytest.raises(DataFileError, match="'position' holds something that is no number"):
+    with pytest.raises(DataFileError, match="sample 0: 'x' is 'here'; must be a number"):
         load_run(tmp_path / "words.csv")
     frame.assign(metadata="{").to_csv(tmp_path / "metadata.csv", index=False)
-    with pytest.raises(DataFileError, match="no JSON object"):
+    with pytest.raises(DataFileError, match="not a JSON object"):
         load_run(tmp_path / "metadata.csv")
+
+
+@pytest.mark.parametrize("count", [1, 20, 200])
+def test_a_last_row_that_is_cut_short_is_refused_with_its_number(tmp_path, count):
+    path = tmp_path / "run.csv"
+    save_run(path, made())
+    path.write_bytes(path.read_bytes()[: -count - 1])
+    with pytest.raises(DataFileError, match=r"run\.csv', sample 39: the row is cut short\. Delete"):
+        load_run(path)
+
+
+def test_a_cut_file_is_a_shorter_run_or_refused_in_one_line(tmp_path):
+    whole, path = tmp_path / "run.csv", tmp_path / "cut.csv"
+    save_run(whole, made(4))
+    content, messages = whole.read_bytes(), []
+    for length in range(0, len(content), 7):
+        path.write_bytes(content[:length])
+        try:
+            assert len(load_run(path)) < 4
+        except DataFileError as error:
+            messages.append(str(error))
+    assert len(messages) > 100
+    for message in messages:
+        assert message.startswith(f"run '{path}'")
+        assert "\n" not in message
+        assert ": run" not in message
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        ("group", "1.5", "'group' is '1.5'; must be an integer"),
+        ("group", "1e300", r"'group' is '1e\+300'; must be an integer"),
+        ("group", "-9", "'group' must be -1"),
+        ("sign", "", "'sign' is ''; must be an integer"),
+        ("clutch", "2", "'clutch' is '2'; must be 0 or 1"),
+        ("stopped", "yes", "'stopped' is 'yes'; must be 0 or 1"),
+        ("time", "inf", "'time' is not finite"),
+        ("time", "nan", "'time' is 'nan'; must be a number"),
+        ("x", "1e300", "'position' must be within 1000 m"),
+        ("mode", "", "'mode' must be one of"),
+        ("metadata", "[" * 100000, "'metadata' of the first sample is not a JSON"),
+        ("metadata", "3", "'metadata' of the first sample is not a JSON"),
+        ("metadata", '{"robot": "tiago"}', "it has format 1; this version of tcs reads format 2"),
+    ],
+)
+def test_odd_values_are_refused_with_their_sample(tmp_path, column, value, expected):
+    path = tmp_path / "run.csv"
+    save_run(path, made())
+    frame = pd.read_csv(path, keep_default_na=False, dtype=str)
+    frame.loc[0, column] = value
+    frame.to_csv(path, index=False)
+    with pytest.raises(DataFileError, match=r"run\.csv'(, sample 0)?: " + expected):
+        load_run(path)
 
 
 def test_arrays_are_read_only():
