@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.errors import TcsError
+from tcs.errors import GridError, TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
@@ -190,3 +190,25 @@ def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm
         torso_height=used,
         frames=frames,
     )
+
+
+def torso_height_of(robot: RobotFile, requested: float | None = None) -> float:
+    """Return a torso height that the robot can have [m]; 0 for a robot without a torso joint.
+
+    Args:
+        robot: The robot.
+        requested: Height of the torso joint [m]; None for the middle of its range.
+
+    Raises:
+        GridError: If the requested height is out of range.
+    """
+    low = high = 0.0
+    if robot.torso_joint is not None:
+        low, high = robot.joint_limits()[robot.torso_joint]
+    height = 0.5 * (low + high) if requested is None else requested
+    if not low <= height <= high:
+        raise GridError(
+            f"robot '{robot.name}': torso height {height:g} m is out of range; its torso goes from "
+            f"{low:g} to {high:g} m."
+        )
+    return height

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.cli.teleop_live_work import _followed
+from tcs.cli.teleop import line_text
 from tcs.teleop import Command, Teleoperation, load_arm
 from tcs.teleop.experiment.course import find_course
+from tcs.teleop.experiment.trial import line_result
 from tcs.teleop.line import Line
 from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.runs.recorder import run_from_steps
@@ -30,7 +31,10 @@ def saved(tmp_path_factory):
     command = Command(linear=(0.1, 0.0, 0.0))
     rows = [(command, session.step(command)) for _ in range(100)]
     path = tmp_path_factory.mktemp("run") / "run.csv"
-    save_run(path, run_from_steps(arm, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"}))
+    save_run(
+        path,
+        run_from_steps(arm, rows, {"robot": "iiwa7", "torso_height": 0.0, "condition": "novel"}),
+    )
     return path
 
 
@@ -88,7 +92,7 @@ def test_nothing_is_written_where_nobody_has_looked(tcs_command, tmp_path):
     path = tmp_path / "run.csv"
     ran = tcs_command("teleop", "--no-browser", "--duration", 0.2, "--save", path)
     assert ran.code == 0
-    assert "nothing was driven" in ran.err
+    assert "no browser was connected" in ran.err
     assert "control steps: median" in ran.err
     assert list(tmp_path.iterdir()) == []
 
@@ -128,7 +132,9 @@ def test_runs_that_cannot_be_played_are_told(tcs_command, saved, tmp_path):
     nobody = tmp_path / "nobody.csv"
     nobody.write_text(saved.read_text().replace('""robot""', '""belongs to""'))
     lifted = tmp_path / "lifted.csv"
-    lifted.write_text(saved.read_text().replace('""lift"": 0.0', '""lift"": ""up""'))
+    lifted.write_text(
+        saved.read_text().replace('""torso_height"": 0.0', '""torso_height"": ""up""')
+    )
     assert refused(tcs_command("teleop", "replay", tmp_path / "none.csv"), "none.csv")
     assert refused(tcs_command("teleop", "replay", broken), "broken.csv", "missing")
     assert refused(tcs_command("teleop", "replay", nobody), "nobody.csv", "--robot")
@@ -231,7 +237,7 @@ def test_how_well_a_line_was_followed_is_told():
     rows = [(one, session.step(one)) for one in asked]
     session.place(np.radians(READY_DEG))
     rows += [(one, session.step(one)) for one in [Command()] * 50 + [command] * 190]
-    told = _followed(run_from_steps(arm, rows, {}), line)
+    told = line_text(line_result(run_from_steps(arm, rows, {}), line))
     # 0.18 m to the sphere at 0.1 m/s, and some time to speed up.
     seconds = float(told.split("took ")[1].split(" s")[0])
     assert 1.8 <= seconds <= 1.9

@@ -15,6 +15,7 @@ from tcs.teleop.control.session import Teleoperation
 from tcs.teleop.control.settings import Command, Mode, Settings
 from tcs.teleop.experiment.course import Course
 from tcs.teleop.experiment.metrics import (
+    Accuracy,
     completion_time,
     effort,
     resampled,
@@ -23,12 +24,15 @@ from tcs.teleop.experiment.metrics import (
     steering_translation,
     trajectory_accuracy,
 )
+from tcs.teleop.line import Line
 from tcs.teleop.operators.scripted import Experience, OperatorTraits, Recovery, ScriptedOperator
-from tcs.teleop.runs.recorder import run_from_steps
+from tcs.teleop.runs.recorder import last_attempt, run_from_steps
 from tcs.teleop.runs.run import Run
 
 GOAL_RADIUS = 0.02
 """Of the sphere at the end of the line [m]; the paper draws one and does not say how large."""
+SCRIPTED_TYPE = "scripted"
+"""Metadata `operator_type` of a run with a scripted operator."""
 TIME_LIMIT = 120.0
 """Of a trial [s] (paper, experiment information, part 3)."""
 
@@ -131,9 +135,9 @@ def run_trial(
         rows.append((command, step))
     said = {
         "robot": arm.name,
-        "lift": arm.torso_height,
+        "torso_height": arm.torso_height,
         "condition": condition.name,
-        "operator_kind": "scripted",
+        "operator_type": SCRIPTED_TYPE,
         "line_start": list(course.line.start),
         "line_end": list(course.line.end),
     }
@@ -216,3 +220,31 @@ def sampled_path(run: Run, count: int = 200) -> FloatArray:
     """Return some points of the tool's path at even times, for a picture [m], shape (count, 3)."""
     rows = np.linspace(0, len(run) - 1, min(count, len(run))).astype(int)
     return np.asarray(run.position[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class LineResult:
+    """How well the last attempt of a run followed a line, as the paper measures it."""
+
+    time: float | None
+    """Completion time [s]; None where the end was not reached."""
+    distance_left: float
+    """Distance from the last tool position to the end [m]."""
+    accuracy: Accuracy | None
+    """Trajectory accuracy up to the completion; None where the end was not reached."""
+
+
+def line_result(run: Run, line: Line) -> LineResult:
+    """Return how well the last attempt of a run followed a line.
+
+    Args:
+        run: The run; attempts begin with the first command after the arm was put back.
+        line: The line.
+    """
+    first = last_attempt(run)
+    time, position = run.time[first:], run.position[first:]
+    left = float(np.linalg.norm(position[-1] - line.end))
+    took = completion_time(time, position, line, radius=GOAL_RADIUS)
+    if took is None:
+        return LineResult(None, left, None)
+    return LineResult(took, left, trajectory_accuracy(position[time - time[0] <= took], line))

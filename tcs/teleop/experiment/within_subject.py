@@ -240,7 +240,7 @@ def _drive(
                 "trial": trial - plan.training + 1 if counts else trial + 1,
                 "training": not counts,
                 "seed": plan.seed,
-                "place_in_order": plan.order(operator).index(condition) + 1,
+                "order": plan.order(operator).index(condition) + 1,
             },
         )  # fmt: skip
         measured.append(measure(run, course, time_limit=plan.time_limit))

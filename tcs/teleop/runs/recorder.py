@@ -59,7 +59,7 @@ class Recorder:
         return Run(self._arm.joints, **arrays, metadata=metadata)
 
 
-def begun_at(run: Run) -> int:
+def last_attempt(run: Run) -> int:
     """Return the sample with which the last try of a person at a line begins.
 
     That is the first command after the arm was last put back to where it began; the last sample if

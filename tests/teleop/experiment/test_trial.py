@@ -55,7 +55,7 @@ def test_a_run_tells_what_the_arm_did(iiwa, runs, condition):
     np.testing.assert_allclose(moved, run.rates[1:], atol=1e-6)
     assert (run.joints >= iiwa.lower).all()
     assert (run.joints <= iiwa.upper).all()
-    assert run.metadata["operator_kind"] == "scripted"
+    assert run.metadata["operator_type"] == "scripted"
     assert run.metadata["condition"] == condition.name
 
 

@@ -188,6 +188,14 @@ class LivePage:
                 since = 0
                 self.show()
 
+    def timing(self) -> str:
+        """Return the times of control steps and frames in one line."""
+        late = f"; {self.dropped} steps dropped, as the loop was late" if self.dropped else ""
+        return (
+            f"{self.steps.count} control steps: {self.steps.summary()}; {self.pictures.count} "
+            f"frames: {self.pictures.summary()}{late}."
+        )
+
     def mode_line(self) -> str:
         """Return what commands move, in one line."""
         number = self.hand.group

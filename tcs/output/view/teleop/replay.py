@@ -1,45 +1,38 @@
-"""A recorded run, played back in Meshcat or written as one page that plays by itself."""
+"""Playback of a recorded run in Meshcat."""
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Meshcat, MeshcatAnimation
+from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
-from tcs.errors import DataFileError
-from tcs.output.view.export import overlay
+from tcs.errors import DataFileError, GridError
+from tcs.model.robots import load_robot
 from tcs.output.view.teleop.panel import (
-    COLOURS,
-    LINES,
     Panel,
     Readout,
-    bar,
-    bar_properties,
     mode_line,
     readout,
     state_facts,
 )
 from tcs.output.view.teleop.robot_display import TOOL, RobotDisplay, draw_course, draw_path, pose_of
-from tcs.teleop import Arm, Mode, Settings
-from tcs.teleop.experiment.trial import GOAL_RADIUS
+from tcs.teleop import Arm, Mode, Settings, load_arm
+from tcs.teleop.arm import torso_height_of
+from tcs.teleop.experiment.trial import GOAL_RADIUS, SCRIPTED_TYPE
+from tcs.teleop.runs.files import load_run
 from tcs.teleop.runs.run import NO_GROUP, Run
 
 FloatArray = NDArray[np.float64]
 PLACE, SPEED = "time [s]", "speed"
 PLAY, AGAIN = "play or hold (space)", "from the start (X)"
-_RATE = 25
-"""Pictures in a second of the page."""
-_MOST_PICTURES = 3000
-"""Of a page: a longer run gets fewer in a second, so that the page stays below 10 MB."""
-_PICTURE = 0.03
-"""From picture to picture of the playback [s]."""
+_FRAME_PERIOD = 0.03
+"""Time between two frames of the playback [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +76,17 @@ class RunView:
             draw_course(meshcat, *self.course, GOAL_RADIUS)
 
     @property
+    def summary(self) -> str:
+        """Duration, samples, controller and operator in one line."""
+        metadata = self.run.metadata
+        words = [f"{self.length:.1f} s, {len(self.run)} samples"]
+        words += [f"controller {metadata['condition']}"] if "condition" in metadata else []
+        if metadata.get("operator_type") == SCRIPTED_TYPE:
+            operator = f"scripted operator {metadata.get('operator', '')}".strip()
+            words.append(f"{operator}, not a person")
+        return "; ".join(words)
+
+    @property
     def length(self) -> float:
         """How long it lasts [s]."""
         return float(self.run.time[-1] - self.run.time[0])
@@ -110,6 +114,33 @@ class RunView:
         if run.stopped[i]:
             facts = f"stopped; {facts}" if facts else "stopped"
         return readout(self.arm, run.joints[i], limits, singular, line, facts)
+
+
+def load_run_view(path: Path, robot: str | None = None) -> RunView:
+    """Return the run in a file with the arm that it belongs to.
+
+    Args:
+        path: A file that `save_run` wrote.
+        robot: Name or YAML file of the robot; None for the one in the run's metadata.
+
+    Raises:
+        DataFileError: If the file cannot be read, names no robot, or is a run of another robot.
+        GridError: If the robot's torso cannot have the run's height.
+    """
+    run = load_run(path)
+    named = robot or run.metadata.get("robot")
+    if not isinstance(named, str):
+        raise DataFileError(f"run '{path}': it names no robot. Name its robot with --robot.")
+    height = run.metadata.get("torso_height", 0.0)
+    if isinstance(height, bool) or not isinstance(height, int | float):
+        raise DataFileError(
+            f"run '{path}': its 'torso_height' is {height!r}, but must be a number [m]."
+        )
+    file = load_robot(named)
+    try:
+        return RunView(load_arm(file, torso_height=torso_height_of(file, float(height))), run)
+    except (GridError, DataFileError, OverflowError) as error:
+        raise DataFileError(f"run '{path}': {error}") from None
 
 
 class Replay:
@@ -171,85 +202,7 @@ class Replay:
         """Play for so long [s], or until interrupted."""
         begun = before = time.monotonic()
         while duration is None or before - begun < duration:
-            time.sleep(_PICTURE)
+            time.sleep(_FRAME_PERIOD)
             now = time.monotonic()
             self.advance(now - before)
             before = now
-
-
-def replay_page(
-    meshcat: Meshcat, stage: RobotDisplay, film: RunView, *, title: str, notes: Sequence[str] = ()
-) -> str:
-    """Return one page that plays the run without a server.
-
-    Args:
-        meshcat: An empty one.
-        stage: The robot.
-        film: The run.
-        title: First line, for a person.
-        notes: Further lines.
-    """
-    rate = min(_RATE, _MOST_PICTURES / max(film.length, 1e-9))
-    count = math.ceil(film.length * rate) + 1
-    samples = [film.sample(number / rate) for number in range(count)]
-    stage.set_up(meshcat, film.run.position[0], target=False, compact=True)
-    film.draw(meshcat)
-    panel = Panel(meshcat, film.arm)
-    readouts = [film.readout(i) for i in samples]
-    panel.show(readouts[0])
-    shots = [{**stage.poses(film.run.joints[i]), TOOL: film.tool(i)} for i in samples]
-    for path, pose in shots[0].items():
-        meshcat.SetTransform(path, pose)
-    animation = MeshcatAnimation(rate)
-    for path in shots[0]:
-        poses = [shot[path].GetAsMatrix34() for shot in shots]
-        for at in _keys([pose.tobytes() for pose in poses]):
-            animation.SetTransform(at, path, shots[at][path])
-    _play_bars(animation, film.arm, readouts)
-    _play_lines(animation, panel, readouts)
-    meshcat.SetAnimation(animation)
-    text = overlay(title, notes)
-    return str(meshcat.StaticHtml()).replace("</body>", f"{text}\n</body>", 1)
-
-
-def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -> None:
-    """Let the bars go along, and change colour."""
-    for i, bounded in enumerate(arm.bounded):
-        shares = [one.shares[i] for one in readouts]
-        for at in _keys(shares):
-            for path, name, value in bar_properties(i, shares[at], bool(bounded)):
-                animation.SetProperty(at, path, name, value)
-        states = [one.states[i] for one in readouts]
-        for state in COLOURS:
-            _play_visible(animation, f"{bar(i)}/{state}", [one == state for one in states])
-
-
-def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readout]) -> None:
-    """Let the lines of text change."""
-    for line in LINES:
-        said = [getattr(one, line) for one in readouts]
-        for text in dict.fromkeys(said):
-            path = panel.text(line, text)
-            if path:
-                _play_visible(animation, path, [one == text for one in said])
-
-
-def _play_visible(animation: MeshcatAnimation, path: str, shown: list[bool]) -> None:
-    """Show and hide a thing; what is or is not there does not fade in between."""
-    for at, visible in enumerate(shown):
-        if at in (0, len(shown) - 1) or visible != shown[at - 1]:
-            animation.SetProperty(at, path, "visible", visible)
-
-
-def _keys(values: Sequence[object]) -> list[int]:
-    """Return where a value is needed so that the browser's straight lines between meet them all.
-
-    >>> _keys([1, 1, 1, 2, 3, 3, 3])
-    [0, 2, 3, 4, 6]
-    """
-    last = len(values) - 1
-    return [
-        i
-        for i, value in enumerate(values)
-        if i in (0, last) or value != values[i - 1] or value != values[i + 1]
-    ]

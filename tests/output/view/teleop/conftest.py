@@ -108,4 +108,4 @@ def driven(iiwa):
     asked += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
     asked += [(Command(mode=Mode.END_EFFECTOR, linear=(0.25, 0.0, 0.1)), 500)]
     rows = [(command, session.step(command)) for command, count in asked for _ in range(count)]
-    return run_from_steps(iiwa, rows, {"robot": "iiwa7", "lift": 0.0, "condition": "novel"})
+    return run_from_steps(iiwa, rows, {"robot": "iiwa7", "torso_height": 0.0, "condition": "novel"})

@@ -7,11 +7,12 @@ import pytest
 
 from tcs.errors import OutputError
 from tcs.output.view import open_meshcat
-from tcs.output.view.teleop import LivePage, Recorder, RobotDisplay, start_posture
+from tcs.output.view.teleop import LivePage, RobotDisplay, start_posture
 from tcs.output.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, buttons, sliders
 from tcs.output.view.teleop.live import key_name
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR, readout
 from tcs.teleop import Mode, Settings, load_arm
+from tcs.teleop.runs.recorder import Recorder
 from tests.output.view.teleop.conftest import MODES, Instead
 
 FORWARD, DOWN = "move x [m/s]", "move z [m/s]"

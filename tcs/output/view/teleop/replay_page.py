@@ -1,0 +1,152 @@
+"""A recorded run as one self-contained page that plays it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydrake.geometry import Meshcat, MeshcatAnimation
+
+from tcs.files.writing import whole_file
+from tcs.output.view.export import overlay
+from tcs.output.view.live import open_meshcat
+from tcs.output.view.teleop.panel import (
+    COLOURS,
+    LINES,
+    Panel,
+    Readout,
+    bar,
+    bar_properties,
+)
+from tcs.output.view.teleop.replay import RunView, load_run_view
+from tcs.output.view.teleop.robot_display import TOOL, RobotDisplay
+from tcs.teleop import Arm
+
+_FRAME_RATE = 25
+"""Frames per second of the page."""
+_MOST_FRAMES = 3000
+"""Frames of a page: longer runs get a lower rate, so that the page stays below 10 MB."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportedPage:
+    """What was written."""
+
+    size: int
+    """[bytes]."""
+    samples: int
+    """Samples of the run."""
+    seconds: float
+    """Duration of the run [s]."""
+    source: str
+    """Origin and licence of the robot's model, as its robot file states them."""
+
+
+def export_run(path: Path, page: Path, robot: str | None = None, *, meshes: bool) -> ExportedPage:
+    """Write a run as one page.
+
+    Args:
+        path: The run file.
+        page: The page to write.
+        robot: Name or YAML file of the robot; None for the one in the run's metadata.
+        meshes: Whether the page shows the robot's meshes instead of its collision shapes.
+
+    Raises:
+        OutputError: If the page cannot be written.
+        DataFileError: As `load_run_view`.
+    """
+    view = load_run_view(path, robot)
+    file = view.arm.robot
+    notes = [view.summary]
+    if meshes:
+        notes.append(
+            "This page holds the robot's meshes in another format: every triangle in its place, no "
+            f"textures. Source according to the robot file: {file.source}"
+        )
+    display = RobotDisplay(view.arm, meshes=meshes)
+    text = replay_page(open_meshcat(), display, view, title=file.title, notes=notes).encode()
+    with whole_file(page, "Page") as stream:
+        stream.write(text)
+    return ExportedPage(
+        size=len(text), samples=len(view.run), seconds=view.length, source=file.source
+    )
+
+
+def replay_page(
+    meshcat: Meshcat, stage: RobotDisplay, film: RunView, *, title: str, notes: Sequence[str] = ()
+) -> str:
+    """Return one page that plays the run without a server.
+
+    Args:
+        meshcat: An empty one.
+        stage: The robot.
+        film: The run.
+        title: First line, for a person.
+        notes: Further lines.
+    """
+    rate = min(_FRAME_RATE, _MOST_FRAMES / max(film.length, 1e-9))
+    count = math.ceil(film.length * rate) + 1
+    samples = [film.sample(number / rate) for number in range(count)]
+    stage.set_up(meshcat, film.run.position[0], target=False, compact=True)
+    film.draw(meshcat)
+    panel = Panel(meshcat, film.arm)
+    readouts = [film.readout(i) for i in samples]
+    panel.show(readouts[0])
+    shots = [{**stage.poses(film.run.joints[i]), TOOL: film.tool(i)} for i in samples]
+    for path, pose in shots[0].items():
+        meshcat.SetTransform(path, pose)
+    animation = MeshcatAnimation(rate)
+    for path in shots[0]:
+        poses = [shot[path].GetAsMatrix34() for shot in shots]
+        for at in _keys([pose.tobytes() for pose in poses]):
+            animation.SetTransform(at, path, shots[at][path])
+    _play_bars(animation, film.arm, readouts)
+    _play_lines(animation, panel, readouts)
+    meshcat.SetAnimation(animation)
+    text = overlay(title, notes)
+    return str(meshcat.StaticHtml()).replace("</body>", f"{text}\n</body>", 1)
+
+
+def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -> None:
+    """Let the bars go along, and change colour."""
+    for i, bounded in enumerate(arm.bounded):
+        shares = [one.shares[i] for one in readouts]
+        for at in _keys(shares):
+            for path, name, value in bar_properties(i, shares[at], bool(bounded)):
+                animation.SetProperty(at, path, name, value)
+        states = [one.states[i] for one in readouts]
+        for state in COLOURS:
+            _play_visible(animation, f"{bar(i)}/{state}", [one == state for one in states])
+
+
+def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readout]) -> None:
+    """Let the lines of text change."""
+    for line in LINES:
+        said = [getattr(one, line) for one in readouts]
+        for text in dict.fromkeys(said):
+            path = panel.text(line, text)
+            if path:
+                _play_visible(animation, path, [one == text for one in said])
+
+
+def _play_visible(animation: MeshcatAnimation, path: str, shown: list[bool]) -> None:
+    """Show and hide a thing; what is or is not there does not fade in between."""
+    for at, visible in enumerate(shown):
+        if at in (0, len(shown) - 1) or visible != shown[at - 1]:
+            animation.SetProperty(at, path, "visible", visible)
+
+
+def _keys(values: Sequence[object]) -> list[int]:
+    """Return where a value is needed so that the browser's straight lines between meet them all.
+
+    >>> _keys([1, 1, 1, 2, 3, 3, 3])
+    [0, 2, 3, 4, 6]
+    """
+    last = len(values) - 1
+    return [
+        i
+        for i, value in enumerate(values)
+        if i in (0, last) or value != values[i - 1] or value != values[i + 1]
+    ]

@@ -1,0 +1,141 @@
+"""A live session: one robot, the page that teleoperates its arm, and the recording of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+import tcs
+from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
+from tcs.model.robots import load_robot
+from tcs.output.view.live import open_meshcat
+from tcs.output.view.teleop.live import LivePage
+from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
+from tcs.output.view.teleop.start import start_posture
+from tcs.teleop import Arm, Mode, Settings, load_arm
+from tcs.teleop.arm import torso_height_of
+from tcs.teleop.control.settings import LimitBehaviour
+from tcs.teleop.experiment.course import find_course
+from tcs.teleop.experiment.trial import GOAL_RADIUS
+from tcs.teleop.runs.recorder import Recorder
+from tcs.teleop.runs.run import Run
+
+LiveCondition = Literal["end-effector", "novel", "assisted", "drake"]
+CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
+    "end-effector": (Mode.END_EFFECTOR,),
+    "novel": (Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.POSE),
+    "assisted": (Mode.ASSISTED, Mode.NULL_SPACE, Mode.POSE),
+    "drake": (Mode.DRAKE, Mode.NULL_SPACE, Mode.POSE),
+}
+"""Modes between which the operator can switch, by condition."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveOptions:
+    """Options of a live session.
+
+    Attributes:
+        robot: Name or YAML file of the robot.
+        behaviour: Behaviour at an invalid joint configuration.
+        condition: Key of `CONDITION_MODES`.
+        start_deg: Start posture [deg], seven numbers; None to search for one.
+        torso_height: Height of the torso joint [m]; None for the middle of its range.
+        line: Whether to show the experiment's line and start there.
+    """
+
+    robot: str
+    behaviour: LimitBehaviour = "clamped"
+    condition: LiveCondition = "novel"
+    start_deg: tuple[float, ...] | None = None
+    torso_height: float | None = None
+    line: bool = False
+
+
+class LiveSession:
+    """A robot whose arm an operator teleoperates in the browser.
+
+    Attributes:
+        arm: The arm.
+        course: The line to follow and its start posture; None without a line.
+        page: The live page.
+        url: Address of the page.
+    """
+
+    def __init__(
+        self,
+        options: LiveOptions,
+        *,
+        port: int | None,
+        on_stop: Callable[[str], None],
+        record: bool,
+    ) -> None:
+        """Open the page.
+
+        Args:
+            options: Robot, condition and start.
+            port: Port of the page; None for the first free one.
+            on_stop: Called with the reason whenever the arm stops.
+            record: Whether to record what is done; with a line it is recorded in any case.
+
+        Raises:
+            OutputError: If the port cannot be used.
+            TcsError: If the robot cannot be used, the start posture is out of the joint limits, or
+                no line is found.
+        """
+        self._options = options
+        robot = load_robot(options.robot)
+        self.arm = load_arm(robot, torso_height=torso_height_of(robot, options.torso_height))
+        start = None if options.start_deg is None else _start(self.arm, options.start_deg)
+        meshcat = open_meshcat(port)
+        display = RobotDisplay(self.arm, meshes=True)
+        self.course = find_course(self.arm) if options.line else None
+        if self.course is not None:
+            start = self.course.joints
+        self._recorder = Recorder(self.arm)
+        self.page = LivePage(
+            meshcat,
+            display,
+            self.arm,
+            start_posture(self.arm, display) if start is None else start,
+            settings=Settings(limits=options.behaviour),
+            modes=CONDITION_MODES[options.condition],
+            tell=on_stop,
+            on_step=self._recorder.add if record or self.course is not None else None,
+        )
+        if self.course is not None:
+            ends = np.array(self.course.line.start), np.array(self.course.line.end)
+            draw_course(meshcat, *ends, GOAL_RADIUS)
+        self.url = str(meshcat.web_url())
+
+    def run(self) -> Run | None:
+        """Return what was recorded; None where no browser was connected."""
+        metadata: dict[str, Any] = {
+            "tcs": tcs.__version__,
+            "robot": self._options.robot,
+            "torso_height": self.arm.torso_height,
+            "condition": self._options.condition,
+            "limits": self._options.behaviour,
+            "operator_type": "live",
+        }
+        if self.course is not None:
+            line = self.course.line
+            metadata |= {"line_start": list(line.start), "line_end": list(line.end)}
+        return self._recorder.run(metadata)
+
+
+def _start(arm: Arm, degrees: tuple[float, ...]) -> FloatArray:
+    """Return a start posture [rad], shape (7,).
+
+    Raises:
+        TcsError: If it is out of the joint limits.
+    """
+    start = arm.checked([math.radians(value) for value in degrees], "start posture")
+    outside = arm.limit_violation(start)
+    if outside:
+        raise TcsError(f"start posture: {outside}. Give one within them with --start-deg.")
+    return start
