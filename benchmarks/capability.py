@@ -1,10 +1,10 @@
-"""Measure capability maps: making them, merging them, their accuracy, and the thesis's task.
+"""Measure capability maps: computation, merging, accuracy, and the task of the ITCM thesis.
 
 Usage: python benchmarks/capability.py [--repeats 5] [--queries 40000] [--seeds 5] [--pictures DIR]
 
 The last part is the pick-and-place task of the ITCM thesis on TIAGo: two positions 15 cm apart at
-0.41 m, three side grasps each with a pre-grasp 5 cm before, the shoulder at 0.91 m. Its operator is
-simulated, so that a few seeds are shown. Nothing here is a test: tests never depend on time.
+0.41 m, three side grasps each with a pre-grasp 5 cm before it, the shoulder at 0.91 m. Recordings
+are simulated with several seeds.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from tcs.output.draw.capability_maps import task_figure
 from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
 TORSO_HEIGHT = 0.1725
-"""Brings TIAGo's shoulder to 0.91 m."""
+"""Torso height with the shoulder of TIAGo at 0.91 m."""
 HEIGHT = 0.41
-# Table 1 of the ITCM thesis: the task in the robot's frame, x, y [m] and rotation [deg].
+# ITCM thesis, Table 1: the task in the frame of the robot, x, y [m] and rotation [deg].
 HIGH, EXPERT, LOW = (0.75, 0.15, 0.0), (0.88, 0.20, 2.9), (0.55, -0.45, -90.0)
 
 
@@ -66,29 +66,34 @@ def main() -> None:
 
 
 def compile_first(reach: Reach) -> None:
-    """Run everything compiled once, for no time below is to hold compiling."""
+    """Run all compiled functions once, so that no time below includes compilation."""
     reach.free_torso_heights(np.zeros((1, 7)))
     reach.manipulability(np.zeros((1, 7)))
     simulate_recording(reach, HandMotion(seconds=1.0))
 
 
 def timed(run: Callable[[], object]) -> tuple[float, float]:
-    """Return wall and processor seconds of a call."""
+    """Return wall and processor time of a call [s]."""
     wall, cpu = time.perf_counter(), time.process_time()
     run()
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
 def making(reach: Reach, jobs: int) -> CapabilityMap:
-    """Measure an IHCM with side and top grasps, 5 cm and pi/8, and return the whole one."""
+    """Measure an IHCM with side and top grasps, 5 cm and pi/8, and return the complete map."""
     for radius in (0.9, reach.length):
         begun = time.perf_counter(), time.process_time()
         found = map_from_ik(reach, MapGrid.of(), radius=radius, jobs=jobs)
         wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-        cells = f"{found.metadata['cells_asked']:,} cells asked, {len(found.cells):,} held"
-        said = f"{wall:.1f} s on {jobs} threads, {cpu:.1f} s of the processor; {cells}"
-        row(f"IHCM, radius {radius:.2f} m", said)
-        cell("times", f"IHCM, side and top grasps, 5 cm, pi/8, radius {radius:.2f} m", "time", said)
+        cells = f"{found.metadata['cells_considered']:,} cells, {len(found.cells):,} reached"
+        time_text = f"{wall:.1f} s on {jobs} threads, {cpu:.1f} s of the processor; {cells}"
+        row(f"IHCM, radius {radius:.2f} m", time_text)
+        cell(
+            "times",
+            f"IHCM, side and top grasps, 5 cm, pi/8, radius {radius:.2f} m",
+            "time",
+            time_text,
+        )
     return found
 
 
@@ -124,15 +129,15 @@ def inverting(reach: Reach, repeats: int) -> None:
             R_AT, p_AT = reach.tool_poses(joints)
             grid.nearest(reach.R_BA @ R_AT, p_AT @ reach.R_BA.T + reach.p_BA)
 
-        taken = spread_ms([timed(invert)[0] for _ in range(repeats)])
-        row(f"800 grasps inverted, {grasps}", taken)
-        cell("times", f"800 grasps inverted to cells, {grasps}", "time", taken)
+        time_text = spread_ms([timed(invert)[0] for _ in range(repeats)])
+        row(f"800 grasps inverted, {grasps}", time_text)
+        cell("times", f"800 grasps inverted to cells, {grasps}", "time", time_text)
 
 
 def accuracy(reach: Reach, queries: int, jobs: int) -> None:
-    """Measure how often maps of two grids are right."""
-    print("\nmap beside inverse kinematics, shares of all queries [%]")
-    print(f"{'grasps':<7} {'grid':<16} radius  true   right  false+ false-  recall precision")
+    """Measure the accuracy of maps of two grids."""
+    print("\nmap compared with inverse kinematics, fractions of all queries [%]")
+    print(f"{'grasps':<7} {'grid':<16} radius  reach. accur. false+ false-  recall precision")
     for step, yaw_bins, radius in (
         (0.05, 16, 0.9),
         (0.05, 16, None),
@@ -142,13 +147,13 @@ def accuracy(reach: Reach, queries: int, jobs: int) -> None:
         for grasps in ("side", "top", "all"):
             grid = MapGrid.of(step, yaw_bins, grasps)
             found = check_map(reach, grid, grasps, radius=radius, queries=queries, jobs=jobs)
-            shares = (
+            fractions = (
                 found.reachable, found.accuracy, found.false_positives, found.false_negatives,
                 found.recall, found.precision,
             )  # fmt: skip
-            shown = " ".join(f"{100 * share:6.2f}" for share in shares)
-            grid_said = f"{step:g} m, {360 / yaw_bins:g} deg  {radius or reach.length:.2f}"
-            print(f"{grasps:<7} {grid_said}  {shown}")
+            numbers = " ".join(f"{100 * value:6.2f}" for value in fractions)
+            grid_text = f"{step:g} m, {360 / yaw_bins:g} deg  {radius or reach.length:.2f}"
+            print(f"{grasps:<7} {grid_text}  {numbers}")
             names = (
                 "reachable",
                 "accuracy",
@@ -157,33 +162,38 @@ def accuracy(reach: Reach, queries: int, jobs: int) -> None:
                 "recall",
                 "precision",
             )
-            for name, share in zip(names, shares, strict=True):
-                line = f"{grasps}, {grid_said.replace('  ', ', radius ')} m"
-                cell("accuracy", line, f"{name} [%]", f"{100 * share:.1f}")
+            for name, value in zip(names, fractions, strict=True):
+                line = f"{grasps}, {grid_text.replace('  ', ', radius ')} m"
+                cell("accuracy", line, f"{name} [%]", f"{100 * value:.1f}")
 
 
 def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | None) -> None:
-    """Compare the thesis's pick-and-place task with its published base poses."""
+    """Compare the pick-and-place task of the thesis with its published base poses."""
     maps = []
     for seed in range(seeds):
+        begun = time.perf_counter()
         simulated = simulate_recording(reach, HandMotion(height=HEIGHT), seed=seed)
+        seconds = time.perf_counter() - begun
         grid = MapGrid.of(grasps="side")
         recorded = map_from_recording(reach, grid, simulated.recording, height=HEIGHT)
+        cells = f"{len(recorded.capability.cells):,} cells"
+        text = f"{seconds:.1f} s; stopped {simulated.stopped.mean():.0%} of the time; {cells}"
+        row(f"simulated recording of {HandMotion().seconds:.0f} s, seed {seed}", text)
         maps.append((f"ITCM, seed {seed}", recorded.capability))
         if seed == 0:
-            print("\nTable 3: from the recorded to the grid's pose, mean (std)")
+            print("\nTable 3: from the recorded pose to the cell, mean (std)")
             for axis, error in recorded.error_table().items():
                 print(f"  {axis:<6} {error['mean']:.4f} ({error['std']:.4f})")
     maps.append(("IHCM", ihcm))
     around = Surroundings(reach.robot, table())
-    for direction, words in ((1, "left"), (3, "right")):
+    for direction, side in ((1, "left"), (3, "right")):
+        print(f"\npick and place, to the {side} along the edge: x, y [m], yaw [deg] of the")
         print(
-            f"\npick and place, {words} along the table's edge; x, y [m], yaw [deg] of the base in"
+            "base in the task frame, score: base poses | best | best feasible with the table, and"
         )
         print(
-            "the task's frame, and its score: base poses | best | best that the table leaves, how"
+            "distances to ITCM-high and expert | fraction that scores less than ITCM-high, expert,"
         )
-        print("far from ITCM-high and expert | share that scores less than ITCM-high, expert,")
         print("ITCM-low (---- where not in the map) | best score at yaw 0 | worst")
         for name, capability in maps:
             found = merge(
@@ -201,12 +211,12 @@ def thesis_task(reach: Reach, ihcm: CapabilityMap, seeds: int, pictures: Path | 
 
 
 def the_task(direction: int) -> GraspTask:
-    """Return the thesis's task, its second position to the left (1) or to the right (3)."""
+    """Return the task of the thesis, its second position to the left (1) or to the right (3)."""
     return pick_and_place_task(0.15, HEIGHT, pre_grasps=(0.05,), direction=direction)
 
 
 def table() -> EnvironmentFile:
-    """Return the thesis's table, 37 cm high and 75.5 cm wide, its edge 10 cm before the cup."""
+    """Return the table of the thesis: 37 cm high, 75.5 cm wide, its edge 10 cm before the cup."""
     axes = {
         name: {"unit": unit, "start": 0.0, "step": 0.0, "count": 1}
         for name, unit in (("base_x", "m"), ("base_y", "m"), ("base_yaw", "deg"), ("torso", "m"))
@@ -218,44 +228,44 @@ def table() -> EnvironmentFile:
     )  # fmt: skip
 
 
-def base_of(seen: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the base in the task's frame, from the task in the robot's; yaw [rad]."""
-    x, y, turn = seen[0], seen[1], math.radians(seen[2])
-    c, s = math.cos(turn), math.sin(turn)
-    return -(c * x + s * y), s * x - c * y, -turn
+def base_of(task: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the base in the task frame, from the task in the frame of the robot; yaw [rad]."""
+    x, y, yaw = task[0], task[1], math.radians(task[2])
+    c, s = math.cos(yaw), math.sin(yaw)
+    return -(c * x + s * y), s * x - c * y, -yaw
 
 
 def described(found: TaskMap, around: Surroundings) -> str:
-    """Return one line on a task map."""
+    """Return a line of numbers about a task map."""
     poses = found.base_poses
-    best, (left, _) = found.best(), around.best(found)
+    best, (feasible, _) = found.best(), around.best(found)
     front = poses[np.abs(poses[:, 2]) < 0.01]
-    apart = [
-        math.hypot(left.x - base_of(other)[0], left.y - base_of(other)[1])
+    distances = [
+        math.hypot(feasible.x - base_of(other)[0], feasible.y - base_of(other)[1])
         for other in (HIGH, EXPERT)
     ]
     ranks = " ".join(quantile(poses, base_of(other), found) for other in (HIGH, EXPERT, LOW))
     yaw_0 = f"{front[:, 4].max():.3f}" if len(front) else "none"
     return (
-        f"{len(poses):>5} | {placed(best)} | {placed(left)}, {apart[0]:.2f} {apart[1]:.2f} | "
-        f"{ranks} | {yaw_0} | {placed(found.worst())}"
+        f"{len(poses):>5} | {brief(best)} | {brief(feasible)}, {distances[0]:.2f} "
+        f"{distances[1]:.2f} | {ranks} | {yaw_0} | {brief(found.worst())}"
     )
 
 
-def placed(base: BasePose) -> str:
-    """Return a base pose and its score, briefly."""
+def brief(base: BasePose) -> str:
+    """Return a base pose and its score."""
     yaw = math.degrees(base.yaw)
     return f"{base.x:5.2f} {base.y:5.2f} {yaw:6.1f} {base.score:.3f}"
 
 
 def quantile(poses: np.ndarray, base: tuple[float, float, float], found: TaskMap) -> str:
-    """Return the share of base poses that score less than the cell nearest to one."""
-    step, turn = found.grid.step, found.grid.yaw_step
+    """Return the fraction of base poses that score less than the cell nearest to one."""
+    step, yaw_step = found.grid.step, found.grid.yaw_step
     near = (np.abs(poses[:, 0] - base[0]) <= step / 2 + 1e-9) & (
         np.abs(poses[:, 1] - base[1]) <= step / 2 + 1e-9
     )
-    gap = (poses[:, 2] - base[2] + math.pi) % (2 * math.pi) - math.pi
-    rows = np.flatnonzero(near & (np.abs(gap) <= turn / 2 + 1e-9))
+    yaw_difference = (poses[:, 2] - base[2] + math.pi) % (2 * math.pi) - math.pi
+    rows = np.flatnonzero(near & (np.abs(yaw_difference) <= yaw_step / 2 + 1e-9))
     if not len(rows):
         return "----"
     return f"{(poses[:, 4] < poses[rows[0], 4]).mean():.2f}"

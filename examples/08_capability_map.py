@@ -1,7 +1,7 @@
-"""Where to stand for the hand alone, whatever is around it: a capability map.
+"""Make a capability map of a robot, and find the best base pose for pick and place.
 
-A map holds the base poses from which one pose of the tool is reached. Maps of all tool poses of a
-task are merged, and the best base pose of the result is where to stand.
+A map holds the base poses from which one tool pose is reached, without furniture. The maps of all
+tool poses of a task are merged; the result has the base poses that reach all of them.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from tcs.model.robots import load_robot
 
 
 def main(folder: Path = Path("out/examples")) -> None:
-    """Make a map of TIAGo, keep it, and merge it for picking a cup and putting it down."""
+    """Make a map of TIAGo, save it, and merge it for a pick-and-place task."""
     folder.mkdir(parents=True, exist_ok=True)
-    # Steps of 10 cm and 45 deg are coarse, so that this is quick; 5 cm and 22.5 deg are usual.
+    # A coarse grid of 10 cm and 45 deg is fast; the default is 5 cm and 22.5 deg.
     grid = MapGrid.of(step=0.1, yaw_bins=8, grasps="side")
-    # Robot and grid have the same step, for the map counts torso heights in it too.
+    # Torso heights have the step of the grid.
     reach = Reach(load_robot("tiago"), torso_height=0.15, step=0.1)
     path = folder / "tiago.tcm"
     save_map(path, map_from_ik(reach, grid))
 
-    # Two positions 20 cm apart, 0.6 m above the floor; the origin is the first of them.
+    # Two positions 20 cm apart, 0.6 m above the floor; the first is the origin.
     task = pick_and_place_task(0.2, 0.6, step=grid.step)
     found = merge(load_map(path), task)
     best = found.best()
-    print(f"{len(found.base_poses)} base poses reach both positions; the best one is")
+    print(f"{len(found.base_poses)} base poses reach both positions; the best is")
     print(f"  x {best.x:.2f} m, y {best.y:.2f} m, heading {math.degrees(best.yaw):.0f} deg,")
     print(f"  torso height {best.torso_height:.2f} m, score {best.score:.2f}")
 

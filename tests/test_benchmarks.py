@@ -144,11 +144,11 @@ def test_a_small_run_prints_every_part():
     assert min(shares) > 0.0
 
 
-def test_the_base_poses_of_the_thesis_are_as_far_apart_as_it_says(module):
+def test_the_base_poses_of_the_thesis_are_as_far_apart_as_published(module):
     script = module("capability")
-    high, expert = (script.base_of(seen) for seen in (script.HIGH, script.EXPERT))
+    high, expert = (script.base_of(task) for task in (script.HIGH, script.EXPERT))
     # "14 cm apart and the yaw angle difference was only 2.8 deg", from figures of two digits.
     assert np.hypot(high[0] - expert[0], high[1] - expert[1]) == pytest.approx(0.14, abs=0.005)
     assert np.degrees(high[2] - expert[2]) == pytest.approx(2.8, abs=0.15)
-    # Turned to the right of the robot, the task sees it on its own left, facing along its y axis.
+    # A task to the right of the robot has the robot on its left, along its y axis.
     assert script.base_of(script.LOW) == pytest.approx((-0.45, -0.55, np.pi / 2))

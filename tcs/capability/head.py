@@ -77,13 +77,13 @@ def load_head(robot: RobotFile, head: str | Path | None = None) -> HeadFile:
     where = f"head file '{path}'"
     found = read_document(path, HeadFile, where, RobotError)
     model = robot.model()
-    for kind, value, known in (
+    for noun, value, known in (
         ("link", found.camera_frame, model.links),
         ("joint", found.pan_joint, model.joints),
         ("joint", found.tilt_joint, model.joints),
     ):
         if value not in known:
-            raise UnknownNameError(kind, value, known, where=where)
+            raise UnknownNameError(noun, value, known, where=where)
     return found
 
 
