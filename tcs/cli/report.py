@@ -55,19 +55,19 @@ def report(
         check_writable(path)
 
     import tcs
-    from tcs.output.report import CheckSizes, score_page, score_report
+    from tcs.output.report import CheckSizes, make_score_page, make_score_report
 
     found = observed_settings(observed or (), tcs.load(file).observed_axes)
     with talk.progress_bar("pairs re-checked") as on_progress:
-        answer = score_report(
+        answer = make_score_report(
             file,
             here=chosen_from,
             max_members=max_members,
             observed=found,
-            check=CheckSizes(pairs=pairs, dense=dense, seed=seed),
+            sizes=CheckSizes(pairs=pairs, dense=dense, seed=seed),
             on_progress=on_progress,
         )
-    page = score_page(answer, command=shlex.join(["tcs", *sys.argv[1:]]))
+    page = make_score_page(answer, command=shlex.join(["tcs", *sys.argv[1:]]))
     sizes = [_write(path, page) for path in paths]
     reachability, manipulability = answer.scores
     result = {
@@ -120,6 +120,8 @@ def _report(result: dict[str, Any]) -> None:
     for name, size in zip(result["files"], result["bytes"], strict=True):
         typer.echo(f"wrote {name}: {size / 1e6:.2f} MB")
     checked, shown = result["verification"]["checked"], result["shown_checked"]
-    sound = "every answer holds" if result["is_sound"] else "SOME ANSWERS ARE FALSE"
-    if checked or shown:
-        typer.echo(f"{shown} answers shown and {checked:,} others re-checked with Drake: {sound}")
+    if not checked and not shown:
+        typer.echo(result["verification"]["verdict"])
+        return
+    verdict = "every answer holds" if result["is_sound"] else "SOME ANSWERS ARE FALSE"
+    typer.echo(f"{shown} answers shown and {checked:,} others re-checked with Drake: {verdict}")

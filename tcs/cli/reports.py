@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich import box
 from rich.table import Table
@@ -19,12 +19,8 @@ from tcs.output.words import (
     scores_text,
     settings_text,
 )
+from tcs.output.words.verification import check_lines
 
-if TYPE_CHECKING:
-    # Listing what ships has no use for the arrays of a choice.
-    pass
-
-_DENSE = {"analytic": "11,520 angles each", "numeric": "400 starts each"}
 NUMERIC_NOTE = (
     "Numeric inverse kinematics: no closed form solves this arm. That takes longer, and a few "
     "pairs that could be reached may count as not; tcs verify says how many."
@@ -125,35 +121,11 @@ def report_choice(result: Mapping[str, Any]) -> None:
 
 
 def report_verification(found: Mapping[str, Any]) -> None:
-    """Print what re-checking found."""
-    recall = found["recall_note"]
-    if recall is None:
-        low, high = found["recall_ci95"]
-        recall = f"{found['recall']:.2%} (95 % between {low:.2%} and {high:.2%})"
-    left = "not estimated: no reached pair was scanned"
-    if found["mean_shortfall"] is not None:
-        left = f"{found['mean_shortfall']:.1e}"
-
-    def greatest(key: str, unit: str = "") -> str:
-        return "none checked" if found[key] is None else f"{found[key]:.1e}{unit}"
-
-    rows = (
-        ("reached pairs re-checked with Drake", f"{found['checked']:,}"),
-        ("  of them false", f"{found['false_reached']:,}"),
-        ("  joints beyond their limits", f"{found['limit_violations']:,}"),
-        ("  tool off its goal, at most", greatest("max_position_error", " m")),
-        ("  tool turned off its goal, at most", greatest("max_rotation_error", " rad")),
-        (f"  {found['measure']} off, at most", greatest("max_isotropy_error")),
-        (f"unreached pairs scanned densely ({_DENSE[found['ik']]})", f"{found['dense_checked']:,}"),
-        ("  of them reachable after all", f"{found['missed']:,}"),
-        ("  solutions that Drake refuses", f"{found['unconfirmed_hits']:,}"),
-        ("recall", recall),
-        (f"mean {found['measure']} left behind", left),
-        ("verdict", found["verdict"]),
-    )
-    table = new_table("check", ">found")
-    for name, value in rows:
-        table.add_row(name, value)
+    """Print the result of a verification, given as `Verification.to_json` returns it."""
+    table = new_table("check", ">result")
+    for line in check_lines(found):
+        table.add_row(f"  {line.text}" if line.is_detail else line.text, line.value)
+    table.add_row("verdict", found["verdict"])
     paper().print(table)
 
 

@@ -8,7 +8,7 @@ import pytest
 import tcs
 from tcs.kernel.dexterity import MEASURES
 from tcs.model.grid import Grid
-from tcs.output.report import CheckSizes, score_page, score_report
+from tcs.output.report import CheckSizes, make_score_page, make_score_report
 from tcs.output.words.reasons import COLOUR_NAMES
 from tcs.placement.reasons import explain, fix_weights
 from tcs.placement.selection import TravelWeights, UtilityWeights
@@ -100,8 +100,8 @@ def test_parts_of_a_report(tmp_path):
     # A room with states has a report with every part.
     path = tmp_path / "bed.tcs"
     tcs.save(path, tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml"))
-    report = score_page(
-        score_report(path, check=CheckSizes(pairs=1, dense=0)), command="tcs report"
+    report = make_score_page(
+        make_score_report(path, sizes=CheckSizes(pairs=1, dense=0)), command="tcs report"
     )
     told = [row[0] for row in rows(page("reading-a-report"), "| part of the page |")]
     for section in report.sections:

@@ -8,8 +8,8 @@ from tcs.output.report.markdown import as_markdown
 from tcs.output.report.paper import Paper, load_paper
 from tcs.output.report.robustness import robustness_page
 from tcs.output.report.row_pictures import RowPictures, draw_row, draw_rows
-from tcs.output.report.score_page import score_page
-from tcs.output.report.score_report import CheckSizes, ScoreReport, score_report
+from tcs.output.report.score_page import make_score_page
+from tcs.output.report.score_report import CheckSizes, ScoreReport, make_score_report
 from tcs.output.report.write import write_report
 
 __all__ = [
@@ -24,8 +24,8 @@ __all__ = [
     "draw_row",
     "draw_rows",
     "load_paper",
+    "make_score_page",
+    "make_score_report",
     "robustness_page",
-    "score_page",
-    "score_report",
     "write_report",
 ]

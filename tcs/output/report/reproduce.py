@@ -1,4 +1,4 @@
-"""How a score file, and the report of it, can be made again: exact commands."""
+"""The commands that reproduce a score file and its report."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tcs.output.report.score_report import ScoreReport
 from tcs.placement.store import ScoreFile, state_to_json
 
 PAPER_DISTANCE = 0.40
-"""Least distance of two members where nobody asks for another [m], as in the TCS paper."""
+"""Default distance of two members [m], from the TCS paper."""
 
 
 def commands(report: ScoreReport, command: str) -> str:
-    """Return the commands that make the file and the report, one a line.
+    """Return the commands that make the file and the report, one per line.
 
     Args:
-        report: What the report is about.
+        report: The report.
         command: The command that made the report.
     """
     return "\n".join(
@@ -27,7 +27,7 @@ def commands(report: ScoreReport, command: str) -> str:
 
 
 def score_command(report: ScoreReport) -> str:
-    """Return the command that scores the same again; today's models are those of the file."""
+    """Return the command that scores the file; the current models are those of the file."""
     file, sets = report.file, report.scored.sets
     words = ["tcs", "score", as_given(file, "task")]
     words += ["--environment", as_given(file, "environment"), "--robot", as_given(file, "robot")]
@@ -58,25 +58,25 @@ def as_given(file: ScoreFile, key: str) -> str:
 
 
 def robustify_command(report: ScoreReport) -> str:
-    """Return the command that estimates success again; "" where nothing is estimated."""
-    made = estimated(report)
-    if made is None:
+    """Return the command that estimates the success; "" if the file holds no estimates."""
+    record = success_record(report)
+    if record is None:
         return ""
     words = ["tcs", "robustify", str(report.path)]
-    words += ["--sets", str(made["sets"]), "--samples", str(made["samples"])]
-    words += ["--seed", str(made["seed"])]
-    if made["check_base"]:
+    words += ["--sets", str(record["sets"]), "--samples", str(record["samples"])]
+    words += ["--seed", str(record["seed"])]
+    if record["check_base"]:
         words.append("--check-base")
-    if not made["environment_errors"]:
+    if not record["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
     records = report.file.metadata["robustness"]
-    if any(record != made for record in records):
+    if any(other != record for other in records):
         words += _observed(report)
     return shlex.join(words)
 
 
-def estimated(report: ScoreReport) -> dict[str, Any] | None:
-    """Return how the success of this table's sets was estimated; None where it was not."""
+def success_record(report: ScoreReport) -> dict[str, Any] | None:
+    """Return the record of how the success was estimated; None without estimates."""
     records = report.file.metadata.get("robustness")
     if not isinstance(records, list) or report.success is None:
         return None

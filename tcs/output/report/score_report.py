@@ -1,4 +1,4 @@
-"""What the report of one score file is about: the set it answers with, checked and drawn."""
+"""The report of one score file: a set of it, verified and drawn."""
 
 from __future__ import annotations
 
@@ -22,68 +22,70 @@ from tcs.placement.store import ScoreFile, StateTables, load_scores
 from tcs.placement.tables import Reason, SuccessTable
 
 _DPI = 110
-"""Of pictures in the page: sharp at the width of a page, also for who reads it twice as large."""
+"""Resolution of pictures: sharp on a page that is shown at twice its size."""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckSizes:
-    """How much of a file is re-checked."""
+    """How many pairs of a file are verified."""
 
     pairs: int = 500
-    """Reached pairs that Drake checks again."""
+    """Number of reached pairs that Drake re-checks."""
     dense: int = 200
-    """Unreached and reached pairs that are scanned densely."""
+    """Number of pairs, unreached and reached, that are scanned densely."""
     seed: int = 0
+    """Seed of the random draw."""
 
 
 @dataclass(frozen=True, slots=True)
 class GoalResult:
-    """What came of one member of the set at one goal."""
+    """The result of one member of the set at one goal."""
 
     reason: Reason
     pair: tuple[str, str] | None
-    """The two bodies that block, if any do."""
+    """The bodies in contact, if a contact is the reason."""
     measure: float
-    """The dexterity measure of the stored posture, 0 where the goal is not reached."""
+    """Dexterity of the stored posture, 0 if the goal is not reached."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreReport:
-    """A score file's report, and everything the report tells about it."""
+    """A score file, the set that is reported, and the results of checking both."""
 
     path: Path
-    """Where the file is."""
+    """Path of the score file."""
     sha256: str
-    """Of the file."""
+    """SHA-256 of the file."""
     file: ScoreFile
     job: Job
-    """What it was scored from."""
+    """The models and the task that were scored."""
     shown: ShownSet
-    """The set that the report is about."""
+    """The set that is reported."""
     max_members: int | None
-    """Most members that it was to have, if that was asked for."""
+    """Most members requested; None for as many as the file holds."""
     verification: Verification
-    """What re-checking random pairs of the file found."""
+    """Verification of random pairs of the file."""
     findings: Mapping[int, Finding]
-    """What Drake says of the very postures that the report shows, by goal."""
-    check: CheckSizes
+    """Drake's findings on the postures that the report shows, by goal."""
+    sizes: CheckSizes
+    """How many pairs were verified."""
     map: bytes
-    """From above, PNG."""
+    """Map, PNG."""
     states: bytes | None
-    """From above for each state of the environment, PNG; None where there is one only."""
+    """Map of each state of the environment, PNG; None if there is one state only."""
     views: tuple[bytes, ...]
-    """Each member, and the tool at a goal from nearby, PNG."""
+    """Each member, with a close view of the tool at a goal, PNG."""
     seconds: float
-    """How long all of this took, wall clock."""
+    """Wall time to make the report."""
 
     @property
     def scored(self) -> StateTables:
-        """The table that the set is of."""
+        """The state table that holds the set."""
         return self.file.tables[self.shown.table]
 
     @property
     def goals(self) -> int:
-        """How many goals there are."""
+        """Number of goals."""
         return self.scored.scores.goals
 
     @property
@@ -93,19 +95,19 @@ class ScoreReport:
 
     @property
     def scores(self) -> tuple[float, float]:
-        """P_R and P_M of the set; zeros where it has no member."""
+        """P_R and P_M of the set; zeros if it has no member."""
         if not self.shown.indices:
             return (0.0, 0.0)
         return self.scored.sets.scores_of(tuple(sorted(self.shown.indices)))
 
     @property
     def success(self) -> SuccessTable | None:
-        """Estimates of success, where the file holds any for this table."""
+        """Estimated success under error, if the file holds estimates for this table."""
         return self.scored.success
 
     @cached_property
     def results(self) -> tuple[tuple[GoalResult, ...], ...]:
-        """What came of each member, at each goal."""
+        """The result of each member at each goal."""
         scores = self.scored.scores
         return tuple(
             tuple(
@@ -121,7 +123,7 @@ class ScoreReport:
 
     @property
     def is_sound(self) -> bool:
-        """Whether no answer was found false, of the file or of those shown."""
+        """Whether no checked answer is false, of the file and of the postures shown."""
         return self.verification.is_sound and all(map(self.is_confirmed, self.findings))
 
     def is_confirmed(self, goal: int) -> bool:
@@ -136,7 +138,7 @@ class ScoreReport:
 
     @cached_property
     def distributions(self) -> tuple[Distribution, ...]:
-        """For each goal, how the reasons are spread over the grid."""
+        """Distribution of the reasons over the grid, for each goal."""
         return tuple(Distribution.of(self.scored.scores, goal) for goal in range(self.goals))
 
     @property
@@ -151,30 +153,30 @@ class ScoreReport:
         return explain(self.file, goal, from_where, observed=observed or None)
 
 
-def score_report(
+def make_score_report(
     path: Path,
     *,
     here: InitialConfiguration | None = None,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
-    check: CheckSizes | None = None,
+    sizes: CheckSizes | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> ScoreReport:
-    """Return a score file's report, re-checked with Drake and drawn.
+    """Return the report of a score file: verified with Drake and drawn.
 
     Args:
         path: A score file.
-        here: Where the robot is now; without it, the set with the best scores is shown.
+        here: The current state; without it the set with the best scores is reported.
         max_members: Most members of the set; by default as many as the file holds.
-        observed: How the person is found: values of the observed axes [m or rad].
-        check: How much to re-check.
-        on_progress: Called with re-checked pairs done and in all.
+        observed: Observed values of the observed axes [m or rad].
+        sizes: How many pairs to verify.
+        on_progress: Called with the numbers of pairs done and in total.
 
     Raises:
-        StoreError: If the file cannot be used, or is not of today's models.
+        StoreError: If the file cannot be used, or was made from other models.
         SelectionError: If no such set can be chosen.
     """
-    begun, check = time.perf_counter(), check or CheckSizes()
+    begun, sizes = time.perf_counter(), sizes or CheckSizes()
     file = load_scores(path)
     shown = ShownSet.of(file, here, max_members, observed)
     scored = scored_scene(file, shown)
@@ -192,10 +194,10 @@ def score_report(
         shown=shown,
         max_members=max_members,
         verification=verify(
-            file, pairs=check.pairs, dense=check.dense, seed=check.seed, on_progress=on_progress
+            file, pairs=sizes.pairs, dense=sizes.dense, seed=sizes.seed, on_progress=on_progress
         ),
         findings=dict(zip(served, findings, strict=True)),
-        check=check,
+        sizes=sizes,
         map=as_png(map_figure(file, shown, scored), _DPI, colours=None),
         states=as_png(states_figure(file, shown, scored=scored), _DPI, colours=None)
         if has_states(file)

@@ -14,17 +14,12 @@ from typer.testing import CliRunner
 
 from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
-from tcs.output.report import CheckSizes, as_html, as_markdown, score_page, score_report
+from tcs.output.report import CheckSizes, as_html, as_markdown, make_score_page, make_score_report
+from tcs.output.report.check_tables import success_table, verification_table
+from tcs.output.report.goal_tables import goals_table, joints_table, stops_table
+from tcs.output.report.grid_tables import pairs_table, reasons_table
 from tcs.output.report.reproduce import as_given, robustify_command, score_command
-from tcs.output.report.score_tables import (
-    goals_table,
-    joints_table,
-    pairs_table,
-    reasons_table,
-    stops_table,
-    success_table,
-    verification_table,
-)
+from tcs.output.words import goals_text
 from tcs.placement.scoring import score
 from tcs.placement.store import StateTables, load_scores, save_scores
 from tcs.placement.tables import Reason
@@ -52,19 +47,19 @@ def _small_pictures():
 
 
 @pytest.fixture(scope="module")
-def answer(score_path, _small_pictures):
-    return score_report(score_path, check=CHECK)
+def report(score_path, _small_pictures):
+    return make_score_report(score_path, sizes=CHECK)
 
 
 @pytest.fixture(scope="module")
 def single(score_path, _small_pictures):
     """About one place only, which does not reach every goal."""
-    return score_report(score_path, max_members=1, check=CheckSizes(pairs=0, dense=0))
+    return make_score_report(score_path, max_members=1, sizes=CheckSizes(pairs=0, dense=0))
 
 
 @pytest.fixture(scope="module")
-def page(answer):
-    return score_page(answer, command="tcs report f.tcs --out r.html")
+def page(report):
+    return make_score_page(report, command="tcs report f.tcs --out r.html")
 
 
 def test_the_page_has_every_part_and_needs_nothing_else(page):
@@ -76,16 +71,16 @@ def test_the_page_has_every_part_and_needs_nothing_else(page):
     # A map, no states in a wheelchair, and a picture of each of the two stops.
     assert reader.tags.count("img") == 3
     said = "".join(reader.text)
-    for part in ("In short", "Each stop", "Goal by goal", "Why not elsewhere", "Checked again"):
+    for part in ("Summary", "Robot at each stop", "Goals", "Reasons over", "Verification"):
         assert part in said
     assert "tcs report f.tcs --out r.html" in said
-    assert "For each state of the room" not in said
+    assert "Maps by environment state" not in said
     assert as_markdown(page).count("\n## ") == len(page.sections)
 
 
-def test_each_goal_is_told_as_the_file_has_it(answer, score_path):
-    table, scores = goals_table(answer), load_scores(score_path).nominal.scores
-    members = list(answer.shown.indices)
+def test_each_goal_is_told_as_the_file_has_it(report, score_path):
+    table, scores = goals_table(report), load_scores(score_path).nominal.scores
+    members = list(report.shown.indices)
     best = scores.dexterity[members].argmax(axis=0)
     for goal, said in enumerate(column(table, "Reached from")):
         reached = scores.reached[members, goal].any()
@@ -98,32 +93,34 @@ def test_each_goal_is_told_as_the_file_has_it(answer, score_path):
                 assert not said[0].isdigit()
     share = scores.reached.mean(axis=0)
     for goal, said in enumerate(column(table, "Of the grid")):
-        assert float(said.removesuffix(" %")) == pytest.approx(100 * share[goal], abs=5.1e-3)
-    assert set(column(table, "Drake")) == {"confirms it"}
+        assert float(said.removesuffix("%")) == pytest.approx(100 * share[goal], abs=5.1e-3)
+    assert set(column(table, "Drake")) == {"confirmed"}
 
 
-def test_joints_and_stops_are_those_of_the_file(answer):
-    scores = answer.scored.scores
-    for row in joints_table(answer).texts():
+def test_joints_and_stops_are_those_of_the_file(report):
+    scores = report.scored.scores
+    for row in joints_table(report).texts():
         goal, stop = int(row[0]), int(row[1]) - 1
-        expected = np.degrees(scores.joints_of(answer.shown.indices[stop], goal))
+        expected = np.degrees(scores.joints_of(report.shown.indices[stop], goal))
         np.testing.assert_allclose([float(cell) for cell in row[2:]], expected, atol=0.0051)
-    table = stops_table(answer)
-    for number, member in enumerate(answer.shown.members):
-        assert float(column(table, "x [m]")[number]) == pytest.approx(member.base_x, abs=5e-3)
+    table = stops_table(report)
+    for number, member in enumerate(report.shown.members):
+        assert float(column(table, "base x [m]")[number]) == pytest.approx(member.base_x, abs=5e-3)
         heading = math.degrees(member.base_yaw) % 360
         assert float(column(table, "heading [deg]")[number]) == pytest.approx(heading, abs=0.5)
-    listed = " ".join(column(table, "Best at goals")).split()
-    assert sorted(map(int, listed)) == [g for g, at in enumerate(answer.server) if at is not None]
+    listed = ", ".join(column(table, "Serves goals")).split(", ")
+    assert sorted(map(int, listed)) == [
+        g for g, at in enumerate(report.assignment) if at is not None
+    ]
 
 
-def test_every_configuration_counts_once_for_each_goal(answer):
-    for row in reasons_table(answer).texts():
+def test_every_configuration_counts_once_for_each_goal(report):
+    for row in reasons_table(report).texts():
         # Six shares rounded to a hundredth.
         assert sum(float(cell) for cell in row[2:]) == pytest.approx(100.0, abs=0.03)
-    scores = answer.scored.scores
+    scores = report.scored.scores
     counts = {}
-    for row in pairs_table(answer).texts():
+    for row in pairs_table(report).texts():
         counts[row[0]] = counts.get(row[0], 0) + int(row[3].replace(",", ""))
     for name, reason in (
         ("body blocked", Reason.BODY_BLOCKED),
@@ -134,21 +131,21 @@ def test_every_configuration_counts_once_for_each_goal(answer):
 
 def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
     assert single.unreached
-    said = as_markdown(score_page(single, command="c"))
+    said = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        assert f"Goal {goal} would be reached from stop 1 so: " in said
-    assert f"Not reached: {', '.join(map(str, single.unreached))}." in said
+        assert f"From stop 1, goal {goal} would be reached so: " in said
+    assert f"Not reached: {goals_text(single.unreached)}." in said
     assert "Nothing was re-checked" in said
-    assert "Of the sets of at most 1 that the file keeps, it is the one with the greatest" in said
-    assert all(single.server[goal] is None for goal in single.unreached)
+    assert "Of the sets of at most 1 in the file this one has the greatest P\\_R + P\\_M" in said
+    assert all(single.assignment[goal] is None for goal in single.unreached)
     assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
 
 
 def test_the_set_is_the_one_to_choose_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
-    found = score_report(score_path, here=here, check=CheckSizes(pairs=0, dense=0))
-    said = as_markdown(score_page(found, command="c"))
-    assert "the set to choose for a robot at x 0.6 m, y 0.7 m, heading 0 deg" in said
+    found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
+    said = as_markdown(make_score_page(found, command="c"))
+    assert "this set is chosen for a robot at x 0.60 m, y 0.70 m, heading 0 deg" in said
 
 
 @pytest.fixture(scope="module")
@@ -165,11 +162,11 @@ def false_path(score_path, tmp_path_factory):
 
 
 def test_a_false_answer_is_told(false_path):
-    found = score_report(false_path, check=CHECK)
+    found = make_score_report(false_path, sizes=CHECK)
     assert not found.is_sound
-    assert set(column(goals_table(found), "Drake")) == {"REFUSES IT"}
-    assert column(verification_table(found), "Found")[1] == "12"
-    said = as_markdown(score_page(found, command="c"))
+    assert set(column(goals_table(found), "Drake")) == {"REFUTED"}
+    assert column(verification_table(found), "Result")[1] == "12"
+    said = as_markdown(make_score_page(found, command="c"))
     assert "SOME ANSWERS OF THE FILE ARE FALSE" in said
     assert "every answer holds" not in said
 
@@ -186,49 +183,47 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     table = StateTables.of(dataclasses.replace(scores, arm_joints=joints), file.nominal.sets)
     save_scores(path, dataclasses.replace(file, tables=(table,)))
     # Nothing is drawn at random.
-    found = score_report(path, check=CheckSizes(pairs=0, dense=0))
+    found = make_score_report(path, sizes=CheckSizes(pairs=0, dense=0))
     assert found.verification.is_sound
     assert not found.is_sound
     assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
-    assert column(verification_table(found), "Found")[-1].startswith("THESE HOLD, BUT NOT ALL")
+    assert column(verification_table(found), "Result")[-1].startswith("THESE HOLD, BUT SOME")
 
 
-def test_what_was_rechecked_is_told(answer):
+def test_what_was_rechecked_is_told(report):
     found = dict(
-        zip(*(column(verification_table(answer), t) for t in ("Check", "Found")), strict=True)
+        zip(*(column(verification_table(report), t) for t in ("Check", "Result")), strict=True)
     )
-    assert found["Stored answers re-checked with Drake, drawn at random"] == "12"
-    assert found["of them false"] == "0"
+    assert found["Reached pairs re-checked with Drake"] == "12"
+    assert found["– false"] == "0"
     assert found["Verdict"] == "every answer holds"
-    assert "seed 3" in verification_table(answer).caption
+    assert "seed 3" in verification_table(report).caption
 
 
-def test_estimates_of_success_are_those_of_the_file(answer):
-    success, table = answer.success, success_table(answer)
+def test_estimates_of_success_are_those_of_the_file(report):
+    success, table = report.success, success_table(report)
     assert success is not None
-    for name, most in (("the surest set of one", 1), ("the surest set of up to 2", 2)):
-        row = success.row_of(success.most_robust(answer.scored.sets, max_members=most))
+    for name, most in (("most robust set of one", 1), ("most robust set of up to 2", 2)):
+        row = success.row_of(success.most_robust(report.scored.sets, max_members=most))
         said = column(table, "Under error")[column(table, "Set").index(name)]
-        assert float(said.removesuffix(" %")) == pytest.approx(
-            100 * success.success[row], abs=0.051
-        )
-        ends = column(table, "95 %")[column(table, "Set").index(name)].split(" to ")
+        assert float(said.removesuffix("%")) == pytest.approx(100 * success.success[row], abs=0.051)
+        ends = column(table, "95% interval")[column(table, "Set").index(name)].split(" to ")
         assert list(map(float, ends)) == pytest.approx(
             [100 * success.low[row], 100 * success.high[row]], abs=0.051
         )
     file = dataclasses.replace(
-        answer.file, tables=tuple(StateTables.of(t.scores, t.sets) for t in answer.file.tables)
+        report.file, tables=tuple(StateTables.of(t.scores, t.sets) for t in report.file.tables)
     )
-    plain = dataclasses.replace(answer, file=file)
+    plain = dataclasses.replace(report, file=file)
     assert success_table(plain) is None
-    assert "tcs robustify" in as_markdown(score_page(plain, command="c"))
+    assert "tcs robustify" in as_markdown(make_score_page(plain, command="c"))
 
 
-def test_data_files_are_named_as_they_were_given(answer, tmp_path, monkeypatch):
+def test_data_files_are_named_as_they_were_given(report, tmp_path, monkeypatch):
     own = tmp_path / "mine.yaml"
-    located = {**answer.file.metadata, "robot": str(own)}
+    located = {**report.file.metadata, "robot": str(own)}
     file = dataclasses.replace(
-        answer.file, metadata={**located, "given": {"robot": "mine.yaml", "task": "shaving"}}
+        report.file, metadata={**located, "given": {"robot": "mine.yaml", "task": "shaving"}}
     )
     monkeypatch.chdir(tmp_path)
     assert (as_given(file, "robot"), as_given(file, "task")) == ("mine.yaml", "shaving")
@@ -237,8 +232,8 @@ def test_data_files_are_named_as_they_were_given(answer, tmp_path, monkeypatch):
     assert as_given(file, "robot") == str(own)
 
 
-def test_commands_make_the_same_again(answer, score_path):
-    words = shlex.split(score_command(answer))
+def test_commands_make_the_same_again(report, score_path):
+    words = shlex.split(score_command(report))
     room = str(score_path.parent / "small-wheelchair.yaml")
     assert words[:7] == ["tcs", "score", "shaving", "--environment", room, "--robot", "pr2"]
     options = dict(zip(words[7::2], words[8::2], strict=True))
@@ -248,12 +243,12 @@ def test_commands_make_the_same_again(answer, score_path):
         "--max-members": "2",
         "--out": str(score_path),
     }
-    said = robustify_command(answer)
+    said = robustify_command(report)
     assert said == f"tcs robustify {score_path} --sets 12 --samples 32 --seed 0"
     digest = hashlib.sha256(score_path.read_bytes()).hexdigest()
-    made = as_markdown(score_page(answer, command="c"))
+    made = as_markdown(make_score_page(report, command="c"))
     assert digest in made
-    assert answer.file.metadata["scene_digest"] in made
+    assert report.file.metadata["scene_digest"] in made
 
 
 def test_on_the_command_line(score_path, tmp_path):
@@ -273,12 +268,15 @@ def test_on_the_command_line(score_path, tmp_path):
 def test_nothing_in_reach_is_a_page_too(tmp_path):
     path = tmp_path / "far.tcs"
     save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR)))
-    found = score_report(path, check=CHECK)
+    found = make_score_report(path, sizes=CHECK)
     assert found.is_sound
-    said = as_markdown(score_page(found, command="c"))
-    assert "None of the 8 goals is reached from anywhere" in said
-    assert said.count("what came nearest was stopped by this: too far for the arm.") == 2
+    said = as_markdown(make_score_page(found, command="c"))
+    assert "No configuration of the grid reaches any of the 8 goals" in said
+    assert said.count("Those that passed the most checks failed with: too far for the arm.") == 2
     assert "Nothing was re-checked with Drake." in said
+    # No claim about answers that nothing was checked for.
+    assert "every answer holds" not in said
+    assert column(verification_table(found), "Result")[-1] == found.verification.verdict
     assert found.views == ()
 
 
@@ -308,6 +306,6 @@ def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path
     )
     path = tmp_path / "better.tcs"
     save_scores(path, dataclasses.replace(file, tables=(table,)))
-    found = score_report(path, check=CheckSizes(pairs=0, dense=0))
+    found = make_score_report(path, sizes=CheckSizes(pairs=0, dense=0))
     assert all(one.is_true for one in found.findings.values())
     assert not found.is_sound

@@ -44,7 +44,10 @@ def test_each_panel_shows_its_own_state(file):
         np.testing.assert_allclose(drawn, 100.0 * expected.T, atol=1e-9)
     assert panels[0].get_ylabel().startswith("bed height 0.20 m")
     assert panels[4].get_ylabel().startswith("bed height 0.00 m")
-    assert [axes.texts[-1].get_text() for axes in panels[:2]] == ["head rest 0°", "head rest 70°"]
+    assert [axes.texts[-1].get_text() for axes in panels[:2]] == [
+        "head rest 0 deg",
+        "head rest 70 deg",
+    ]
 
 
 def test_members_stand_in_the_panel_of_the_state_they_want(file):
@@ -89,5 +92,5 @@ def test_too_many_states_are_refused():
 
 def test_words_of_a_panel(file):
     said = words(states_figure(file, ShownSet.of(file, None)))
-    for word in ("best place", "head rest 70°", "person", "Each place: best of all headings."):
+    for word in ("best place", "head rest 70 deg", "person", "Each place: best of all headings."):
         assert word in said

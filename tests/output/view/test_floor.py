@@ -41,7 +41,7 @@ def test_reason_is_the_one_that_came_nearest(bed, state):
         assert to_hex(floor.colours[k]) == REASON_COLOURS[max(found, key=ORDER.index)]
 
 
-@pytest.mark.parametrize("kind", ["reachability", "manipulability"])
+@pytest.mark.parametrize("colouring", ["reachability", "manipulability"])
 def test_colours_rise_with_the_best_score_of_a_place(bed, colouring):
     state = 3
     floor = floor_map(bed, state, 0, colouring)
@@ -68,7 +68,7 @@ def test_success_lies_where_a_single_place_has_an_estimate(estimated):
     assert not len(floor_map(estimated, 5, 0, "success").places)
 
 
-@pytest.mark.parametrize("kind", ["reason", "manipulability"])
+@pytest.mark.parametrize("colouring", ["reason", "manipulability"])
 def test_a_place_is_as_wide_as_the_step_of_the_grid(bed, colouring):
     steps = [bed.grid.axis(name).step for name in ("base_x", "base_y")]
     assert floor_map(bed, 0, 0, colouring).half == tuple(step / 2 for step in steps)

@@ -83,7 +83,7 @@ def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, s
     assert not viewer.look()
     assert len(told) == 1
     assert told[0].startswith("member 1 of 2: goal ")
-    meshcat.SetSliderValue("stand at x [m]", -0.1)
+    meshcat.SetSliderValue("base x [m]", -0.1)
     assert viewer.look()
     assert not viewer.look()
     along = viewer.state.along
@@ -97,7 +97,7 @@ def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shavin
     meshcat.SetSliderValue("set member", 2.0)
     assert viewer.look()
     at = shaving_set.grid.configuration(shaving_set.members[1])
-    assert meshcat.GetSliderValue("stand at y [m]") == pytest.approx(at.base_y)
+    assert meshcat.GetSliderValue("base y [m]") == pytest.approx(at.base_y)
     assert meshcat.GetSliderValue("torso [m]") == pytest.approx(at.torso)
     assert not viewer.look()
 

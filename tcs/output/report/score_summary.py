@@ -1,0 +1,112 @@
+"""The summary of a score report: the set, its scores, and how far they can be trusted."""
+
+from __future__ import annotations
+
+from tcs.output.report.blocks import Block, Bullets
+from tcs.output.report.goal_tables import stops_table
+from tcs.output.report.score_report import ScoreReport
+from tcs.output.words import (
+    REASON_TEXTS,
+    base_pose_text,
+    goals_text,
+    percent,
+    percentage,
+    settings_text,
+)
+from tcs.placement.store import state_to_json
+
+LIMITS = (
+    "Each goal is checked by itself in a static scene. The approach to a goal, the path of the arm "
+    "between goals and the path of the base between stops are not checked."
+)
+
+
+def summary_blocks(report: ScoreReport) -> list[Block]:
+    """Return the summary: what is reached from where, and the stops."""
+    reachability, manipulability = report.scores
+    members, goals = len(report.shown.members), report.goals
+    if not members:
+        text = f"No configuration of the grid reaches any of the {goals} goals."
+        return [Bullets([text, *unreached_everywhere(report), _soundness(report), LIMITS])]
+    reached = goals - len(report.unreached)
+    stops = ("one base pose", "two base poses", "three base poses")[members - 1]
+    items = [
+        f"From {stops} the robot reaches {reached} of {goals} goals (P_R "
+        f"{percentage(reachability)}); P_M is {manipulability:.3f} ({report.measure})."
+    ]
+    if report.unreached:
+        items.append(
+            f"Not reached: {goals_text(report.unreached)}. The section Goals gives the reasons and "
+            "what would help."
+        )
+    if report.shown.here is not None:
+        here = base_pose_text(report.shown.here.to_json())
+        items.append(f"With the default weights this set is chosen for a robot at {here}.")
+    else:
+        of_size = "" if report.max_members is None else f" of at most {report.max_members}"
+        items.append(
+            f"Of the sets{of_size} in the file this one has the greatest P_R + P_M, wherever the "
+            "robot is now."
+        )
+    state = report.file.observed_states[report.shown.table]
+    if state:
+        values = settings_text(state_to_json(report.file.observed_axes, state))
+        tables = len(report.file.tables)
+        of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
+        items.append(f"It holds for the observed state {values}{of_states}.")
+    items += _success(report)
+    return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
+
+
+def unreached_everywhere(report: ScoreReport) -> list[str]:
+    """Return the goals that no configuration reaches, with the last check that stopped them."""
+    found: dict[str, list[int]] = {}
+    for goal, counts in enumerate(report.distributions):
+        if counts.reached == 0 and counts.farthest is not None:
+            found.setdefault(REASON_TEXTS[counts.farthest.reason], []).append(goal)
+    return [
+        f"No configuration reaches {goals_text(goals)}. Those that passed the most checks failed "
+        f"with: {reason}."
+        for reason, goals in found.items()
+    ]
+
+
+def _soundness(report: ScoreReport) -> str:
+    """Return what the verification shows."""
+    found = report.verification
+    if not report.is_sound:
+        return (
+            "SOME ANSWERS OF THE FILE ARE FALSE: do not use it. The sections Goals and "
+            "Verification show which checks fail."
+        )
+    parts = []
+    if found.checked:
+        shown = f"each of the {len(report.findings)} postures shown here and "
+        parts.append(
+            f"Drake confirms {shown if report.findings else ''}all of {found.checked:,} stored "
+            "answers drawn at random"
+        )
+    elif report.findings:
+        parts.append(f"Drake confirms each of the {len(report.findings)} postures shown here")
+    if found.dense_checked:
+        parts.append(
+            f"of {found.dense_checked:,} unreached pairs drawn at random {found.missed:,} are "
+            "reachable after all"
+        )
+    if not parts:
+        return "Nothing was re-checked with Drake."
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _success(report: ScoreReport) -> list[str]:
+    """Return the estimated success of the set under error, if there is an estimate."""
+    success = report.success
+    row = success.row_of(tuple(sorted(report.shown.indices))) if success is not None else None
+    if success is None or row is None:
+        return []
+    low, high = percent(float(success.low[row])), percentage(float(success.high[row]))
+    return [
+        "In the randomly perturbed environment it is estimated to reach "
+        f"{percentage(float(success.success[row]))} of the goals (95% between {low} and {high})."
+    ]

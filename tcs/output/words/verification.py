@@ -1,0 +1,64 @@
+"""The checks of a score file, line by line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from tcs.output.words.numbers import percentage
+
+_SCANS = {"analytic": "11,520 arm angles each", "numeric": "400 starts each"}
+
+
+class CheckLine(NamedTuple):
+    """One line of the result of a verification."""
+
+    text: str
+    """What was checked or counted."""
+    value: str
+    """The result."""
+    is_detail: bool = False
+    """Whether the line details the one before."""
+
+
+def check_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
+    """Return the result of a verification, without its verdict.
+
+    Args:
+        found: The result, as `Verification.to_json` returns it.
+    """
+
+    def greatest(key: str, unit: str = "") -> str:
+        return "none checked" if found[key] is None else f"{found[key]:.1e}{unit}"
+
+    measure, scan = found["measure"], _SCANS[found["ik"]]
+    shortfall = "not estimated: no reached pair was scanned"
+    if found["mean_shortfall"] is not None:
+        shortfall = f"{found['mean_shortfall']:.1e}"
+    return (
+        CheckLine("reached pairs re-checked with Drake", f"{found['checked']:,}"),
+        CheckLine("false", f"{found['false_reached']:,}", is_detail=True),
+        CheckLine("joints beyond their limits", f"{found['limit_violations']:,}", is_detail=True),
+        CheckLine("greatest position error", greatest("max_position_error", " m"), is_detail=True),
+        CheckLine(
+            "greatest orientation error", greatest("max_rotation_error", " rad"), is_detail=True
+        ),
+        CheckLine(f"greatest error of {measure}", greatest("max_isotropy_error"), is_detail=True),
+        CheckLine(f"unreached pairs scanned densely ({scan})", f"{found['dense_checked']:,}"),
+        CheckLine("reachable", f"{found['missed']:,}", is_detail=True),
+        CheckLine("solutions that Drake refutes", f"{found['unconfirmed_hits']:,}", is_detail=True),
+        CheckLine("recall", recall_text(found)),
+        CheckLine(f"mean shortfall of {measure}", shortfall),
+    )
+
+
+def recall_text(found: Mapping[str, Any]) -> str:
+    """Return the estimated recall with its interval, or why it is not estimated.
+
+    Args:
+        found: The result of a verification, as `Verification.to_json` returns it.
+    """
+    if found["recall"] is None or found["recall_ci95"] is None:
+        return str(found["recall_note"])
+    low, high = (percentage(end, 2) for end in found["recall_ci95"])
+    return f"{percentage(found['recall'], 2)} (95% between {low} and {high})"
