@@ -50,8 +50,8 @@ def test_table_3_says_na_where_the_paper_does(study, paper):
     feeding = dataclasses.replace(study, task="feeding")
     table = table_3([study, feeding], paper)
     assert column(table, "Members") == ["1", "2", "1", "2"]
-    assert column(table, "With, paper")[1] == "94.0 (11.6)"
-    assert column(table, "With, paper")[3] == "N/A"
+    assert column(table, "Without, paper")[1] == "94.0 (11.6)"
+    assert column(table, "Without, paper")[3] == "N/A"
     fractions = study.methods.paired[2, True].fractions
     with_two = float(column(table, "With")[1].split(" ")[0])
     assert with_two == pytest.approx(100.0 * fractions.mean(), abs=0.05)
