@@ -91,7 +91,7 @@ def _decode(content: object) -> CapabilityMap:
             torso_height=content["torso_height"],
             free_torso_heights=decompress(content, "free_torso_heights", "u4", count),
             manipulability_scale=content["manipulability_scale"],
-            metadata=content["metadata"],
+            metadata=plain("metadata", content["metadata"]),
             joints=joints,
         )
     except TcsError as error:

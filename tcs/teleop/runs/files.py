@@ -82,8 +82,9 @@ def load_run(path: Path) -> Run:
     try:
         return _from_frame(frame)
     except DataFileError as error:
-        # These messages begin with "run": name the file there.
-        raise DataFileError(f"{where}{str(error).removeprefix('run')}") from None
+        # These messages begin with "run": name the file there. A damaged file may hold line breaks.
+        text = " ".join(str(error).split())
+        raise DataFileError(f"{where}{text.removeprefix('run')}") from None
 
 
 def _read(path: Path, where: str) -> pd.DataFrame:
@@ -101,13 +102,13 @@ def _read(path: Path, where: str) -> pd.DataFrame:
             f"{where} needs a library that is not installed: pip install 'tcs[parquet]'."
         )
     try:
-        if path.suffix == ".parquet":
-            return pd.read_parquet(path, engine="pyarrow")
         content = path.read_bytes()
-        frame = pd.read_csv(io.BytesIO(content), keep_default_na=False, low_memory=False)
     except OSError as error:
-        reason = error.strerror or str(error).splitlines()[0]
-        raise DataFileError(f"{where} cannot be read: {reason}.") from None
+        raise DataFileError(f"{where} cannot be read: {error.strerror}.") from None
+    try:
+        if path.suffix == ".parquet":
+            return pd.read_parquet(io.BytesIO(content), engine="pyarrow")
+        frame = pd.read_csv(io.BytesIO(content), keep_default_na=False, low_memory=False)
     # pandas and its engines raise various exceptions on a broken file.
     except Exception as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__

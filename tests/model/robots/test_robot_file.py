@@ -11,7 +11,7 @@ import yaml
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.paths import data_folder
-from tcs.model.robots import load_robot, robot_names
+from tcs.model.robots import load_robot
 
 FOLDER = data_folder() / "models" / "robots"
 
@@ -26,12 +26,6 @@ def write(folder: Path, content) -> Path:
     path = folder / "mine.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
-
-
-def test_every_shipped_robot_loads():
-    assert "pr2" in robot_names()
-    for name in robot_names():
-        assert load_robot(name).name == name
 
 
 def test_copy_elsewhere_is_the_same_robot(content, tmp_path, pr2):
