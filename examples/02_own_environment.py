@@ -1,7 +1,7 @@
-"""Put furniture into the room, and see what it leaves.
+"""Score an environment of your own.
 
-`kitchen.yaml` beside this file is a room of its own in eight lines: the wheelchair's room with a
-table and a lamp. Wherever the name of a room goes, the path of such a file may go as well.
+`kitchen.yaml` beside this file is an environment in eight lines: the wheelchair with a table and a
+lamp. The path of such a file can be given wherever the name of an environment can.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ HERE = Path(__file__).resolve().parent
 
 def main() -> None:
     """Score feeding with and without the furniture."""
-    for room in ("wheelchair", HERE / "kitchen.yaml"):
-        file = tcs.score("feeding", environment=room)
-        # What was scored, as plain numbers: the same that `tcs score --json` prints.
-        found = tcs.summary(file)
+    for environment in ("wheelchair", HERE / "kitchen.yaml"):
+        file = tcs.score("feeding", environment=environment)
+        # The scores as plain numbers: the same that `tcs score --json` prints.
+        summary = tcs.summary(file)
+        reasons = summary["reasons"]
         print(f"{file.environment['name']}:")
-        print(f"  {found['reasons']['reached']:,} pairs of configuration and goal are reached,")
-        print(f"  {found['reasons']['body_blocked']:,} are not, for there the base has no room.")
-        print(f"  Best place to stand: {found['best_single']['members']}")
+        print(f"  {reasons['reached']:,} pairs of configuration and goal are reached;")
+        print(f"  in {reasons['body_blocked']:,} the robot's body would touch something.")
+        print(f"  Best base pose: {summary['best_single']['members']}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Scenes that several tests share: building one takes a second, so it happens once a session."""
+"""Fixtures that several packages share; scenes take a second to build, so once a session."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tcs.model.tasks import load_task
 
 @pytest.fixture(autouse=True, scope="session")
 def _interruptible():
-    """Tests interrupt on purpose, but a shell has its background jobs ignore Ctrl-C."""
+    """Restore Ctrl-C, which some tests send and which shells make background jobs ignore."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -45,7 +45,7 @@ def _one_scene(spec):
 
 @pytest.fixture
 def scene(_one_scene):
-    """A scene of PR2 and wheelchair, in its first state before and after each test."""
+    """A scene of PR2 and wheelchair, in its initial state before and after each test."""
     before = _one_scene.positions()
     yield _one_scene
     _one_scene.restore(before)
@@ -71,5 +71,5 @@ def lowered(spec, shaving, full_grid):
 
 @pytest.fixture
 def rng():
-    """Random numbers, the same in every run."""
+    """A random generator with a fixed seed."""
     return np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Environment files of a user's own: the shipped ones on a small grid."""
+"""Environment files for tests: the shipped environments on small grids."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CORNER = {
     "base_yaw": (90, 90, 2),
     "torso": (0.15, 0.15, 2),
 }
-"""Where the PR2 has goals of shaving in reach: 36 configurations."""
+"""A corner where the PR2 reaches goals of shaving: 36 configurations."""
 
 
 def write_environment(
@@ -36,13 +36,13 @@ def write_environment(
     """Write an environment file and return its path.
 
     Args:
-        folder: Where to.
-        name: Of file and environment.
+        folder: Folder of the file.
+        name: Name of file and environment.
         grid: Start, step and count of each axis, in metres or degrees.
-        based_on: The environment that all the rest is taken from.
-        observed: The same of how the person may be found.
+        based_on: The environment that all other keys are inherited from.
+        observed: The same for the observed axes.
     """
-    content = {"based_on": based_on, "name": name, "title": f"{based_on}, from a few places"}
+    content = {"based_on": based_on, "name": name, "title": f"{based_on}, on a small grid"}
     for key, axes in (("grid", grid), ("observed", observed)):
         if axes is not None:
             content[key] = {

@@ -1,4 +1,4 @@
-"""Code run in an interpreter of its own, which has imported nothing yet."""
+"""Code run in a new interpreter that has imported nothing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 
 
 def fresh(code: str) -> str:
-    """What a new interpreter prints."""
+    """Return what the code prints in a new interpreter."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
     )

@@ -69,7 +69,7 @@ def object_named(name: str) -> Any:
 
 
 class Descriptions:
-    """Where each object of the package is described, by whatever name it is asked for."""
+    """Where each object of the package is described, under whichever of its names."""
 
     def __init__(self) -> None:
         """Know nothing yet: the descriptions have to be read first."""
@@ -120,7 +120,7 @@ class Descriptions:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx when to look for names."""
+    """Connect to the events of reading and resolving."""
     descriptions = Descriptions()
     app.connect("doctree-read", link_names)
     app.connect("doctree-read", leave_foreign_types)

@@ -27,6 +27,6 @@ def make_ready(
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx to call us before Napoleon, which comes at 500."""
+    """Connect before Napoleon, whose priority is 500."""
     app.connect("autodoc-process-docstring", make_ready, priority=400)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -23,7 +23,7 @@ def command_lines() -> list:
         text = page.read_text(encoding="utf-8")
         blocks = re.findall(r"^ *```(\w*)[^\n]*\n(.*?)^ *```", text, flags=re.S | re.M)
         lines = (
-            "".join(block for kind, block in blocks if kind in ("", "sh"))
+            "".join(block for language, block in blocks if language in ("", "sh"))
             .replace("\\\n", " ")
             .splitlines()
         )
@@ -94,6 +94,6 @@ def test_an_unknown_option_is_refused():
 def test_table_of_task_keys_is_complete():
     text = (CHECKOUT / "docs" / "adding.md").read_text(encoding="utf-8")
     section = text[text.index("## A task") : text.index("## A robot")]
-    told = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.*?) \|", section, flags=re.M))))
-    assert told == set(TaskFile.model_fields)
+    listed = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.*?) \|", section, flags=re.M))))
+    assert listed == set(TaskFile.model_fields)
     assert all(f"`{key}`" in section for key in GoalEntry.model_fields)

@@ -1,4 +1,4 @@
-"""The site in a real browser: nothing fetched, nothing wider than the screen, no complaints."""
+"""The site in a real browser: no requests, no overflow, no messages in the console."""
 
 import pytest
 
@@ -9,7 +9,7 @@ PHONE, DESKTOP = 390, 1280
 """Widths of a common phone and of a small laptop [px]."""
 
 
-CUT_OFF = """
+OVERFLOWING = """
 const scrolls = one => /auto|scroll/.test(getComputedStyle(one).overflowX);
 const inScrolled = one =>
   one.tagName !== "ARTICLE" && (scrolls(one) || inScrolled(one.parentElement));
@@ -17,7 +17,7 @@ return [...document.querySelectorAll("article *")]
   .filter(one => one.getBoundingClientRect().right > window.innerWidth + 1 && !inScrolled(one))
   .map(one => one.tagName + " " + one.textContent.slice(0, 40));
 """
-"""What stands out of the screen and is in nothing that can be scrolled by itself."""
+"""Elements wider than the screen that are in no container that scrolls."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_pages_fit_the_screen(site, browser, width):
     for source in DOCS.rglob("*.md"):
         path = (site / source.relative_to(DOCS)).with_suffix(".html")
         browser.driver.get(path.as_uri())
-        assert browser.driver.execute_script(CUT_OFF) == [], path
+        assert browser.driver.execute_script(OVERFLOWING) == [], path
         assert all(address.startswith("file://") for address in browser.fetched()), path
         assert browser.complaints() == [], path
 
@@ -52,7 +52,7 @@ def test_what_does_not_fit_is_found(site, browser):
         wide.textContent = "wide";
         document.querySelector("article").append(wide);
     """)
-    assert browser.driver.execute_script(CUT_OFF) == ["DIV wide"]
+    assert browser.driver.execute_script(OVERFLOWING) == ["DIV wide"]
 
 
 @pytest.mark.slow

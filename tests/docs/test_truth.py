@@ -66,7 +66,7 @@ def test_costs_of_changes():
 
 def test_default_weights():
     text = page("selection")
-    told = {row[0]: row for row in rows(text, "| symbol | meaning | default |")}
+    listed = {row[0]: row for row in rows(text, "| symbol | meaning | default |")}
     weights = UtilityWeights()
     for symbol, value in [
         ("alpha", weights.reachability),
@@ -74,7 +74,7 @@ def test_default_weights():
         ("gamma", weights.travel),
         ("delta", weights.success),
     ]:
-        assert float(told[symbol][2]) == value
+        assert float(listed[symbol][2]) == value
     travel = TravelWeights()
     for row in rows(text, "| motion | weight | default |"):
         field = re.fullmatch(r"`TravelWeights\.(\w+)`", row[1])[1]
@@ -91,18 +91,18 @@ def test_reasons():
 
 
 def test_colours_of_verdicts():
-    told = [row[0] for row in rows(page("viewer"), "| colour | goal |")]
-    assert told == [COLOUR_NAMES[reason] for reason in Reason]
+    listed = [row[0] for row in rows(page("viewer"), "| colour | goal |")]
+    assert listed == [COLOUR_NAMES[reason] for reason in Reason]
 
 
 @pytest.mark.slow
 def test_parts_of_a_report(tmp_path):
-    # A room with states has a report with every part.
+    # An environment with states has a report with every part.
     path = tmp_path / "bed.tcs"
     tcs.save(path, tcs.score("scratching_chest", DOCS.parent / "examples" / "small_bed.yaml"))
     report = make_score_page(
         make_score_report(path, sizes=CheckSizes(pairs=1, dense=0)), command="tcs report"
     )
-    told = [row[0] for row in rows(page("reading-a-report"), "| part of the page |")]
+    listed = [row[0] for row in rows(page("reading-a-report"), "| part of the page |")]
     for section in report.sections:
-        assert any(part.startswith(section.title) for part in told), section.title
+        assert any(part.startswith(section.title) for part in listed), section.title

@@ -1,4 +1,4 @@
-"""Every example runs as it stands, in an empty folder, and says what its comments promise."""
+"""Every example runs in an empty folder and prints what its comments promise."""
 
 import re
 import runpy
@@ -9,7 +9,7 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
-# What each has to print, as one expression over all of its lines; and the files it leaves.
+# What each must print, as one expression over all lines, and the files it writes.
 PRINTED = {
     "01_score_and_select": r"y 1 m, reaching 100% of the goals:\n.*base_x.*y -1 m, reaching 100%",
     "02_own_environment": r"wheelchair:\n  4,717 pairs.*kitchen:\n  [1-4],\d{3} pairs",

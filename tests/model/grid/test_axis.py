@@ -48,7 +48,7 @@ def test_a_single_value_needs_no_step():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"unit": "cm"}, "unit is 'cm', but must be one of m, deg"),
         ({"start": math.nan}, "start is nan, but must be a finite number"),
@@ -65,12 +65,12 @@ def test_a_single_value_needs_no_step():
     ],
     ids=str,
 )
-def test_what_is_no_axis_is_refused(changes, said):
+def test_what_is_no_axis_is_refused(changes, expected):
     spec = {"name": "base_x", "unit": "m", "start": 0, "step": 0.1, "count": 3}
     with pytest.raises(GridError) as caught:
-        Axis.from_dict({**spec, **changes}, where="room.yaml")
-    assert said in str(caught.value)
-    assert str(caught.value).startswith("room.yaml: a")
+        Axis.from_dict({**spec, **changes}, where="own.yaml")
+    assert expected in str(caught.value)
+    assert str(caught.value).startswith("own.yaml: a")
 
 
 def test_missing_keys_are_named():
@@ -79,8 +79,8 @@ def test_missing_keys_are_named():
 
 
 def test_misspelt_key_gets_the_nearest_one():
-    with pytest.raises(UnknownNameError, match=r"room.yaml: axis 'a'.*Did you mean 'count'\?"):
-        Axis.from_dict({"name": "a", "unit": "m", "start": 0, "coutn": 2}, where="room.yaml")
+    with pytest.raises(UnknownNameError, match=r"own.yaml: axis 'a'.*Did you mean 'count'\?"):
+        Axis.from_dict({"name": "a", "unit": "m", "start": 0, "coutn": 2}, where="own.yaml")
 
 
 def test_override_replaces_what_it_names():

@@ -124,7 +124,7 @@ def test_axis_by_name():
 
 
 @pytest.mark.parametrize(
-    ("spec", "said"),
+    ("spec", "expected"),
     [
         (changed("base_x", count=0), "axis 'base_x': count is 0, so the grid would be empty"),
         (
@@ -140,11 +140,11 @@ def test_axis_by_name():
     ],
     ids=["empty", "enormous", "unit", "full-turn-twice", "missing", "nothing", "no-axis"],
 )
-def test_what_is_no_grid_is_refused(spec, said):
+def test_what_is_no_grid_is_refused(spec, expected):
     with pytest.raises(GridError) as caught:
-        Grid.from_spec(spec, where="file 'room.yaml'")
-    assert said in str(caught.value)
-    assert str(caught.value).startswith("file 'room.yaml': ")
+        Grid.from_spec(spec, where="file 'own.yaml'")
+    assert expected in str(caught.value)
+    assert str(caught.value).startswith("file 'own.yaml': ")
     assert "\n" not in str(caught.value)
 
 

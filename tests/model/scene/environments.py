@@ -1,4 +1,4 @@
-"""Environments without any robot, and where a person's skin is exposed in them."""
+"""Environments without a robot, and the exposed skin of the person in them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tcs.model.scene.environment import load_environment
 from tcs.model.scene.environment_plant import add_environment, environment_parts
 
 DATA = Path(__file__).parents[2] / "data"
-BALL_RADIUS = 0.015
-"""Skin counts as exposed where a ball of 30 mm diameter can touch it [m]."""
+PROBE_RADIUS = 0.015
+"""Skin counts as exposed where a sphere of 30 mm diameter can touch it [m]."""
 
 
 def rows(name):
@@ -28,7 +28,7 @@ def numbers(row, *columns):
 
 
 class EnvironmentAlone:
-    """An environment without any robot."""
+    """An environment in a plant without a robot."""
 
     def __init__(self, environment):
         self.file = load_environment(environment)
@@ -96,8 +96,8 @@ class EnvironmentAlone:
             # The meshes reach into one another with slots and sockets that nothing ever meets.
             # What lies inside another part is such a place, and so is what a ball cannot touch
             # because another part is in its way.
-            others = self.distances_to_links(point + BALL_RADIUS * normal)
+            others = self.distances_to_links(point + PROBE_RADIUS * normal)
             others.pop(link)
-            if min(others.values()) >= BALL_RADIUS:
+            if min(others.values()) >= PROBE_RADIUS:
                 exposed.append((link, self.distances_to_links(point)))
         return exposed

@@ -76,7 +76,7 @@ def test_body_frames_lie_where_the_original_had_them(environment, head_rest_deg,
     np.testing.assert_allclose(hinge.translation(), published["head_rest_link"][1], atol=1e-6)
 
 
-def test_raising_the_bed_lifts_all_but_feet_posts_and_wall(environment):
+def test_raising_the_bed_raises_all_except_feet_posts_and_wall(environment):
     still, raised = {}, {}
     for height, found in ((0.0, still), (0.3, raised)):
         environment.set(bed_height=height, head_rest=0.5)
@@ -84,8 +84,8 @@ def test_raising_the_bed_lifts_all_but_feet_posts_and_wall(environment):
             found[part] = environment.query().GetPoseInWorld(part.geometry).GetAsMatrix34().copy()
     for part, before in still.items():
         stays = part.name in ("wall", "floor") or " post " in part.name or " disc " in part.name
-        lifted = before + (0.0 if stays else 0.3) * np.eye(3, 4, 3)[[1, 2, 0]]
-        np.testing.assert_allclose(raised[part], lifted, atol=1e-12, err_msg=part.name)
+        raised = before + (0.0 if stays else 0.3) * np.eye(3, 4, 3)[[1, 2, 0]]
+        np.testing.assert_allclose(raised[part], raised, atol=1e-12, err_msg=part.name)
 
 
 @pytest.mark.parametrize("head_rest_deg", [0, 20, 35, 70, 80])

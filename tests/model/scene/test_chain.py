@@ -70,7 +70,7 @@ def test_parallel_axes_do_not_meet():
     assert meeting_points(a, b) is None
 
 
-def mirrored_arm(shoulder_miss=0.0, wrist_miss=0.0):
+def spherical_shoulder_arm(shoulder_miss=0.0, wrist_miss=0.0):
     """Axes 1, 2 and 3 meet in S, 5 and 6 in W; axis 7 passes them."""
     S, W = np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.1, 0.4])
     return (
@@ -90,7 +90,7 @@ def mirrored_arm(shoulder_miss=0.0, wrist_miss=0.0):
 
 
 def test_origins_of_the_mirror_image_slide_to_where_its_axes_meet():
-    axes, S, W = mirrored_arm()
+    axes, S, W = spherical_shoulder_arm()
     _, p_AL = link_frames(axes)
     # A few roundings of numbers below 1.
     np.testing.assert_allclose(p_AL[[0, 1, 2]], [S, S, S], atol=1e-15)
@@ -101,7 +101,7 @@ def test_origins_of_the_mirror_image_slide_to_where_its_axes_meet():
 @pytest.mark.parametrize("miss", [{"shoulder_miss": 0.01}, {"wrist_miss": 0.01}], ids=str)
 def test_half_a_mirror_image_leaves_axis_1_and_the_wrist_alone(miss):
     # Axes 2 and 3 meet here or not; nothing else may move for it.
-    axes, _, _ = mirrored_arm(**miss)
+    axes, _, _ = spherical_shoulder_arm(**miss)
     _, p_AL = link_frames(axes)
     for i in (0, 3, 4, 5, 6):
         np.testing.assert_array_equal(p_AL[i], axes[i].p_AJ)
@@ -109,7 +109,7 @@ def test_half_a_mirror_image_leaves_axis_1_and_the_wrist_alone(miss):
 
 def test_an_arm_of_both_classes_keeps_its_first_joint_frame():
     # With a spherical wrist the arm is solved as it stands, so axis 1 needs no frame of its own.
-    axes, S, W = mirrored_arm()
+    axes, S, W = spherical_shoulder_arm()
     axes = (*axes[:6], axis_through(W, [0, 0, 1], slide=-0.3, turn=0.7))
     _, p_AL = link_frames(axes)
     np.testing.assert_array_equal(p_AL[0], axes[0].p_AJ)

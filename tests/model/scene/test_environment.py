@@ -84,7 +84,7 @@ def test_unknown_name_gets_the_nearest():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"flor": True}, r"unknown key 'flor'\. Known: .*based_on.*Did you mean 'floor'"),
         (
@@ -160,9 +160,9 @@ def test_unknown_name_gets_the_nearest():
     ],
     ids=lambda value: str(value)[:40] if isinstance(value, dict) else "",
 )
-def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path, changes, said):
+def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path, changes, expected):
     path = written(tmp_path, **changes)
-    with pytest.raises((EnvironmentFileError, UnknownNameError), match=said) as caught:
+    with pytest.raises((EnvironmentFileError, UnknownNameError), match=expected) as caught:
         load_environment(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -175,7 +175,7 @@ def test_a_bad_grid_names_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("axes", "error", "said"),
+    ("axes", "error", "expected"),
     [
         ({"person_y": {**SHIFT, "count": 0}}, GridError, "axis 'person_y': count is 0"),
         ({"person_y": {**SHIFT, "unit": "cm"}}, GridError, "axis 'person_y': unit is 'cm'"),
@@ -185,8 +185,8 @@ def test_a_bad_grid_names_the_file(tmp_path):
     ],
     ids=["empty", "unit", "missing", "key", "both"],
 )
-def test_a_bad_observed_axis_names_the_file(tmp_path, axes, error, said):
-    with pytest.raises(error, match=rf"own\.yaml', field 'observed': {said}"):
+def test_a_bad_observed_axis_names_the_file(tmp_path, axes, error, expected):
+    with pytest.raises(error, match=rf"own\.yaml', field 'observed': {expected}"):
         load_environment(written(tmp_path, observed=axes))
 
 

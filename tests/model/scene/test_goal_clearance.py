@@ -175,8 +175,8 @@ def test_the_tables_in_the_documentation_are_todays(compared):
         chair if compared.environment == "wheelchair" else bed,
     )
     # Chest, forearms and so on are scratched where they are washed.
-    told = {(task, i) for task, i, _ in compared.at if not task.startswith("scratching")}
-    assert {(task, int(goal)) for task, goal, *_ in found} == told
+    compared_goals = {(task, i) for task, i, _ in compared.at if not task.startswith("scratching")}
+    assert {(task, int(goal)) for task, goal, *_ in found} == compared_goals
     for task, goal, *written in found:
         meshes, here = written[:2] if compared.finger == "open" else written[2:]
         at_goal = [

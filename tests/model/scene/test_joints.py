@@ -87,7 +87,7 @@ def test_a_leader_goes_no_farther_than_its_knots(lift):
 
 
 @pytest.mark.parametrize(
-    ("changes", "error", "said"),
+    ("changes", "error", "expected"),
     [
         (
             {"joints": {"height": 2.5}},
@@ -141,8 +141,8 @@ def test_a_leader_goes_no_farther_than_its_knots(lift):
         ),
     ],
 )
-def test_what_a_joint_cannot_do_is_refused_with_its_place(lift, changes, error, said):
-    with pytest.raises(error, match=said) as caught:
+def test_what_a_joint_cannot_do_is_refused_with_its_place(lift, changes, error, expected):
+    with pytest.raises(error, match=expected) as caught:
         lift(**changes)
     assert "\n" not in str(caught.value)
 
@@ -183,7 +183,7 @@ def test_a_scene_refuses_what_its_joints_cannot_do(bed_scene):
 
 
 @pytest.mark.parametrize(
-    ("axis", "error", "said"),
+    ("axis", "error", "expected"),
     [
         (
             Axis("head_rest", "deg", 0, 35, 4),
@@ -197,9 +197,9 @@ def test_a_scene_refuses_what_its_joints_cannot_do(bed_scene):
     ],
     ids=lambda value: value.name if isinstance(value, Axis) else "",
 )
-def test_a_grid_beyond_the_bed_is_refused(bed_scene, axis, error, said):
+def test_a_grid_beyond_the_bed_is_refused(bed_scene, axis, error, expected):
     robot_axes = Grid.from_spec(bed_scene.spec.environment.grid).axes[-4:]
-    with pytest.raises(error, match=rf"task 'bathing', environment 'bed'.*{said}"):
+    with pytest.raises(error, match=rf"task 'bathing', environment 'bed'.*{expected}"):
         lower(bed_scene, load_task("bathing"), Grid((axis, *robot_axes)))
 
 

@@ -46,8 +46,8 @@ def test_the_torso_stays_within_its_limits(scene):
     assert scene.set_torso(0.0) == 0.0115
     low = scene.tool_pose().translation()
     assert scene.set_torso(0.15) == 0.15
-    lifted = scene.tool_pose().translation() - low
-    np.testing.assert_allclose(lifted, [0.0, 0.0, 0.15 - 0.0115], atol=1e-12)
+    raised = scene.tool_pose().translation() - low
+    np.testing.assert_allclose(raised, [0.0, 0.0, 0.15 - 0.0115], atol=1e-12)
     assert scene.set_torso(9.0) == 0.305
 
 
@@ -132,7 +132,7 @@ def test_neighbours_in_the_arm_do_not_block_it(scene):
     assert scene.violations() == ()
 
 
-def test_the_parts_of_the_robot_are_told_apart(scene):
+def test_the_parts_of_the_robot_are_distinguished(scene):
     carriers = {part.name: (part.group, part.carrier) for part in scene.built.parts}
     assert carriers["base_link"] == (Group.BODY, 0)
     assert carriers["torso_lift_link"] == (Group.BODY, 1)
@@ -272,7 +272,7 @@ def test_a_model_of_the_users_own_stands_where_the_environment_file_says(
 
 
 @pytest.mark.parametrize(
-    ("shape", "joint", "said"),
+    ("shape", "joint", "expected"),
     [
         ("<cylinder><radius>1</radius><length>1</length></cylinder>", FIXED, "a Cylinder.*Box"),
         (BOARD, "", r"2 links without a parent: board, leg"),
@@ -287,10 +287,10 @@ def test_a_model_of_the_users_own_stands_where_the_environment_file_says(
     ],
     ids=["cylinder", "loose link", "two models", "torn box", "hung"],
 )
-def test_a_model_that_cannot_be_used_is_refused_in_one_line(spec, tmp_path, shape, joint, said):
+def test_a_model_that_cannot_be_used_is_refused_in_one_line(spec, tmp_path, shape, joint, expected):
     path = tmp_path / "shelf.sdf"
     path.write_text(SHELF.format(static="", z=0, shape=shape, joint=joint))
-    with pytest.raises(EnvironmentFileError, match=said) as caught:
+    with pytest.raises(EnvironmentFileError, match=expected) as caught:
         obstacle_scene(spec, Obstacle(name="shelf", file=str(path)))
     assert "\n" not in str(caught.value)
 
@@ -299,13 +299,13 @@ def test_names_that_are_not_there_are_refused(spec):
     environment = spec.environment
     entry = ModelEntry(name="copy", file=environment.models[0].file, parent="person::hed")
     bends = {"person_x": ErrorDistribution(distribution="normal", std_deg=1.0)}
-    for changes, said in (
+    for changes, expected in (
         ({"models": (*environment.models, entry)}, r"'copy': unknown parent 'person::hed'"),
         ({"padding": {"person::hed": 0.01}}, r"'padding': unknown link 'person::hed'"),
         ({"body_frames": {"head": "person::hed"}}, r"body frame 'head': unknown link"),
         ({"joints": {"bed_height": 0.1}}, r"'joints': unknown joint 'bed_height'"),
     ):
-        with pytest.raises(UnknownNameError, match=said):
+        with pytest.raises(UnknownNameError, match=expected):
             Scene(with_changes(spec, **changes))
     with pytest.raises(EnvironmentFileError, match=r"'errors', joint 'person_x'.*prismatic.*'std'"):
         Scene(with_changes(spec, errors=bends))

@@ -134,7 +134,7 @@ def test_unknown_task_gets_the_nearest_name():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ("title:", "titel:", "unknown key 'titel'. Known: allowed_contacts"),
         ("position:", "positoin:", "field 'goals[0]': unknown key 'positoin'. Known: body_frame"),
@@ -149,12 +149,12 @@ def test_unknown_task_gets_the_nearest_name():
     ],
     ids=["top", "goal", "nearest", "unit", "grid", "environment"],
 )
-def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, said):
-    assert said in refused(GOOD.replace(old, new), UnknownNameError)
+def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, expected):
+    assert expected in refused(GOOD.replace(old, new), UnknownNameError)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ("[1, 0, 0, 0]", "[1, 0.1, 0, 0]", "goals[0]: field 'quaternion_wxyz' has length 1.00499"),
         ("[1, 0, 0, 0]", "[1, 0, 0]", "goals[0]: field 'quaternion_wxyz' is [1.0, 0.0, 0.0]"),
@@ -185,9 +185,9 @@ def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, said):
         ("name: wiping", "name: !!python/name:os.system", "is not valid YAML: line 1"),
     ],
 )
-def test_impossible_values_are_refused_with_their_place(refused, old, new, said):
+def test_impossible_values_are_refused_with_their_place(refused, old, new, expected):
     assert old in GOOD
-    assert said in refused(GOOD.replace(old, new, 1))
+    assert expected in refused(GOOD.replace(old, new, 1))
 
 
 def test_goals_are_needed(refused):
@@ -197,7 +197,7 @@ def test_goals_are_needed(refused):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "expected"),
     [
         ("", "must hold keys and values: name, title"),
         ("- a\n- b\n", "must hold keys and values"),
@@ -206,8 +206,8 @@ def test_goals_are_needed(refused):
     ],
     ids=["empty", "list", "binary", "control"],
 )
-def test_files_that_are_something_else(refused, content, said):
-    assert said in refused(content)
+def test_files_that_are_something_else(refused, content, expected):
+    assert expected in refused(content)
 
 
 def test_several_mistakes_are_counted(refused):

@@ -66,7 +66,7 @@ def test_tasks_go_to_other_processes():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"body_frame": ""}, "field 'body_frame' is empty"),
         ({"position": [0.1, 0.2]}, "must be 3 finite numbers (x, y, z)"),
@@ -84,14 +84,14 @@ def test_tasks_go_to_other_processes():
     ],
     ids=str,
 )
-def test_what_is_no_goal_is_refused(changes, said):
+def test_what_is_no_goal_is_refused(changes, expected):
     with pytest.raises(TaskError) as caught:
         goal(**changes)
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         ({"name": ""}, "field 'name' is empty"),
         ({"goals": ()}, "needs at least one goal"),
@@ -100,8 +100,8 @@ def test_what_is_no_goal_is_refused(changes, said):
     ],
     ids=["name", "goals", "environments", "twice"],
 )
-def test_what_is_no_task_is_refused(changes, said):
-    with pytest.raises(TaskError, match=said):
+def test_what_is_no_task_is_refused(changes, expected):
+    with pytest.raises(TaskError, match=expected):
         task(**changes)
 
 
