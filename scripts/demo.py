@@ -67,7 +67,7 @@ def run(folder: Path) -> int:
             ROBOT,
             jobs=2,
             on_progress=on_progress,
-            on_compile=terminal.say_compiling,
+            on_compile=terminal.note_compiling,
         )
     tcs.save(path, scored)
     summary = {**tcs.summary(scored), "file": str(path)}

@@ -138,7 +138,7 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
                 ROBOT,
                 jobs=options.jobs,
                 on_progress=on_progress,
-                on_compile=terminal.say_compiling,
+                on_compile=terminal.note_compiling,
             )
         tcs.save(path, scored)
     file = tcs.load(path)

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
             plan,
             jobs=options.jobs,
             on_progress=on_progress,
-            on_compile=terminal.say_compiling,
+            on_compile=terminal.note_compiling,
         )
     pictures = draw_rows(paths, jobs=options.jobs)
     seconds = time.perf_counter() - begun
@@ -85,7 +85,7 @@ def score(path: Path, row: tuple[str, str], jobs: int) -> None:
     """Score a row and save it."""
     with terminal.progress_bar(f"configurations, {path.stem}") as on_progress:
         file = tcs.score(
-            *row, ROBOT, jobs=jobs, on_progress=on_progress, on_compile=terminal.say_compiling
+            *row, ROBOT, jobs=jobs, on_progress=on_progress, on_compile=terminal.note_compiling
         )
     tcs.save(path, file)
 
@@ -108,7 +108,7 @@ def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> N
             tables=[file.nominal_index],
             jobs=options.jobs,
             on_progress=on_progress,
-            on_compile=terminal.say_compiling,
+            on_compile=terminal.note_compiling,
         )
     tcs.save(path, file)
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli import capability_reports as reports
-from tcs.cli import options, talk
+from tcs.cli import options
 from tcs.cli.option_groups import expand_options
-from tcs.cli.places import check_writable
+from tcs.files.writing import check_writable
+from tcs.output import terminal
 
 if TYPE_CHECKING:
     from tcs.capability import CapabilityMap, MapGrid, Reach, Recording, TaskShape
@@ -160,7 +161,7 @@ def from_ik(
     cells = grid.grid(grasps)
     reach = grid.reach(scores.robot, scores.measure, scores.head)
     begun = time.perf_counter()
-    with talk.progress_bar("cells") as on_progress:
+    with terminal.progress_bar("cells") as on_progress:
         capability = map_from_ik(
             reach, cells, map_type=map_type, radius=radius, view_rule=scores.visibility, jobs=jobs,
             on_progress=on_progress,
@@ -168,7 +169,7 @@ def from_ik(
     seconds = time.perf_counter() - begun
     files.write(capability)
     result = {**reports.map_result(files.out, capability), "seconds": round(seconds, 3)}
-    talk.print_result(result, reports.report_map, as_json=as_json)
+    terminal.print_result(result, reports.report_map, as_json=as_json)
 
 
 @app.command()
@@ -216,7 +217,7 @@ def record(
 
     height = 0.41 if samples.height is None else samples.height
     motion = HandMotion(height=height, seconds=seconds, scale=scale, centre=centre)
-    with talk.progress_bar("samples") as on_progress:
+    with terminal.progress_bar("samples") as on_progress:
         simulated = simulate_recording(reach, motion, seed=seed, on_progress=on_progress)
     if save_csv is not None:
         write_csv(save_csv, reach.robot, simulated.recording)
@@ -267,7 +268,7 @@ def _map_recording(
         **recorded.to_json(),
         **more,
     }
-    talk.print_result(result, reports.report_map, as_json=as_json)
+    terminal.print_result(result, reports.report_map, as_json=as_json)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,7 +357,7 @@ def merge_maps(
     if split:
         stops = split_task(loaded, grasps, torso_height=torso_height, scale=scale)
         sequence = {"task": grasps.name, "stops": [stop.to_json() for stop in stops]}
-        talk.print_result(sequence, reports.report_stops, as_json=as_json)
+        terminal.print_result(sequence, reports.report_stops, as_json=as_json)
         return
     begun = time.perf_counter()
     task_map = merge(loaded, grasps, torso_height=torso_height, scale=scale)
@@ -374,7 +375,7 @@ def merge_maps(
         )
         base, rejected = around.best(task_map)
         result |= {"best_in_environment": base.to_json(), "rejected": rejected}
-    talk.print_result(result, reports.report_merged, as_json=as_json)
+    terminal.print_result(result, reports.report_merged, as_json=as_json)
 
 
 def _shape(task: _Task) -> TaskShape:
@@ -412,7 +413,7 @@ def show(
 
     _check_picture(out)
     save_map_layer(out, load_map(capability), tilt=tilt, height=height)
-    talk.print_result({"file": str(out)}, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
+    terminal.print_result({"file": str(out)}, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
 
 
 def _check_picture(path: Path | None) -> None:
@@ -470,4 +471,4 @@ def map_check(
                 reach, cells, name, radius=radius, queries=queries, seed=seed, jobs=jobs
             )
     result = reports.check_result(capability, cells, checks)
-    talk.print_result(result, reports.report_check, as_json=as_json)
+    terminal.print_result(result, reports.report_check, as_json=as_json)

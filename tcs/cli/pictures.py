@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcs.cli import options, talk
+from tcs.cli import options
+from tcs.output import terminal
 
 if TYPE_CHECKING:
     # `tcs list` gets by without drawing.
@@ -105,10 +106,11 @@ def _draw(
 ) -> None:
     """Draw the set chosen from here, or the best one."""
     import tcs
-    from tcs.cli.places import check_writable, observed_settings, place_told
+    from tcs.cli.values import observed_settings, state_if_given
+    from tcs.files.writing import check_writable
     from tcs.output.draw import check_format, save_figure
 
-    chosen_from = place_told(here, torso)
+    chosen_from = state_if_given(here, torso)
     check_format(out)
     check_writable(out)
     loaded = tcs.load(file)
@@ -119,4 +121,4 @@ def _draw(
     shown = ShownSet.of(loaded, chosen_from, max_members, found)
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
-    talk.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)
+    terminal.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

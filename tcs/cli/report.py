@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcs.cli import options, talk
+from tcs.cli import options
 from tcs.errors import OutputError
+from tcs.output import terminal
 
 if TYPE_CHECKING:
     # `tcs list` gets by without drawing.
@@ -47,9 +48,10 @@ def report(
     With --here about the set chosen from there, else about the one with the best scores. Answers
     are re-checked with Drake; if one is false the page says so, and the exit code is 1.
     """
-    from tcs.cli.places import check_writable, observed_settings, place_told
+    from tcs.cli.values import observed_settings, state_if_given
+    from tcs.files.writing import check_writable
 
-    chosen_from = place_told(here, torso)
+    chosen_from = state_if_given(here, torso)
     paths = _paths(out, markdown=markdown)
     for path in paths:
         check_writable(path)
@@ -58,7 +60,7 @@ def report(
     from tcs.output.report import CheckSizes, make_score_page, make_score_report
 
     found = observed_settings(observed or (), tcs.load(file).observed_axes)
-    with talk.progress_bar("pairs re-checked") as on_progress:
+    with terminal.progress_bar("pairs re-checked") as on_progress:
         answer = make_score_report(
             file,
             here=chosen_from,
@@ -85,9 +87,9 @@ def report(
         "is_sound": answer.is_sound,
         "seconds": answer.seconds,
     }
-    talk.print_result(result, _report, as_json=as_json)
+    terminal.print_result(result, _report, as_json=as_json)
     if not answer.is_sound:
-        talk.say(f"some answers in '{file}' are false; do not use them.")
+        terminal.note(f"some answers in '{file}' are false; do not use them.")
         raise typer.Exit(1)
 
 

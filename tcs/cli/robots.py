@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import options, talk
+from tcs.cli import options
+from tcs.output import terminal
 
 app = typer.Typer(
     help="Robots: draft a robot file from any URDF, and check a robot.", no_args_is_help=True
@@ -30,12 +31,12 @@ def new(
     as_json: options.Json = False,
 ) -> None:
     """Draft a robot file from any URDF, with its collision primitives in a CSV file beside it."""
-    from tcs.cli.places import check_writable
+    from tcs.files.writing import check_writable
     from tcs.model.robots.draft import check_free, draft_robot, write_draft
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
     check_writable(check_free(path))
-    with talk.progress_bar("bodies") as on_progress:
+    with terminal.progress_bar("bodies") as on_progress:
         draft = draft_robot(urdf, tool, base=base, name=path.stem, on_progress=on_progress)
     shapes = write_draft(draft, path)
     robot = draft.robot
@@ -49,7 +50,7 @@ def new(
         "disabled_pairs": len(robot.disabled_pairs),
         "remarks": list(draft.remarks),
     }
-    talk.print_result(result, _report_draft, as_json=as_json)
+    terminal.print_result(result, _report_draft, as_json=as_json)
 
 
 def _report_draft(result: dict[str, Any]) -> None:
@@ -74,9 +75,9 @@ def check(
     from tcs.model.robots import load_robot
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
-    talk.print_result(found.to_json(), _report_check, as_json=as_json)
+    terminal.print_result(found.to_json(), _report_check, as_json=as_json)
     if not found.is_sound:
-        talk.say(f"robot '{found.robot.name}' is not fit for scoring.")
+        terminal.note(f"robot '{found.robot.name}' is not fit for scoring.")
         raise typer.Exit(1)
 
 

@@ -9,8 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
-from tcs.cli import options, reports, talk
-from tcs.cli.places import observed_settings
+from tcs.cli import options
+from tcs.cli.values import observed_settings
+from tcs.output import terminal
+from tcs.output.terminal import tables
 from tcs.output.words import member_text, settings_text
 from tcs.output.words.robustness import error_width
 
@@ -69,7 +71,7 @@ def evaluate(
 
     loaded = tcs.load(file)
     table = _table(loaded, observed)
-    with talk.progress_bar("configurations in samples") as on_progress:
+    with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
             loaded,
             samples=samples,
@@ -81,9 +83,9 @@ def evaluate(
             check_base=check_base,
             jobs=jobs,
             on_progress=on_progress,
-            on_compile=talk.say_compiling,
+            on_compile=terminal.note_compiling,
         )
-    talk.print_result(found.to_json(), report_evaluation, as_json=as_json)
+    terminal.print_result(found.to_json(), report_evaluation, as_json=as_json)
 
 
 def robustify(
@@ -109,14 +111,14 @@ def robustify(
     Without --observed, for every observed state that was scored.
     """
     import tcs
-    from tcs.cli.places import check_writable
+    from tcs.files.writing import check_writable
     from tcs.placement.robustness import success_summary
 
     path = out or file
     check_writable(path)
     loaded = tcs.load(file)
     table = _table(loaded, observed)
-    with talk.progress_bar("rounds") as on_progress:
+    with terminal.progress_bar("rounds") as on_progress:
         done = tcs.robustify(
             loaded,
             sets=sets,
@@ -127,17 +129,17 @@ def robustify(
             tables=None if table is None else [table],
             jobs=jobs,
             on_progress=on_progress,
-            on_compile=talk.say_compiling,
+            on_compile=terminal.note_compiling,
         )
         tcs.save(path, done)
     result = {"file": str(path), **success_summary(done)}
-    talk.print_result(result, report_robustified, as_json=as_json)
+    terminal.print_result(result, report_robustified, as_json=as_json)
 
 
 def report_robustified(result: Mapping[str, Any]) -> None:
     """Print the most robust set of each size with its estimate."""
-    out = talk.paper()
-    table = reports.new_table("observed", "set", ">success", ">95 % interval", ">sets", "members")
+    out = terminal.results_console()
+    table = tables.new_table("observed", "set", ">success", ">95 % interval", ">sets", "members")
     for row in result["tables"]:
         state = settings_text(row["observed"]) or "-"
         for best in row["best"]:
@@ -167,9 +169,9 @@ def _table(loaded: Any, observed: list[str] | None) -> int | None:
 
 def report_evaluation(result: Mapping[str, Any]) -> None:
     """Print the success of a set under error."""
-    out = talk.paper()
+    out = terminal.results_console()
     if result["members"]:
-        out.print(reports.members_table(result["members"]))
+        out.print(tables.members_table(result["members"]))
     else:
         out.print(f"one of {result['choices']:,} sets with equal P_R is drawn for each sample")
     interval = ""

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tcs.cli import options, reports, talk
+from tcs.cli import options
+from tcs.output import terminal
+from tcs.output.terminal import tables
 
 if TYPE_CHECKING:
     from tcs.teleop.experiment.trial import LineResult
@@ -104,7 +106,7 @@ def live(
     if line and start_deg is not None:
         raise typer.BadParameter("the line has a start of its own.", param_hint="--start-deg")
 
-    from tcs.cli.places import check_writable
+    from tcs.files.writing import check_writable
     from tcs.output.view.teleop.session import LiveOptions, LiveSession
     from tcs.teleop.experiment.trial import line_result
     from tcs.teleop.runs.files import check_format, save_run
@@ -113,7 +115,7 @@ def live(
         check_format(save)
         check_writable(save)
     if line:
-        talk.say("searching for a line that needs null-space motion; this takes some seconds.")
+        terminal.note("searching for a line that needs null-space motion; this takes some seconds.")
     session = LiveSession(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
@@ -122,23 +124,23 @@ def live(
         port=port, on_stop=typer.echo, record=save is not None,
     )  # fmt: skip
     title = session.arm.robot.title
-    talk.say(f"{title}, {condition}, limits as in {behaviour}. {_KEYS}")
+    terminal.note(f"{title}, {condition}, limits as in {behaviour}. {_KEYS}")
     _open(session.url, browser)
     begun = time.perf_counter()
     try:
         session.page.run(duration)
     except KeyboardInterrupt:
-        talk.say(f"closed after {time.perf_counter() - begun:.0f} s.")
+        terminal.note(f"closed after {time.perf_counter() - begun:.0f} s.")
     finally:
         run = session.run()
         if save is not None and run is None:
-            talk.say(f"no browser was connected, so '{save}' is not written.")
+            terminal.note(f"no browser was connected, so '{save}' is not written.")
         elif save is not None and run is not None:
             save_run(save, run)
             typer.echo(f"wrote {save}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
     if session.course is not None and run is not None:
         typer.echo(line_text(line_result(run, session.course.line)))
-    talk.say(session.page.timing())
+    terminal.note(session.page.timing())
 
 
 def line_text(result: LineResult) -> str:
@@ -175,7 +177,7 @@ def replay(
     """Play a saved run back in the browser, or write it as one page."""
     options.check_export(export, meshes=meshes, as_json=as_json)
 
-    from tcs.cli.places import check_page
+    from tcs.files.writing import check_page
 
     if export is not None:
         from tcs.output.view.teleop.replay_page import export_run
@@ -186,7 +188,7 @@ def replay(
             "file": str(export), "bytes": page.size, "samples": page.samples,
             "seconds": page.seconds, "meshes": meshes, "source": page.source if meshes else None,
         }  # fmt: skip
-        talk.print_result(result, _report_page, as_json=as_json)
+        terminal.print_result(result, _report_page, as_json=as_json)
         return
 
     from tcs.output.view import open_meshcat
@@ -201,11 +203,11 @@ def replay(
     try:
         playback.run(duration)
     except KeyboardInterrupt:
-        talk.say("closed.")
+        terminal.note("closed.")
 
 
 def _open(url: str, browser: bool) -> None:
-    talk.say(f"open {url} in a browser; Ctrl-C ends.")
+    terminal.note(f"open {url} in a browser; Ctrl-C ends.")
     if browser:
         webbrowser.open(url)
 
@@ -250,7 +252,7 @@ def experiment(
     as_json: options.Json = False,
 ) -> None:
     """Let scripted operators, not people, follow a line that needs null-space motion."""
-    from tcs.cli.places import check_writable
+    from tcs.files.writing import check_writable
     from tcs.model.robots import load_robot
     from tcs.output.report.teleop_files import FILES, make_experiment_folder, write_experiment
     from tcs.teleop.arm import load_arm, torso_height_of
@@ -269,12 +271,12 @@ def experiment(
     make_experiment_folder(arm, folder, runs_as=suffix, maps=maps)
     for name in FILES:
         check_writable(folder / name)
-    with talk.progress_bar("operators times controllers") as on_progress:
+    with terminal.progress_bar("operators times controllers") as on_progress:
         result = write_experiment(
             arm, plan, folder, line_seed=line_seed, runs_as=suffix, maps=maps,
             command=shlex.join(words), jobs=jobs, on_progress=on_progress,
         )  # fmt: skip
-    talk.print_result(result, _report_experiment, as_json=as_json)
+    terminal.print_result(result, _report_experiment, as_json=as_json)
 
 
 def _report_experiment(result: dict[str, Any]) -> None:
@@ -282,10 +284,10 @@ def _report_experiment(result: dict[str, Any]) -> None:
     from tcs.output.report.teleop_tables import NAMES, SCALE
     from tcs.teleop.experiment.within_subject import SCRIPTED
 
-    out = talk.paper()
+    out = terminal.results_console()
     out.print(f"{result['operators']} {SCRIPTED}, robot {result['robot']}, seed {result['seed']}")
     conditions = list(result["medians"])
-    table = reports.new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
+    table = tables.new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
     for name, text in NAMES.items():
         scale = SCALE.get(name, 1.0)
         cells = [f"{scale * result['medians'][c][name]:.3g}" for c in conditions]

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from tcs.cli import options, talk
+from tcs.cli import options
+from tcs.output import terminal
 
 
 def view(
@@ -31,18 +32,19 @@ def view(
     """Look at it in the browser: step through set and goals, or stand elsewhere."""
     options.check_export(export, meshes=meshes, as_json=as_json)
 
-    from tcs.cli.places import check_page, place_told
+    from tcs.cli.values import state_if_given
+    from tcs.files.writing import check_page
 
     if export is not None:
         check_page(export)
 
     from tcs.cli import view_work as work
 
-    chosen_from = place_told(here, torso)
+    chosen_from = state_if_given(here, torso)
     as_meshes = meshes or export is None
     staged = work.stage(file, chosen_from, max_members, observed or (), meshes=as_meshes)
     if export is not None:
         result = work.export(staged, export, meshes=meshes)
-        talk.print_result(result, work.report_page, as_json=as_json)
+        terminal.print_result(result, work.report_page, as_json=as_json)
         return
     work.show_live(staged, port=port, browser=browser, duration=duration)

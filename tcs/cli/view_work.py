@@ -12,10 +12,10 @@ from typing import Any
 import typer
 
 import tcs
-from tcs.cli import talk
-from tcs.cli.places import observed_settings
+from tcs.cli.values import observed_settings
 from tcs.files.writing import whole_file
 from tcs.model.grid import InitialConfiguration
+from tcs.output import terminal
 from tcs.output.report.pictures import scored_scene, title_of
 from tcs.output.report.shown_set import ShownSet
 from tcs.output.view import SceneObjects, ViewedSet, Viewer, export_page, open_meshcat
@@ -124,10 +124,10 @@ def show_live(staged: Staged, *, port: int | None, browser: bool, duration: floa
     typer.echo(f"{staged.title}; {staged.subtitle}")
     typer.echo(f"arrows: {colour_legend()}")
     viewer = Viewer(meshcat, staged.props, staged.answers, typer.echo)
-    talk.say(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
+    terminal.note(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
     if browser:
         webbrowser.open(meshcat.web_url())
     try:
         viewer.run(duration)
     except KeyboardInterrupt:
-        talk.say(f"closed after {time.perf_counter() - begun:.0f} s.")
+        terminal.note(f"closed after {time.perf_counter() - begun:.0f} s.")

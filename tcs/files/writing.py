@@ -69,3 +69,34 @@ def make_folder(
         raise OutputError(
             f"{what} '{folder}' cannot be created: {error.strerror}. {advice}"
         ) from error
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a path that cannot be written, before the work whose result it is for.
+
+    Raises:
+        OutputError: If it is a folder, or its folder is missing or not writable.
+    """
+    if path.is_dir():
+        raise OutputError(f"'{path}' is a folder. Name a file in it.")
+    # Permissions say nothing of read-only disks and quotas; an attempt does.
+    trial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.trial")
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "
+            "writable folder."
+        ) from error
+
+
+def check_page(path: Path) -> None:
+    """Refuse the path of a page that is not named `.html`, or that cannot be written.
+
+    Raises:
+        OutputError: If its name ends otherwise, or as `check_writable`.
+    """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(f"Page '{path}': its name must end in .html.")
+    check_writable(path)

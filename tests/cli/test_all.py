@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tcs
-from tcs.cli import reports
+from tcs.output.terminal import tables
 from tests.placement.store.example import METADATA, score_file
 
 ROWS = {
@@ -70,7 +70,7 @@ def test_every_name_and_number_is_printed_in_full(tcs_command, stand_in, tmp_pat
         **dict.fromkeys(("scoring_seconds", "total_seconds"), 888.88),
         **{"goals": 14, "file_bytes": 88_880_000},
     }
-    reports.report_rows({"rows": [row | large for row in rows]})
+    tables.report_rows({"rows": [row | large for row in rows]})
     lines = capsys.readouterr().out.splitlines()
     for task, environment in ROWS:
         assert sum(line.split()[:3] == [task, environment, "8,888,888"] for line in lines) == 1

@@ -41,7 +41,7 @@ def test_damaged_data_is_one_line(tcs_command, tmp_path, monkeypatch):
     for part in ("tasks/adl", "models/robots", "models/beds_wheelchairs"):
         (tmp_path / part).mkdir(parents=True)
     (tmp_path / "models/robots/r2.yaml").write_text("name: r2\n")
-    monkeypatch.setattr("tcs.cli.catalogue.data_folder", lambda: tmp_path)
+    monkeypatch.setattr("tcs.model.catalogue.data_folder", lambda: tmp_path)
     ran = tcs_command("list")
     assert ran.code == 1
     assert ran.err.count("\n") == 1

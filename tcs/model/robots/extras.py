@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tcs.model.robots.robot_file import BodyPrimitive, RobotFile
 from tcs.model.robots.urdf import Geometry, Joint, Urdf
@@ -78,6 +77,9 @@ def _geometries(shape: BodyPrimitive) -> tuple[Geometry, ...]:
     sphere = replace(geometry, shape="sphere", size=shape.size[:1])
     if shape.kind == "sphere":
         return (sphere,)
+    # Imported where it is needed: it is slow to import, and few robots have capsules of their own.
+    from scipy.spatial.transform import Rotation
+
     along = Rotation.from_euler("xyz", shape.rpy).as_matrix()[:, 2] * (shape.size[1] / 2)
     ends = np.array(shape.xyz) + np.stack([along, -along])
     caps = tuple(replace(sphere, xyz=(float(x), float(y), float(z))) for x, y, z in ends)

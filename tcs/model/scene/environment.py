@@ -146,6 +146,18 @@ class EnvironmentFile(Document):
         )
 
     @property
+    def observable_axes(self) -> tuple[Axis, ...]:
+        """The joints that an observation may give, with their units.
+
+        First those that have an error distribution, then the observed axes.
+        """
+        perturbed = [
+            Axis(name, "m" if error.std_deg is None else "deg", 0.0, 0.0, 1)
+            for name, error in self.errors.items()
+        ]
+        return (*perturbed, *self.observed_axes)
+
+    @property
     def placed(self) -> tuple[ModelEntry | Obstacle, ...]:
         """Models, then obstacles."""
         return (*self.models, *self.obstacles)

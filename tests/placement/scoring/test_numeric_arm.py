@@ -7,9 +7,9 @@ import shutil
 import pytest
 
 import tcs
-from tcs.cli.reports import NUMERIC_NOTE, report_scores
 from tcs.files.paths import data_folder
 from tcs.model.grid import InitialConfiguration
+from tcs.output.terminal.tables import NUMERIC_NOTE, report_scores
 from tcs.placement.reasons import explain
 from tcs.placement.scoring import score, summary, verify
 from tcs.placement.selection import select

@@ -1,14 +1,15 @@
-"""Results for a person: compact tables with units, rounded to what matters."""
+"""Results as compact tables with units, rounded to the digits that matter."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich import box
 from rich.table import Table
 
-from tcs.cli.talk import paper
+from tcs.output.terminal.console import results_console
 from tcs.output.words import (
     REASON_TEXTS,
     axis_title,
@@ -31,14 +32,14 @@ _ROWS_WIDTH = 170
 
 def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
     """Print the tasks, environments and robots there are."""
-    out = paper()
+    out = results_console()
     tasks = new_table("task", "what", ">goals", "environments")
     for task in known["tasks"]:
         places = ", ".join(task["environments"])
         tasks.add_row(task["name"], task["title"], str(task["goals"]), places)
     environments = new_table("environment", "what", "origin and axes")
-    for room in known["environments"]:
-        environments.add_row(room["name"], room["title"], room["origin"])
+    for environment in known["environments"]:
+        environments.add_row(environment["name"], environment["title"], environment["origin"])
     robots = new_table("robot", "what")
     for robot in known["robots"]:
         robots.add_row(robot["name"], robot["title"])
@@ -48,7 +49,7 @@ def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
 
 def report_scores(result: Mapping[str, Any]) -> None:
     """Print what scoring found."""
-    out = paper()
+    out = results_console()
     out.print(
         f"{result['configurations']:,} configurations x {result['goals']} goals scored in "
         f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} reach at least one goal, "
@@ -72,6 +73,20 @@ def report_scores(result: Mapping[str, Any]) -> None:
     out.print(f"wrote {result['file']}")
 
 
+def report_observed(result: Mapping[str, Any]) -> None:
+    """Print the result of scoring an observed environment."""
+    out = results_console()
+    observation = result["observation"]
+    state = result["tables"][0]["observed"]
+    moved = {key: float(f"{value:.4g}") for key, value in state.items() if value}
+    out.print(f"scored as observed: {settings_text(moved) or 'everything at its nominal position'}")
+    if observation["frame_position_error"] is not None:
+        rotation = observation["frame_rotation_error"]
+        angle = "" if rotation is None else f" and {math.degrees(rotation):.1f} deg"
+        out.print(f"observed frames fit to {observation['frame_position_error']:.4f} m{angle}")
+    report_scores(result)
+
+
 def report_rows(result: Mapping[str, Any]) -> None:
     """Print the rows of every task in every environment, one line each."""
     table = new_table(
@@ -90,12 +105,12 @@ def report_rows(result: Mapping[str, Any]) -> None:
             f"{row['total_seconds']:.2f}",
             f"{row['file_bytes'] / 1e6:.2f}",
         )
-    paper(_ROWS_WIDTH).print(table)
+    results_console(_ROWS_WIDTH).print(table)
 
 
 def report_choice(result: Mapping[str, Any]) -> None:
     """Print a choice."""
-    out = paper()
+    out = results_console()
     out.print(members_table(result["members"]))
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
     out.print(
@@ -126,7 +141,7 @@ def report_verification(found: Mapping[str, Any]) -> None:
     for line in check_lines(found):
         table.add_row(f"  {line.text}" if line.is_detail else line.text, line.value)
     table.add_row("verdict", found["verdict"])
-    paper().print(table)
+    results_console().print(table)
 
 
 def members_table(

@@ -1,51 +1,49 @@
-"""Values that commands take: a place, values of axes, a file to write."""
+"""Values of options: the current state, settings of axes, observed joints and frames."""
 
 from __future__ import annotations
 
 import math
-import secrets
 from collections.abc import Sequence
-from pathlib import Path
 
 import typer
 
-from tcs.errors import OutputError, SelectionError
+from tcs.errors import SelectionError
 from tcs.model.grid import Axis, InitialConfiguration
 
 
-def place_told(
+def state_if_given(
     here: tuple[float, float, float] | None, torso: float
 ) -> InitialConfiguration | None:
-    """Return the current state, None where nobody says where the robot is.
+    """Return the current state, or None without `--here`.
 
     Args:
         here: x [m], y [m] and heading [deg] in the environment frame, or None.
-        torso: Torso lift [m].
+        torso: Torso height [m].
 
     Raises:
-        typer.BadParameter: If there is a torso lift without a place.
+        typer.BadParameter: If there is a torso height without `--here`.
     """
     if here is not None:
-        return place(here, torso)
+        return current_state(here, torso)
     if torso:
         raise typer.BadParameter("needs --here.", param_hint="--torso")
     return None
 
 
-def place(
+def current_state(
     here: tuple[float, float, float], torso: float = 0.0, at: Sequence[str] = ()
 ) -> InitialConfiguration:
     """Return the current state.
 
     Args:
         here: x [m], y [m] and heading [deg] in the environment frame.
-        torso: Torso lift [m].
+        torso: Torso height [m].
         at: Settings of the environment's axes as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
 
     Raises:
-        SelectionError: If a setting is none.
+        SelectionError: If a setting is not of that form.
 
-    >>> place((1.0, 2.0, 180.0), 0.1, ["head_rest_deg=90"]).environment
+    >>> current_state((1.0, 2.0, 180.0), 0.1, ["head_rest_deg=90"]).environment
     (('head_rest', 1.5707963267948966),)
     """
     x, y, yaw_deg = here
@@ -65,7 +63,7 @@ def settings(given: Sequence[str], option: str) -> dict[str, float]:
     """Return settings of axes given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg], in m and rad.
 
     Args:
-        given: What stood on the command line.
+        given: Values on the command line.
         option: Name of the option, for the message.
 
     Raises:
@@ -84,11 +82,11 @@ def settings(given: Sequence[str], option: str) -> dict[str, float]:
 
 
 def observed_settings(given: Sequence[str], axes: Sequence[Axis]) -> dict[str, float]:
-    """Return how the person is found, given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
+    """Return the observed state, given as "AXIS=VALUE" [m] or "AXIS_deg=VALUE" [deg].
 
     Args:
-        given: What stood on the command line.
-        axes: The observed axes of the score file; names that are none of them pass.
+        given: Values on the command line.
+        axes: The observed axes of the score file; other names are passed on unchecked.
 
     Raises:
         SelectionError: If one is not of that form or in the other unit, or an axis is set twice.
@@ -107,32 +105,32 @@ def observed_settings(given: Sequence[str], axes: Sequence[Axis]) -> dict[str, f
     return found
 
 
-def frame_places(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return places of body frames given as "FRAME=X,Y,Z" [m].
+def frame_values(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return positions of body frames given as "FRAME=X,Y,Z" [m], or poses with a quaternion.
 
     Raises:
         SelectionError: If one is not of that form.
 
-    >>> frame_places(["head=0.29,0.05,0.68"])
+    >>> frame_values(["head=0.29,0.05,0.68"])
     {'head': (0.29, 0.05, 0.68)}
     """
-    places = {}
+    frames = {}
     for text in given:
         name, _, numbers = text.partition("=")
         try:
-            places[name] = tuple(float(number) for number in numbers.split(","))
+            frames[name] = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             raise SelectionError(
                 f"--seen is '{text}'; must be FRAME=X,Y,Z, e.g. head=0.29,0.05,0.68."
             ) from None
-    return places
+    return frames
 
 
 def axis_values(given: Sequence[str], option: str) -> tuple[tuple[str, float], ...]:
     """Return names and numbers given as "NAME=NUMBER".
 
     Args:
-        given: What stood on the command line.
+        given: Values on the command line.
         option: Name of the option, for the message.
 
     Raises:
@@ -148,34 +146,3 @@ def axis_values(given: Sequence[str], option: str) -> tuple[tuple[str, float], .
                 f"{option} is '{text}'; must be NAME=NUMBER, e.g. bed_height=0.2."
             ) from None
     return tuple(pairs)
-
-
-def check_writable(path: Path) -> None:
-    """Refuse a file that could not be written, before the work that is to fill it.
-
-    Raises:
-        OutputError: If it is a folder, or its folder is missing or takes no files.
-    """
-    if path.is_dir():
-        raise OutputError(f"'{path}' is a folder. Name a file in it.")
-    # Permissions do not tell of read-only disks, nor of quotas: only trying does.
-    trial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.trial")
-    try:
-        trial.touch(exist_ok=False)
-        trial.unlink()
-    except OSError as error:
-        raise OutputError(
-            f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "
-            "writable folder."
-        ) from error
-
-
-def check_page(path: Path) -> None:
-    """Refuse a page that no browser would open, or that could not be written.
-
-    Raises:
-        OutputError: If its name says that it is something else, or as `check_writable`.
-    """
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise OutputError(f"Page '{path}': its name must end in .html.")
-    check_writable(path)

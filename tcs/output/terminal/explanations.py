@@ -7,8 +7,8 @@ from typing import Any
 
 from rich.console import Console
 
-from tcs.cli.reports import members_table, new_table
-from tcs.cli.talk import paper
+from tcs.output.terminal.console import results_console
+from tcs.output.terminal.tables import members_table, new_table
 from tcs.output.words import (
     REASON_NAMES,
     REASON_TEXTS,
@@ -32,7 +32,7 @@ thousand times as often as the arm, and would leave no room for what blocks that
 
 def report_explanation(result: Mapping[str, Any]) -> None:
     """Print an explanation, given as `Explanation.to_json` returns it."""
-    out = paper()
+    out = results_console()
     frame = f", on {result['body_frame']}" if result["body_frame"] else ""
     out.print(f"Goal {result['goal']} of {result['task']} in {result['environment']}{frame}")
     if result["observed"]:

@@ -1,0 +1,183 @@
+"""The commands on score files as a whole: `tcs score`, `tcs verify` and `tcs export`."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tcs.cli import options
+from tcs.output import terminal
+from tcs.output.terminal import tables
+
+
+def score(
+    task: Annotated[
+        str | None,
+        typer.Argument(metavar="TASK", help="Name or YAML file of a task.", show_default=False),
+    ] = None,
+    environment: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of an environment.", show_default="wheelchair"),
+    ] = None,
+    everything: Annotated[
+        bool,
+        typer.Option(
+            "--all", help="Score every task in each of its environments, or in the one named."
+        ),
+    ] = False,
+    robot: options.Robot = "pr2",
+    measure: Annotated[
+        str,
+        typer.Option(
+            help="Dexterity measure to maximise: isotropy or inverse-condition; -limited lowers it "
+            "near joint limits, -limited-thesis with the penalty printed in the ITCM thesis."
+        ),
+    ] = "isotropy",
+    jobs: options.Jobs = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write; with --all, the folder.",
+            show_default="<task>-<environment>-<robot>.tcs",
+        ),
+    ] = None,
+    rules: Annotated[
+        str,
+        typer.Option(help="Rule for the kept sets: paper, or code2015 as in the original program."),
+    ] = "paper",
+    same_environment: Annotated[
+        bool,
+        typer.Option(
+            "--same-environment", help="Only sets whose members share the state of the environment."
+        ),
+    ] = False,
+    max_members: Annotated[
+        int,
+        typer.Option(
+            min=1, max=3, help="Greatest number of members of a set; 3 takes seconds longer."
+        ),
+    ] = 2,
+    observed: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=VALUE",
+            help="Score the observed environment, e.g. person_x=0.025 (m; JOINT_deg=VALUE).",
+        ),
+    ] = None,
+    seen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FRAME=X,Y,Z",
+            help="The same from the observed position of a frame on the person or the furniture, "
+            "in the environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
+        ),
+    ] = None,
+    at: options.At = None,
+    as_json: options.Json = False,
+) -> None:
+    """Score every initial configuration of a grid and build the sets to select from."""
+    if (task is None) != everything:
+        raise typer.BadParameter("name a task, or give --all for all tasks.", param_hint="TASK")
+    if task is None and (observed or seen):
+        raise typer.BadParameter("needs one task, not --all.", param_hint="--observed")
+    if at and not seen:
+        raise typer.BadParameter(
+            "states how the environment was set for --seen, which is not given.", param_hint="--at"
+        )
+
+    from tcs.placement.scoring import default_path, files
+
+    options_of_sets: dict[str, Any] = {
+        "measure": measure,
+        "rule": rules,
+        "same_environment": same_environment,
+        "max_members": max_members,
+        "jobs": jobs,
+        "on_compile": terminal.note_compiling,
+    }
+    if task is None:
+        rows = files.score_all_to_files(
+            environment, robot, out or Path(), progress=_progress, **options_of_sets
+        )
+        terminal.print_result({"rows": rows}, tables.report_rows, as_json=as_json)
+        return
+    environment = environment or "wheelchair"
+    path = out or default_path(task, environment, robot)
+    if not observed and not seen:
+        with _progress(task) as on_progress:
+            result = files.score_to_file(
+                task, environment, robot, path, on_progress=on_progress, **options_of_sets
+            )
+        terminal.print_result(result, tables.report_scores, as_json=as_json)
+        return
+
+    import tcs
+    from tcs.cli.values import frame_values, observed_settings, settings
+    from tcs.model.scene import load_environment
+
+    if out is None:
+        # The file of the task scored offline stays.
+        path = path.with_stem(f"{path.stem}-live")
+    observation = tcs.Observation(
+        joints=observed_settings(observed or (), load_environment(environment).observable_axes),
+        frames=frame_values(seen or ()),
+        setting=settings(at or (), "--at"),
+    )
+    result = files.score_observed_to_file(
+        task, environment, robot, path, observation, **options_of_sets
+    )
+    terminal.print_result(result, tables.report_observed, as_json=as_json)
+
+
+def verify(
+    file: options.File,
+    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check.")] = 500,
+    dense: Annotated[
+        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
+    ] = 200,
+    seed: options.Seed = 0,
+    as_json: options.Json = False,
+) -> None:
+    """Re-check answers with Drake and estimate the recall of the search."""
+    import tcs
+
+    loaded = tcs.load(file)
+    with terminal.progress_bar("pairs") as on_progress:
+        found = tcs.verify(loaded, pairs=pairs, dense=dense, seed=seed, on_progress=on_progress)
+    terminal.print_result(found.to_json(), tables.report_verification, as_json=as_json)
+    if not found.is_sound:
+        terminal.note(f"some answers in '{file}' are false; do not use them.")
+        raise typer.Exit(1)
+
+
+def export(
+    file: options.File,
+    out: Annotated[Path, typer.Option(help="CSV file to write.")],
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also configurations that reach no goal.")
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Write scores as a CSV table, one row for each configuration that reaches a goal."""
+    import tcs
+    from tcs.files.writing import check_writable
+
+    check_writable(out)
+    loaded = tcs.load(file)
+
+    from tcs.placement.store.frame import score_frame, write_csv
+
+    frame = score_frame(loaded, everything=everything)
+    write_csv(out, frame)
+    result = {"file": str(out), "rows": len(frame), "columns": list(frame.columns)}
+    terminal.print_result(
+        result, lambda _: typer.echo(f"wrote {out}: {len(frame):,} rows"), as_json=as_json
+    )
+
+
+def _progress(task: str) -> AbstractContextManager[Any]:
+    """Return the progress bar of one task."""
+    return terminal.progress_bar(f"configurations, {Path(task).stem}")

@@ -1,0 +1,113 @@
+"""Score tasks to files: one task, an observed scene, or every row of the paper's Table I."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from tcs.files.writing import check_writable, make_folder
+from tcs.model.scene import Observation
+from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
+from tcs.placement.scoring.live import LiveScorer
+from tcs.placement.scoring.offline import score
+from tcs.placement.scoring.score_summary import summary
+from tcs.placement.store import ScoreFile, save_scores
+
+
+class Progress(Protocol):
+    """Reports the progress of one scoring job."""
+
+    def __call__(self, task: str) -> Any:
+        """Return a context manager that yields `on_progress(done, total)`."""
+
+
+def score_to_file(
+    task: str,
+    environment: str,
+    robot: str,
+    path: Path,
+    *,
+    on_progress: Callable[[int, int], None] | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Score a task, write its file and return the summary.
+
+    Args:
+        task: Name or path of a task.
+        environment: Name or path of an environment.
+        robot: Name or path of a robot.
+        path: File to write.
+        on_progress: Called with the number of configurations done and in total.
+        **options: Further options of `tcs.score`.
+
+    Raises:
+        OutputError: If the file cannot be written; reported before scoring begins.
+        TcsError: As `tcs.score`.
+    """
+    check_writable(path)
+    file = score(task, environment, robot, on_progress=on_progress, **options)
+    save_scores(path, file)
+    return saved_summary(path, file)
+
+
+def score_observed_to_file(
+    task: str, environment: str, robot: str, path: Path, observation: Observation, **options: Any
+) -> dict[str, Any]:
+    """Score a task in the observed scene, write its file and return the summary.
+
+    Args:
+        task: Name or path of a task.
+        environment: Name or path of an environment.
+        robot: Name or path of a robot.
+        path: File to write.
+        observation: Observed joint values or frames.
+        **options: Further options of `tcs.LiveScorer`.
+
+    Raises:
+        OutputError: If the file cannot be written; reported before scoring begins.
+        TcsError: As `tcs.LiveScorer`.
+    """
+    check_writable(path)
+    file = LiveScorer(task, environment, robot, **options).score(observation)
+    save_scores(path, file)
+    return {**saved_summary(path, file), "observation": file.metadata["observation"]}
+
+
+def score_all_to_files(
+    environment: str | None, robot: str, folder: Path, *, progress: Progress, **options: Any
+) -> list[dict[str, Any]]:
+    """Score every task in each of its environments, one file each, and return the summaries.
+
+    Args:
+        environment: Restrict to this environment; None for all.
+        robot: Name or path of a robot.
+        folder: Folder of the files; created if missing.
+        progress: Reports the progress of each task.
+        **options: Further options of `tcs.score`.
+
+    Raises:
+        OutputError: If the folder cannot be made or written.
+        TcsError: As `tcs.score`. Files of earlier rows are kept.
+    """
+    rows = task_environment_pairs(environment)
+    make_folder(folder, advice="Name one with --out.")
+    results = []
+    for task, name in rows:
+        path = folder / default_path(task, name, robot)
+        with progress(task) as on_progress:
+            results.append(
+                score_to_file(task, name, robot, path, on_progress=on_progress, **options)
+            )
+    return results
+
+
+def saved_summary(path: Path, file: ScoreFile) -> dict[str, Any]:
+    """Return the summary of a score file and where it was saved, as plain containers."""
+    return {
+        "task": file.task["name"],
+        "environment": file.environment["name"],
+        **summary(file),
+        "file": str(path),
+        "file_bytes": path.stat().st_size,
+    }
