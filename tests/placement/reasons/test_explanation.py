@@ -138,7 +138,7 @@ def made(grid, outcome):
 
 
 def bed_between(h, here_side):
-    """A bed along x = 0.1 in a room 1.8 m by 1.8 m, open at one end; reached beyond it."""
+    """A bed along x = 0.1 on a grid of 1.8 m by 1.8 m, open at one end; reached beyond it."""
     x, y = divmod(h, 10)
     if x == 4 and y < 8:
         return Reason.BODY_BLOCKED
@@ -148,13 +148,13 @@ def bed_between(h, here_side):
 
 
 @pytest.fixture(scope="module")
-def room():
+def bedside():
     grid = small_grid(nx=10, ny=10, yaws=1, torsos=1)
     return grid, made(grid, lambda h: bed_between(h, here_side=0))
 
 
-def test_way_around_the_furniture(room):
-    grid, file = room
+def test_path_around_the_furniture(bedside):
+    grid, file = bedside
     here = 3 * 10 + 2
     straight = tcs.explain(file, 0, here, weights=fix_weights(grid, route="straight")).fix
     assert (straight.index, straight.sentence) == (52, "Drive 40 cm forward.")
@@ -175,8 +175,8 @@ def test_detour_is_refused():
     assert fix.sentence == f"Drive 40 cm forward ({fix.driving:.2f} m around the furniture)."
 
 
-def test_lines_count_where_the_base_cannot_be(room):
-    grid, file = room
+def test_distances_are_straight_from_a_base_in_contact(bedside):
+    grid, file = bedside
     blocked = 4 * 10 + 1
     explained = tcs.explain(file, 0, blocked)
     assert explained.explained.reason == Reason.BODY_BLOCKED
@@ -189,7 +189,7 @@ def test_lines_count_where_the_base_cannot_be(room):
     assert (explained.fix.route, explained.fix.index) == ("around", 2)
 
 
-def test_place_without_room_falls_back_to_lines():
+def test_distances_are_straight_from_an_enclosed_base():
     grid = small_grid(nx=10, ny=10, yaws=1, torsos=1)
 
     def outcome(h):
@@ -217,8 +217,8 @@ def test_distribution_equals_counting():
             for pair, reason in zip(scores.pair[:, goal], reasons, strict=True)
             if pair >= 0
         ]
-        told = {(one.pair, one.reason): one.count for one in found.blocking_pairs}
-        assert told == {key: blocking.count(key) for key in set(blocking)}
+        counted = {(one.pair, one.reason): one.count for one in found.blocking_pairs}
+        assert counted == {key: blocking.count(key) for key in set(blocking)}
         counts = [one.count for one in found.blocking_pairs]
         assert counts == sorted(counts, reverse=True)
         left = GRID.size

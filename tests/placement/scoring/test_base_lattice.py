@@ -39,11 +39,11 @@ def plain_moves(scores, grid, lattice):
         return free[*state, *inside]
 
     moves = np.zeros((4, *shape), dtype=bool)
-    for kind, (dx, dy) in enumerate(((1, 0), (0, 1), (1, 1), (1, -1))):
+    for step, (dx, dy) in enumerate(((1, 0), (0, 1), (1, 1), (1, -1))):
         for i in range(shape[0] - dx):
             for j in range(max(0, -dy), shape[1] - max(0, dy)):
                 places = {(i + p, j + q) for p in {0, dx} for q in {0, dy}}
-                moves[kind, i, j] = any(all(is_free(s, *p) for p in places) for s in states)
+                moves[step, i, j] = any(all(is_free(s, *p) for p in places) for s in states)
     return moves
 
 

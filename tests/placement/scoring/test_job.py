@@ -74,7 +74,7 @@ def test_file_survives_the_disk(small_file, tmp_path):
 
 
 def test_an_obstacle_never_makes_a_goal_reachable(small_file, small_environment, tmp_path):
-    path = tmp_path / "room.yaml"
+    path = tmp_path / "environment.yaml"
     path.write_text(
         f"based_on: {small_environment}\nname: cluttered\n"
         "obstacles:\n  - {name: table, box: [0.5, 0.4, 0.9], xyz: [0.9, -0.55, 0.45]}\n"
@@ -94,15 +94,15 @@ def test_a_task_that_is_not_for_the_environment_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("names", "kind", "near"),
+    ("names", "named", "near"),
     [
         (("shavin", "wheelchair", "pr2"), "task", "shaving"),
         (("shaving", "wheelchai", "pr2"), "environment", "wheelchair"),
         (("shaving", "wheelchair", "pr3"), "robot", "pr2"),
     ],
 )
-def test_unknown_names_come_with_the_nearest(names, kind, near):
-    with pytest.raises(UnknownNameError, match=f"{kind}.*Did you mean '{near}'"):
+def test_unknown_names_come_with_the_nearest(names, named, near):
+    with pytest.raises(UnknownNameError, match=f"{named}.*Did you mean '{near}'"):
         load_job(*names)
 
 

@@ -33,7 +33,7 @@ TABLES = ("reason", "dexterity", "arm_joints")
 
 @pytest.fixture(scope="module")
 def scorer(small_environment):
-    """Shaving in the small room, ready to be scored."""
+    """Shaving in the small environment, ready to be scored."""
     return LiveScorer("shaving", small_environment)
 
 
@@ -67,7 +67,7 @@ def seven(scorer, joints=(), name="head"):
 
 
 def blamed(scores):
-    """Names of what is in contact; how they are numbered hangs on what else is in the file."""
+    """Names of the bodies in contact; their numbers depend on the other contacts of the file."""
     return np.array([*map(" + ".join, scores.pair_names), ""])[scores.pair]
 
 
@@ -150,33 +150,33 @@ def test_a_set_is_chosen_from_what_was_scored_live(scorer):
     assert file.metadata["observation"]["joints"] == {"person_x": 0.03}
 
 
-def test_frames_with_their_orientation_tell_the_joints(scorer):
+def test_frames_with_orientation_determine_the_joints(scorer):
     joints = {"person_x": 0.03, "person_y": -0.02, "person_yaw": 0.07, "head_tilt": -0.05}
     chair = {"wheelchair_x": 0.01, "wheelchair_y": 0.005, "wheelchair_yaw": 0.02}
     frames = {name: seven(scorer, {**joints, **chair}, name) for name in ("head", "chest")}
     file = scorer.score(Observation(joints=chair, frames=frames))
-    told = file.metadata["observation"]
+    entry = file.metadata["observation"]
     # Rounded to a nanometre.
-    assert told["joints"] == pytest.approx({**joints, **chair}, abs=2e-9)
-    assert told["frame_position_error"] < 1e-8
-    assert told["frame_rotation_error"] < 1e-8
+    assert entry["joints"] == pytest.approx({**joints, **chair}, abs=2e-9)
+    assert entry["frame_position_error"] < 1e-8
+    assert entry["frame_rotation_error"] < 1e-8
 
 
 def test_a_place_alone_is_explained_by_the_most_likely_joints(scorer, head):
     seen = [head[0] + 0.04, head[1], head[2]]
-    told = scorer.score(Observation(frames={"head": seen})).metadata["observation"]
-    assert told["frame_position_error"] < 1e-8
-    joints = told["joints"]
+    entry = scorer.score(Observation(frames={"head": seen})).metadata["observation"]
+    assert entry["frame_position_error"] < 1e-8
+    joints = entry["joints"]
     # The person's spread is 5 cm and the chair's 1.25 cm: shares go with the squares.
     assert abs(joints["person_x"]) == pytest.approx(0.04 * 16 / 17, abs=1e-6)
     assert joints["wheelchair_x"] == pytest.approx(0.04 / 17, abs=1e-6)
 
 
-def test_a_frame_on_the_bed_tells_the_shift(bed_scorer):
+def test_a_frame_on_the_bed_determines_the_shift(bed_scorer):
     setting = {"bed_height": 0.2, "head_rest": np.radians(35.0)}
     seen = seven(bed_scorer, {**setting, "person_y": 0.025, "person_x": -0.01})[:3]
-    told = bed_scorer.score(Observation(frames={"head": seen}, setting=setting))
-    assert told.metadata["observation"]["joints"] == pytest.approx(
+    file = bed_scorer.score(Observation(frames={"head": seen}, setting=setting))
+    assert file.metadata["observation"]["joints"] == pytest.approx(
         {"person_x": -0.01, "person_y": 0.025}, abs=2e-9
     )
 

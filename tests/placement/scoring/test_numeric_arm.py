@@ -15,9 +15,9 @@ from tcs.placement.scoring import score, summary, verify
 from tcs.placement.selection import select
 from tcs.placement.tables import Reason
 
-# The bends of shoulder and wrist 2 cm beside the axes before them, the hand 1 cm beside the wrist.
-BENDS = {'xyz="0 0 0.2155"': 'xyz="0.02 0 0.2155"', 'xyz="0 0.0805 0"': 'xyz="0 0.0805 0.01"'}
-ROOM = """
+# Axes of shoulder and wrist 2 cm beside the ones before them, the hand 1 cm beside the wrist.
+OFFSETS = {'xyz="0 0 0.2155"': 'xyz="0.02 0 0.2155"', 'xyz="0 0.0805 0"': 'xyz="0 0.0805 0.01"'}
+ENVIRONMENT = """
 based_on: wheelchair
 name: small-wheelchair
 title: The wheelchair, seen from a few places
@@ -36,39 +36,39 @@ def files(tmp_path_factory):
     for name in ("iiwa7.urdf", "iiwa7.yaml", "iiwa7_primitives.csv"):
         shutil.copy(data_folder() / "models" / "robots" / name, folder / name)
     text = (folder / "iiwa7.urdf").read_text()
-    for before, after in BENDS.items():
+    for before, after in OFFSETS.items():
         assert before in text
         text = text.replace(before, after)
     (folder / "iiwa7.urdf").write_text(text)
-    (folder / "room.yaml").write_text(ROOM)
-    return folder / "iiwa7.yaml", folder / "room.yaml"
+    (folder / "environment.yaml").write_text(ENVIRONMENT)
+    return folder / "iiwa7.yaml", folder / "environment.yaml"
 
 
 @pytest.fixture(scope="module")
 def scored(files):
     """Feeding, scored."""
-    robot, room = files
-    return score("feeding", room, robot)
+    robot, environment = files
+    return score("feeding", environment, robot)
 
 
 def test_the_file_says_that_ik_was_numeric(scored, tmp_path, capsys):
     assert scored.metadata["ik"] == "numeric"
-    told = summary(scored)
-    assert told["ik"] == "numeric"
+    figures = summary(scored)
+    assert figures["ik"] == "numeric"
     path = tmp_path / "bent.tcs"
     tcs.save(path, scored)
     assert tcs.load(path).metadata["ik"] == "numeric"
-    report_scores({**told, "file": str(path)})
+    report_scores({**figures, "file": str(path)})
     printed = " ".join(capsys.readouterr().out.split())
     assert NUMERIC_NOTE in printed
 
 
 def test_the_closed_form_says_so_too_without_a_note(capsys):
-    told = {
+    figures = {
         "ik": "analytic", "configurations": 1, "goals": 1, "scoring_seconds": 0.1, "candidates": 0,
         "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x", "pairs": 1,
     }  # fmt: skip
-    report_scores(told)
+    report_scores(figures)
     assert "Numeric" not in capsys.readouterr().out
 
 
@@ -107,13 +107,13 @@ def test_baxter_feeds_a_person_in_a_wheelchair():
     found = verify(file, pairs=500, dense=300)
     assert (found.checked, found.false_reached) == (500, 0)
     assert found.is_sound
-    # Measured with 2000 of either kind: none missed. One of 249 to 2,784 reached shows as 0.996.
+    # Measured with 2000 pairs of either type: none missed. One of 249 to 2,784 reached gives 0.996.
     assert found.recall > 0.99
 
 
 def test_jobs_do_not_matter(files, scored):
-    robot, room = files
-    one = score("feeding", room, robot, jobs=1)
+    robot, environment = files
+    one = score("feeding", environment, robot, jobs=1)
     for name in ("reason", "pair", "dexterity", "arm_joints"):
         first, second = (getattr(f.nominal.scores, name) for f in (one, scored))
         assert (first == second).all(), name

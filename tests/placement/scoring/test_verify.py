@@ -67,16 +67,16 @@ def test_a_joint_moved_by_a_hundredth_is_found(small_file):
 
 
 def test_a_joint_beyond_its_limit_is_found(small_file):
-    def bend(joints):
+    def shift(joints):
         joints[:, 3] = -0.1
 
-    found = verify(with_joints(small_file, bend), pairs=10, dense=0)
+    found = verify(with_joints(small_file, shift), pairs=10, dense=0)
     assert found.limit_violations == 10
     assert not found.is_sound
 
 
 def test_an_arm_too_close_to_the_person_is_found(small_file, small_environment):
-    # The same answers in a room that asks for 25 cm of distance: only contact differs.
+    # The same answers in an environment that requires 25 cm of clearance: only contact differs.
     text = small_environment.read_text().replace("name: small-wheelchair", "name: tight-wheelchair")
     tight = small_environment.parent / "tight-wheelchair.yaml"
     tight.write_text(text + "contact_margin: 0.25\n")

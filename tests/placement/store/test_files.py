@@ -259,8 +259,8 @@ def changed(file, section, name, change):
     place[section] = dict(place[section])
     old = place[section][name]
     if isinstance(old, dict) and "bytes" in old:
-        kind = old["type"][0] if old["type"][0] == "u" else old["type"]
-        array = decompress({name: old}, name, kind, (None,) * len(old["shape"]))
+        element = old["type"][0] if old["type"][0] == "u" else old["type"]
+        array = decompress({name: old}, name, element, (None,) * len(old["shape"]))
         new = change(array)
         place[section][name] = compress(new) if isinstance(new, np.ndarray) else new
     else:
@@ -339,7 +339,7 @@ FORGED_SCORES = {
     "names no pairs": ("scores", "pair_names", lambda names: [["arm"]] * 3),
     "names no list": ("scores", "pair_names", lambda names: "arm"),
 }
-"""Found when the scores are first asked for: choosing never reads them."""
+"""Found on first access to the scores: selection never reads them."""
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ FORGED_SCORES = {
     [*FORGED.values(), *FORGED_SCORES.values()],
     ids=[*FORGED, *FORGED_SCORES],
 )
-def test_a_forged_file_is_told_in_one_line(path, file, section, name, change):
+def test_a_forged_file_is_refused_in_one_line(path, file, section, name, change):
     joblib.dump(changed(file, section, name, change), path, compress=3)
     loaded = load_scores(path) if section == "scores" else None
     with pytest.raises(StoreFormatError) as caught:
@@ -359,7 +359,7 @@ def test_a_forged_file_is_told_in_one_line(path, file, section, name, change):
     assert "\n" not in message
 
 
-def test_a_folded_array_may_not_swell(path, file):
+def test_a_compressed_array_must_have_its_stated_size(path, file):
     """What decompresses to more than its shape says is refused before it fills the memory."""
     content = encode(file)
     bomb = np.frombuffer(zlib.compress(bytes(100_000_000)), dtype=np.uint8)

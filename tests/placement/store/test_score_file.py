@@ -41,7 +41,7 @@ def test_parts_must_belong_together():
         dataclasses.replace(file, grid={})
 
 
-def test_other_models_are_told():
+def test_other_models_are_refused():
     file = score_file()
     check_scene(file, METADATA["scene_digest"])
     with pytest.raises(StoreMismatchError, match=r"'shaving' were made by tcs 0\.1\.0 from other"):

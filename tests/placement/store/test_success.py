@@ -46,10 +46,10 @@ def test_files_without_estimates_load():
     assert decode(packed).nominal.success is None
 
 
-def test_estimates_of_sets_that_are_not_held_are_refused():
-    nobody = np.setdiff1d(np.arange(500), score_file().tables[0].sets.candidates)[0]
+def test_estimates_of_unknown_sets_are_refused():
+    other = np.setdiff1d(np.arange(500), score_file().tables[0].sets.candidates)[0]
     with pytest.raises(StoreError, match="the table does not have"):
-        with_estimates(members=np.array([[nobody, -1], [nobody, 10**6]], dtype=np.int32))
+        with_estimates(members=np.array([[other, -1], [other, 10**6]], dtype=np.int32))
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ def test_knows_its_shape_and_is_read_only():
         lattice.moves[0, 0, 0] = True
 
 
-def leaving(kind, i, j):
+def leaving(step, i, j):
     moves = np.zeros((4, 2, 3), dtype=np.bool_)
-    moves[kind, i, j] = True
+    moves[step, i, j] = True
     return {"moves": moves}
 
 
@@ -28,7 +28,7 @@ WRONG = {
     "step": ({"step": (0.1, 0.0)}, "positive"),
     "start": ({"start": (0.0, float("nan"))}, "finite"),
     "integers": ({"start": (0, 1)}, "finite numbers"),
-    "three kinds": ({"moves": np.zeros((3, 2, 3), dtype=np.bool_)}, "shape"),
+    "three types": ({"moves": np.zeros((3, 2, 3), dtype=np.bool_)}, "shape"),
     "a single row": ({"moves": np.zeros((4, 1, 3), dtype=np.bool_)}, "at least two"),
     "out along x": (leaving(0, 1, 0), "leaves the lattice"),
     "out along y": (leaving(1, 0, 2), "leaves the lattice"),

@@ -48,7 +48,7 @@ def test_the_most_robust_set_has_the_greatest_lower_bound():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("name", "value", "message"),
     [
         ("members", [[3, -1], [9, -1], [4, 1], [3, 9]], "ascending"),
         ("members", [[3, -1], [9, -1], [4, 4], [5, 9]], "ascending"),
@@ -64,7 +64,7 @@ def test_the_most_robust_set_has_the_greatest_lower_bound():
         ("samples", [64, 64, 1], "has shape"),
     ],
 )
-def test_what_contradicts_itself_is_refused(name, value, said):
+def test_what_contradicts_itself_is_refused(name, value, message):
     wrong = np.array(value, dtype=PARTS[name].dtype)
-    with pytest.raises(TcsError, match=said):
+    with pytest.raises(TcsError, match=message):
         SuccessTable(**{**PARTS, name: wrong})

@@ -1,4 +1,4 @@
-"""An arm of the mirrored class from robot file to verified answers: a Panda on a pedestal."""
+"""A spherical-shoulder arm, from robot file to verified answers: a Panda on a pedestal."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CAPSULES = {
     "panda_link7": (0.04, 0.05, (0, 0, 0.03), 0.0),
     "panda_hand": (0.03, 0.12, (0, 0, 0.04), np.pi / 2),
 }
-ROOM = """
+ENVIRONMENT = """
 based_on: wheelchair
 name: small-wheelchair
 title: The wheelchair, seen from a few places
@@ -66,20 +66,20 @@ def files(tmp_path_factory):
         + "\n  ".join(neighbours)
         + "\n"
     )
-    (folder / "room.yaml").write_text(ROOM)
-    return folder / "panda.yaml", folder / "room.yaml"
+    (folder / "environment.yaml").write_text(ENVIRONMENT)
+    return folder / "panda.yaml", folder / "environment.yaml"
 
 
 def test_the_arm_is_solved_in_reverse(files):
-    robot, room = files
-    job = load_job("feeding", room, robot)
+    robot, environment = files
+    job = load_job("feeding", environment, robot)
     lowered = job.lowered(job.scene())
     assert build_problem(lowered.arrays, lowered.grid).arm.free == LAST
 
 
 def test_drake_confirms_what_is_scored_and_the_dense_scan_finds_little_more(files):
-    robot, room = files
-    file = score("feeding", room, robot)
+    robot, environment = files
+    file = score("feeding", environment, robot)
     assert np.count_nonzero(file.nominal.scores.reached) > 100
     found = verify(file, pairs=100, dense=20)
     assert found.checked == 100
