@@ -44,7 +44,7 @@ def test_parts_of_a_score_file(part):
 
 def test_top_level_of_a_score_file():
     text = page("files")
-    text = text[text.index("Top level:") : text.index("`success` is none")]
+    text = text[text.index("Top level:") : text.index("`success` is None")]
     for key in encode(score_file()):
         assert f"`{key}`" in text, key
 
@@ -61,7 +61,7 @@ def test_costs_of_changes():
     costs = {change: float(cost) for change, cost, _ in cells}
     assert costs["driving, per metre"] == weights.metre
     assert costs["turning, per radian"] == weights.turn
-    assert costs["torso, per metre"] == weights.torso
+    assert costs["torso height, per metre"] == weights.torso
 
 
 def test_default_weights():
