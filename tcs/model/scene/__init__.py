@@ -16,7 +16,8 @@ from tcs.model.scene.environment import (
     load_environment,
 )
 from tcs.model.scene.error_distribution import ErrorDistribution
-from tcs.model.scene.lowering import LoweredScene, arm_chain, environment_at, goal_poses, lower
+from tcs.model.scene.lowered_scene import LoweredScene
+from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
 from tcs.model.scene.posture import Posture
 from tcs.model.scene.scene import Contact, Scene

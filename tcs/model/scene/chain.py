@@ -1,4 +1,4 @@
-"""The frames that the kernel's arm chain uses, chosen from where the joint axes lie."""
+"""Link frames of the kernel's arm chain, chosen from the joint axes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 
 AXES_MEET = 1e-6
-"""Axes closer than this meet [m]: far above rounding in a URDF's figures (1e-9), far below what
-could move a tool visibly."""
+"""Axes closer than this intersect [m]: far above the rounding of a URDF's figures (1e-9), far below
+any relevant motion of the tool."""
 
 _PARALLEL = 1e-9
-"""Squared sine of the angle below which two axes count as parallel: there, the point where they
-meet is lost in rounding."""
+"""Squared sine of the angle below which two axes count as parallel: their intersection is
+ill-conditioned there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,11 @@ class JointAxis:
 def link_frames(axes: tuple[JointAxis, ...]) -> tuple[FloatArray, FloatArray]:
     """Return the poses of link frames L1..L7 in the arm base A, all joints at zero.
 
-    Each L turns about its own z. Its origin is that of the joint frame, except where sliding it
-    along the joint axis makes the closed form of the arm visible: L2 and L3 lie where axes 2 and
-    3 meet, L5, L6 and L7 where axes 5, 6 and 7 meet in one point. An arm that lacks one of the
-    two may be the mirror image: then L1, L2 and L3 lie where axes 1, 2 and 3 meet in one point,
-    L5 and L6 where axes 5 and 6 meet.
+    Each L rotates about its own z. Its origin is that of the joint frame, except where moving it
+    along the joint axis gives the arm its closed form: L2 and L3 are at the intersection of axes 2
+    and 3; L5, L6 and L7 at that of axes 5, 6 and 7 (spherical wrist). An arm without these
+    intersections may have a spherical shoulder instead: then L1, L2 and L3 are at the intersection
+    of axes 1, 2 and 3, and L5 and L6 at that of axes 5 and 6.
 
     Args:
         axes: The seven joint axes, in the arm's order.
@@ -70,9 +70,9 @@ def link_frames(axes: tuple[JointAxis, ...]) -> tuple[FloatArray, FloatArray]:
 def _common_points(
     first: JointAxis, middle: JointAxis, last: JointAxis
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return where three axes in a row meet in one point, one point on each, in A [m], or None."""
-    # The outer two may be parallel at zero, so each is met with the middle one, where the point is
-    # sharp.
+    """Return the intersection of three consecutive axes, a point on each in A [m], or None."""
+    # The outer two may be parallel at zero, so each is intersected with the middle one, which is
+    # well conditioned.
     inner, outer = meeting_points(first, middle), meeting_points(last, middle)
     if inner is None or outer is None or np.linalg.norm(inner[1] - outer[1]) >= AXES_MEET:
         return None
@@ -80,9 +80,9 @@ def _common_points(
 
 
 def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, FloatArray] | None:
-    """Return where two axes meet, expressed in A [m], or None if they pass each other.
+    """Return the intersection of two axes, expressed in A [m], or None if they are skew.
 
-    Axes given in rounded figures miss each other by a hair, so there is one point on each: every
+    Axes given in rounded figures do not intersect exactly, so there is one point on each: every
     link origin stays on its own axis, and the chain stays exact.
 
     >>> z = JointAxis(np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]))
@@ -108,8 +108,8 @@ def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, Flo
 def _rotation_to_z(direction: FloatArray) -> FloatArray:
     """Return the rotation whose z column is `direction`, cyclic where the axis is x or y.
 
-    The columns of a URDF axis along x, y or z stay exact zeros and ones, so no rounding creeps
-    into the chain.
+    For a URDF axis along x, y or z the columns are exact zeros and ones, so the chain has no
+    rounding errors.
     """
     largest = int(np.argmax(np.abs(direction)))
     z = direction / np.linalg.norm(direction)

@@ -1,12 +1,9 @@
-"""From a Drake plant to the arrays that the kernel scores: nothing here is typed in by hand."""
+"""Lowering: from a Drake plant to the arrays of the kernel, every figure read from the plant."""
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
@@ -18,67 +15,25 @@ from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArr
 from tcs.model.grid import Grid
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
+from tcs.model.scene.lowered_scene import LoweredScene, read_only
 from tcs.model.scene.scene import Scene
 from tcs.model.tasks import Task
-
-T = TypeVar("T", SceneArrays, GridArrays)
-
-_DIGEST_DECIMALS = 9
-"""Arrays are hashed as multiples of a nanometre (or nanoradian): far below any change of a model,
-far above what another processor's rounding alters."""
-
-
-@dataclass(frozen=True, slots=True)
-class LoweredScene:
-    """A scene, its goals and its grid as plain arrays, and the names behind their indices.
-
-    Attributes:
-        arrays: Everything the kernel needs to score one configuration.
-        grid: The configurations to score.
-        robot_bodies: Names that `body` of the arm's and the robot's shapes refers to.
-        environment_bodies: Names that `body` of the room's shapes refers to.
-        goals: Names of the goals, in order.
-    """
-
-    arrays: SceneArrays
-    grid: GridArrays
-    robot_bodies: tuple[str, ...]
-    environment_bodies: tuple[str, ...]
-    goals: tuple[str, ...]
-
-    def digest(self) -> str:
-        """Return the SHA-256 of all arrays and names, as hexadecimal digits.
-
-        Two scenes of the same digest give the same scores.
-        """
-        sha = hashlib.sha256()
-        for item in _flat((self.arrays, self.grid)):
-            array = np.asarray(item)
-            if array.dtype.kind == "f":
-                # Adding 0.0 turns -0.0 into 0.0, which is equal and must hash so.
-                array = np.round(array.astype("<f8"), _DIGEST_DECIMALS) + 0.0
-            else:
-                array = array.astype("<i8")
-            sha.update(repr(array.shape).encode())
-            sha.update(array.tobytes())
-        sha.update(repr((self.robot_bodies, self.environment_bodies, self.goals)).encode())
-        return sha.hexdigest()
 
 
 def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     """Return the arrays of a scene for a task, read off its Drake plant and scene graph.
 
     Args:
-        scene: The scene; its state is left as it was.
-        task: The goals, and the contacts the task allows; None for arrays that have no goals yet.
+        scene: The scene; its state is restored.
+        task: The goals and the contacts that the task allows; None for arrays without goals.
         grid: The configurations; axes besides the robot's move the environment's joints of the
             same name.
 
     Raises:
-        UnknownNameError: If a goal rides on a body frame that the environment does not have, the
-            task allows contact between bodies that are not there, or a grid axis is no joint.
-        GridError: If a grid axis goes beyond its joint's limits, or is of another unit.
-        EnvironmentFileError: If a shape is of a kind the kernel does not know.
+        UnknownNameError: If the environment lacks the body frame of a goal or the joint of a grid
+            axis, or the task allows contact between bodies that do not exist.
+        GridError: If a grid axis exceeds its joint's limits, or has another unit.
+        EnvironmentFileError: If the kernel does not support a shape.
     """
     before = scene.positions()
     try:
@@ -101,9 +56,9 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     )
     arm = [part for part in built.parts if part.group is Group.ARM]
     body = [part for part in built.parts if part.group is Group.BODY]
-    room = [part for part in built.parts if part.group is Group.ENVIRONMENT]
+    environment_parts = [part for part in built.parts if part.group is Group.ENVIRONMENT]
     robot_bodies = _names([*arm, *body])
-    environment_bodies = _names(room)
+    environment_bodies = _names(environment_parts)
 
     scene.place_base(0.0, 0.0, 0.0)
     scene.set_arm(np.zeros(len(built.arm_joints)))
@@ -112,7 +67,9 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     arm_base, body_poses = _torso_states(scene, body, torso_levels)
     for axis in grid.environment_axes:
         built.environment_joints.check_axis(axis, where=where)
-    room_poses, poses_of_goals = _environment_states(scene, room, task, grid.environment_states())
+    environment_poses, goal_matrices = _environment_states(
+        scene, environment_parts, task, grid.environment_states()
+    )
 
     arrays = SceneArrays(
         chain=chain,
@@ -120,20 +77,20 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         arm_base_p=_origins(_matrices([arm_base]))[0],
         arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
         body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
-        environment=_shapes(scene, room, environment_bodies, room_poses),
+        environment=_shapes(scene, environment_parts, environment_bodies, environment_poses),
         arm_vs_arm=_checked(rule, arm, arm),
         arm_vs_body=_checked(rule, arm, body),
-        arm_vs_environment=_checked(rule, arm, room),
-        body_vs_environment=_checked(rule, body, room),
+        arm_vs_environment=_checked(rule, arm, environment_parts),
+        body_vs_environment=_checked(rule, body, environment_parts),
         margin=scene.spec.environment.contact_margin,
-        goal_R=_rotations(poses_of_goals),
-        goal_p=_origins(poses_of_goals),
+        goal_R=_rotations(goal_matrices),
+        goal_p=_origins(goal_matrices),
     )
     return LoweredScene(
-        arrays=_read_only(arrays),
-        grid=_read_only(
+        arrays=read_only(arrays),
+        grid=read_only(
             GridArrays(
-                environment_states=len(poses_of_goals),
+                environment_states=len(goal_matrices),
                 base_x=grid.axis("base_x").values,
                 base_y=grid.axis("base_y").values,
                 base_yaw=grid.axis("base_yaw").values,
@@ -160,7 +117,7 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
     R_AL, p_AL = link_frames(tuple(axes))
     X_AL = [_transform(R, p) for R, p in zip(R_AL, p_AL, strict=True)]
     X_AT = built.tool_frame.CalcPose(state, built.arm_base_frame)
-    # At zero every Rz is the identity, so F[i] is what lies between neighbouring frames.
+    # At zero every Rz is the identity, so F[i] is the transform between consecutive frames.
     frames = [RigidTransform(), *X_AL, X_AT]
     steps = [before.inverse() @ after for before, after in itertools.pairwise(frames)]
     chain = Chain(
@@ -205,69 +162,73 @@ def environment_at(
 
     Args:
         lowered: The scene as arrays.
-        scene: The scene itself; its state is left as it was.
+        scene: The scene itself; its state is restored.
         task: The goals.
-        states: Positions of the environment's joints by name [m or rad]; what one state does not
-            name stays as the state before has left it.
+        states: Positions of the environment's joints by name [m or rad]; joints that a state does
+            not name keep their positions of the previous state.
 
     Returns:
-        Arrays of as many environment states; a state of the grid gives the very numbers that
-        lowering the grid gives.
+        Arrays of these environment states; for a state of the grid, the same numbers as lowering
+        the grid gives.
 
     Raises:
         UnknownNameError: If there is no such joint.
-        TcsError: If a joint follows another one, or does not go that far.
+        TcsError: If a joint follows another one, or a position exceeds its limits.
     """
     before = scene.positions()
-    room = [part for part in scene.built.parts if part.group is Group.ENVIRONMENT]
+    environment_parts = [part for part in scene.built.parts if part.group is Group.ENVIRONMENT]
     try:
-        room_poses, poses_of_goals = _environment_states(scene, room, task, states)
+        environment_poses, goal_matrices = _environment_states(
+            scene, environment_parts, task, states
+        )
     finally:
         scene.restore(before)
-    moved = lowered.arrays.environment._replace(R=_rotations(room_poses), p=_origins(room_poses))
+    moved = lowered.arrays.environment._replace(
+        R=_rotations(environment_poses), p=_origins(environment_poses)
+    )
     return lowered.arrays._replace(
-        environment=moved, goal_R=_rotations(poses_of_goals), goal_p=_origins(poses_of_goals)
+        environment=moved, goal_R=_rotations(goal_matrices), goal_p=_origins(goal_matrices)
     )
 
 
 def _environment_states(
     scene: Scene, parts: list[Part], task: Task | None, states: Iterable[Mapping[str, float]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the poses in W of the room's shapes and of the goals, for each environment state.
+    """Return the poses in W of the environment's shapes and of the goals, for each state.
 
     Returns:
         Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
     """
-    riding = [] if task is None else _riding_goals(scene, task)
-    rooms, goals = [], []
+    goals_in_frames = [] if task is None else _goals_in_frames(scene, task)
+    shapes, goals = [], []
     for state in states:
         for name, value in state.items():
             scene.set_joint(name, value)
         query = scene.query_object()
-        rooms.append([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
+        shapes.append([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
         goals.append(
             [
                 (frame.CalcPoseInWorld(scene.plant_context) @ X_HG).GetAsMatrix34()
-                for frame, X_HG in riding
+                for frame, X_HG in goals_in_frames
             ]
         )
-    return _stacked(rooms, len(parts)), _stacked(goals, len(riding))
+    return _stacked(shapes, len(parts)), _stacked(goals, len(goals_in_frames))
 
 
 def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
-    """Return X_WG of every goal of a task, at the scene's present state.
+    """Return X_WG of every goal of a task, at the scene's current state.
 
     Raises:
-        UnknownNameError: If a goal rides on a body frame that the environment does not have.
+        UnknownNameError: If the environment lacks the body frame of a goal.
     """
     return [
         frame.CalcPoseInWorld(scene.plant_context) @ X_HG
-        for frame, X_HG in _riding_goals(scene, task)
+        for frame, X_HG in _goals_in_frames(scene, task)
     ]
 
 
-def _riding_goals(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]]:
-    """Return the body frame H that each goal rides on, and its pose X_HG there.
+def _goals_in_frames(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]]:
+    """Return the body frame H of each goal, and the goal's pose X_HG in it.
 
     Raises:
         UnknownNameError: If the environment has no such body frame.
@@ -284,7 +245,7 @@ def _riding_goals(scene: Scene, task: Task) -> list[tuple[Frame, RigidTransform]
 
 
 def _names(parts: list[Part]) -> tuple[str, ...]:
-    """Return the names of the parts, each once, in the order they first come."""
+    """Return the names of the parts without repetitions, in order of appearance."""
     return tuple(dict.fromkeys(part.name for part in parts))
 
 
@@ -332,20 +293,3 @@ def _origins(poses: FloatArray) -> FloatArray:
 
 def _transform(R: FloatArray, p: FloatArray) -> RigidTransform:
     return RigidTransform(RotationMatrix(R), p)
-
-
-def _flat(item: object) -> Iterator[object]:
-    """Yield the leaves of nested named tuples, in order."""
-    if isinstance(item, tuple):
-        for member in item:
-            yield from _flat(member)
-    else:
-        yield item
-
-
-def _read_only(arrays: T) -> T:
-    """Return the same arrays, guarded against being written to."""
-    for leaf in _flat(arrays):
-        if isinstance(leaf, np.ndarray):
-            leaf.flags.writeable = False
-    return arrays

@@ -1,0 +1,72 @@
+"""A scene as plain arrays, with the names behind their indices and a digest."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from tcs.kernel.arrays import GridArrays, SceneArrays
+
+T = TypeVar("T", SceneArrays, GridArrays)
+
+_DIGEST_DECIMALS = 9
+"""Arrays are hashed in multiples of a nanometre (or nanoradian): far below any change of a model,
+far above the rounding differences between processors."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoweredScene:
+    """A scene, its goals and its grid as plain arrays, and the names behind their indices.
+
+    Attributes:
+        arrays: The input of the kernel for every configuration.
+        grid: The configurations to score.
+        robot_bodies: Names that `body` of the arm's and the robot's shapes refers to.
+        environment_bodies: Names that `body` of the environment's shapes refers to.
+        goals: Names of the goals, in order.
+    """
+
+    arrays: SceneArrays
+    grid: GridArrays
+    robot_bodies: tuple[str, ...]
+    environment_bodies: tuple[str, ...]
+    goals: tuple[str, ...]
+
+    def digest(self) -> str:
+        """Return the SHA-256 of all arrays and names, as hexadecimal digits.
+
+        Two scenes of the same digest give the same scores.
+        """
+        sha = hashlib.sha256()
+        for item in _flat((self.arrays, self.grid)):
+            array = np.asarray(item)
+            if array.dtype.kind == "f":
+                # Adding 0.0 turns -0.0 into 0.0, which is equal and must have the same hash.
+                array = np.round(array.astype("<f8"), _DIGEST_DECIMALS) + 0.0
+            else:
+                array = array.astype("<i8")
+            sha.update(repr(array.shape).encode())
+            sha.update(array.tobytes())
+        sha.update(repr((self.robot_bodies, self.environment_bodies, self.goals)).encode())
+        return sha.hexdigest()
+
+
+def _flat(item: object) -> Iterator[object]:
+    """Yield the leaves of nested named tuples, in order."""
+    if isinstance(item, tuple):
+        for member in item:
+            yield from _flat(member)
+    else:
+        yield item
+
+
+def read_only(arrays: T) -> T:
+    """Return the same arrays, made read-only."""
+    for leaf in _flat(arrays):
+        if isinstance(leaf, np.ndarray):
+            leaf.flags.writeable = False
+    return arrays
