@@ -1,8 +1,8 @@
 """Simulated recordings: a random hand at the master drives the teleoperated arm.
 
 The joint states become a capability map (ITCM) where no operator is at hand. The hand heads for
-random poses in the box of a master device; the arm follows in end-effector control and stops
-before it touches the robot or the floor.
+random poses in the box of a master device; the arm follows in end-effector control. It stops before
+it touches the robot or the floor, and goes back along its path.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ _FASTEST = (1.5, 0.4)
 _LEAD = 0.10
 """Distance by which the hand leads the tool before it waits [m]."""
 _PATIENCE = 1.0
-"""Time that the hand waits for the tool or for a stopped arm [s]."""
+"""Time that the hand waits for the tool [s]."""
+_RETREAT = 50
+"""Samples that the arm goes back after its first stop: one second."""
 _STRETCH = 25
 """Samples between two collision checks, which are done at once: half a second."""
 _SETTINGS = Settings(period=PERIOD, length=0.3)
@@ -110,7 +112,7 @@ class SimulatedRecording:
     orientation_error: FloatArray
     """Angle from the commanded to the actual tool orientation [rad], shape (n,)."""
     stopped: BoolArray
-    """Whether the arm stood still to avoid a contact, shape (n,)."""
+    """Whether the arm, stopped before a contact, went back along its path, shape (n,)."""
 
 
 def simulate_recording(
@@ -147,23 +149,29 @@ def simulate_recording(
     hand = _Hand(motion, np.random.default_rng(seed), step)
     joints, poses = np.empty((count, JOINTS)), np.empty((count, 3))
     stopped = np.zeros(count, np.bool_)
-    done, free = 0, start
+    done, path, back = 0, [start], _RETREAT
     while done < count:
-        end = min(done + _STRETCH, count)
+        first, end = done, min(done + _STRETCH, count)
         for i in range(done, end):
             step = session.step(hand.command(step))
             joints[i], poses[i] = step.joints, hand.pose
         blocked = np.flatnonzero(~reach.free(joints[done:end], reach.level))
-        if blocked.size:
-            # The arm stops at its last posture without contact, until the hand gives up.
-            end, done = done + int(blocked[0]), done + int(blocked[0])
-            free = joints[end - 1].copy() if end else start
-            end = min(end + round(_PATIENCE / PERIOD), count)
-            joints[done:end], poses[done:end], stopped[done:end] = free, poses[done], True
-            session.place(free)
+        done = done + int(blocked[0]) if blocked.size else end
+        path.extend(joints[first:done].copy())
+        if not blocked.size:
+            back = max(_RETREAT, back - _STRETCH)
+        else:
+            # Back along the free path, further at each stop, or the arm would stay wedged.
+            end = min(done + max(1, min(back, len(path) - 1)), count)
+            for i in range(done, end):
+                if len(path) > 1:
+                    path.pop()
+                joints[i] = path[-1]
+            poses[done:end], stopped[done:end] = poses[done], True
+            done, back = end, 2 * back
+            session.place(path[-1])
             step = session.step(Command())
             hand.give_up(step)
-        done = end
         if on_progress is not None:
             on_progress(done, count)
     R_BC, p_BC = motion.tool_poses(poses)

@@ -61,14 +61,16 @@ def test_drake_finds_no_contact(reach, minute):
         scene.restore(before)
 
 
-def test_the_arm_stands_still_where_it_stopped(minute):
-    stopped = minute.stopped
+def test_a_stopped_arm_goes_back_along_its_path(minute):
+    stopped, joints = minute.stopped, minute.recording.joints
     assert stopped.any()
-    assert not stopped.all()
-    inside = stopped[1:] & stopped[:-1]
-    same = np.all(np.diff(minute.recording.joints, axis=0) == 0.0, axis=1)
-    # Two stops may follow one another from different postures.
-    assert same[inside].mean() > 0.9
+    # The rest of the time it follows the hand: it is never wedged for good.
+    assert stopped.mean() < 0.6
+    assert not stopped[-500:].all()
+    for i in np.flatnonzero(stopped)[::50]:
+        # At the start of the path there is no sample of the start posture.
+        earlier = np.any(np.all(joints[:i] == joints[i], axis=1))
+        assert earlier or np.abs(joints[i] - joints[0]).max() < 0.1
 
 
 def test_the_arm_follows_the_hand_where_nothing_is_in_the_way(minute):
