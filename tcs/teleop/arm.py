@@ -1,4 +1,4 @@
-"""The arm that a person drives: its chain, its limits, and where its tool is, fast in Python."""
+"""The teleoperated arm: chain, joint limits, forward kinematics and Jacobian."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 
 JOINTS = 7
 DEFAULT_VELOCITY = 1.0
-"""Velocity limit of a joint whose URDF gives none [rad/s]: slower than any arm that ships."""
+"""Velocity limit of a joint whose URDF gives none [rad/s]: below that of any arm included."""
 
 
 class Kinematics(NamedTuple):
-    """Where the tool T is in the robot's base B, and how the joints move it."""
+    """Pose of the tool T in the robot's base B, and its Jacobian."""
 
     R: FloatArray
     """R_BT, shape (3, 3)."""
@@ -32,16 +32,16 @@ class Kinematics(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """The scored arm of a robot, torso and base standing still.
+    """The scored arm of a robot whose base and torso are fixed.
 
     Attributes:
-        robot: The robot it belongs to.
-        lower: Lower limits in force [rad], shape (7,); -inf where a joint turns on and on.
-        upper: Upper limits in force [rad], shape (7,); +inf where a joint turns on and on.
+        robot: The robot.
+        lower: Lower limits in force [rad], shape (7,); -inf for a continuous joint.
+        upper: Upper limits in force [rad], shape (7,); +inf for a continuous joint.
         velocity: Greatest joint rates [rad/s], shape (7,).
         torso_height: Height of the torso joint [m]; 0 for a robot without one.
-        frames: What lies between neighbouring link frames, shape (8, 4, 4): X_BL1 at zero, six
-            steps X_Li-1,Li at zero, X_L7T. Link i turns about the z axis of Li.
+        frames: Transforms between neighbouring link frames at zero joint positions, shape
+            (8, 4, 4): X_BL1, six X_Li-1,Li, X_L7T. Link i rotates about the z axis of Li.
     """
 
     robot: RobotFile = field(repr=False)
@@ -53,12 +53,12 @@ class Arm:
     _parts: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only, and split the frames into what cosine and sine multiply."""
+        """Make the arrays read-only; split the frames by the factors 1, cos(q) and sin(q)."""
         turning = self.frames[:JOINTS]
         x, y = turning[:, :, 0], turning[:, :, 1]
         still, cosine, sine = np.zeros_like(turning), np.zeros_like(turning), np.zeros_like(turning)
         still[:, :, 2:] = turning[:, :, 2:]
-        # F Rz(q): the first two columns turn into one another.
+        # F Rz(q) mixes the first two columns.
         cosine[:, :, 0], cosine[:, :, 1] = x, y
         sine[:, :, 0], sine[:, :, 1] = y, -x
         object.__setattr__(self, "_parts", (still, cosine, sine))
@@ -97,7 +97,7 @@ class Arm:
         return poses
 
     def kinematics(self, joints: FloatArray) -> Kinematics:
-        """Return where the tool is and how the joints move it.
+        """Return the tool's pose and Jacobian.
 
         Args:
             joints: Joint positions [rad], shape (7,).
@@ -108,7 +108,7 @@ class Arm:
         arms = p[:, None] - poses[:JOINTS, :3, 3].T
         jacobian = np.empty((6, JOINTS))
         jacobian[:3] = axes
-        # The cross product axis x arm by rows: numpy's own costs more than all of the rest.
+        # The cross product axis x arm by rows: numpy's costs more than the rest together.
         jacobian[3] = axes[1] * arms[2] - axes[2] * arms[1]
         jacobian[4] = axes[2] * arms[0] - axes[0] * arms[2]
         jacobian[5] = axes[0] * arms[1] - axes[1] * arms[0]
@@ -132,7 +132,7 @@ class Arm:
         return values
 
     def limit_violation(self, joints: FloatArray) -> str:
-        """Return which joint breaks its limits and by what, empty if none does.
+        """Return a message about the first joint beyond its limits, empty if there is none.
 
         Args:
             joints: Joint positions [rad], shape (7,).
@@ -147,9 +147,9 @@ class Arm:
         )
 
     def random_joints(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return postures drawn evenly within the limits [rad], shape (count, 7).
+        """Return uniformly drawn postures within the limits [rad], shape (count, 7).
 
-        Joints that turn on and on are drawn from a full turn.
+        Continuous joints are drawn from a full rotation.
         """
         lower = np.where(self.bounded, self.lower, -np.pi)
         upper = np.where(self.bounded, self.upper, np.pi)
@@ -180,8 +180,8 @@ def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm
     frames = np.zeros((JOINTS + 1, 4, 4))
     frames[:, :3, :3], frames[:, :3, 3], frames[:, 3, 3] = chain.R, chain.p, 1.0
     frames[0] = X_BA @ frames[0]
-    said = file.model().joints
-    fastest = np.array([said[name].velocity for name in file.arm_joints])
+    joints = file.model().joints
+    fastest = np.array([joints[name].velocity for name in file.arm_joints])
     return Arm(
         robot=file,
         lower=chain.lower.copy(),

@@ -18,16 +18,16 @@ class Line:
     end: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        """Refuse a line that leads nowhere.
+        """Check the ends.
 
         Raises:
-            DataFileError: If an end is not finite, or both are the same place.
+            DataFileError: If an end is not finite, or both are equal.
         """
         ends = np.array([self.start, self.end], dtype=np.float64)
         if ends.shape != (2, 3) or not np.isfinite(ends).all() or self.length <= 0.0:
             raise DataFileError(
                 f"line from {self.start} to {self.end}: both ends must be three finite numbers in "
-                "metres, and not the same place."
+                "metres, and differ."
             )
 
     @property
@@ -40,11 +40,11 @@ class Line:
         """From start to end, of length 1, shape (3,)."""
         return np.asarray(np.subtract(self.end, self.start) / self.length)
 
-    def at(self, share: FloatArray | float) -> FloatArray:
-        """Return the point after a share of the way [m], shape (..., 3)."""
-        along = np.asarray(share, dtype=np.float64)[..., None]
+    def at(self, fraction: FloatArray | float) -> FloatArray:
+        """Return the point at a fraction of the line [m], shape (..., 3)."""
+        along = np.asarray(fraction, dtype=np.float64)[..., None]
         return np.asarray(self.start + along * np.subtract(self.end, self.start))
 
     def fraction_at(self, position: FloatArray) -> FloatArray:
-        """Return which share of the way lies behind the foot of a point, shape (...)."""
+        """Return the fraction of the line at the projection of a point, shape (...)."""
         return np.asarray((position - np.asarray(self.start)) @ self.direction / self.length)

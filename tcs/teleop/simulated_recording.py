@@ -104,7 +104,7 @@ class HandMotion:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRecording:
-    """Joint states of the driven arm, and how well it followed the hand."""
+    """Joint states of the teleoperated arm, and how well it followed the hand."""
 
     recording: Recording
     position_error: FloatArray

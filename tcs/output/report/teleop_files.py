@@ -156,7 +156,7 @@ def _numbers(experiment: Experiment, maps: ControllerMaps | None) -> dict[str, A
                 "condition": one.condition,
                 "cells": len(one.capability.cells),
                 "samples": one.samples,
-                "shared_fraction": one.shared,
+                "shared_fraction": one.shared_fraction,
                 "mean_score": one.mean_score,
                 "best": None if one.best is None else one.best.to_json(),
             }

@@ -191,7 +191,7 @@ def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:
                 title_of(experiment, one.condition),
                 f"{one.samples:,}",
                 f"{len(one.capability.cells):,}",
-                f"{100 * one.shared:.0f}",
+                f"{100 * one.shared_fraction:.0f}",
                 number(one.mean_score),
                 str(one.grasp_cells),
                 *stand,

@@ -1,4 +1,4 @@
-"""What each mode makes of a command: the joint rates it asks for, or why there are none."""
+"""Control modes: each turns a command and the control state into a rate command."""
 
 from __future__ import annotations
 
@@ -19,6 +19,6 @@ _MODES: Mapping[Mode, Callable[[Command, ControlState], RateCommand]] = {
 }
 
 
-def rate_command(mode: Mode, asked: Command, now: ControlState) -> RateCommand:
-    """Return the joint rates that a command asks for in a mode."""
-    return _MODES[mode](asked, now)
+def rate_command(mode: Mode, command: Command, state: ControlState) -> RateCommand:
+    """Return the joint rates of a command in a mode."""
+    return _MODES[mode](command, state)

@@ -100,7 +100,7 @@ def resolved_rates(
     damping: float = 0.0,
     singular: float = 0.0,
 ) -> tuple[FloatArray, float]:
-    """Return joint rates that move the tool as asked, the smallest there are: eq. (7).
+    """Return joint rates that move the tool as command, the smallest there are: eq. (7).
 
     Without damping, that is the pseudo-inverse of the full Jacobian. With it, close to a
     singularity, the squared singular values s^2 are raised by `damping^2 (1 - (s_min /

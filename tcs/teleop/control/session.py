@@ -1,4 +1,4 @@
-"""Teleoperation: one arm, one person, one step after another."""
+"""Teleoperation session: commands in, steps of the arm out, one per control period."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tcs.teleop.control.status import ShortArray, configuration_status
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """The arm after one step, and what the person is told about it.
+    """State of the arm after one control period.
 
     Attributes:
         time: Time since the session began [s].
@@ -32,13 +32,13 @@ class Step:
         p: Position of the tool in the robot's base [m], shape (3,).
         target_R: Orientation that is held or followed, shape (3, 3).
         target_p: Position that is held or followed [m], shape (3,).
-        mode: What commands move.
+        mode: The control mode.
         limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
         singular: Whether the task of this mode is singular.
         singular_value: Smallest singular value of the task's Jacobian [m/rad].
-        worst_joint: The joint closest to a limit, in shares of its range, counted from 0.
-        stopped: Whether the arm does not do what the person asks.
-        reason: Why, in one line; empty while it does.
+        worst_joint: The joint closest to a limit, as a fraction of its range, counted from 0.
+        stopped: Whether the arm does not follow the command.
+        reason: Why, in one line; empty while it follows.
     """
 
     time: float
@@ -58,7 +58,7 @@ class Step:
 
 
 class Teleoperation:
-    """An arm that follows a person's commands, one every `settings.period`."""
+    """An arm that follows an operator's commands, one every `settings.period`."""
 
     def __init__(
         self,
@@ -69,14 +69,14 @@ class Teleoperation:
     ) -> None:
         """Begin with the arm at rest.
 
-        A posture beyond the limits is no error: the arm holds still there, and every step says
-        why, until `place` puts it elsewhere.
+        A posture beyond the limits is not an error: the arm holds still there, and every step
+        gives the reason, until `place` moves it elsewhere.
 
         Args:
             arm: The arm.
-            joints: Where its joints stand [rad], shape (7,).
-            settings: How commands become motion; None for the defaults.
-            mode: The mode to begin in.
+            joints: Joint positions [rad], shape (7,).
+            settings: Settings of the controller; None for the defaults.
+            mode: The initial mode.
 
         Raises:
             TcsError: If the joints are not seven finite numbers.
@@ -85,15 +85,15 @@ class Teleoperation:
         self.settings = settings or Settings()
         self._mode = mode
         self._time = 0.0
-        self._heard = 0.0
+        self._last_command_time = 0.0
         self._command = Command()
         self.place(joints)
 
     def place(self, joints: ArrayLike) -> None:
-        """Put the arm, at rest, into another posture; time goes on.
+        """Put the arm, at rest, into another posture; time continues.
 
         Args:
-            joints: Where its joints stand [rad], shape (7,).
+            joints: Joint positions [rad], shape (7,).
 
         Raises:
             TcsError: If they are not seven finite numbers.
@@ -105,47 +105,47 @@ class Teleoperation:
         self._switching = False
         self._group: int | None = None
         self._speed = 0.0
-        self._turning: FloatArray | None = None
-        self._way: float | None = None
+        self._group_rates: FloatArray | None = None
+        self._elbow_sign: float | None = None
         self._held_rows: FloatArray | None = None
         self._beyond = self.arm.limit_violation(self._joints)
 
     @property
     def joints(self) -> FloatArray:
-        """Where the joints stand [rad], shape (7,)."""
+        """Joint positions [rad], shape (7,)."""
         return self._joints.copy()
 
     @property
     def mode(self) -> Mode:
-        """What commands move."""
+        """The control mode."""
         return self._mode
 
     def step(self, command: Command | None = None) -> Step:
         """Move the arm on by one period.
 
         Args:
-            command: What the person asks for; None if nothing was heard: the last command goes on
-                until it has been silent for `settings.timeout`.
+            command: The operator's command; None if none arrived: the last command continues
+                until `settings.timeout` has passed.
         """
         self._time += self.settings.period
         why = self._refused(command)
         held = bool(why) or self._command.clutch
-        asked = self._admitted(self._command, held)
+        executed = self._admitted(self._command, held)
         rates, reason = np.zeros(JOINTS), why
         self._held_rows = None
         if not held or self._speed:
-            rates, reason, self._speed, self._turning = self._rate_command(asked)
+            rates, reason, self._speed, self._group_rates = self._rate_command(executed)
             reason = why or reason
         if self._move(rates):
             self._switching = False
-        self._advance_target(asked, stays=held or self._switching or bool(reason))
+        self._advance_target(executed, stays=held or self._switching or bool(reason))
         return self._report(reason)
 
     def _admitted(self, command: Command, held: bool) -> Command:
-        """Return what of a command may reach the arm now.
+        """Return the part of a command that is executed now.
 
-        A group that turns comes to rest before anything else begins, and so does the tool before
-        a group turns: each mode ends by its own rules, so nothing jumps and nothing slips.
+        A moving group comes to rest before anything else begins, and so does the tool before a
+        group moves: each mode ends by its own rules, without jumps and slip.
         """
         if not self._speed:
             self._group = command.group
@@ -162,37 +162,37 @@ class Teleoperation:
         return Command() if held else command
 
     def _refused(self, command: Command | None) -> str:
-        """Take a command over, or say why the arm holds still instead."""
+        """Accept a command, or return why the arm holds still instead."""
         settings = self.settings
         why = ""
         if command is not None:
-            self._heard = self._time
+            self._last_command_time = self._time
             fault = command.fault(len(settings.groups))
             if fault:
-                why = f"command refused: {fault}. The arm holds still until a sound one comes."
+                why = f"command refused: {fault}. The arm holds still until a valid one arrives."
             else:
                 self._command = command
-        # Half a period, so that counting periods up does not decide by its rounding.
-        elif self._time - self._heard > settings.timeout + 0.5 * settings.period:
+        # Half a period, so that rounding of the time does not decide.
+        elif self._time - self._last_command_time > settings.timeout + 0.5 * settings.period:
             why = (
                 f"input lost: no command for more than {settings.timeout:g} s. The arm holds still "
-                "until one comes."
+                "until one arrives."
             )
         if why:
-            # What was asked before must not go on by itself once the reason is gone.
+            # An earlier command must not continue by itself once the reason is gone.
             self._command = Command()
         if self._beyond:
             why = f"start posture: {self._beyond}. The arm holds still; place it within them."
         return why
 
-    def _rate_command(self, asked: Command) -> RateCommand:
-        """Return what the mode makes of a command."""
+    def _rate_command(self, command: Command) -> RateCommand:
+        """Return the rate command of the mode."""
         settings = self.settings
-        # The Jacobian half way through the step follows the tool's curve to second order.
+        # The Jacobian at the middle of the step is accurate to second order.
         middle = self.arm.kinematics(self._joints + 0.5 * settings.period * self._rates)
-        if self._way is None or not (self._speed or asked.sign):
-            # The way of the elbow that turns joint 1 up when it begins to turn.
-            self._way = elbow_sign(middle.jacobian) if self._mode is Mode.POSE else None
+        if self._elbow_sign is None or not (self._speed or command.sign):
+            # The direction of the elbow in which joint 1 increases at the start.
+            self._elbow_sign = elbow_sign(middle.jacobian) if self._mode is Mode.POSE else None
         if self._mode in NULL_SPACE_MODES:
             # Rows of the Jacobian that the mode holds: position, or position and orientation.
             rows = 3 if self._mode is Mode.NULL_SPACE else 0
@@ -207,10 +207,10 @@ class Teleoperation:
             lower=lower,
             upper=upper,
             speed=self._speed,
-            turning=self._turning,
-            way=self._way or 1.0,
+            group_rates=self._group_rates,
+            elbow_sign=self._elbow_sign or 1.0,
         )
-        return rate_command(self._mode, asked, state)
+        return rate_command(self._mode, command, state)
 
     def _move(self, wanted: FloatArray) -> bool:
         """Move on by one period; return whether the rates are those wanted."""
@@ -245,13 +245,13 @@ class Teleoperation:
         self._now = arm.kinematics(self._joints)
         return arrived
 
-    def _advance_target(self, asked: Command, *, stays: bool) -> None:
-        """Let the target go where the person wants it, on its target_lead.
+    def _advance_target(self, command: Command, *, stays: bool) -> None:
+        """Move the target with the command, within the target lead limit.
 
         Args:
-            asked: The command that reached the arm.
-            stays: Whether the target is where the tool is instead: while the tool comes to rest,
-                so that nothing pulls it back, and where its motion ends.
+            command: The executed part of the command.
+            stays: Whether the target stays with the tool instead: while the tool comes to rest, so
+                that nothing pulls it back, and where its motion ends.
         """
         settings, now = self.settings, self._now
         if self._mode in NULL_SPACE_MODES and not self._switching:
@@ -261,13 +261,13 @@ class Teleoperation:
         if stays:
             self._target_R, self._target_p = now.R, now.p
             return
-        twist = commanded_twist(asked)
+        twist = commanded_twist(command)
         self._target_p = self._target_p + twist[3:] * settings.period
         self._target_R = rotated(self._target_R, twist[:3], settings.period)
         error = pose_error(self._target_R, self._target_p, now.R, now.p)
-        angle, way = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
-        if way > settings.target_lead:
-            self._target_p = now.p + error[3:] * (settings.target_lead / way)
+        angle, distance = (math.sqrt(part @ part) for part in (error[:3], error[3:]))
+        if distance > settings.target_lead:
+            self._target_p = now.p + error[3:] * (settings.target_lead / distance)
         assisted = self._mode is Mode.ASSISTED
         target_lead = settings.assist_lead_angle if assisted else settings.target_lead_angle
         if angle > target_lead:

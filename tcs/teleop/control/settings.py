@@ -1,4 +1,4 @@
-"""What a person says to the arm, and how the arm is to take it."""
+"""Control modes, the operator's command, and the settings of the controller."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ LimitBehaviour = Literal["paper", "clamped"]
 
 
 class Mode(StrEnum):
-    """What the person's commands move."""
+    """Control mode: the part of the arm that commands move."""
 
     END_EFFECTOR = "end-effector"
     """The tool, in all six directions (eqs. 6-8)."""
     NULL_SPACE = "null-space"
-    """One joint group, the tool's position held (eqs. 9-14)."""
+    """One joint group, while the tool's position is held (eqs. 9-14)."""
     POSE = "pose"
-    """The elbow, the tool's pose held: the one degree of freedom that is left."""
+    """The elbow, while the tool's pose is held: self-motion."""
     ASSISTED = "assisted"
-    """The tool, while the arm keeps itself away from limits and singularities."""
+    """The tool, while the redundancy avoids limits and singularities."""
     DRAKE = "drake"
-    """The tool, by Drake's differential inverse kinematics: the baseline off the shelf."""
+    """The tool, by Drake's differential inverse kinematics: the baseline."""
 
 
 NULL_SPACE_MODES = (Mode.NULL_SPACE, Mode.POSE)
-"""Modes in which the arm moves and the tool stays."""
+"""Modes that move the arm in the null space of the tool."""
 FASTEST = 100.0
-"""Commands beyond this [m/s or rad/s] are no hand's, but a fault's."""
+"""Commands beyond this [m/s or rad/s] are refused as faults."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What the person asks for during one step.
+    """Command of the operator for one control period.
 
     Attributes:
         linear: Velocity of the tool in the robot's base B [m/s], shape (3,).
         angular: Angular velocity of the tool in B [rad/s], shape (3,).
-        group: The joint group to turn, 0 to 3; None for none.
-        sign: Which way it turns: k of eq. (13). In `Mode.POSE` the way of the elbow.
-        mode: What the command moves; None leaves the mode as it is.
-        clutch: Pressed, it parts arm and person: the arm comes to rest and holds the target,
-            whatever else the command says.
+        group: The joint group to move, 0 to 3; None for none.
+        sign: Its direction: k of eq. (13). In `Mode.POSE` the direction of the elbow.
+        mode: The control mode; None keeps the present one.
+        clutch: Whether the clutch decouples master and slave: the arm comes to rest and holds the
+            target, whatever the rest of the command.
     """
 
     linear: FloatArray | tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -62,7 +62,7 @@ class Command:
         """Return what makes the command unusable, empty if nothing does.
 
         Args:
-            groups: How many joint groups there are.
+            groups: Number of joint groups.
         """
         for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
             try:
@@ -85,15 +85,15 @@ class Command:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """How commands become joint motion.
+    """Settings of the controller.
 
     Attributes:
         period: Time of one step [s]; the paper samples at 100 Hz.
-        limits: What happens at an invalid configuration: "paper" ends the motion there, "clamped"
-            leaves that joint at its limit and goes on with the others.
-        gain: How fast the tool returns to its target [1/s]: errors fall by 1/e in 1/gain.
-        target_lead: How far the target may run ahead of the tool [m].
-        target_lead_angle: The same for its orientation [rad].
+        limits: Behaviour at an invalid joint configuration: "paper" ends the motion, "clamped"
+            leaves that joint at its limit and continues with the others.
+        gain: Feedback gain of the pose error [1/s]: errors fall by 1/e in 1/gain.
+        target_lead: Target lead limit: greatest distance from tool to target [m].
+        target_lead_angle: Target lead limit of the orientation [rad].
         acceleration: Greatest change of a joint's rate [rad/s^2].
         group_rate: Rate of a group's lead joint at k = 1 [rad/s].
         groups: The joint groups of eq. (12), counted from 0, each with its lead joint first.
@@ -101,11 +101,11 @@ class Settings:
         singular: Smallest singular value of the task's Jacobian below which the posture counts as
             singular [m/rad].
         near_limit: A joint this close to a limit counts as at it [rad].
-        length: A turn of 1 rad weighs as much as this way [m] where not all of a command can be
-            followed, and in singular values.
-        assist_rate: How fast the assistance may move the posture [rad/s].
-        assist_lead_angle: How far the assisted tool may be turned off the orientation asked for
-            before that gives way [rad]; up to there, it is come back to.
+        length: Distance that weighs as much as a rotation of 1 rad [m] where a command cannot be
+            followed completely, and in singular values.
+        assist_rate: Greatest joint rate of the assistance in the null space [rad/s].
+        assist_lead_angle: Target lead limit of the orientation in assisted mode [rad]: a smaller
+            orientation error is recovered.
         timeout: Without a command for longer than this, the input counts as lost [s].
     """
 
@@ -126,10 +126,10 @@ class Settings:
     timeout: float = 0.25
 
     def __post_init__(self) -> None:
-        """Refuse settings that no arm can follow.
+        """Check the settings.
 
         Raises:
-            TcsError: As said.
+            TcsError: If a setting is out of its range.
         """
         positive = (
             "period",
@@ -143,7 +143,7 @@ class Settings:
             _check(name, getattr(self, name), above_zero=True)
         for name in ("damping", "near_limit", "assist_rate"):
             _check(name, getattr(self, name), above_zero=False)
-        # Feedback that corrects more than the whole error in a step swings up.
+        # Feedback that corrects more than the whole error in a step is unstable.
         if self.gain * self.period > 1.0:
             raise TcsError(
                 f"teleop settings: gain {self.gain:g} /s at a period of {self.period:g} s corrects "
@@ -162,7 +162,7 @@ class Settings:
 
 
 def _check(name: str, value: float, *, above_zero: bool) -> None:
-    """Refuse a setting that is not finite, or too small."""
+    """Check that a setting is finite and large enough."""
     if math.isfinite(value) and (value > 0.0 or (value == 0.0 and not above_zero)):
         return
     allowed = "above 0" if above_zero else "0 or more"

@@ -1,4 +1,4 @@
-"""What the operator is told: which joints are at a limit, and how close a singularity is."""
+"""Status of a joint configuration: joint limits and singularities, as the operator sees them."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ POSITION_MODES = (Mode.NULL_SPACE,)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConfigurationStatus:
-    """Where the joints stand between their limits, and how near a singularity is.
+    """Joints at their limits, and distance to a singularity.
 
     Attributes:
         limits: -1 where a joint is at its lower limit, 1 where at its upper one, else 0; shape
             (7,).
         singular: Whether the task is singular.
         singular_value: Smallest singular value of the task's Jacobian [m/rad].
-        worst_joint: The joint closest to a limit, in shares of its range, counted from 0.
+        worst_joint: The joint closest to a limit as a fraction of its range, counted from 0.
     """
 
     limits: ShortArray
@@ -36,7 +36,7 @@ class ConfigurationStatus:
 
 
 def range_fraction(arm: Arm, joints: FloatArray) -> FloatArray:
-    """Return where joints stand between their limits: 0 lower, 1 upper, 0.5 without limits.
+    """Return joint positions as fractions of their ranges: 0 lower, 1 upper, 0.5 without limits.
 
     Args:
         arm: The arm.
@@ -51,13 +51,13 @@ def range_fraction(arm: Arm, joints: FloatArray) -> FloatArray:
 def configuration_status(
     arm: Arm, joints: FloatArray, jacobian: FloatArray, mode: Mode, settings: Settings
 ) -> ConfigurationStatus:
-    """Return the flags of a posture.
+    """Return the status of a posture.
 
     Args:
         arm: The arm.
         joints: Joint positions [rad], shape (7,).
         jacobian: Of the tool, shape (6, 7).
-        mode: What decides the task: the tool's position, or its pose.
+        mode: Decides the task: the tool's position, or its pose.
         settings: The thresholds.
     """
     below, above = joints - arm.lower, arm.upper - joints
@@ -66,7 +66,9 @@ def configuration_status(
     limits[below <= settings.near_limit] = -1
     rows = jacobian[3:] if mode in POSITION_MODES else jacobian
     value = smallest_singular_value(rows, settings.length)
-    # Infinite room over an infinite range says nothing; such a joint is never the worst.
-    room = np.minimum(below, above)
-    shares = np.where(np.isfinite(room), room / np.where(arm.bounded, above + below, 1.0), 1.0)
-    return ConfigurationStatus(limits, value < settings.singular, value, int(shares.argmin()))
+    # A continuous joint is never the worst.
+    margin = np.minimum(below, above)
+    fractions = np.where(
+        np.isfinite(margin), margin / np.where(arm.bounded, above + below, 1.0), 1.0
+    )
+    return ConfigurationStatus(limits, value < settings.singular, value, int(fractions.argmin()))

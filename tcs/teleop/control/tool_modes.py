@@ -1,4 +1,4 @@
-"""Modes in which the person moves the tool."""
+"""End-effector control: the operator moves the tool."""
 
 from __future__ import annotations
 
@@ -20,68 +20,68 @@ from tcs.teleop.control.state import (
 
 _EASE = 0.005
 """Damping where joints are held at limits [m/rad]: rates stay bounded where the others become
-singular; 1 % of the motion at a singular value of 0.05, which the feedback makes up for."""
+singular; 1 % of the motion at a singular value of 0.05, which the feedback compensates."""
 _NEAR = 3.0
 """At this many times the singular value that ends the motion, joints begin to slow down."""
 _NEAR_RATE = 1.0
 """Greatest joint rate there [rad/s]: it takes a tenth of a second to stop from."""
 _BEYOND = 0.9
-"""Share of that singular value at which the slowing down would end: the motion ends before."""
+"""Fraction of that singular value at which the rates would be zero: the motion ends before."""
 
 
-def end_effector(asked: Command, now: ControlState) -> RateCommand:
+def end_effector(command: Command, state: ControlState) -> RateCommand:
     """Move the tool: Delta theta = J^+ Delta x, eqs. (7) and (8)."""
-    settings = now.settings
-    wanted = commanded_twist(asked) + settings.gain * now.error
+    settings = state.settings
+    wanted = commanded_twist(command) + settings.gain * state.error
     rates, smallest = resolved_rates(
-        now.jacobian,
+        state.jacobian,
         wanted,
         length=settings.length,
         damping=settings.damping,
         singular=settings.singular,
     )
     if settings.limits == "paper":
-        return _until_invalid(rates, smallest, now)
-    # Too fast a command is followed slower, in the same direction.
-    share, _ = scale_to_bounds(rates, -now.arm.velocity, now.arm.velocity)
-    if ((share * rates >= now.lower) & (share * rates <= now.upper)).all():
+        return _until_invalid(rates, smallest, state)
+    # A command beyond the joint velocities is followed in the same direction, slower.
+    share, _ = scale_to_bounds(rates, -state.arm.velocity, state.arm.velocity)
+    if ((share * rates >= state.lower) & (share * rates <= state.upper)).all():
         return RateCommand(share * rates)
     rates, held = clamped_rates(
-        now.jacobian,
+        state.jacobian,
         share * wanted,
-        now.lower,
-        now.upper,
+        state.lower,
+        state.upper,
         length=settings.length,
         damping=_EASE,
     )
-    return RateCommand(rates, stop_reason(asked, rates, held, now))
+    return RateCommand(rates, stop_reason(command, rates, held, state))
 
 
-def _until_invalid(rates: FloatArray, smallest: float, now: ControlState) -> RateCommand:
+def _until_invalid(rates: FloatArray, smallest: float, state: ControlState) -> RateCommand:
     """End the motion where a joint is at its limit, or the arm singular, as the paper does.
 
-    A motion that leads away from there goes on.
+    A motion that leads away from there continues.
     """
-    nearness = smallest / now.settings.singular
-    if nearness < _NEAR and rates.any() and _gets_more_singular(rates, now):
+    nearness = smallest / state.settings.singular
+    if nearness < _NEAR and rates.any() and _gets_more_singular(rates, state):
         if nearness < 1.0:
             return RateCommand(np.zeros(JOINTS), "the arm is singular: motion ends there.")
-        # Near a singularity a slow tool takes fast joints: they slow down on the way, or they
-        # would race through it before they could stop.
+        # Near a singularity a slow tool needs fast joints: they slow down in advance, or they
+        # would pass through it before they could stop.
         most = _NEAR_RATE * (nearness - _BEYOND) / (_NEAR - _BEYOND)
         rates = rates * min(1.0, most / float(np.abs(rates).max()))
-    share, joint = slow_down_together(rates, now)
+    share, joint = slow_down_together(rates, state)
     if joint >= 0:
         return RateCommand(np.zeros(JOINTS), f"{limit_message([joint])}: motion ends there.")
     return RateCommand(rates * share)
 
 
-def _gets_more_singular(rates: FloatArray, now: ControlState) -> bool:
-    """Return whether a motion leads on to a singularity."""
-    # Far enough for rounding, near enough to stay on this side [rad].
-    ahead = now.joints + (1e-4 / float(np.abs(rates).max())) * rates
+def _gets_more_singular(rates: FloatArray, state: ControlState) -> bool:
+    """Return whether a motion leads towards a singularity."""
+    # Larger than rounding, and small enough not to pass the singularity [rad].
+    ahead = state.joints + (1e-4 / float(np.abs(rates).max())) * rates
     here, there = (
-        smallest_singular_value(now.arm.kinematics(joints).jacobian, now.settings.length)
-        for joints in (now.joints, ahead)
+        smallest_singular_value(state.arm.kinematics(joints).jacobian, state.settings.length)
+        for joints in (state.joints, ahead)
     )
     return there < here

@@ -1,4 +1,4 @@
-"""The experiment's line: one that cannot be followed to its end without reshaping the arm.
+"""The experiment's line: it cannot be followed to its end without null-space motion.
 
 A straight line from the front towards the back of the workspace on which joint 4 or 6 meets a limit
 after three quarters of the way. Nothing is typed in: the line is searched for, the first one that
@@ -30,13 +30,13 @@ _SHORTEST, _LONGEST = 0.4, 0.9
 _OFF_AXIS = 0.2
 """The line keeps so far from the vertical axis of the arm's base [m]: there its body stands."""
 _AHEAD = 0.45
-"""A start lies at least so far ahead of the arm's base, as a share of the arm's reach."""
+"""A start lies at least so far ahead of the arm's base, as a fraction of the arm's reach."""
 _HEADING = math.radians(25.0)
 """The line goes straight back, give or take so much."""
 _TURNS = np.radians(np.arange(10.0, 151.0, 10.0))
 """Turns of joint 1 that are tried."""
 _SOLVING = 3
-"""So many neighbouring turns must open the way: nobody turns a joint to the degree."""
+"""Least number of neighbouring turns that must open the way: no operator is exact to a degree."""
 _DETOURS = 60
 """Hand motions that are tried; one of them at least must open the way."""
 _FARTHEST = 0.2

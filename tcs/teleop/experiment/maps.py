@@ -1,8 +1,8 @@
-"""From operator to recording to map: what a capability map holds, by the controller that was used.
+"""Capability maps of an experiment, one per controller.
 
-The ITCM thesis records people who drive with one controller, and asks what another one would change
-(its open question). Here all that the operators of an experiment did with a controller is one
-recording, and the map of it says where to stand for somebody who drives with that controller.
+The ITCM thesis records people with one controller and leaves open what another one would change.
+Here all trials of an experiment with one controller form one recording, and its capability map
+gives base poses for operators of that controller.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ from tcs.teleop.arm import Arm
 from tcs.teleop.experiment.within_subject import Experiment
 
 STEP, YAW_BINS = 0.05, 16
-"""Of the grid [m], and headings in a full turn: those of the thesis."""
+"""Step of the grid [m], and number of yaw bins: those of the thesis."""
 
 
 @dataclass(frozen=True, eq=False)
 class ControllerMap:
-    """The map of what was driven with one controller."""
+    """The capability map of one controller's trials."""
 
     condition: str
     capability: CapabilityMap
     samples: int
     """Postures in the recording."""
-    shared: float
-    """Share of its cells that the map of the first controller holds, too."""
+    shared_fraction: float
+    """Fraction of its cells that the map of the first controller holds as well."""
     grasp_cells: int
-    """Cells that hold the grasp asked for."""
+    """Cells that hold the requested grasp."""
     best: BasePose | None
-    """Where to stand for that grasp, seen from the tool; None where no cell holds it."""
+    """Best base pose for that grasp, relative to the tool; None where no cell holds it."""
 
     @property
     def mean_score(self) -> float:
@@ -59,7 +59,7 @@ class ControllerMap:
 
 @dataclass(frozen=True, eq=False)
 class ControllerMaps:
-    """The maps of all controllers, and the grasp that they are asked for."""
+    """The maps of all controllers, and the grasp that they are compared by."""
 
     maps: tuple[ControllerMap, ...]
     height: float
@@ -71,10 +71,10 @@ class ControllerMaps:
 
 
 def check_map_robot(arm: Arm) -> None:
-    """Refuse an arm whose recordings can become no map, before they are made.
+    """Refuse an arm whose recordings cannot become a map, before they are made.
 
     Raises:
-        UnknownNameError: If the robot has no head file.
+        RobotError: If the robot has no head file.
     """
     camera_view(_reach(arm), MapGrid.of(STEP, YAW_BINS), ITCM, CORRECTED)
 
@@ -86,11 +86,11 @@ def _reach(arm: Arm) -> Reach:
 def controller_maps(experiment: Experiment) -> ControllerMaps:
     """Return the map of each controller.
 
-    One grasp is asked of all maps, so that their answers compare: of the grid's tilts and heights
-    the one that the poorest map has the most cells for.
+    All maps are compared by one grasp: the tilt and height for which the smallest count of cells
+    over the maps is greatest.
 
     Args:
-        experiment: All of it; its robot must have a head file.
+        experiment: The experiment; its robot must have a head file.
 
     Raises:
         UnknownNameError: If the robot has no head file.
@@ -102,7 +102,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
     found = {}
     for condition, drives in experiment.drives.items():
         postures = np.concatenate([trial for drive in drives for trial in drive.postures])
-        where = f"what was driven with {condition}"
+        where = f"trials with {condition}"
         recording = recording_of(arm.joints, postures, arm.robot, where=where)
         found[condition] = map_from_recording(reach, grid, recording)
     tilt, level = _grasp([one.capability for one in found.values()])
@@ -118,7 +118,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
                 condition=condition,
                 capability=capability,
                 samples=recorded.samples,
-                shared=float((first.rows_of(cells) >= 0).mean()),
+                shared_fraction=float((first.rows_of(cells) >= 0).mean()),
                 grasp_cells=int(((cells[:, TILT] == tilt) & (cells[:, Z] == level)).sum()),
                 best=_best(capability, height, (pitch, roll)),
             )
@@ -127,13 +127,13 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
 
 
 def _grasp(maps: Sequence[CapabilityMap]) -> tuple[int, int]:
-    """Return tilt and level that the poorest map has the most cells for; the first of equals."""
+    """Return the tilt and level whose smallest count of cells is greatest; the first of equals."""
     counts: dict[tuple[int, int], list[int]] = {}
     for number, capability in enumerate(maps):
-        kinds, count = np.unique(capability.cells[:, [TILT, Z]], axis=0, return_counts=True)
-        for (tilt, level), cells in zip(kinds.tolist(), count.tolist(), strict=True):
+        grasps, count = np.unique(capability.cells[:, [TILT, Z]], axis=0, return_counts=True)
+        for (tilt, level), cells in zip(grasps.tolist(), count.tolist(), strict=True):
             counts.setdefault((tilt, level), [0] * len(maps))[number] = cells
-    return max(sorted(counts), key=lambda kind: (min(counts[kind]), sum(counts[kind])))
+    return max(sorted(counts), key=lambda grasp: (min(counts[grasp]), sum(counts[grasp])))
 
 
 def _best(

@@ -64,7 +64,7 @@ def trajectory_accuracy(
     Source:
         Null-space paper, eq. (15) and Appendix A.1. It takes for granted that each plane has a
         sample; of a run that ended early, or skipped a plane at speed, those planes are left out
-        here, and `Accuracy.planes_met` tells.
+        here; `Accuracy.planes_met` counts the rest.
 
     >>> line = Line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     >>> path = np.array([[x, 0.02, 0.0] for x in np.linspace(-0.1, 1.1, 3000)])

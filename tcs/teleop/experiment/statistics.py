@@ -14,7 +14,7 @@ from tcs.errors import DataFileError
 from tcs.kernel.arrays import FloatArray
 
 Tail = Literal["greater", "less", "two-sided"]
-"""What is asked of the first sample against the second."""
+"""Alternative hypothesis about the first sample against the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def signed_rank_test(first: FloatArray, second: FloatArray, *, tail: Tail) -> Si
     Args:
         first: Shape (n,), n >= 3.
         second: Of the same operators in the same order, shape (n,).
-        tail: What is asked of the first against the second.
+        tail: Alternative hypothesis about the first against the second.
 
     Raises:
         DataFileError: If they do not match, or a value is not finite.
@@ -89,8 +89,8 @@ def signed_rank_test(first: FloatArray, second: FloatArray, *, tail: Tail) -> Si
     Source:
         Null-space paper, section II.C.7 and Table III: Levene's test, about the mean; Wilcoxon's
         signed ranks in the normal approximation, zero differences left out. Its z values are those
-        of MATLAB's `signrank`: with half a rank of continuity correction where one tail is asked
-        for, without where both are.
+        of MATLAB's `signrank`: with half a rank of continuity correction for one-tailed
+        tests, without for two-tailed ones.
     """
     from scipy import stats
 
@@ -174,8 +174,8 @@ def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
 
     Source:
         ITCM thesis, section III.C.5: one-way repeated-measures analysis of variance, then paired t
-        tests with Bonferroni's correction. Its t tests are one-tailed; here nobody says beforehand
-        which condition is the better one, so they are two-tailed.
+        tests with Bonferroni's correction. Its t tests are one-tailed; here no direction is
+        hypothesised beforehand, so they are two-tailed.
     """
     import pandas as pd
     from scipy import stats

@@ -63,7 +63,7 @@ CONDITIONS = (END_EFFECTOR, NOVEL, ASSISTED)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialMeasures:
-    """What a trial comes to; the mean of several where it says so."""
+    """Measures of a trial, or means of several."""
 
     accuracy: float
     """Greatest distance between barycentre and line [m]."""
@@ -109,11 +109,11 @@ def run_trial(
         arm: The arm.
         course: Line and start posture.
         condition: The controller.
-        traits: What the operator is like.
-        habits: What has helped so far with this controller; kept up to date.
-        rng: Where chance comes from.
-        time_limit: When the trial is ended [s].
-        metadata: What else the run is to say about itself.
+        traits: Traits of the operator.
+        habits: Successful recoveries with this controller; updated in place.
+        rng: Random generator.
+        time_limit: End of the trial [s].
+        metadata: Further metadata of the run.
 
     Raises:
         TcsError: If the start posture is beyond a limit, is not at the line's start, or the line's
@@ -133,7 +133,7 @@ def run_trial(
         command = operator.command(step)
         step = session.step(command)
         rows.append((command, step))
-    said = {
+    origin = {
         "robot": arm.name,
         "torso_height": arm.torso_height,
         "condition": condition.name,
@@ -141,14 +141,14 @@ def run_trial(
         "line_start": list(course.line.start),
         "line_end": list(course.line.end),
     }
-    return run_from_steps(arm, rows, {**said, **(metadata or {})})
+    return run_from_steps(arm, rows, {**origin, **(metadata or {})})
 
 
 def check_course(arm: Arm, course: Course) -> None:
     """Refuse a line that the arm cannot start on, or whose end is farther than it is long.
 
     Raises:
-        TcsError: As said.
+        TcsError: If the start posture or an end of the line is out of reach.
     """
     outside = arm.limit_violation(course.joints)
     if outside:

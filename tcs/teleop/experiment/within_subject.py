@@ -49,9 +49,9 @@ OPERATORS = 26
 TRAINING = 4
 TRIALS = 3
 SCRIPTED = "scripted operators, not people"
-"""What every table has to say."""
+"""Note of every table."""
 HYPOTHESES: dict[str, Tail] = {"accuracy": "greater", "time": "two-sided", "effort": "greater"}
-"""What is asked of end-effector control against the novel controller (paper, section II.C.6)."""
+"""Tails of end-effector control against the novel controller (paper, section II.C.6)."""
 ANOVA_MEASURES = ("time", "steering_angle", "steering_translation", "arc_length")
 """Measures of the ITCM thesis, compared over all conditions."""
 
@@ -60,13 +60,13 @@ OnProgress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExperimentPlan:
-    """How much is run.
+    """Size and seed of an experiment.
 
     Attributes:
-        operators: How many drive.
+        operators: Number of operators.
         training: Trials that do not count, before those that do.
         trials: Trials that count.
-        seed: Of everything random.
+        seed: Seed of the operators and their noise.
         conditions: Controllers that are compared.
         time_limit: Of a trial [s].
     """
@@ -106,7 +106,7 @@ class ExperimentPlan:
 
 @dataclass(frozen=True, eq=False)
 class ControllerTrials:
-    """What one operator did with one controller."""
+    """Trials of one operator with one controller."""
 
     operator: int
     condition: str
@@ -125,7 +125,7 @@ class ControllerTrials:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """All of it."""
+    """Plan, operators and trials of an experiment."""
 
     arm: Arm
     course: Course
@@ -261,12 +261,13 @@ def _drive(
 
 def run_name(run: Run, runs_as: str = ".csv") -> str:
     """Return the name of a trial's file, e.g. "novel-operator-03-trial-1.csv"."""
-    said = run.metadata
-    return f"{said['condition']}-operator-{said['operator']:02d}-trial-{said['trial']}{runs_as}"
+    metadata = run.metadata
+    operator, trial = metadata["operator"], metadata["trial"]
+    return f"{metadata['condition']}-operator-{operator:02d}-trial-{trial}{runs_as}"
 
 
 def _rng(seed: int, *place: int) -> np.random.Generator:
-    """Return the chance of one place in the experiment, whoever asks first."""
+    """Return the random generator of one place in the experiment, whatever the order of calls."""
     # A path of its own for each length: operator 1 is not trial 1.
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(len(place), *place)))
 

@@ -1,4 +1,4 @@
-"""Smooth random motion about zero: how a hand trembles, and how an eye misjudges a place."""
+"""A smooth Gauss-Markov process: the tremor of a hand and the misjudgement of a position."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from tcs.kernel.arrays import FloatArray
 
 
 class GaussMarkovProcess:
-    """Three independent coordinates that wander about zero, with smooth speed.
+    """A stationary second-order Gauss-Markov process of three independent coordinates.
 
     Each is a critically damped second-order system driven by white noise, in the steady state from
-    the first sample on: its spread is the same at all times and for any sampling period.
+    the first sample on: its variance does not depend on time or sampling period.
     """
 
     def __init__(
         self, rng: np.random.Generator, *, std: float, memory: float, period: float
     ) -> None:
-        """Begin anywhere in the steady state.
+        """Draw the initial state from the steady state.
 
         Args:
-            rng: Where the noise comes from.
+            rng: Generator of the noise.
             std: Standard deviation of each coordinate.
-            memory: Time after which it has forgotten most of where it was [s].
-            period: From one sample to the next [s].
+            memory: Time constant of the correlation [s].
+            period: Sampling period [s].
         """
         a = 1.0 / memory
         fade = math.exp(-a * period)
@@ -36,22 +36,22 @@ class GaussMarkovProcess:
         )
         steady = std * std * np.diag([1.0, a * a])
         noise = steady - self._transition @ steady @ self._transition.T
-        # Rounding may leave an eigenvalue a hair below zero where periods are short.
+        # Rounding may leave an eigenvalue slightly below zero where periods are short.
         values, vectors = np.linalg.eigh(noise)
         self._spread = vectors * np.sqrt(np.maximum(values, 0.0))
         self._state = std * np.array([[1.0], [a]]) * rng.standard_normal((2, 3))
 
     @property
     def value(self) -> FloatArray:
-        """Where it is, shape (3,)."""
+        """Present value, shape (3,)."""
         return np.array(self._state[0])
 
     @property
     def rate(self) -> FloatArray:
-        """How fast it moves [1/s], shape (3,)."""
+        """Present rate of change [1/s], shape (3,)."""
         return np.array(self._state[1])
 
     def advance(self) -> None:
-        """Go on by one period."""
+        """Advance by one period."""
         drive = self._spread @ self._rng.standard_normal((2, 3))
         self._state = self._transition @ self._state + drive

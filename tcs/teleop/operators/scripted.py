@@ -1,17 +1,17 @@
 """Scripted operators: stand-ins for people in the trajectory-following experiment.
 
-They are no people, and what they do proves nothing about people. They let the experiment be run
-again, by anyone, and show what a controller does to one and the same way of driving.
+They are not people, and their results prove nothing about people. They make the experiment
+repeatable and show the effect of a controller on one and the same behaviour.
 
-An operator has one way of driving, whatever the controller: pursue the line, notice late, tremble,
-think when the arm stops, and try something; if that does not help, try something else, further. The
-controller decides only what there is to try (`Recovery`):
+An operator behaves alike with every controller: pursue the line with a reaction delay and tremor;
+when the arm stops, think and try a recovery; if that does not help, try another, larger one. The
+controller decides only the type of recovery (`Recovery`):
 
 - end-effector control: hand motions, a random direction with a random turn;
 - the novel controller: joint group 1, one way or the other.
 
-What helped is remembered and tried first the next time. Nothing else is learnt, and at the outset
-nobody knows what helps.
+A successful recovery is remembered and tried first the next time. Nothing else is learnt, and
+operators begin without experience.
 """
 
 from __future__ import annotations
@@ -32,40 +32,39 @@ from tcs.teleop.operators.gauss_markov import GaussMarkovProcess
 
 
 class Recovery(StrEnum):
-    """What an operator does when the arm stops."""
+    """Recovery of an operator when the arm stops."""
 
     HAND = "hand"
     """Moves and turns the hand."""
     GROUP = "group"
-    """Turns joint group 1, counted from 1, with the tool held."""
+    """Moves joint group 1, counted from 1, while the tool is held."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorTraits:
-    """What one operator is like; the same with every controller.
+    """Behaviour of one operator, the same with every controller.
 
-    The values are ours, set before the first run to what is usual for adults at slow and careful
-    work, and never fitted to an outcome. `drawn` spreads them over operators.
+    The values were set before the first run, to those usual for adults at slow and careful work,
+    and never fitted to an outcome. `drawn` varies them over operators.
 
     Attributes:
-        speed: Of the hand on its way [m/s]: 1 m in 17 s, as "as accurately as possible" asks for.
+        speed: Speed of the hand [m/s]: 1 m in 17 s, for "as accurately as possible".
         reaction: From an event to the hand's answer [s]; simple reactions take 0.2 to 0.3 s.
         thinking: From noticing that the arm has stopped to the next try [s].
         pointing: To take the other device, point at the joint on the interface and press [s].
         regrip: To take the first device again [s].
         muscle: Time constant of the hand's speed [s].
         lookahead: How far ahead on the line the operator aims [m].
-        misjudging: How far off the tool is seen, each coordinate, standard deviation [m].
-        misjudging_memory: For how long a misjudgement lasts [s].
-        tremor: Spread of the hand's speed as a share of the speed itself: noise that grows with
-            the signal (Harris and Wolpert, Nature 394, 1998).
-        tremor_rest: Speed that is added to the hand's before that share is taken [m/s]: a hand at
-            rest is not still.
-        tremor_memory: For how long tremor lasts [s].
-        first_try: How far the hand goes in a first try [m].
-        turn_per_metre: How far it turns on its way in a try [rad/m].
-        first_turn: How far group 1 is turned in a first try [rad].
-        growth: How much further each next try goes.
+        misjudging: Standard deviation of the perceived tool position, each coordinate [m].
+        misjudging_memory: Time constant of the misjudgement [s].
+        tremor: Standard deviation of the hand's speed as a fraction of the speed:
+            signal-dependent noise (Harris and Wolpert, Nature 394, 1998).
+        tremor_rest: Speed added to the hand's before that fraction is taken [m/s]: tremor at rest.
+        tremor_memory: Time constant of the tremor [s].
+        first_try: Distance of the hand's first recovery motion [m].
+        turn_per_metre: Rotation of the hand per distance in a recovery [rad/m].
+        first_turn: Rotation of group 1 in the first recovery [rad].
+        growth: Growth factor from one recovery to the next.
     """
 
     speed: float = 0.06
@@ -87,7 +86,7 @@ class OperatorTraits:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> OperatorTraits:
-        """Return an operator: what people differ in, spread by a fifth (log-normal)."""
+        """Return an operator whose traits vary log-normally by a fifth."""
         usual = cls()
         varied = (
             "speed", "reaction", "thinking", "pointing", "regrip", "misjudging", "tremor",
@@ -103,12 +102,12 @@ class OperatorTraits:
 
 @dataclass(slots=True)
 class Experience:
-    """What has helped so far with one controller, by the number of the obstacle on the way."""
+    """Successful recoveries with one controller, by the number of the obstacle on the line."""
 
     motions: dict[int, FloatArray] = field(default_factory=dict)
-    """The tool's turn and way from where the arm stopped [rad; m], shape (6,)."""
+    """Rotation and translation of the tool from where the arm stopped [rad; m], shape (6,)."""
     turns: dict[int, float] = field(default_factory=dict)
-    """How far group 1 was turned [rad]."""
+    """Rotation of group 1 [rad]."""
 
 
 class _Phase(StrEnum):
@@ -122,15 +121,15 @@ class _Phase(StrEnum):
 
 
 _PAST = 0.05
-"""An obstacle is behind when the tool is this share of the line beyond it."""
+"""An obstacle is passed when the tool is this fraction of the line beyond it."""
 _FARTHEST_TRY = 0.3
-"""Tries grow no further than this [m]: a third of the arm's reach."""
+"""Greatest distance of a recovery [m]: a third of the arm's reach."""
 _FARTHEST_TURN = 1.6
-"""Nor does a turn of the group: a right angle [rad]."""
+"""Greatest rotation of the group in a recovery [rad]: a right angle."""
 
 
 class ScriptedOperator:
-    """One operator in one trial: sees steps, gives commands."""
+    """One operator in one trial: steps in, commands out."""
 
     def __init__(
         self,
@@ -143,16 +142,16 @@ class ScriptedOperator:
         settings: Settings,
         rng: np.random.Generator,
     ) -> None:
-        """Take the device.
+        """Prepare for a trial.
 
         Args:
-            traits: What the operator is like.
-            habits: What has helped so far; kept up to date.
-            line: What to follow.
-            approach: What to do when the arm stops.
-            mode: The mode in which the hand drives the tool.
-            settings: Of the arm that is driven.
-            rng: Where chance comes from.
+            traits: Traits of the operator.
+            habits: Successful recoveries so far; updated in place.
+            line: The line to follow.
+            approach: Recovery when the arm stops.
+            mode: The mode in which the hand moves the tool.
+            settings: Settings of the controller.
+            rng: Random generator.
         """
         self._traits, self._habits, self._line = traits, habits, line
         self._approach, self._mode, self._settings = approach, mode, settings
@@ -167,7 +166,7 @@ class ScriptedOperator:
         )
         self._velocity, self._spin = np.zeros(3), np.zeros(3)
         self._time = 0.0
-        # Whoever is told to begin reacts before the hand moves.
+        # The reaction to the start signal comes before the hand moves.
         self._begin(_Phase.READY, traits.reaction)
         self._obstacle, self._tries, self._farthest = -1, 0, -np.inf
         self._where: Step | None = None
@@ -176,13 +175,13 @@ class ScriptedOperator:
         self._turn, self._turned = 0.0, 0.0
 
     def command(self, step: Step) -> Command:
-        """Return what the operator commands, having seen one more step."""
+        """Return the command of the next period, after the arm's last step."""
         self._time = step.time
         self._seen.append(step)
         self._misjudged.advance()
         self._trembling.advance()
         seen = self._seen[0]
-        # What was seen before this phase began has been dealt with.
+        # A stop observed before this phase began has been handled.
         stopped = seen.stopped and seen.time > self._began
         over = self._time - self._began >= self._lasts - 0.5 * self._settings.period
         aim, spin = np.zeros(3), np.zeros(3)
@@ -206,7 +205,7 @@ class ScriptedOperator:
         return self._commanded(aim, spin)
 
     def _commanded(self, aim: FloatArray, spin: FloatArray) -> Command:
-        """Return the command: muscle and tremor make of what is wanted what the hand does."""
+        """Return the command: the intended motion after muscle dynamics and tremor."""
         traits = self._traits
         share = self._settings.period / (traits.muscle + self._settings.period)
         self._velocity = self._velocity + share * (aim - self._velocity)
@@ -223,7 +222,7 @@ class ScriptedOperator:
         self._phase, self._began, self._lasts = phase, self._time, lasts
 
     def _pursue(self, place: FloatArray, share: float) -> FloatArray:
-        """Return the velocity towards a point a little ahead on the line [m/s]."""
+        """Return the velocity towards a point ahead on the line [m/s]."""
         traits, line = self._traits, self._line
         ahead = line.at(min(1.0, max(0.0, share) + traits.lookahead / line.length)) - place
         distance = float(np.linalg.norm(ahead))
@@ -241,7 +240,7 @@ class ScriptedOperator:
         self._begin(_Phase.THINK, self._traits.thinking)
 
     def _learn(self, share: float) -> None:
-        """Keep what has helped, once the obstacle is behind."""
+        """Remember a successful recovery, once the obstacle is passed."""
         if self._tries and share > self._farthest + _PAST:
             if self._approach is Recovery.GROUP:
                 self._habits.turns[self._obstacle] = self._turned
@@ -250,7 +249,7 @@ class ScriptedOperator:
             self._tries = 0
 
     def _go_on(self) -> None:
-        """Begin what comes after a phase that has lasted its time."""
+        """Begin the phase after one whose time is over."""
         if self._phase is _Phase.THINK:
             self._tries += 1
             if self._approach is Recovery.GROUP:
@@ -261,7 +260,7 @@ class ScriptedOperator:
                 turn, way = (float(np.linalg.norm(part)) for part in np.split(self._motion, 2))
                 pace = self._traits.speed
                 lasts = max(way / pace, turn / (pace * self._traits.turn_per_metre))
-                # What helped may have been next to nothing: it takes a moment all the same.
+                # A remembered motion may be tiny; it still takes a moment.
                 self._begin(_Phase.TRY, max(lasts, self._traits.muscle))
         elif self._phase is _Phase.TO_GROUP:
             self._begin(_Phase.TURN, abs(self._turn) / self._settings.group_rate)
@@ -269,7 +268,7 @@ class ScriptedOperator:
             self._begin(_Phase.FOLLOW)
 
     def _next_motion(self) -> FloatArray:
-        """Return the turn and way of the hand that comes to mind [rad; m], shape (6,)."""
+        """Return the next recovery motion of the hand, rotation and translation, shape (6,)."""
         if self._tries == 1 and self._obstacle in self._habits.motions:
             return self._habits.motions[self._obstacle]
         traits = self._traits
@@ -279,20 +278,19 @@ class ScriptedOperator:
         return np.concatenate([way * traits.turn_per_metre * directions[0], way * directions[1]])
 
     def _next_turn(self) -> float:
-        """Return how far group 1 is to be turned [rad]."""
+        """Return the next rotation of group 1 [rad]."""
         if self._tries == 1 and self._obstacle in self._habits.turns:
             return self._habits.turns[self._obstacle]
         traits = self._traits
         more = min(_FARTHEST_TURN, traits.first_turn * traits.growth ** (self._tries - 1))
         if self._turn and abs(self._turned) + more <= math.pi:
             return math.copysign(more, self._turn)
-        # Nothing tried yet, or that way is closed, or half a turn has not helped: then back, and on
-        # to the other side.
+        # First try, or that direction is blocked, or half a rotation has not helped: reverse.
         way = -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
         return float(way * (abs(self._turned) + more))
 
     def _end_try(self, now: Step, *, stopped: bool) -> None:
-        """Look whether the arm goes on from here; think again where the try itself was stopped."""
+        """Resume the line from here; think again where the recovery itself was stopped."""
         assert self._where is not None
         self._moved = pose_error(now.R, now.p, self._where.R, self._where.p)
         if stopped:
@@ -301,7 +299,7 @@ class ScriptedOperator:
             self._begin(_Phase.FOLLOW)
 
     def _end_turn(self, *, stopped: bool) -> None:
-        """Take the tool again; a way that is closed is not tried on."""
+        """Return to the tool; a blocked direction is not tried again."""
         turned = (self._time - self._began) * self._settings.group_rate
         self._turned += math.copysign(turned, self._turn)
         if stopped:

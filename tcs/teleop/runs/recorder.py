@@ -1,4 +1,4 @@
-"""What is driven, kept in little room: an hour at 100 Hz in some 120 MB."""
+"""Recorder of a session: commands and steps become a run, an hour at 100 Hz in 120 MB."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from tcs.teleop import Arm, Command, Step
 from tcs.teleop.runs.run import NO_GROUP, Run
 
 _BLOCK = 6000
-"""Steps after which single ones become arrays: a minute's."""
+"""Steps after which objects become arrays: a minute."""
 _LEAST = 2
-"""Samples that a run must have."""
+"""Least number of samples of a run."""
 _PUT_BACK = 1e-4
-"""Joints that are farther from where their rates take them than this [rad] were put there."""
+"""Joints farther than this from the integral of their rates [rad] were placed there."""
 
 
 class Recorder:
-    """Commands and steps on their way to a run."""
+    """Collector of commands and steps."""
 
     def __init__(self, arm: Arm) -> None:
-        """Begin with nothing.
+        """Begin empty.
 
         Args:
-            arm: The arm that is driven.
+            arm: The arm.
         """
         self._arm = arm
         self._blocks: list[Run] = []
@@ -36,17 +36,17 @@ class Recorder:
         return sum(len(block) for block in self._blocks) + len(self._rows)
 
     def add(self, command: Command, step: Step) -> None:
-        """Keep a step, and the command that it followed."""
+        """Record a command and the step that followed."""
         self._rows.append((command, step))
         if len(self._rows) >= _BLOCK + _LEAST:
             self._blocks.append(run_from_steps(self._arm, self._rows[:_BLOCK], {}))
             self._rows = self._rows[_BLOCK:]
 
     def run(self, metadata: Mapping[str, Any]) -> Run | None:
-        """Return all of it as a run; None if it is too short for one.
+        """Return the recorded run; None if it is too short for one.
 
         Args:
-            metadata: What the run is to say about itself.
+            metadata: Metadata of the run.
         """
         if len(self) < _LEAST:
             return None
@@ -60,34 +60,34 @@ class Recorder:
 
 
 def last_attempt(run: Run) -> int:
-    """Return the sample with which the last try of a person at a line begins.
+    """Return the first sample of the operator's last attempt at a line.
 
-    That is the first command after the arm was last put back to where it began; the last sample if
-    none came.
+    An attempt begins with the first command after the arm was put back to its start; without a
+    command it is the last sample.
     """
     steps = np.diff(run.joints, axis=0) - run.rates[1:] * np.diff(run.time)[:, None]
-    # A step is its rate times its time, but for the digits of a file; being put back is not.
+    # Steps integrate the rates, up to the digits of a file, except where the arm was put back.
     put_back = np.flatnonzero(np.abs(steps).max(axis=1) > _PUT_BACK)
     first = int(put_back[-1]) + 1 if len(put_back) else 0
-    asked = run.linear.any(axis=1) | run.angular.any(axis=1) | (run.sign != 0)
-    after = np.flatnonzero(asked[first:])
+    commanded = run.linear.any(axis=1) | run.angular.any(axis=1) | (run.sign != 0)
+    after = np.flatnonzero(commanded[first:])
     return first + int(after[0]) if len(after) else len(run) - 1
 
 
 def run_from_steps(arm: Arm, rows: list[tuple[Command, Step]], metadata: Mapping[str, Any]) -> Run:
-    """Return commands, and the steps they led to, as a run.
+    """Return commands and steps as a run.
 
     Args:
         arm: The arm.
         rows: Each command with the step after it; two at least.
-        metadata: What the run is to say about itself.
+        metadata: Metadata of the run.
     """
     from scipy.spatial.transform import Rotation
 
     commands, steps = [row[0] for row in rows], [row[1] for row in rows]
 
-    def column(values: list[Any], kind: Any = np.float64) -> Any:
-        return np.array(values, dtype=kind)
+    def column(values: list[Any], dtype: Any = np.float64) -> Any:
+        return np.array(values, dtype=dtype)
 
     return Run(
         joint_names=tuple(arm.joints),

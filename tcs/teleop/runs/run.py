@@ -144,11 +144,11 @@ class Run:
         moving = (~self.clutch & (self.group == NO_GROUP))[:, None]
         dt = np.diff(self.time, prepend=self.time[0])[:, None]
         position = np.cumsum(np.where(moving, self.linear, 0.0) * dt, axis=0)
-        turns = Rotation.from_rotvec(np.where(moving, self.angular, 0.0) * dt).as_matrix()
-        R = np.empty_like(turns)
+        rotations = Rotation.from_rotvec(np.where(moving, self.angular, 0.0) * dt).as_matrix()
+        R = np.empty_like(rotations)
         current = np.eye(3)
-        for i, turn in enumerate(turns):
-            current = R[i] = turn @ current
+        for i, rotation in enumerate(rotations):
+            current = R[i] = rotation @ current
         angles = Rotation.from_matrix(R).as_euler("xyz", suppress_warnings=True)
         return position, angles
 

@@ -62,4 +62,4 @@ def test_shares_of_range_run_from_limit_to_limit():
 def test_a_stretched_arm_says_so_and_names_no_joint(iiwa, ready):
     session = Teleoperation(iiwa, ready, mode=Mode.ASSISTED)
     reasons = {session.step(Command(linear=(0.1, 0, 0))).reason for _ in range(900)}
-    assert reasons == {"", "the arm is stretched as far as it goes: the tool cannot go that way."}
+    assert reasons == {"", "the arm is fully stretched: the tool cannot move in that direction."}

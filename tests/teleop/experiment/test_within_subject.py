@@ -165,7 +165,7 @@ def test_from_operator_to_recording_to_map():
     plan = ExperimentPlan(operators=3, training=1, trials=1)
     found = controller_maps(run_experiment(arm, find_course(arm), plan))
     assert [one.condition for one in found.maps] == [one.name for one in CONDITIONS]
-    assert found.maps[0].shared == 1.0
+    assert found.maps[0].shared_fraction == 1.0
     sizes = {one.condition: len(one.capability.cells) for one in found.maps}
     # Who searches with the hand brings the arm to more places than who follows the line.
     assert sizes["end-effector"] > sizes["novel"] > sizes["assisted"] > 10

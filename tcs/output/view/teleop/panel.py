@@ -279,5 +279,5 @@ def bar_properties(i: int, share: float, bounded: bool) -> list[tuple[str, str, 
 def _degrees(arm: Arm, i: int) -> tuple[str, str]:
     """Return the limits of a joint as words."""
     if not arm.bounded[i]:
-        return "turns on", ""
+        return "continuous", ""
     return f"{math.degrees(arm.lower[i]):+.0f}", f"{math.degrees(arm.upper[i]):+.0f}"

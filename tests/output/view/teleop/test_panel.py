@@ -167,7 +167,7 @@ def test_limits_stand_below_the_bars(spy, monkeypatch):
     assert [text for text in written if text.startswith("joint")] == [
         f"joint {i}" for i in range(1, 8)
     ]
-    assert written.count("turns on") == np.count_nonzero(~arm.bounded) == 2
+    assert written.count("continuous") == np.count_nonzero(~arm.bounded) == 2
     for i in np.flatnonzero(arm.bounded):
         assert f"{np.degrees(arm.lower[i]):+.0f}" in written
         assert f"{np.degrees(arm.upper[i]):+.0f}" in written
