@@ -1,7 +1,7 @@
-"""Drive a seven-joint arm by its tool until a joint stops it, reshape it, and go on.
+"""Teleoperate a seven-joint arm to a joint limit, leave it by null-space motion, and continue.
 
-With seven joints the tool can stay where it is while the arm moves. That frees a joint that has
-come to its limit. Everything here is simulated; nothing is sent to a robot.
+With seven joints the arm can move while the tool stays. That frees a joint at its
+limit. Everything here is simulated; nothing is sent to a robot.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ UP = Command(linear=(0.0, 0.0, 0.1), mode=Mode.END_EFFECTOR)
 
 
 def drive_up(session: Teleoperation) -> Step:
-    """Move the tool up until the arm stops and says why; one step is 10 ms."""
+    """Move the tool up until the arm stops, and print the reason; one step is 10 ms."""
     step = session.step(UP)
     while not step.stopped:
         step = session.step(UP)
@@ -24,8 +24,8 @@ def drive_up(session: Teleoperation) -> Step:
 
 
 def main() -> None:
-    """Drive the tool of an iiwa up, turn joints 2, 4 and 6 about it, and drive on."""
-    # "paper": a motion ends at the first joint limit. By default the other joints go on.
+    """Move the tool of an iiwa up, move joints 2, 4 and 6 in its null space, and continue."""
+    # "paper": a motion ends at the first joint limit. By default the other joints continue.
     settings = Settings(limits="paper")
     session = Teleoperation(load_arm("iiwa7"), [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0], settings)
     drive_up(session)

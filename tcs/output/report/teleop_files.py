@@ -46,7 +46,7 @@ def make_experiment_folder(arm: Arm, out: Path, *, runs_as: str | None, maps: bo
 
     Raises:
         OutputError: If the folder cannot be made, or the suffix is unknown.
-        UnknownNameError: If maps are to be made and the robot has no head file.
+        RobotError: If maps are to be made and the robot has no head file.
     """
     runs = None
     if runs_as is not None:

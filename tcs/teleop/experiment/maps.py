@@ -93,7 +93,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
         experiment: The experiment; its robot must have a head file.
 
     Raises:
-        UnknownNameError: If the robot has no head file.
+        RobotError: If the robot has no head file.
         DataFileError: If a recording cannot become a map.
     """
     arm = experiment.arm

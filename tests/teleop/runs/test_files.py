@@ -65,7 +65,7 @@ def test_a_capability_map_reads_a_saved_run_as_it_is(tmp_path):
     save_run(tmp_path / "run.csv", run)
     recording = read_csv(tmp_path / "run.csv", ROBOT)
     np.testing.assert_allclose(recording.joints, run.joints, atol=1e-9)
-    assert recording.lift is None
+    assert recording.torso_height is None
 
 
 def test_nothing_is_left_where_a_run_cannot_be_written(tmp_path):
