@@ -28,7 +28,7 @@ class Table(Document):
     legs: tuple[Leg, ...] = ()
     by_name: Mapping[str, Leg] = {}
     feet: Annotated[tuple[int, ...], Field(min_length=2)] = (1, 2)
-    folds: Annotated[bool, Field(strict=True)] = False
+    foldable: Annotated[bool, Field(strict=True)] = False
 
 
 def read(tmp_path, text):
@@ -48,9 +48,9 @@ def test_a_sound_file_becomes_a_value(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
-        ("[a]", "table must hold keys and values: name, height, legs, by_name, feet, folds."),
+        ("[a]", "table must hold keys and values: name, height, legs, by_name, feet, foldable."),
         ("name: a\nheight: 1\nname: b", "line 3, column 1: key 'name' appears twice."),
         ("name: a\nlegs: [{length: 1, length: 2}]", "line 2, column 20: key 'length' appears"),
         ("1: a", "line 1, column 1: a key must be text."),
@@ -60,35 +60,35 @@ def test_a_sound_file_becomes_a_value(tmp_path):
         ("{name: a, height: .nan}", "field 'height' is nan, but must be a finite number."),
         ("{name: a, legs: [4]}", "'legs[0]' is 4, but must be a mapping of keys to values."),
         ("{name: a, feet: []}", "field 'feet' is [], but must have at least 2 items."),
-        ("{name: a, folds: 3}", "field 'folds' is 3, but must be a valid boolean."),
+        ("{name: a, foldable: 3}", "field 'foldable' is 3, but must be a valid boolean."),
         ("{name: a, legs: 4}", "field 'legs' is 4, but must be a valid list."),
         ("{name: a, legs: [{length: 0}]}", "'legs[0].length' is 0, but must be greater than 0."),
         ("{name: 1, height: a}", "but must be a valid string. (1 more after this one.)"),
     ],
 )
-def test_a_wrong_file_gets_one_line_of_the_callers_error(tmp_path, text, said):
+def test_a_wrong_file_gets_one_line_of_the_callers_error(tmp_path, text, message):
     with pytest.raises(RobotError) as caught:
         read(tmp_path, text)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert str(caught.value).startswith("table")
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (
             "{nmae: a}",
-            "table: unknown key 'nmae'. Known: based_on, by_name, feet, folds, heig",
+            "table: unknown key 'nmae'. Known: based_on, by_name, feet, foldable, heig",
         ),
         ("{name: a, legs: [{lenght: 1}]}", "table, field 'legs[0]': unknown key 'lenght'. Known: "),
         ("{name: a, by_name: {x: {xy: 1}}}", "field 'by_name.x': unknown key 'xy'. Known: length"),
     ],
 )
-def test_an_unknown_key_is_reported_with_the_keys_known_there(tmp_path, text, said):
+def test_an_unknown_key_is_reported_with_the_keys_known_there(tmp_path, text, message):
     with pytest.raises(UnknownNameError) as caught:
         read(tmp_path, text)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 class Choice(Document):

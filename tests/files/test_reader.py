@@ -94,7 +94,7 @@ def test_the_attacks_are_real(path, mark):
         mark.unlink()
 
 
-def test_the_name_asked_for_is_told(path, mark):
+def test_the_message_contains_the_name(path, mark):
     joblib.dump(attacks(mark)["os.system"], path)
     with pytest.raises(UnsafeStoreError, match=r"attack\.tcs' names '(posix|nt)\.system'"):
         load_scores(path)

@@ -51,7 +51,7 @@ def test_a_full_disk_is_told_with_what_to_do(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_folder_is_told(tmp_path):
+def test_a_missing_folder_is_reported(tmp_path):
     with (
         pytest.raises(OutputError, match="existing, writable folder"),
         whole_file(tmp_path / "none" / "a.txt", "Text"),

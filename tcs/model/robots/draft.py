@@ -176,8 +176,8 @@ def check_free(path: Path) -> Path:
     """
     if path.suffix != ".yaml":
         raise OutputError(
-            f"robot file '{path}': its name must end in .yaml, which tells a path from the name of "
-            "a robot."
+            f"robot file '{path}': its name must end in .yaml, which distinguishes a path from the "
+            "name of a robot."
         )
     shapes = path.with_name(f"{path.stem}_primitives.csv")
     for file in (path, shapes):

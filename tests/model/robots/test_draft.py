@@ -188,10 +188,10 @@ def test_nothing_is_overwritten(drafted, tmp_path):
 
 def test_both_files_or_neither(drafted, tmp_path, monkeypatch):
     def refuse(path, *arguments, **options):
-        raise OutputError("no room")
+        raise OutputError("disk full")
 
     monkeypatch.setattr("tcs.model.robots.draft.whole_file", refuse)
-    with pytest.raises(OutputError, match="no room"):
+    with pytest.raises(OutputError, match="disk full"):
         write_draft(drafted[0], tmp_path / "mine.yaml")
     assert list(tmp_path.iterdir()) == []
 

@@ -1,4 +1,4 @@
-"""Robots that ship against published figures: fingers, mounts, pedestals, mirrored arms."""
+"""Robots that ship against published figures: fingers, mounts, pedestals, the PR2's two arms."""
 
 import csv
 import itertools
@@ -155,7 +155,7 @@ def test_baxters_arm_is_checked_against_its_torso_and_pedestal():
             assert frozenset((f"left_{part}", trunk)) not in off
 
 
-def test_baxters_torso_leaves_its_arm_most_of_its_room():
+def test_baxters_torso_leaves_most_arm_postures_free():
     """Shapes as wide as its handles would forbid twice as many postures."""
     robot = load_robot("baxter")
     moved = {body for body in robot.model().links if body.startswith(("left_", "l_"))}

@@ -79,7 +79,7 @@ def test_other_arm_follows_the_posture(pr2):
     assert straight["r_elbow_flex_joint"] == -0.15
 
 
-def test_joints_nobody_names_stay_within_limits(pr2):
+def test_joints_left_out_stay_within_limits(pr2):
     bare = pr2.model_copy(update={"posture": None})
     # Zero is beyond the elbow's soft limit.
     assert bare.joint_positions()["r_elbow_flex_joint"] == -0.15

@@ -1,4 +1,4 @@
-"""The suite for robots that ship: a new robot file in `models/robots` runs through all of it.
+"""The suite for robots that ship: a new robot file in `models/robots` runs through every test.
 
 The IK round trip and the remaining checks of `check_up` are in tests/model/checkup/test_report.py,
 stricter properties of the primitives in fitting/test_enclosure.py, and a scored task in

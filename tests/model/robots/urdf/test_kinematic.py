@@ -92,7 +92,7 @@ def test_kinematics_are_those_of_the_original(pr2, frame):
     plant = parsed(kinematic_urdf(pr2.urdf), pr2)
     for positions in sample_positions(pr2, 20, seed=5):
         expected = original_pose(pr2.urdf_path(), frame, positions)
-        # A metre of arm in double precision: some 1e-15; 1e-12 leaves room for other builds.
+        # A metre of arm in double precision: some 1e-15; 1e-12 allows for other builds.
         np.testing.assert_allclose(pose(plant, frame, positions), expected, atol=1e-12)
         R, p = pose_in_root(pr2.model(), frame, positions)
         np.testing.assert_allclose(R, expected[:3, :3], atol=1e-12)

@@ -69,7 +69,7 @@ def test_unreadable_meshes_are_refused(tmp_path):
         as_obj(broken)
 
 
-def test_cache_that_cannot_be_written_is_told(stl, tmp_path, monkeypatch):
+def test_cache_that_cannot_be_written_is_reported(stl, tmp_path, monkeypatch):
     blocked = tmp_path / "blocked"
     blocked.mkdir()
     (blocked / "meshes").write_text("a file where a folder should be")
