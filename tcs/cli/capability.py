@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tcs.cli import capability_reports as reports
 from tcs.cli import options
 from tcs.cli.option_groups import expand_options
 from tcs.files.writing import check_writable
 from tcs.output import terminal
+from tcs.output.terminal import capability_tables
 
 if TYPE_CHECKING:
     from tcs.capability import CapabilityMap, MapGrid, Reach, Recording, TaskShape
@@ -168,8 +168,8 @@ def from_ik(
         )  # fmt: skip
     seconds = time.perf_counter() - begun
     files.write(capability)
-    result = {**reports.map_result(files.out, capability), "seconds": round(seconds, 3)}
-    terminal.print_result(result, reports.report_map, as_json=as_json)
+    result = {**capability_tables.map_result(files.out, capability), "seconds": round(seconds, 3)}
+    terminal.print_result(result, capability_tables.report_map, as_json=as_json)
 
 
 @app.command()
@@ -263,12 +263,12 @@ def _map_recording(
     )  # fmt: skip
     files.write(recorded.capability)
     result = {
-        **reports.map_result(files.out, recorded.capability),
+        **capability_tables.map_result(files.out, recorded.capability),
         "dropped": recording.dropped,
         **recorded.to_json(),
         **more,
     }
-    terminal.print_result(result, reports.report_map, as_json=as_json)
+    terminal.print_result(result, capability_tables.report_map, as_json=as_json)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -357,11 +357,11 @@ def merge_maps(
     if split:
         stops = split_task(loaded, grasps, torso_height=torso_height, scale=scale)
         sequence = {"task": grasps.name, "stops": [stop.to_json() for stop in stops]}
-        terminal.print_result(sequence, reports.report_stops, as_json=as_json)
+        terminal.print_result(sequence, capability_tables.report_stops, as_json=as_json)
         return
     begun = time.perf_counter()
     task_map = merge(loaded, grasps, torso_height=torso_height, scale=scale)
-    result = reports.task_map_result(task_map, time.perf_counter() - begun)
+    result = capability_tables.task_map_result(task_map, time.perf_counter() - begun)
     if out is not None:
         write_base_poses(out, task_map)
     if picture is not None:
@@ -375,7 +375,7 @@ def merge_maps(
         )
         base, rejected = around.best(task_map)
         result |= {"best_in_environment": base.to_json(), "rejected": rejected}
-    terminal.print_result(result, reports.report_merged, as_json=as_json)
+    terminal.print_result(result, capability_tables.report_merged, as_json=as_json)
 
 
 def _shape(task: _Task) -> TaskShape:
@@ -470,5 +470,5 @@ def map_check(
             checks[name] = check_map(
                 reach, cells, name, radius=radius, queries=queries, seed=seed, jobs=jobs
             )
-    result = reports.check_result(capability, cells, checks)
-    terminal.print_result(result, reports.report_check, as_json=as_json)
+    result = capability_tables.check_result(capability, cells, checks)
+    terminal.print_result(result, capability_tables.report_check, as_json=as_json)

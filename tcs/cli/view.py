@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -29,22 +29,45 @@ def view(
     duration: options.Duration = None,
     as_json: options.PageJson = False,
 ) -> None:
-    """Look at it in the browser: step through set and goals, or stand elsewhere."""
+    """Show a score file in the browser: its sets, every other base pose and each goal."""
     options.check_export(export, meshes=meshes, as_json=as_json)
 
-    from tcs.cli.values import state_if_given
+    from tcs.cli.values import observed_settings, state_if_given
     from tcs.files.writing import check_page
 
     if export is not None:
         check_page(export)
 
-    from tcs.cli import view_work as work
+    import tcs
+    from tcs.output.view import make_score_view, show_score_view, write_score_view
 
     chosen_from = state_if_given(here, torso)
-    as_meshes = meshes or export is None
-    staged = work.stage(file, chosen_from, max_members, observed or (), meshes=as_meshes)
+    loaded = tcs.load(file)
+    shown = make_score_view(
+        loaded,
+        here=chosen_from,
+        max_members=max_members,
+        observed=observed_settings(observed or (), loaded.observed_axes),
+        meshes=meshes or export is None,
+    )
     if export is not None:
-        result = work.export(staged, export, meshes=meshes)
-        terminal.print_result(result, work.report_page, as_json=as_json)
+        terminal.print_result(write_score_view(shown, export), _report_page, as_json=as_json)
         return
-    work.show_live(staged, port=port, browser=browser, duration=duration)
+    show_score_view(
+        shown,
+        port=port,
+        browser=browser,
+        duration=duration,
+        on_line=typer.echo,
+        on_note=terminal.note,
+    )
+
+
+def _report_page(result: dict[str, Any]) -> None:
+    """Print the summary of a page, with the licence of the meshes in it."""
+    typer.echo(f"wrote {result['file']}: {result['bytes'] / 1e6:.1f} MB")
+    if result["meshes"]:
+        typer.echo(
+            "The page contains the robot's meshes; their licence applies when you share it. "
+            f"Origin and licence, from the robot file: {result['source']}"
+        )

@@ -8,6 +8,7 @@ from tcs.output.report.markdown import as_markdown
 from tcs.output.report.paper import Paper, load_paper
 from tcs.output.report.robustness import robustness_page
 from tcs.output.report.row_pictures import RowPictures, draw_row, draw_rows
+from tcs.output.report.score_files import report_paths, write_score_report
 from tcs.output.report.score_page import make_score_page
 from tcs.output.report.score_report import CheckSizes, ScoreReport, make_score_report
 from tcs.output.report.write import write_report
@@ -26,6 +27,8 @@ __all__ = [
     "load_paper",
     "make_score_page",
     "make_score_report",
+    "report_paths",
     "robustness_page",
     "write_report",
+    "write_score_report",
 ]

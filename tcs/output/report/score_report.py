@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from tcs.model.grid import InitialConfiguration
 from tcs.output.draw import as_png
@@ -145,6 +146,23 @@ class ScoreReport:
     def unreached(self) -> tuple[int, ...]:
         """The goals that no member reaches."""
         return tuple(goal for goal, number in enumerate(self.assignment) if number is None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the set, its scores and the results of the checks as plain containers."""
+        reachability, manipulability = self.scores
+        return {
+            "members": [member.to_json() for member in self.shown.members],
+            # Seven sevenths add up to 1 only after rounding.
+            "reachability": round(reachability, 12),
+            "manipulability": round(manipulability, 12),
+            "measure": self.measure,
+            "unreached_goals": list(self.unreached),
+            "verification": self.verification.to_json(),
+            "shown_checked": len(self.findings),
+            "shown_false": [goal for goal in self.findings if not self.is_confirmed(goal)],
+            "is_sound": self.is_sound,
+            "seconds": self.seconds,
+        }
 
     def explanation(self, goal: int) -> Explanation:
         """Return what would have to change for the set to reach a goal."""

@@ -7,6 +7,12 @@ from tcs.output.view.export import PlayStep, export_page, play_steps
 from tcs.output.view.floor import FloorMap, floor_map
 from tcs.output.view.live import Viewer, open_meshcat
 from tcs.output.view.scene_objects import SceneObjects
+from tcs.output.view.score_view import (
+    ScoreView,
+    make_score_view,
+    show_score_view,
+    write_score_view,
+)
 from tcs.output.view.viewed_set import ConfigurationResult, ViewedSet
 
 __all__ = [
@@ -15,12 +21,16 @@ __all__ = [
     "FloorMap",
     "PlayStep",
     "SceneObjects",
+    "ScoreView",
     "Slider",
     "ViewState",
     "ViewedSet",
     "Viewer",
     "export_page",
     "floor_map",
+    "make_score_view",
     "open_meshcat",
     "play_steps",
+    "show_score_view",
+    "write_score_view",
 ]

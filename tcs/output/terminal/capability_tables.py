@@ -1,4 +1,4 @@
-"""Results of the commands on capability maps: as plain containers, and as text."""
+"""Results on capability maps: as plain containers, and as text on stdout."""
 
 from __future__ import annotations
 
