@@ -12,6 +12,7 @@ from tcs.model.tasks import load_task
 from tcs.placement.scoring import load_job, score, summary, sweep
 from tcs.placement.scoring.job import data_references
 from tcs.placement.store import load_scores, save_scores
+from tcs.placement.tables import Reason
 
 
 def test_a_small_environment_is_reached_and_summed_up(small_file):
@@ -44,11 +45,12 @@ def test_no_threads_are_refused(small_job, jobs):
 
 def test_blocked_pairs_name_the_bodies_in_contact(small_file):
     scores = small_file.nominal.scores
-    blocked = np.isin(scores.reason, (3, 5))
+    blocked = np.isin(scores.reason, (Reason.BODY_BLOCKED, Reason.ARM_BLOCKED))
+    gripper = (Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT, Reason.GRIPPER_BLOCKED_BY_ROBOT)
     assert blocked.any()
     assert np.all(scores.pair[blocked] >= 0)
-    assert np.all(scores.pair[~blocked & (scores.reason != 4)] == -1)
-    robot, other = scores.pair_names[scores.pair[scores.reason == 3][0]]
+    assert np.all(scores.pair[~blocked & ~np.isin(scores.reason, gripper)] == -1)
+    robot, other = scores.pair_names[scores.pair[scores.reason == Reason.BODY_BLOCKED][0]]
     assert not robot.startswith(("wheelchair::", "person::"))
     assert other.startswith(("wheelchair::", "person::"))
 

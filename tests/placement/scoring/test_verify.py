@@ -12,6 +12,7 @@ from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
 from tcs.placement.scoring.verify import estimated_recall
 from tcs.placement.store import StateTables
+from tcs.placement.tables import Reason
 from tests.environments import BESIDE, write_environment
 
 
@@ -102,7 +103,7 @@ def test_reached_pairs_taken_away_are_missed(small_file):
     scores = small_file.nominal.scores
     reason, dexterity = scores.reason.copy(), scores.dexterity.copy()
     taken = np.argwhere(scores.reached)[::2]
-    reason[taken[:, 0], taken[:, 1]] = 5
+    reason[taken[:, 0], taken[:, 1]] = Reason.ARM_BLOCKED
     dexterity[taken[:, 0], taken[:, 1]] = 0.0
     kept = np.ones(len(scores.arm_joints), dtype=bool)
     kept[::2] = False
