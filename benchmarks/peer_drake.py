@@ -126,25 +126,27 @@ def add_arm(
         name = lowered.robot_bodies[arrays.body.body[k]]
         return carrier(name, torso if arrays.body.frame[k] else base, robot)
 
-    def in_room(k: int) -> RigidBody:
+    def in_environment(k: int) -> RigidBody:
         return carrier(
             lowered.environment_bodies[arrays.environment.body[k]], plant.world_frame(), environment
         )
 
     arm = _register(plant, arrays.arm, on_link, "arm")
     body = _register(plant, arrays.body, on_body, "body")
-    room = _register(plant, arrays.environment, in_room, "room")
+    obstacles = _register(plant, arrays.environment, in_environment, "environment")
     plant.Finalize()
-    declaration = CollisionFilterDeclaration().ExcludeWithin(GeometrySet([*arm, *body, *room]))
+    declaration = CollisionFilterDeclaration().ExcludeWithin(GeometrySet([*arm, *body, *obstacles]))
     for i, shape in enumerate(arm):
         partners = [arm[j] for j in np.flatnonzero(arrays.arm_vs_arm[i, :i])]
         partners += [body[j] for j in np.flatnonzero(arrays.arm_vs_body[i])]
-        partners += [room[j] for j in np.flatnonzero(arrays.arm_vs_environment[i])]
+        partners += [obstacles[j] for j in np.flatnonzero(arrays.arm_vs_environment[i])]
         _allow(declaration, shape, partners)
     if joints:
         for i, shape in enumerate(body):
             _allow(
-                declaration, shape, [room[j] for j in np.flatnonzero(arrays.body_vs_environment[i])]
+                declaration,
+                shape,
+                [obstacles[j] for j in np.flatnonzero(arrays.body_vs_environment[i])],
             )
     scene_graph.collision_filter_manager().Apply(declaration)
     return ArmPlant(base, torso, tool, robot)

@@ -170,7 +170,7 @@ class Verdict:
 
 
 class Judge:
-    """Drake's verdict on answers, with the whole robot in the whole room.
+    """Drake's verdict on answers, with the whole robot in the whole environment.
 
     Peers know one distance that everything has to keep, the contact margin; the paddings of some
     of the person's shapes, which our kernel keeps as well, are not asked of them.

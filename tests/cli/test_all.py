@@ -10,7 +10,7 @@ from tests.placement.store.example import METADATA, score_file
 
 ROWS = {
     *((task, "wheelchair") for task in ("shaving", "feeding", "brushing")),
-    *(("shaving", room) for room in ("bed", "bed-no-wall")),
+    *(("shaving", environment) for environment in ("bed", "bed-no-wall")),
     ("bathing", "bed"),
     *(
         (f"scratching_{part}", "bed")

@@ -14,7 +14,7 @@ import tcs
 from tcs.placement.robustness import success_summary
 from tests.placement.store.example import score_file
 
-ROOM = """
+BESIDE = """
 based_on: wheelchair
 name: beside
 title: A few places beside the wheelchair
@@ -29,10 +29,10 @@ grid:
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     folder = tmp_path_factory.mktemp("beside")
-    room = folder / "beside.yaml"
-    room.write_text(ROOM)
+    environment = folder / "beside.yaml"
+    environment.write_text(BESIDE)
     path = folder / "beside.tcs"
-    tcs.save(path, tcs.score("shaving", room))
+    tcs.save(path, tcs.score("shaving", environment))
     return path
 
 

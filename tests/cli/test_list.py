@@ -8,7 +8,9 @@ def test_list_knows_what_ships(tcs_command):
     assert ran.code == 0
     known = ran.json
     assert tuple(task["name"] for task in known["tasks"]) == task_names()
-    assert tuple(room["name"] for room in known["environments"]) == environment_names()
+    assert (
+        tuple(environment["name"] for environment in known["environments"]) == environment_names()
+    )
     assert tuple(robot["name"] for robot in known["robots"]) == robot_names()
 
 
@@ -23,8 +25,11 @@ def test_headings_are_those_of_the_checked_files(tcs_command):
             entry["environments"],
         )
     for entry in known["environments"]:
-        room = load_environment(entry["name"])
-        assert (room.title, " ".join(room.origin.split())) == (entry["title"], entry["origin"])
+        environment = load_environment(entry["name"])
+        assert (environment.title, " ".join(environment.origin.split())) == (
+            entry["title"],
+            entry["origin"],
+        )
     for entry in known["robots"]:
         assert load_robot(entry["name"]).title == entry["title"]
 

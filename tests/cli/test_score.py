@@ -139,7 +139,9 @@ def test_pictures_have_a_known_format_and_a_place(tcs_command, small_file, tmp_p
     [
         pytest.param(("shavin",), "unknown task 'shavin'.*Did you mean 'shaving'", id="task"),
         pytest.param(
-            ("shaving", "--environment", "wheelchiar"), "Did you mean 'wheelchair'", id="room"
+            ("shaving", "--environment", "wheelchiar"),
+            "Did you mean 'wheelchair'",
+            id="environment",
         ),
         pytest.param(("shaving", "--robot", "pr3"), "unknown robot 'pr3'", id="robot"),
         pytest.param(
@@ -167,8 +169,8 @@ def test_unknown_names(tcs_command, tmp_path, words, said):
     ],
 )
 def test_impossible_grids(tcs_command, tmp_path, count, said):
-    room = write_environment(tmp_path, "corner", CORNER | {"base_x": (0.95, 0.1, count)})
-    ran = tcs_command("score", "shaving", "--environment", room, "--out", tmp_path / "o.tcs")
+    environment = write_environment(tmp_path, "corner", CORNER | {"base_x": (0.95, 0.1, count)})
+    ran = tcs_command("score", "shaving", "--environment", environment, "--out", tmp_path / "o.tcs")
     assert ran.code == 1
     assert ran.err.count("\n") == 1
     assert said in ran.err

@@ -8,7 +8,7 @@ import pytest
 import tcs
 
 
-def test_the_room_is_scored_as_it_is_found(tcs_command, corner, tmp_path, monkeypatch):
+def test_the_environment_is_scored_as_observed(tcs_command, corner, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = (
         "--environment",

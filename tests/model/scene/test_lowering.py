@@ -139,13 +139,13 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
     ):
         assert [names[i] for i in shapes.body] == [part.name for part in of_group(scene, group)]
     assert len(set(lowered.robot_bodies)) == len(lowered.robot_bodies)
-    room = {
+    padding = {
         lowered.environment_bodies[i]: pad
         for i, pad in zip(arrays.environment.body, arrays.environment.pad, strict=True)
     }
-    assert room["person::head_center"] == wheelchair.padding["person::head_center"]
-    assert room["wheelchair::seat"] == wheelchair.padding["wheelchair::base_link"]
-    assert room["floor"] == 0.0
+    assert padding["person::head_center"] == wheelchair.padding["person::head_center"]
+    assert padding["wheelchair::seat"] == wheelchair.padding["wheelchair::base_link"]
+    assert padding["floor"] == 0.0
     assert not arrays.arm.pad.any()
     assert arrays.margin == wheelchair.contact_margin
     # A user reads these: parts of the chair one by one, parts of the body as a whole.
