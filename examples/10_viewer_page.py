@@ -1,6 +1,6 @@
-"""Write the answer as one page that opens offline, to look at and to pass on.
+"""Export a set as one page that opens offline.
 
-`tcs view FILE --export PAGE` does the same; here it is step by step.
+`tcs view FILE --export PAGE` does the same; this example does it step by step.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from tcs.placement.scoring import rebuild_scene
 
 
 def main(folder: Path = Path("out/examples")) -> None:
-    """Score feeding, and write the best set at work as a page."""
+    """Score feeding, and export the best set as a page."""
     folder.mkdir(parents=True, exist_ok=True)
     file = tcs.score("feeding")
-    # The scene is built anew from the file, which names its models and knows their digest.
+    # The scene is rebuilt from the models that the file names, whose digest it holds.
     job, scene, _ = rebuild_scene(file)
-    # What came of each configuration; table 0 is the only one where nothing is observed.
-    answers = ViewedSet.of(file, 0, file.nominal.sets.best)
-    props = SceneObjects(scene, job.task, answers, meshes=False)
-    text = export_page(open_meshcat(), props, answers, title="Feeding in the wheelchair, PR2")
+    # Without an observed state, table 0 is the only one.
+    viewed = ViewedSet.of(file, 0, file.nominal.sets.best)
+    objects = SceneObjects(scene, job.task, viewed, meshes=False)
+    text = export_page(open_meshcat(), objects, viewed, title="Feeding in the wheelchair, PR2")
     path = folder / "feeding.html"
     path.write_text(text, encoding="utf-8")
     print(f"wrote {path}, {len(text) / 1e6:.1f} MB: open it in a browser")

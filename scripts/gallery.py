@@ -70,7 +70,7 @@ of the best single, but its code requires a hundredth more (`tcs score --rules c
 
 
 @dataclass(frozen=True)
-class Drawn:
+class GalleryPicture:
     """A picture of the gallery with its text."""
 
     name: str
@@ -146,7 +146,7 @@ def score_file(row: tuple[str, str], options: argparse.Namespace) -> ScoreFile:
     return file
 
 
-def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
+def from_behind(files: dict[tuple[str, str], ScoreFile]) -> GalleryPicture:
     """Return the paper's Figure 1: shaving in a bed without a wall, from one place."""
     free, walled = files["shaving", "bed-no-wall"], files["shaving", "bed"]
     shown = ShownSet.of(free, None, max_members=1)
@@ -163,7 +163,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
         f"from it {alone[0]:.0%} of the goals are reached, P_M {alone[1]:.3f}. With the wall that "
         f"base pose is blocked, and the best single reaches {behind[0]:.0%}, P_M {behind[1]:.3f}."
     )
-    return Drawn(
+    return GalleryPicture(
         "gallery-figure-1",
         member_figure(free, shown, 0),
         _DPI,
@@ -173,7 +173,7 @@ def from_behind(files: dict[tuple[str, str], ScoreFile]) -> Drawn:
     )
 
 
-def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
+def scene_of(row: tuple[str, str], file: ScoreFile) -> GalleryPicture:
     """Return a row of Figure 6: the robot at each base pose of the best set."""
     shown = ShownSet.of(file, None)
     sets = file.nominal.sets
@@ -192,7 +192,7 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
         f"{reachability:.0%} of the goals, P_M {manipulability:.3f} "
         f"({file.metadata['measure']}); {stops}.{beside}"
     )
-    return Drawn(
+    return GalleryPicture(
         f"gallery-{row[0]}-{row[1]}",
         scene_figure(file, shown),
         _DPI,
@@ -202,13 +202,13 @@ def scene_of(row: tuple[str, str], file: ScoreFile) -> Drawn:
     )
 
 
-def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
+def maps(files: dict[tuple[str, str], ScoreFile]) -> list[GalleryPicture]:
     """Return the maps: the one of the README, and one for each state of the bed."""
     chair, bed = files["shaving", "wheelchair"], files["bathing", "bed"]
     chosen = ShownSet.of(chair, HERE)
     command = "tcs map shaving-wheelchair-pr2.tcs --out map.png --here 1.4 -1.2 180"
     return [
-        Drawn(
+        GalleryPicture(
             "map",
             map_figure(chair, chosen),
             _MAP_DPI,
@@ -219,7 +219,7 @@ def maps(files: dict[tuple[str, str], ScoreFile]) -> list[Drawn]:
             "vision deficiencies; tests simulate protanopia, deuteranopia and tritanopia.",
             "A wheelchair and the person in it from above, with base positions coloured by score.",
         ),
-        Drawn(
+        GalleryPicture(
             "states",
             states_figure(bed, ShownSet.of(bed, None)),
             _MAP_DPI,

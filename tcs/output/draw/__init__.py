@@ -1,4 +1,8 @@
-"""Pictures of scores and scenes, as matplotlib figures; nothing here opens a window."""
+"""Pictures of scores and scenes.
+
+In: scores, place maps, solids and base footprints. Out: matplotlib figures, their bytes and files,
+without a display.
+"""
 
 from __future__ import annotations
 

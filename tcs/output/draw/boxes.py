@@ -1,4 +1,4 @@
-"""Box plots: how samples of several methods are spread, group by group."""
+"""Box plots of the samples of several methods, group by group."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
-"""Blue, orange, green, purple of Okabe and Ito: told apart by who is colour-blind, and in grey."""
+"""Blue, orange, green, purple of Okabe and Ito: distinct in grey and under colour
+vision deficiency."""
 _INK = "#222222"
 _HEIGHT = 0.26
 """Height of a box in inches."""
 _GAP = 0.6
-"""Room between two groups, in boxes."""
+"""Gap between two groups, in boxes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +28,16 @@ class BoxPlot:
     """The samples of one method."""
 
     series: int
-    """Which of the figure's series: colour and name."""
+    """Number of the series, which sets colour and name."""
     samples: NDArray[np.float64]
     """Shape (n,)."""
     reference: tuple[float, float] | None = None
-    """Mean and standard deviation that somebody else has published."""
+    """Published mean and standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoxGroup:
-    """Boxes that belong together, one below the other."""
+    """Boxes one below the other, under one name."""
 
     name: str
     boxes: Sequence[BoxPlot]
@@ -45,16 +46,16 @@ class BoxGroup:
 def draw_boxes(
     groups: Sequence[BoxGroup], series: Sequence[str], *, label: str, reference: str = ""
 ) -> Figure:
-    """Return box plots of groups of samples, lying, the first group on top.
+    """Return horizontal box plots of groups of samples, the first group on top.
 
-    A box spans the middle half of the samples, its line is the median, whiskers reach the 5th and
-    95th percentile and the dot is the mean. The outermost samples are small rings.
+    A box spans the middle half of the samples. Its line is the median, its whiskers reach the 5th
+    and 95th percentile, and the dot is the mean; samples beyond are small rings.
 
     Args:
-        groups: What to draw.
-        series: Names of the methods, by number.
-        label: What the samples are, with their unit.
-        reference: What to call the published figures.
+        groups: The groups.
+        series: Names of the series.
+        label: Name of the samples, with their unit.
+        reference: Name of the published figures.
     """
     rows = sum(len(group.boxes) + _GAP for group in groups)
     figure = Figure(figsize=(8.2, 1.3 + _HEIGHT * rows), layout="constrained")
@@ -99,7 +100,7 @@ def _draw(axes: Axes, y: float, box: BoxPlot) -> None:
         medianprops={"color": _INK, "lw": 1.6},
         whiskerprops={"color": _INK, "lw": 0.8},
         capprops={"color": _INK, "lw": 0.8},
-        # In the series' colour: where all samples are alike, the dot is all there is of a box.
+        # In the colour of the series: a box of equal samples consists of its dot.
         meanprops={"marker": "o", "mfc": COLOURS[box.series], "mec": _INK, "ms": 6.0},
         flierprops={"marker": "o", "mfc": "none", "mec": "#8a939c", "ms": 2.5, "mew": 0.6},
     )

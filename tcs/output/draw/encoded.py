@@ -1,4 +1,4 @@
-"""Figures as bytes, to be put into a page."""
+"""Figures as bytes for pages."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 _DPI = 96
-_SAID_BY_DEFAULT = ("Creator", "Date", "Format", "Type")
-"""What matplotlib writes into an SVG if not told otherwise; the page has it already."""
+_DEFAULT_METADATA = ("Creator", "Date", "Format", "Type")
+"""Metadata that matplotlib writes into an SVG by default; the page has its own."""
 
 
 def as_svg(figure: Figure, name: str) -> bytes:
@@ -18,12 +18,12 @@ def as_svg(figure: Figure, name: str) -> bytes:
 
     Args:
         figure: The figure.
-        name: Any text that no other figure of the page has: it keeps their inner names apart, and
-            the same figure gives the same bytes.
+        name: A text unique within the page. It separates the ids of its figures, and makes the
+            bytes of a figure reproducible.
     """
     stream = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
-        figure.savefig(stream, format="svg", metadata=dict.fromkeys(_SAID_BY_DEFAULT))
+        figure.savefig(stream, format="svg", metadata=dict.fromkeys(_DEFAULT_METADATA))
     return stream.getvalue()
 
 
@@ -32,16 +32,16 @@ def as_png(figure: Figure, dpi: float = _DPI, *, colours: int | None = 256) -> b
 
     Args:
         figure: The figure.
-        dpi: Pixels in an inch.
-        colours: How many colours it may have; 256 take a fifth of the room. None for all of them,
-            where colours are a scale to be read.
+        dpi: Pixels per inch.
+        colours: Number of colours; 256 take a fifth of the size. None keeps all of them, for
+            figures with a colour scale.
     """
     full, small = io.BytesIO(), io.BytesIO()
     figure.savefig(full, format="png", dpi=dpi)
     picture = Image.open(full).convert("RGB")
     if colours is not None:
-        # An octree keeps small patches of a colour of their own, such as the goals; the median
-        # cut lets them go.
+        # An octree keeps small patches of a distinct colour, such as the goals; the median cut
+        # drops them.
         picture = picture.quantize(colours, method=Image.Quantize.FASTOCTREE)
     picture.save(small, "png", optimize=True)
     return small.getvalue()

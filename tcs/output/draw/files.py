@@ -1,4 +1,4 @@
-"""Write pictures, wholly or not at all."""
+"""Picture files, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tcs.errors import OutputError
 from tcs.files.writing import whole_file
 
 FORMATS = ("png", "pdf", "svg")
-"""What a picture may be written as; the end of its name says which."""
+"""Formats of pictures, given by the suffix of the file name."""
 
 
 def check_format(path: Path) -> str:
-    """Return the format that a file name asks for.
+    """Return the format of a picture file.
 
     Raises:
-        OutputError: If the name ends in none of `FORMATS`.
+        OutputError: If the name does not end in one of `FORMATS`.
     """
     ending = path.suffix.lower().removeprefix(".")
     if ending not in FORMATS:
@@ -30,7 +30,7 @@ def save_figure(path: Path, figure: Figure, *, dpi: float = 130.0) -> None:
     """Write a figure; an older file of that name stays until the new one is complete.
 
     Raises:
-        OutputError: If its name ends in none of `FORMATS`, or it cannot be written there.
+        OutputError: If its name does not end in one of `FORMATS`, or it cannot be written there.
     """
     ending = check_format(path)
     with whole_file(path, "Picture") as stream:

@@ -1,4 +1,4 @@
-"""Parts of a picture from above: score cells, shadows of the room, robots to scale, a scale bar."""
+"""Parts of a map: score cells, the environment's outlines, base footprints, a scale bar."""
 
 from __future__ import annotations
 
@@ -23,38 +23,38 @@ from tcs.output.words import member_text
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
 ARROW = 0.45
-"""Length of a heading arrow [m]: a little beyond the front of a mobile robot."""
+"""Length of a heading arrow [m]: it ends ahead of the front of a mobile robot."""
 MARGIN = 0.05
-"""Free room around what is shown [m]."""
+"""Margin around what is shown [m]."""
 _EDGE = "#00000066"
-"""Around each shadow, so that it keeps its shape where colours are hard to tell apart."""
+"""Outline of each shape, visible where its colour resembles that below."""
 
 
 @dataclass(frozen=True, eq=False)
 class BaseFootprint:
-    """A robot standing somewhere, as seen from above."""
+    """The base of a robot from above."""
 
     configuration: InitialConfiguration
-    """Where, in the frame of the map."""
+    """Its configuration, in the frame of the map."""
     outline: FloatArray
     """Outline of its base in the base's own frame [m], shape (n, 2)."""
 
     @property
     def polygon(self) -> FloatArray:
-        """The outline where it stands [m], shape (n, 2)."""
+        """The outline in the frame of the map [m], shape (n, 2)."""
         at = self.configuration
         c, s = math.cos(at.base_yaw), math.sin(at.base_yaw)
         return np.asarray(self.outline @ np.array([[c, s], [-s, c]]) + [at.base_x, at.base_y])
 
 
 def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: float) -> QuadMesh:
-    """Colour each place by its value, grey where the robot cannot stand at all.
+    """Colour each base position by its value, grey where the base is blocked.
 
     Args:
         axes: Where to.
-        places: The places.
-        values: A value for each; no colour where it is 0, shape (X, Y).
-        most: The value at the upper end of the scale.
+        places: The base positions.
+        values: Value of each, no colour where it is 0, shape (X, Y).
+        most: Value at the upper end of the scale.
     """
     edges = (cell_edges(places.x), cell_edges(places.y))
     blocked = np.ma.masked_where(places.free, np.ones(places.free.shape))
@@ -63,10 +63,10 @@ def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: 
     return axes.pcolormesh(*edges, scored.T, cmap=SCALE, vmin=0.0, vmax=most, rasterized=True)
 
 
-def draw_room(axes: Axes, room: Sequence[Solid]) -> None:
-    """Draw shadows on the floor, what is lower first: the person sits on the chair."""
-    # By their middles: a raised head rest reaches higher than the head that lies before it.
-    ordered = sorted(room, key=lambda solid: float(solid.corners[:, 2].mean()))
+def draw_environment(axes: Axes, environment: Sequence[Solid]) -> None:
+    """Draw the outlines of solids from above, lower ones first: the person sits on the chair."""
+    # Ordered by their centres: a raised head rest reaches higher than the head before it.
+    ordered = sorted(environment, key=lambda solid: float(solid.corners[:, 2].mean()))
     axes.add_collection(
         PolyCollection(
             [solid.footprint for solid in ordered],
@@ -80,32 +80,32 @@ def draw_room(axes: Axes, room: Sequence[Solid]) -> None:
 
 
 def draw_base(
-    axes: Axes, stand: BaseFootprint, *, label: str = "", is_here: bool = False, size: float = 1.0
+    axes: Axes, base: BaseFootprint, *, label: str = "", is_here: bool = False, size: float = 1.0
 ) -> None:
-    """Draw the base of a robot to scale, and which way it faces.
+    """Draw the base of a robot to scale, with its heading.
 
     Args:
-        axes: Where to.
-        stand: The robot.
-        label: What to write in its middle.
-        is_here: Whether it is where the robot is now, rather than a place to go to.
-        size: Of lines and letters.
+        axes: The axes.
+        base: The base.
+        label: Text at its origin.
+        is_here: Whether it is the current base pose rather than a member of the set.
+        size: Scale of lines and text.
     """
-    at, colour = stand.configuration, HERE if is_here else MEMBER
+    at, colour = base.configuration, HERE if is_here else MEMBER
     cased: list[AbstractPathEffect] = [
         Stroke(linewidth=4.4 * size, foreground=CASING),
         Normal(),
     ]
     outline = Polygon(
-        stand.polygon,
+        base.polygon,
         facecolor=f"{CASING}50",
         edgecolor=colour,
         lw=2.0 * size,
         ls="--" if is_here else "-",
         zorder=5,
     )
-    # Around the line alone: a casing would fill the outline.
-    axes.add_patch(Polygon(stand.polygon, fill=False, edgecolor=CASING, lw=4.4 * size, zorder=4.9))
+    # A path effect would fill the outline: the casing is a patch of its own.
+    axes.add_patch(Polygon(base.polygon, fill=False, edgecolor=CASING, lw=4.4 * size, zorder=4.9))
     axes.add_patch(outline)
     tip = (at.base_x + ARROW * math.cos(at.base_yaw), at.base_y + ARROW * math.sin(at.base_yaw))
     arrow = {
@@ -133,13 +133,11 @@ def draw_base(
 
 
 def draw_scale_bar(axes: Axes, *, size: float = 1.0) -> None:
-    """Draw a bar in the lower left corner that is as long on the floor as it says.
-
-    Call it when the limits of the axes are set.
+    """Draw a scale bar in the lower left corner, for the current limits of the axes.
 
     Args:
-        axes: Where to.
-        size: Of lines and letters.
+        axes: The axes.
+        size: Scale of lines and text.
     """
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     length = 1.0 if x1 - x0 > 2.5 else 0.5
@@ -163,7 +161,7 @@ def draw_scale_bar(axes: Axes, *, size: float = 1.0) -> None:
 
 
 def frame(axes: Axes, points: Iterable[FloatArray], margin: float = MARGIN) -> None:
-    """Show everything that has corners at these points [m], to scale, and nothing else."""
+    """Set the limits of axes to the bounding box of points [m], to scale."""
     found = np.concatenate(list(points))
     low, high = found.min(axis=0), found.max(axis=0)
     axes.set_aspect("equal")
@@ -172,32 +170,34 @@ def frame(axes: Axes, points: Iterable[FloatArray], margin: float = MARGIN) -> N
 
 
 def cell_edges(centres: FloatArray) -> FloatArray:
-    """Return the borders of cells around evenly spaced centres, one more than there are."""
+    """Return the edges of cells around evenly spaced centres, one more than centres."""
     step = float(centres[1] - centres[0]) if len(centres) > 1 else 0.05
     return np.append(centres - step / 2.0, centres[-1] + step / 2.0)
 
 
-def legend_handles(room: Sequence[Solid], *, robot: bool) -> list[Artist]:
-    """Return what goes into a legend: the room, places without a colour, and robots."""
-    kinds = [kind for kind in Category if any(solid.category is kind for solid in room)]
-    handles: list[Artist] = [Patch(facecolor=kind.colour, label=kind.label) for kind in kinds]
-    handles.append(Patch(facecolor=BLOCKED, label="robot cannot stand here"))
-    handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="no goal in reach"))
+def legend_handles(environment: Sequence[Solid], *, robot: bool) -> list[Artist]:
+    """Return the legend of solids, base positions without a colour, and bases."""
+    shown = {solid.category for solid in environment}
+    handles: list[Artist] = [
+        Patch(facecolor=one.colour, label=one.label) for one in Category if one in shown
+    ]
+    handles.append(Patch(facecolor=BLOCKED, label="base blocked"))
+    handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="no goal reached"))
     if robot:
-        label = "robot's base to scale, and its heading"
+        label = "robot's base to scale, with heading"
         handles.append(Patch(facecolor="none", edgecolor=MEMBER, lw=2.0, label=label))
     return handles
 
 
-def stops(members: Sequence[BaseFootprint], here: BaseFootprint | None) -> list[Artist]:
-    """Return where robot and members stand in numbers, for a legend."""
+def pose_handles(members: Sequence[BaseFootprint], here: BaseFootprint | None) -> list[Artist]:
+    """Return the legend of the current configuration and of the members."""
     handles: list[Artist] = []
     if here is not None:
-        said = member_text(here.configuration.to_json())
-        handles.append(Patch(facecolor="none", edgecolor=HERE, ls="--", label=f"now: {said}"))
-    for number, stand in enumerate(members, start=1):
-        said = member_text(stand.configuration.to_json())
+        text = member_text(here.configuration.to_json())
+        handles.append(Patch(facecolor="none", edgecolor=HERE, ls="--", label=f"now: {text}"))
+    for number, base in enumerate(members, start=1):
+        text = member_text(base.configuration.to_json())
         handles.append(
-            Line2D([], [], ls="none", color=MEMBER, marker="o", label=f"{number}: {said}")
+            Line2D([], [], ls="none", color=MEMBER, marker="o", label=f"{number}: {text}")
         )
     return handles

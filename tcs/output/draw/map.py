@@ -1,4 +1,4 @@
-"""The map: how good every base place is, and where the chosen members stand."""
+"""The map: the best scores at each base position, and the members of a set."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from tcs.output.draw.solids import Solid
 from tcs.output.words import REACHABILITY_LABEL, axis_title, manipulability_label
 from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
-_TITLE_WIDTH = 115
-"""Letters that fit into a line of the title."""
+_TITLE_WIDTH = 130
+"""Characters per line of the title."""
 _PANEL_WIDTH = 70
-"""Letters that fit above a panel."""
+"""Characters per line above a panel."""
 _BEYOND = 0.5
-"""How far beyond the grid the room is shown [m]: the end of a bed, not all of a long wall."""
+"""Extent of the environment shown beyond the grid [m]: the end of a bed, not a whole wall."""
 
 
 def draw_map(
     places: PlaceMap,
-    room: Sequence[Solid],
+    environment: Sequence[Solid],
     members: Sequence[BaseFootprint],
     *,
     here: BaseFootprint | None = None,
@@ -36,15 +36,15 @@ def draw_map(
     subtitle: str = "",
     measure: str = DEFAULT_MEASURE,
 ) -> Figure:
-    """Return a picture of the best scores per base place, beside each other: P_R and P_M.
+    """Return two maps side by side: the best P_R and P_M at each base position.
 
     Args:
         places: The scores.
-        room: Furniture, person and obstacles, drawn as their shadows on the floor.
-        members: The chosen configurations in the order of the tour; none is fine.
-        here: Where the robot is now.
-        title: First line, for a person.
-        subtitle: Second line, e.g. the scores of the chosen set.
+        environment: Furniture, person and obstacles, drawn as their outlines from above.
+        members: The members of the set in the order of the tour; may be empty.
+        here: The current base pose.
+        title: First line.
+        subtitle: Second line, e.g. the scores of the set.
         measure: Name of the dexterity measure behind P_M.
     """
     figure = Figure(figsize=(12.4, 7.0), layout="constrained")
@@ -54,14 +54,14 @@ def draw_map(
         (left, 100.0 * places.reachability, 100.0, REACHABILITY_LABEL),
         (right, places.manipulability, top or 1.0, manipulability_label(measure)),
     )
-    shown = [stand.polygon for stand in (*members, here) if stand is not None]
-    floor_plan.frame(left, [_grid_and_room(places, room), *shown])
-    over = textwrap.fill(f"best of all {places.over_words} at each place", _PANEL_WIDTH)
+    shown = [base.polygon for base in (*members, here) if base is not None]
+    floor_plan.frame(left, [_grid_and_environment(places, environment), *shown])
+    over = textwrap.fill(f"best of all {places.over_words} at each base position", _PANEL_WIDTH)
     for axes, values, most, label in panels:
         mesh = floor_plan.draw_cells(axes, places, values, most)
         figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
         axes.set_title(over, fontsize=10)
-        floor_plan.draw_room(axes, room)
+        floor_plan.draw_environment(axes, environment)
         _draw_tour(axes, members, here)
         floor_plan.draw_scale_bar(axes)
         axes.set_aspect("equal")
@@ -69,30 +69,32 @@ def draw_map(
     left.set_ylabel(axis_title("base_y"))
     lines = [*textwrap.wrap(title, _TITLE_WIDTH), *textwrap.wrap(subtitle, _TITLE_WIDTH)]
     figure.suptitle("\n".join(lines), fontsize=13)
-    handles = floor_plan.legend_handles(room, robot=bool(members))
+    handles = floor_plan.legend_handles(environment, robot=bool(members))
     if here is not None:
-        handles.append(Line2D([], [], ls=":", color=HERE, label="way, as the travel cost has it"))
+        handles.append(
+            Line2D([], [], ls=":", color=HERE, label="straight-line path of the travel cost")
+        )
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=10)
-    stops = floor_plan.stops(members, here)
+    stops = floor_plan.pose_handles(members, here)
     figure.legend(handles=stops, loc="outside lower right", frameon=False, fontsize=10)
     return figure
 
 
-def _grid_and_room(places: PlaceMap, room: Sequence[Solid]) -> FloatArray:
-    """Return corners of what is shown: the grid and what stands in it [m], shape (n, 2)."""
+def _grid_and_environment(places: PlaceMap, environment: Sequence[Solid]) -> FloatArray:
+    """Return the corners of the grid and of the environment within it [m], shape (n, 2)."""
     edges = (floor_plan.cell_edges(places.x), floor_plan.cell_edges(places.y))
     low, high = np.array([[edge[0], edge[-1]] for edge in edges]).T
-    around = [np.clip(s.footprint, low - _BEYOND, high + _BEYOND) for s in room]
+    around = [np.clip(s.footprint, low - _BEYOND, high + _BEYOND) for s in environment]
     return np.concatenate([np.stack([low, high]), *around])
 
 
 def _draw_tour(axes: Axes, members: Sequence[BaseFootprint], here: BaseFootprint | None) -> None:
-    """Draw where the robot is, where it is to go, and the straight lines between."""
-    stops = [stand for stand in (here, *members) if stand is not None]
+    """Draw the current base pose, the members, and the straight lines between."""
+    stops = [base for base in (here, *members) if base is not None]
     line = np.array([[s.configuration.base_x, s.configuration.base_y] for s in stops])
     if here is not None:
         if len(stops) > 1:
             axes.plot(line[:, 0], line[:, 1], ":", color=HERE, linewidth=1.4, zorder=4)
         floor_plan.draw_base(axes, here, is_here=True)
-    for number, stand in enumerate(members, start=1):
-        floor_plan.draw_base(axes, stand, label=str(number))
+    for number, base in enumerate(members, start=1):
+        floor_plan.draw_base(axes, base, label=str(number))

@@ -17,8 +17,8 @@ from tcs.output.draw.raster import Mesh, Raster, rasterise_scene
 from tcs.output.draw.shading import shade
 from tcs.output.draw.solids import Category, FloatArray, Solid
 
-_LETTERS = 56
-"""Letters of the title that fit above a view."""
+_TITLE_WIDTH = 66
+"""Characters of the title per line above a view."""
 _UNHIDDEN = 0.6
 """Fraction of the robot and person that a view has to show, of what the best view shows."""
 _GOALS = {Category.GOAL: 1.0, Category.CURRENT_GOAL: 5.0}
@@ -69,14 +69,14 @@ def draw_scene(views: Sequence[ScenePanel], *, title: str) -> Figure:
         caption = view.caption if is_whole else f"{view.caption}\n({_LEFT_OUT})"
         axes.set_title(caption, fontsize=11)
     if title:
-        width = _LETTERS * len(views)
+        width = _TITLE_WIDTH * len(views)
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, width)]
         figure.suptitle("\n".join(lines), fontsize=13)
     shown = {solid.category for view in views for solid in view.solids}
     handles = [
-        Patch(facecolor=kind.colour, edgecolor="#555555", lw=0.5, label=kind.label)
-        for kind in Category
-        if kind in shown
+        Patch(facecolor=one.colour, edgecolor="#555555", lw=0.5, label=one.label)
+        for one in Category
+        if one in shown
     ]
     columns = min(3 * len(views), 6)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)

@@ -1,4 +1,4 @@
-"""Small scatter plots beside each other: how well one figure predicts another."""
+"""Small scatter plots, one panel for each group of points."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ class Cloud:
     points: Sequence[tuple[FloatArray, FloatArray]]
     """x and y of each series of points."""
     marked: tuple[float, float] | None = None
-    """A point to be pointed out."""
+    """A point to highlight."""
 
 
 def draw_clouds(
     clouds: Sequence[Cloud], series: Sequence[str], *, x_label: str, y_label: str
 ) -> Figure:
-    """Return a panel for each cloud, each with axes of its own.
+    """Return a figure with a panel for each cloud, each with its own axes.
 
     Args:
-        clouds: What to draw.
-        series: Names of the series of points, by number.
-        x_label: What x is, with its unit.
-        y_label: What y is, with its unit.
+        clouds: The panels.
+        series: Names of the series of points.
+        x_label: Name of x, with its unit.
+        y_label: Name of y, with its unit.
     """
     columns = min(_COLUMNS, max(len(clouds), 1))
     rows = math.ceil(len(clouds) / columns)

@@ -1,4 +1,4 @@
-"""What pictures are made of: convex solids, each of a kind that has a colour."""
+"""Convex solids of pictures, each of a category with a colour."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUND = 16
 
 
 class Category(Enum):
-    """What a solid is of: how a legend calls it, and its colour."""
+    """What a solid belongs to, with its name in a legend and its colour."""
 
     FURNITURE = ("furniture", colours.FURNITURE)
     PERSON = ("person", colours.PERSON)
@@ -32,12 +32,12 @@ class Category(Enum):
 
     @property
     def label(self) -> str:
-        """Name for a person."""
+        """Name in a legend."""
         return self.value[0]
 
     @property
     def colour(self) -> str:
-        """Colour for matplotlib."""
+        """Colour, as matplotlib reads it."""
         return self.value[1]
 
 
@@ -54,7 +54,7 @@ class Solid:
         """Return the solid of corners given in a frame of their own.
 
         Args:
-            category: What it is of.
+            category: What it belongs to.
             corners: Corners in their own frame S [m], shape (n, 3).
             R: R_WS, orientation of S in the frame of the picture, shape (3, 3).
             p: p_WoSo_W, origin of S there [m], shape (3,).
@@ -73,7 +73,7 @@ class Solid:
 
     @cached_property
     def footprint(self) -> FloatArray:
-        """Its shadow on the floor: corners of a convex polygon [m], in order, shape (k, 2)."""
+        """Its outline from above: corners of a convex polygon [m], in order, shape (k, 2)."""
         return outline(self.corners[:, :2])
 
 
@@ -82,31 +82,31 @@ def outline(points: FloatArray) -> FloatArray:
     return np.asarray(points[ConvexHull(points).vertices])
 
 
-def primitive_corners(kind: int, size: tuple[float, float, float]) -> FloatArray:
+def primitive_corners(shape: int, size: tuple[float, float, float]) -> FloatArray:
     """Return corners of a collision shape in its own frame [m], shape (n, 3).
 
     Args:
-        kind: `SPHERE`, `CAPSULE` or `BOX` of the kernel.
+        shape: `SPHERE`, `CAPSULE` or `BOX` of the kernel.
         size: Its sizes in the kernel's terms: radius; radius, half length; half sizes [m].
 
     Raises:
-        TcsError: If there is no such kind.
+        TcsError: If there is no such shape.
 
     >>> primitive_corners(BOX, (1.0, 2.0, 3.0)).max(axis=0).tolist()
     [1.0, 2.0, 3.0]
     """
-    if kind == BOX:
+    if shape == BOX:
         signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
         return np.asarray(signs * np.array(size))
-    if kind not in (SPHERE, CAPSULE):
-        raise TcsError(f"no picture of a shape of kind {kind}: known are sphere, capsule, box.")
-    half_length = size[1] if kind == CAPSULE else 0.0
-    ball = size[0] * _unit_ball()
-    cap = ball[ball[:, 2] >= 0.0] + np.array([0.0, 0.0, half_length])
+    if shape not in (SPHERE, CAPSULE):
+        raise TcsError(f"no picture of shape {shape}: known are sphere, capsule, box.")
+    half_length = size[1] if shape == CAPSULE else 0.0
+    sphere = size[0] * _unit_sphere()
+    cap = sphere[sphere[:, 2] >= 0.0] + np.array([0.0, 0.0, half_length])
     return np.concatenate([cap, cap * np.array([1.0, 1.0, -1.0])])
 
 
-def _unit_ball() -> FloatArray:
+def _unit_sphere() -> FloatArray:
     """Return points on a unit sphere along circles of latitude, poles included."""
     around = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
     up = np.linspace(0.0, np.pi / 2.0, _ROUND // 4 + 1)

@@ -1,4 +1,4 @@
-"""Small multiples: the same map for every state of the environment, all in one scale."""
+"""Small multiples: the map of each state of the environment, all in one scale."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tcs.placement.tables.place_map import FloatArray, PlaceMap
 
 Score = Literal["reachability", "manipulability"]
 _PANEL = 2.5
-"""Width of a panel in inches."""
+"""Width of a panel [in]."""
 _LINES = 0.7
-"""Size of lines and letters, beside those of a map that has the page to itself."""
-_ROOM_AROUND = 0.15
-"""What is shown around places, person and robots [m]."""
+"""Scale of lines and text, relative to a single map."""
+_MARGIN = 0.15
+"""Margin around base positions, person and bases [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,11 @@ class StatePanel:
     """The map of one state of the environment."""
 
     places: PlaceMap
-    """What each place is worth in this state."""
-    room: Sequence[Solid]
-    """Furniture, person and obstacles as they are then."""
+    """The scores in this state."""
+    environment: Sequence[Solid]
+    """Furniture, person and obstacles in this state."""
     members: Sequence[tuple[int, BaseFootprint]]
-    """Members of the chosen set that want this state, each with its number in the tour."""
+    """Members of the set with this state, each with its number in the tour."""
 
 
 def draw_states(
@@ -52,26 +52,26 @@ def draw_states(
 ) -> Figure:
     """Return a picture with a panel for each state of the environment.
 
-    Each panel says what its best place is worth. All show the same part of the floor: every place
-    that is worth anything in any state, the person, and the chosen members.
+    The title of a panel is its best score. All panels show the same part of the floor: every base
+    position that reaches a goal in any state, the person, and the members of the set.
 
     Args:
         panels: Row by row, from the top.
-        rows: What the states of each row have in common; "" where that goes without saying.
-        columns: What those of each column have in common.
-        members: The chosen configurations in the order of the tour.
-        title: First line, for a person.
+        rows: Settings that the states of each row share; "" for none.
+        columns: Settings that the states of each column share.
+        members: The members of the set in the order of the tour.
+        title: First line.
         subtitle: Second line.
-        score: Which score the colours stand for.
+        score: Score that the colours show.
         measure: Name of the dexterity measure behind P_M.
     """
-    points = _part_of_the_floor(panels)
+    points = _shown_points(panels)
     low, high = points.min(axis=0), points.max(axis=0)
     tall = float(np.clip((high - low)[1] / (high - low)[0], 0.5, 1.6))
     size = (_PANEL * len(columns) + 1.6, _PANEL * tall * len(rows) + 1.9 + 0.24 * len(members))
     figure = Figure(figsize=(max(size[0], 7.0), size[1]), layout="constrained")
     grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
-    floor_plan.frame(grid[0, 0], [points], _ROOM_AROUND)
+    floor_plan.frame(grid[0, 0], [points], _MARGIN)
     factor = 100.0 if score == "reachability" else 1.0
     values = [[factor * getattr(panel.places, score) for panel in row] for row in panels]
     best = max(float(one.max(initial=0.0)) for row in values for one in row)
@@ -81,7 +81,7 @@ def draw_states(
         for j, panel in enumerate(row):
             axes = grid[i, j]
             mesh = floor_plan.draw_cells(axes, panel.places, values[i][j], most)
-            _draw_panel(axes, panel, _said(float(values[i][j].max(initial=0.0)), score))
+            _draw_panel(axes, panel, _best_text(float(values[i][j].max(initial=0.0)), score))
             if i == 0:
                 axes.annotate(
                     columns[j], (0.5, 1.0), (0, 22), xycoords="axes fraction",
@@ -98,40 +98,42 @@ def draw_states(
         figure.colorbar(mesh, ax=list(grid.ravel()), label=label, shrink=0.6, aspect=30)
     width = int(9.5 * figure.get_figwidth())
     lines = [*textwrap.wrap(title, width), *textwrap.wrap(subtitle, width)]
-    lines.append(f"Each place: best of all {panels[0][0].places.over_words}.")
+    lines.append(f"Best of all {panels[0][0].places.over_words} at each base position.")
     figure.suptitle("\n".join(lines), fontsize=11)
-    room = [solid for row in panels for panel in row for solid in panel.room]
-    handles = floor_plan.legend_handles(room, robot=bool(members))
-    handles += floor_plan.stops(members, None)
+    environment = [solid for row in panels for panel in row for solid in panel.environment]
+    handles = floor_plan.legend_handles(environment, robot=bool(members))
+    handles += floor_plan.pose_handles(members, None)
     figure.legend(handles=handles, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
     return figure
 
 
-def _draw_panel(axes: Axes, panel: StatePanel, said: str) -> None:
-    floor_plan.draw_room(axes, panel.room)
-    for number, stand in panel.members:
-        floor_plan.draw_base(axes, stand, label=str(number), size=_LINES)
+def _draw_panel(axes: Axes, panel: StatePanel, text: str) -> None:
+    floor_plan.draw_environment(axes, panel.environment)
+    for number, base in panel.members:
+        floor_plan.draw_base(axes, base, label=str(number), size=_LINES)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=8)
-    axes.set_title(said, fontsize=9, pad=4)
+    axes.set_title(text, fontsize=9, pad=4)
 
 
-def _said(best: float, score: Score) -> str:
-    """Return what the best place of a panel is worth."""
+def _best_text(best: float, score: Score) -> str:
+    """Return the best score of a panel as text."""
     if best <= 0.0:
-        return "nothing in reach"
-    return f"best place {best:.0f} %" if score == "reachability" else f"best place {best:.3f}"
+        return "no goal reached"
+    return f"best {best:.0f}%" if score == "reachability" else f"best {best:.3f}"
 
 
-def _part_of_the_floor(panels: Sequence[Sequence[StatePanel]]) -> FloatArray:
-    """Return corners of everything that all panels have to show [m], shape (n, 2)."""
+def _shown_points(panels: Sequence[Sequence[StatePanel]]) -> FloatArray:
+    """Return corners of everything that every panel shows [m], shape (n, 2)."""
     found = []
     for panel in (panel for row in panels for panel in row):
         places = panel.places
         grid = np.stack(np.meshgrid(places.x, places.y, indexing="ij"), axis=-1)
         found.append(grid[places.reachability > 0.0])
-        found += [stand.polygon for _, stand in panel.members]
-        found += [solid.footprint for solid in panel.room if solid.category is Category.PERSON]
+        found += [base.polygon for _, base in panel.members]
+        found += [
+            solid.footprint for solid in panel.environment if solid.category is Category.PERSON
+        ]
     points = np.concatenate(found) if found else np.empty((0, 2))
     if len(points):
         return points

@@ -1,4 +1,4 @@
-"""Paths of a tool beside the line it was to follow, from above and from the side."""
+"""Paths of a tool beside the commanded line, from above and from the side."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _COLUMN = 3.1
 
 @dataclass(frozen=True, eq=False)
 class PathGroup:
-    """Paths that belong together: one column of the picture."""
+    """Paths of one column of the picture."""
 
     name: str
     paths: Sequence[NDArray[np.float64]]
@@ -33,20 +33,20 @@ def draw_tool_paths(
     *,
     blocked: float | None = None,
 ) -> Figure:
-    """Return paths seen from above and from the side, a column for each group.
+    """Return paths from above and from the side, a column for each group.
 
     Args:
         groups: The paths.
-        start: Of the line [m], shape (3,).
-        end: Of the line [m], shape (3,).
-        blocked: Share of the line at which a joint meets its limit, to be marked.
+        start: Start of the line [m], shape (3,).
+        end: End of the line [m], shape (3,).
+        blocked: Fraction of the line at which a joint meets its limit, to mark.
     """
     level = np.array([end[0] - start[0], end[1] - start[1], 0.0])
     level /= np.linalg.norm(level)
     side = np.array([-level[1], level[0], 0.0])
     views = (("to its left [m]", side), ("above [m]", np.array([0.0, 0.0, 1.0])))
     points = np.concatenate([*(path for group in groups for path in group.paths), [start, end]])
-    along, left, above = (np.ptp(points @ way) for way in (level, side, views[1][1]))
+    along, left, above = (np.ptp(points @ axis) for axis in (level, side, views[1][1]))
     # As high as the paths are wide, at the scale of the columns.
     heights = np.clip(_COLUMN * np.array([left, above]) / along, 0.8, 4.0)
     figure = Figure(

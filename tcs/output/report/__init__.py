@@ -1,4 +1,8 @@
-"""Reports: pages of text, tables and pictures about what was scored and how well it holds up."""
+"""Reports: pages of text, tables and pictures about score files and experiments.
+
+In: score files, robustness studies and teleoperation experiments. Out: pages, as HTML and Markdown,
+and the pictures in them.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What a page is made of: sections of text, lists, tables and pictures, as plain values.
+"""The parts of a page: sections of text, lists, tables and pictures, as plain values.
 
-Nothing here knows HTML: `tcs.output.report.html` and `tcs.output.report.markdown` write a page.
+`tcs.output.report.html` and `tcs.output.report.markdown` write a page.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Tone = Literal["plain", "good", "bad", "quiet"]
-"""How a cell is to be read at a glance; its text must say the same without colour."""
+"""Emphasis of a cell; its text must have the same meaning without colour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +30,14 @@ class Bullets:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Lines to type."""
+    """Command lines."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Names and what they stand for."""
+    """Names and their values."""
 
     items: Sequence[tuple[str, str]]
 
@@ -56,7 +56,7 @@ class Column:
 
     title: str
     is_number: bool = True
-    """Numbers stand to the right."""
+    """Whether the column is right-aligned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Table:
 
     def __post_init__(self) -> None:
         """Check the shape."""
-        # A mistake of ours, never of a user.
+        # An error in the program, never of a user.
         assert all(len(row) == len(self.columns) for row in self.rows), self.caption
 
     def texts(self) -> list[list[str]]:
@@ -85,13 +85,13 @@ class Picture:
     """The file: SVG or PNG."""
     format: Literal["svg", "png"]
     description: str
-    """What is to be seen, for who cannot see it."""
+    """Text alternative of the picture."""
     caption: str
 
 
 @dataclass(frozen=True, slots=True)
 class Folded:
-    """Blocks that are shown when their title is pressed; on paper they are shown."""
+    """Blocks that expand when their title is clicked, and are always printed."""
 
     title: str
     blocks: Sequence[Block]
@@ -109,7 +109,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """What a link to it ends in.
+        """The fragment of a link to it.
 
         >>> Section("Table I: 13 rows", ()).anchor
         'table-i-13-rows'
@@ -123,7 +123,7 @@ class Page:
 
     title: str
     lead: str
-    """What it is, in a sentence or two."""
+    """The subject of the page, in one or two sentences."""
     sections: Sequence[Section]
     foot: str = ""
-    """Version, date, machine: what stands below everything."""
+    """Version and date, at the end of the page."""

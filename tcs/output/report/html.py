@@ -1,4 +1,4 @@
-"""Write a page down as one HTML file that needs nothing else."""
+"""A page as one self-contained HTML document."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tcs.output.report.blocks import (
 )
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-"""The page may load nothing and run nothing, whatever a name in it says."""
+"""The page may load and run nothing, whatever text it contains."""
 
 
 def as_html(page: Page) -> str:

@@ -1,4 +1,4 @@
-"""Write a page down as Markdown: its text and tables, for a commit, a mail or a paper's draft."""
+"""A page as Markdown: its text and tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tcs.output.report.blocks import Block, Bullets, Code, Facts, Folded, Page, 
 
 
 def as_markdown(page: Page) -> str:
-    """Return a page as Markdown; of pictures the captions stay."""
+    """Return a page as Markdown; pictures are reduced to their captions."""
     parts = [f"# {_plain(page.title)}", _plain(page.lead)]
     for section in page.sections:
         parts += [f"## {_plain(section.title)}", *(_written(block) for block in section.blocks)]
@@ -62,7 +62,7 @@ def _(block: Folded) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return text whose signs mean nothing to Markdown."""
+    """Return text with the special characters of Markdown escaped."""
     for sign in ("\\", "|", "*", "_", "`", "<"):
         text = text.replace(sign, f"\\{sign}")
     return " ".join(text.splitlines())

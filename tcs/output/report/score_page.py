@@ -107,7 +107,8 @@ def _reasons(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "The checks, in their order: contact of the robot's body; contact of the gripper at "
-            "the goal; reach of the arm; joint limits; contact of the arm."
+            "the goal with the environment or the person; reach of the arm; contact of the "
+            "gripper with the robot; joint limits; contact of the arm."
         ),
         reasons_table(report),
     ]

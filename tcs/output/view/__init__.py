@@ -1,4 +1,7 @@
-"""A score file in Drake's Meshcat: walk through its sets, stand elsewhere, see what is reached."""
+"""A score file in Drake's Meshcat: its sets, any other configuration, and what each reaches.
+
+In: a score file and its scene. Out: a live viewer with sliders, or one self-contained page.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is looked at, and what sliders and buttons change about it; nothing here needs a browser."""
+"""The state of the viewer and its controls; needs no browser."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ KEYS: Mapping[str, str] = {
     NEXT_COLOUR: "KeyC",
     BACK: "KeyB",
 }
-"""Buttons, and the key of each in the browser."""
+"""Buttons, with the key of each in the browser."""
 _PARTS = 1_000_000
-"""Of a metre or degree: finer than anybody writes a grid."""
+"""Parts of a metre or degree: finer than the step of any grid."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ViewState:
-    """What is looked at."""
+    """What the viewer shows."""
 
     along: tuple[int, ...]
-    """Where the configuration lies along each axis of the grid."""
+    """Index of the configuration along each axis of the grid."""
     goal: int
     """Number of the goal."""
     colouring: str
-    """What the floor is coloured by."""
+    """Quantity that the floor shows."""
     member: int
-    """Number of the member of the set that was looked at last."""
+    """Number of the member of the set that was shown last."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Slider:
-    """A slider; it takes low, low + step, ... high."""
+    """A slider with the values low, low + step, ... high."""
 
     name: str
     low: float
@@ -50,7 +50,7 @@ class Slider:
 
     @property
     def tick(self) -> float:
-        """The step that Meshcat is given: it rounds to multiples of it, whatever the lowest value.
+        """The step for Meshcat, which rounds to multiples of it whatever the lowest value is.
 
         >>> Slider("base x [m]", 0.1, 0.5, 0.2).tick
         0.1
@@ -60,17 +60,17 @@ class Slider:
 
 
 class Controls:
-    """The controls of one file: names and ranges, and what they do to the state."""
+    """The controls of one file: names, ranges, and their effect on the state."""
 
     def __init__(self, viewed: ViewedSet) -> None:
-        """Lay the controls out.
+        """Create the controls.
 
         Args:
-            viewed: What there is to look at.
+            viewed: The scores and the set.
         """
         self._viewed = viewed
         self._colourings = colourings(viewed)
-        # An axis of one value leaves nothing to move.
+        # An axis of one value needs no slider.
         self._axes = {
             label_of(axis): (number, axis)
             for number, axis in enumerate(viewed.grid.axes)
@@ -79,7 +79,7 @@ class Controls:
 
     @property
     def sliders(self) -> tuple[Slider, ...]:
-        """Every slider that has something to move, in the order in which they are shown."""
+        """Every slider with more than one value, in the order in which they are shown."""
         counted = (
             Slider(MEMBER, 1.0, float(len(self._viewed.members)), 1.0),
             Slider(GOAL, 0.0, float(self._viewed.goals - 1), 1.0),
@@ -92,12 +92,12 @@ class Controls:
         return tuple(slider for slider in (*counted, *moving) if slider.high > slider.low)
 
     def first(self) -> ViewState:
-        """Return what is looked at first: the first member of the set at a goal it serves."""
+        """Return the first state: the first member of the set at a goal it serves."""
         state = ViewState((0,) * len(self._viewed.grid.axes), 0, self._colourings[0], 0)
         return self._at_member(state, 0) if self._viewed.members else state
 
     def values(self, state: ViewState) -> dict[str, float]:
-        """Return where every slider stands in a state, by name [m or deg]."""
+        """Return the value of every slider in a state, by name [m or deg]."""
         counted = {
             MEMBER: state.member + 1.0,
             GOAL: float(state.goal),
@@ -115,7 +115,7 @@ class Controls:
         Args:
             state: The state before.
             name: Name of the slider.
-            value: Where it stands now; the nearest step counts, within its range.
+            value: Its value; rounded to the nearest step within its range.
         """
         slider = next(one for one in self.sliders if one.name == name)
         last = round((slider.high - slider.low) / slider.step)
@@ -156,14 +156,14 @@ class Controls:
         return self._viewed.environment_state(self.index(state))
 
     def heading(self, state: ViewState) -> str:
-        """Return where the configuration comes from, as words."""
+        """Return whether the configuration is a member of the set, as text."""
         members = self._viewed.members
         if members and members[state.member] == self.index(state):
             return f"member {state.member + 1} of {len(members)}"
-        return "stand here"
+        return "other configuration"
 
     def _at_member(self, state: ViewState, number: int) -> ViewState:
-        """Return the state at a member; a goal it cannot reach gives way to one it serves best."""
+        """Return the state at a member; a goal it does not reach is replaced by one it serves."""
         index = self._viewed.members[number]
         along = tuple(self._viewed.grid.indices(index).tolist())
         goal = state.goal

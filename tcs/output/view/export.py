@@ -1,4 +1,4 @@
-"""The scene as one page that needs no server: it plays through the members of a set and goals."""
+"""The scene as one self-contained page with an animation of the members and their goals."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from tcs.output.words import REASON_COLOURS, REASON_NAMES, goals_text
 from tcs.placement.tables import Reason
 
 _RATE = 10
-"""Frames in a second: a change takes one of them."""
+"""Frames per second; a change takes one frame."""
 _HOLD = 15
 """Frames for which each goal is shown."""
 
 
 @dataclass(frozen=True)
 class PlayStep:
-    """What is shown for a while."""
+    """One step of the animation."""
 
     member: int
     """Number of the member of the set."""
@@ -41,9 +41,9 @@ class PlayStep:
 
 
 def play_steps(viewed: ViewedSet) -> tuple[PlayStep, ...]:
-    """Return what the animation goes through: each member, at each goal it serves best.
+    """Return the steps of the animation: each member at each goal it serves.
 
-    A set without members, where no goal is reached from anywhere, shows the first configuration.
+    For a set without members, because no goal is reached, it is the first configuration.
     """
     steps = [
         PlayStep(number, index, goal)
@@ -63,14 +63,14 @@ def export_page(
 ) -> str:
     """Return the page.
 
-    The map on the floor is that of the reachability, with the bed as the member shown wants it.
+    The floor shows the reachability for the state of the environment of the member.
 
     Args:
-        meshcat: An empty one.
-        objects: The things to show.
-        viewed: What came of each configuration.
-        title: First line, for a person.
-        notes: Further lines, such as where the meshes come from and under which licence.
+        meshcat: An empty Meshcat.
+        objects: The objects of the scene.
+        viewed: The scores and the set.
+        title: First line.
+        notes: Further lines, such as the source and licence of the meshes.
     """
     steps = play_steps(viewed)
     shots = [objects.snapshot(step.index, step.goal) for step in steps]
@@ -82,23 +82,23 @@ def export_page(
     for number in sorted(set(environments)):
         floor = floor_map(viewed, number, steps[0].goal, REACHABILITY)
         draw_floor(meshcat, floor, f"{FLOOR}/{number}")
-    seen = [
+    visible = [
         {f"{FLOOR}/{number}", *(arrow_path(arrow) for arrow in shot.arrows)}
         for number, shot in zip(environments, shots, strict=True)
     ]
-    for path in set().union(*seen):
-        meshcat.SetProperty(path, "visible", path in seen[0])
+    for path in set().union(*visible):
+        meshcat.SetProperty(path, "visible", path in visible[0])
     if len(shots) > 1:
-        meshcat.SetAnimation(_animation(shots, seen))
+        meshcat.SetAnimation(_animation(shots, visible))
     panel = _panel(title, [*_captions(viewed, steps), *notes])
     return str(meshcat.StaticHtml()).replace("</body>", f"{panel}\n</body>", 1)
 
 
-def _animation(shots: list[Snapshot], seen: list[set[str]]) -> MeshcatAnimation:
-    """Return the snapshots one after the other, each held for a while, and the paths seen at each.
+def _animation(shots: list[Snapshot], visible: list[set[str]]) -> MeshcatAnimation:
+    """Return an animation of the snapshots, with the paths that are visible at each.
 
-    The browser moves things in straight lines from key to key, so whatever changes gets a key
-    right before it does: nothing is seen to glide through a bed on a way that nobody has checked.
+    The browser interpolates linearly between keys, so an object that changes gets a key right
+    before the change: no object moves along a path that was never checked.
     """
     animation = MeshcatAnimation(_RATE)
     for path in shots[0].poses:
@@ -109,19 +109,19 @@ def _animation(shots: list[Snapshot], seen: list[set[str]]) -> MeshcatAnimation:
                     last = RigidTransform(poses[number - 1])
                     animation.SetTransform(number * _HOLD - 1, path, last)
                 animation.SetTransform(number * _HOLD, path, RigidTransform(pose))
-    # The animation ends with its last key: the last goal is to be held as long as the others.
+    # The animation ends with its last key, which holds the last goal as long as the others.
     end = RigidTransform(shots[-1].poses[SHOWN])
     animation.SetTransform(len(shots) * _HOLD, SHOWN, end)
-    for path in sorted(set().union(*seen)):
-        shown = [path in one for one in seen]
-        for number, visible in enumerate(shown):
-            if number == 0 or visible != shown[number - 1]:
-                animation.SetProperty(number * _HOLD, path, "visible", visible)
+    for path in sorted(set().union(*visible)):
+        shown = [path in one for one in visible]
+        for number, is_visible in enumerate(shown):
+            if number == 0 or is_visible != shown[number - 1]:
+                animation.SetProperty(number * _HOLD, path, "visible", is_visible)
     return animation
 
 
 def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
-    """Return a line for each member: when it is shown, and what it reaches."""
+    """Return a line for each member: its time in the animation, and what it reaches."""
     lines = []
     for number, index in enumerate(viewed.members):
         times = [at * _HOLD / _RATE for at, one in enumerate(steps) if one.member == number]
@@ -131,12 +131,13 @@ def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
             line = viewed.result(index).summary
             shown = f"member {number + 1} at {goals_text(goals)}"
             lines.append(f"{times[0]:g} to {until:g} s: {shown}. It reaches {line}.")
-    return lines or ["No goal is reached from anywhere."]
+    return lines or ["No configuration reaches a goal."]
 
 
 def _panel(title: str, lines: list[str]) -> str:
-    """Return title, lines and the legend of the arrows, to lie over the picture."""
-    colours = "".join(
+    """Return title, lines and the legend of the arrows as an overlay."""
+    # The space between the entries is where the browser may break the line.
+    colours = " ".join(
         '<span style="white-space:nowrap;margin-right:1em">'
         f'<span style="color:{REASON_COLOURS[one]}">&#9632;</span> {REASON_NAMES[one]}</span>'
         for one in Reason
@@ -145,16 +146,16 @@ def _panel(title: str, lines: list[str]) -> str:
 
 
 def overlay(title: str, lines: Sequence[str], more: str = "") -> str:
-    """Return title and lines of text as HTML that lies over the picture.
+    """Return title and lines of text as an HTML overlay.
 
     Args:
         title: First line, in bold.
         lines: Further lines.
-        more: HTML below them, taken as it is.
+        more: HTML below them, inserted unescaped.
     """
-    said = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
+    paragraphs = "".join(f"<p>{html.escape(line)}</p>" for line in lines)
     return (
         "<style>#tcs{position:fixed;left:0;top:0;max-width:44em;margin:8px;padding:6px 10px;"
         "background:#ffffffdd;font:13px sans-serif;color:#222}#tcs p{margin:3px 0}</style>"
-        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{said}{more}</div>'
+        f'<div id="tcs"><p><b>{html.escape(title)}</b></p>{paragraphs}{more}</div>'
     )

@@ -1,4 +1,4 @@
-"""The score map that lies on the floor: a colour for each base place."""
+"""The score map on the floor: a colour for each base position."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ REACHABILITY, MANIPULABILITY, REASON, SUCCESS = (
     "reason",
     "success",
 )
-"""What the floor may be coloured by."""
+"""Quantities that the floor can show."""
 _NEAREST = (*CHECKS, Reason.REACHED)
-"""Reasons, the one that came nearest to reaching the goal last."""
+"""Reasons in the order of the checks, so that the last one passed the most checks."""
 
 
 @dataclass(frozen=True, eq=False)
 class FloorMap:
-    """Places that have a colour; at the others nothing is reached, or nothing known."""
+    """The base positions with a colour; at the others no goal is reached, or nothing is known."""
 
     places: FloatArray
-    """x and y of their middles in W [m], shape (n, 2)."""
+    """x and y of their centres in W [m], shape (n, 2)."""
     half: tuple[float, float]
-    """Half the size of a place along x and y [m]."""
+    """Half the step of the grid along x and y [m]."""
     colours: FloatArray
     """Red, green, blue of each, 0 to 1, shape (n, 3)."""
 
 
 def colourings(viewed: ViewedSet) -> tuple[str, ...]:
-    """Return what the floor can be coloured by: success only where it has been estimated."""
+    """Return the quantities that the floor can show: success only if it has been estimated."""
     known = (REACHABILITY, MANIPULABILITY, REASON)
     return known if viewed.success is None else (*known, SUCCESS)
 
@@ -51,15 +51,15 @@ def floor_map(viewed: ViewedSet, state: int, goal: int, colouring: str) -> Floor
     """Return the map for one state of the environment.
 
     Args:
-        viewed: The scores.
+        viewed: The scores and the set.
         state: Number of the environment's state, in C order over its axes.
-        goal: The goal that is shown; only the reasons depend on it.
+        goal: The goal that is shown; matters for the reasons only.
         colouring: One of `colourings`.
 
     Returns:
-        The best P_R, P_M, estimated success of one configuration, or the reason that came nearest
-        to reaching the goal, over all headings and torso heights at each place. P_R and P_M are
-        coloured up to the best place of this state.
+        At each base position, over all headings and torso heights: the best P_R, P_M or estimated
+        success of one configuration, or the reason that passed the most checks. The scale of P_R
+        and P_M ends at the best base position of this state.
     """
     grid, scores = viewed.grid, viewed.scores
     places = PlaceMap.of_state(scores, grid, state)

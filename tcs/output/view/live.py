@@ -1,4 +1,4 @@
-"""The live viewer: Meshcat shows the state, its sliders and buttons change it."""
+"""The live viewer: Meshcat shows the state, and its sliders and buttons change it."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from tcs.output.view.viewed_set import ViewedSet
 from tcs.placement.tables import Reason
 
 _PAUSE = 0.01
-"""Between two looks at the controls [s]: short against the 0.1 s that a change may take."""
+"""Interval of polling the controls [s]: short against the 0.1 s that a change may take."""
 
 
 def open_meshcat(port: int | None = None) -> Meshcat:
-    """Return an empty Meshcat that this machine alone can look at.
+    """Return an empty Meshcat that only this machine can open.
 
     Args:
-        port: Where it listens; by default the first free one from 7000 on.
+        port: Its port; by default the first free one from 7000 on.
 
     Raises:
-        OutputError: If it cannot listen there.
+        OutputError: If the port is not free.
     """
-    # Who is to look there is told by whoever opens it.
+    # The caller prints the address.
     log = logging.getLogger("drake")
     level = log.level
     log.setLevel(logging.WARNING)
@@ -43,24 +43,24 @@ def open_meshcat(port: int | None = None) -> Meshcat:
 
 
 class Viewer:
-    """Answers on show in a Meshcat."""
+    """A set of a score file, shown in a Meshcat."""
 
     def __init__(
         self,
         meshcat: Meshcat,
         objects: SceneObjects,
         viewed: ViewedSet,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
     ) -> None:
-        """Show the set's first member, and lay out the controls.
+        """Show the first member of the set, and add the controls.
 
         Args:
-            meshcat: An empty one.
-            objects: The things to show.
-            viewed: What came of each configuration.
-            tell: Called with a line of text for each state that is shown.
+            meshcat: An empty Meshcat.
+            objects: The objects of the scene.
+            viewed: The scores and the set.
+            report: Called with a line of text for each state that is shown.
         """
-        self._meshcat, self._objects, self._viewed, self._tell = meshcat, objects, viewed, tell
+        self._meshcat, self._objects, self._viewed, self._report = meshcat, objects, viewed, report
         self._controls = Controls(viewed)
         arrows = ((g, reason) for g in range(viewed.goals) for reason in Reason)
         objects.set_up(meshcat, arrows)
@@ -78,11 +78,11 @@ class Viewer:
 
     @property
     def state(self) -> ViewState:
-        """What is looked at now."""
+        """What is shown now."""
         return self._state
 
-    def look(self) -> bool:
-        """Do what was asked for since the last look; return whether anything was."""
+    def update(self) -> bool:
+        """Apply the changes of the controls since the last call; return whether there were any."""
         state = self._state
         before = self._controls.values(state)
         for name, value in before.items():
@@ -98,17 +98,17 @@ class Viewer:
             return False
         self._state = state
         for name, value in self._controls.values(state).items():
-            # A slider that is being dragged is where it should be: to set it would hold it back.
+            # Setting a slider that is being dragged would hold it back.
             if abs(self._meshcat.GetSliderValue(name) - value) > 1e-6:
                 self._meshcat.SetSliderValue(name, value)
         self._show()
         return True
 
     def run(self, duration: float | None = None) -> None:
-        """Answer the controls, for so long [s] or until interrupted."""
+        """Follow the controls for a duration [s], or until interrupted."""
         end = None if duration is None else time.monotonic() + duration
         while end is None or time.monotonic() < end:
-            if not self.look():
+            if not self.update():
                 time.sleep(_PAUSE)
 
     def _show(self) -> None:
@@ -122,16 +122,16 @@ class Viewer:
             draw_floor(self._meshcat, floor_map(self._viewed, *floor))
             self._floor = floor
         line = self._viewed.result(index).line(state.goal)
-        self._tell(f"{controls.heading(state)}: {line}")
+        self._report(f"{controls.heading(state)}: {line}")
 
 
 def show_change(meshcat: Meshcat, before: Snapshot | None, after: Snapshot) -> None:
-    """Move what has moved, and show the arrows whose colour has changed."""
+    """Update the poses that differ and the arrows whose colours differ."""
     for path, pose in after.poses.items():
         if before is None or (before.poses[path] != pose).any():
             meshcat.SetTransform(path, RigidTransform(pose))
-    seen = before.arrows if before is not None else frozenset()
-    for arrow in sorted(after.arrows - seen):
+    visible = before.arrows if before is not None else frozenset()
+    for arrow in sorted(after.arrows - visible):
         meshcat.SetProperty(arrow_path(arrow), "visible", True)
-    for arrow in sorted(seen - after.arrows):
+    for arrow in sorted(visible - after.arrows):
         meshcat.SetProperty(arrow_path(arrow), "visible", False)

@@ -1,4 +1,4 @@
-"""The things in the viewer: what Meshcat is given once, and what moves with the state."""
+"""The objects in the viewer: what Meshcat receives once, and what moves with the state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tcs.model.tasks import Task
 from tcs.output.draw import BaseFootprint, Category
 from tcs.output.report.scene_solids import base_outline, environment_parts
 from tcs.output.view.floor import FloorMap
-from tcs.output.view.shapes import Drawn, draw_ground, draw_shapes, rgba, robot_shapes
+from tcs.output.view.shapes import BodyShape, draw_ground, draw_shapes, rgba, robot_shapes
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason
@@ -24,50 +24,57 @@ FloatArray = NDArray[np.float64]
 Arrow = tuple[int, Reason]
 """A goal's arrow in the colour of a reason."""
 
-ROBOT, ROOM, GOALS, SHOWN, FLOOR, MEMBERS = "robot", "room", "goals", "goal shown", "floor", "set"
-"""Paths of the things in Meshcat."""
-_BALL = 0.018
-"""Radius of the ball at the goal that is shown [m]: seen beside an arrow, and hides none."""
+ROBOT, ENVIRONMENT, GOALS, SHOWN, FLOOR, MEMBERS = (
+    "robot",
+    "environment",
+    "goals",
+    "goal shown",
+    "floor",
+    "set",
+)
+"""Paths of the objects in Meshcat."""
+_MARK_RADIUS = 0.018
+"""Radius of the sphere at the shown goal [m]: visible beside an arrow, and hides none."""
 _ARROW = (0.16, 0.055, 0.009, 0.022)
-"""Of an arrow: length, length of its head, half widths of shaft and head [m]."""
+"""Length of an arrow and of its head, half widths of shaft and head [m]."""
 _MEMBER = "#d7263d"
 _MAP_HEIGHT, _LINE_HEIGHT = 0.004, 0.008
-"""Above the floor [m], one above the other, so that none flickers through the next."""
+"""Heights above the floor [m], one above the other against flicker."""
 _CAMERA = np.array([1.9, -1.9, 1.3])
-"""From the middle of the goals [m]: all of a bed and a robot fits into the picture."""
+"""Position relative to the centre of the goals [m]: a whole bed and a robot are in view."""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Where everything that moves is, and which arrows are seen."""
+    """Poses of all moving objects, and the visible arrows."""
 
     poses: Mapping[str, FloatArray]
-    """Pose of each path in its parent: rotation and place beside each other, shape (3, 4)."""
+    """Pose of each path in its parent: rotation and position, shape (3, 4)."""
     arrows: frozenset[Arrow]
-    """The arrows that are seen, one for each goal."""
+    """The visible arrows, one for each goal."""
 
 
 class SceneObjects:
-    """The things of one scene."""
+    """The objects of one scene."""
 
     def __init__(self, scene: Scene, task: Task, viewed: ViewedSet, *, meshes: bool) -> None:
-        """Look at a scene.
+        """Read the objects of a scene.
 
         Args:
-            scene: A scene of the file; it is moved about. Built with meshes if they are shown.
+            scene: The scene of the file, which is moved; built with meshes if they are shown.
             task: Its task.
-            viewed: What came of its configurations.
+            viewed: The scores and the set.
             meshes: Whether the robot is shown as its meshes, or as its collision shapes.
         """
         self._scene, self._task, self._viewed = scene, task, viewed
-        # Moves the base, which every snapshot places anew.
+        # Moves the base, which every snapshot places again.
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
-        self._room = _room_shapes(scene)
+        self._environment = _environment_shapes(scene)
         self._rest = _resting_arm(scene)
 
     def snapshot(self, index: int, goal: int) -> Snapshot:
-        """Return where everything is at a configuration, the arm at a goal if it is reached.
+        """Return the poses at a configuration, with the arm at a goal if it is reached.
 
         Args:
             index: Flat index of the configuration.
@@ -87,9 +94,9 @@ class SceneObjects:
         for body in {one.body for one in self._robot}:
             X_WL = plant.EvalBodyPoseInWorld(context, plant.get_body(body))
             poses[f"{ROBOT}/{int(body)}"] = X_WB.inverse() @ X_WL
-        for body in {one.body for one in self._room}:
+        for body in {one.body for one in self._environment}:
             X_WL = plant.EvalBodyPoseInWorld(context, plant.get_body(body))
-            poses[f"{ROOM}/{int(body)}"] = X_WL
+            poses[f"{ENVIRONMENT}/{int(body)}"] = X_WL
         goals = goal_poses(scene, self._task)
         poses |= {f"{GOALS}/{g}": X_WG for g, X_WG in enumerate(goals)}
         poses[SHOWN] = RigidTransform(goals[goal].translation())
@@ -99,29 +106,29 @@ class SceneObjects:
         )
 
     def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
-        """Give Meshcat everything there is, nothing placed yet.
+        """Add all objects to Meshcat, without poses.
 
         Args:
-            meshcat: An empty one.
-            arrows: The arrows that will be seen at some time; all are hidden.
-            compact: Whether meshes are handed over as bare triangles, which take a fifth of the
-                room of their files, but seconds to read.
+            meshcat: An empty Meshcat.
+            arrows: The arrows that are shown at any time; all are hidden.
+            compact: Whether meshes are sent as bare triangles, a fifth of the size of their files,
+                which take seconds to read.
         """
         draw_ground(meshcat)
-        for root, shapes in ((ROBOT, self._robot), (ROOM, self._room)):
+        for root, shapes in ((ROBOT, self._robot), (ENVIRONMENT, self._environment)):
             draw_shapes(meshcat, root, shapes, compact=compact)
         corners, faces = _arrow()
         for goal, reason in arrows:
             path = arrow_path((goal, reason))
             meshcat.SetTriangleMesh(path, corners, faces, rgba(REASON_COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
-        meshcat.SetObject(SHOWN, Sphere(_BALL), rgba(Category.CURRENT_GOAL.colour))
+        meshcat.SetObject(SHOWN, Sphere(_MARK_RADIUS), rgba(Category.CURRENT_GOAL.colour))
         self._draw_members(meshcat)
         middle = np.mean([X.translation() for X in goal_poses(self._scene, self._task)], axis=0)
         meshcat.SetCameraPose(middle + _CAMERA, middle)
 
     def _draw_members(self, meshcat: Meshcat) -> None:
-        """Draw the outline of the base at each member of the set, and which way it faces."""
+        """Draw the outline and the heading of the base at each member of the set."""
         for number, index in enumerate(self._viewed.members):
             at = self._viewed.grid.configuration(index)
             stand = BaseFootprint(at, self._outline)
@@ -134,13 +141,13 @@ class SceneObjects:
 
 
 def arrow_path(arrow: Arrow) -> str:
-    """Return where an arrow is."""
+    """Return the path of an arrow."""
     goal, reason = arrow
     return f"{GOALS}/{goal}/{reason.name.lower()}"
 
 
 def draw_floor(meshcat: Meshcat, floor: FloorMap, path: str = FLOOR) -> None:
-    """Lay a score map on the floor, in place of an older one at that path."""
+    """Draw a score map on the floor, in place of an older one at that path."""
     if not len(floor.places):
         meshcat.Delete(path)
         return
@@ -159,31 +166,31 @@ def draw_floor(meshcat: Meshcat, floor: FloorMap, path: str = FLOOR) -> None:
     )  # fmt: skip
 
 
-def _room_shapes(scene: Scene) -> list[Drawn]:
+def _environment_shapes(scene: Scene) -> list[BodyShape]:
     inspector = scene.built.scene_graph.model_inspector()
     return [
-        Drawn(
+        BodyShape(
             part.body,
             inspector.GetShape(part.geometry),
             inspector.GetPoseInFrame(part.geometry),
-            rgba(kind.colour),
+            rgba(category.colour),
         )
-        for part, kind in environment_parts(scene)
+        for part, category in environment_parts(scene)
     ]
 
 
 def _resting_arm(scene: Scene) -> FloatArray:
-    """Return the arm's joints at rest [rad], as the robot file says them, within their limits."""
+    """Return the rest posture of the robot file [rad], within the joint limits."""
     robot = scene.spec.robot
-    told = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
+    rest = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
     lower, upper = scene.arm_limits
-    return np.asarray(np.clip(told, lower, upper))
+    return np.asarray(np.clip(rest, lower, upper))
 
 
 def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:
     """Return corners and triangles of an arrow along x whose tip is at the origin.
 
-    The tip is where the tool has to come to, and it points where the tool points.
+    The tip is at the goal, and the arrow points as the tool does.
     """
     length, head, thin, wide = _ARROW
     square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])

@@ -1,4 +1,4 @@
-"""What bodies look like in Meshcat: the robot as its meshes, or as its collision shapes."""
+"""Shapes of bodies in Meshcat: the meshes of the robot, or its collision shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tcs.output.draw import Category
 
 FloatArray = NDArray[np.float64]
 _GREY = Rgba(0.75, 0.77, 0.8, 1.0)
-"""Of meshes that the URDF gives no colour."""
+"""Colour of meshes without a colour in the URDF."""
 
 _LIGHTS = {
     "SpotLight": 0.0,
@@ -29,11 +29,11 @@ _LIGHTS = {
     "AmbientLight": 0.9,
     "FillLight": 0.4,
 }
-"""Strengths of Meshcat's lights: under its own ones colours fade to white."""
+"""Strengths of Meshcat's lights: under the default ones colours fade to white."""
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class BodyShape:
     """One shape of a body."""
 
     body: BodyIndex
@@ -43,10 +43,10 @@ class Drawn:
     colour: Rgba
 
 
-def robot_shapes(scene: Scene, meshes: bool) -> list[Drawn]:
-    """Return what the robot is shown as.
+def robot_shapes(scene: Scene, meshes: bool) -> list[BodyShape]:
+    """Return the shapes that the robot is shown as.
 
-    Bodies that have no mesh, such as a tool of our own, show their collision shapes.
+    Bodies without a mesh, such as a custom tool, are shown as their collision shapes.
     """
     inspector = scene.built.scene_graph.model_inspector()
     plant = scene.built.plant
@@ -59,27 +59,27 @@ def robot_shapes(scene: Scene, meshes: bool) -> list[Drawn]:
             properties = inspector.GetIllustrationProperties(geometry)
             colour = properties.GetPropertyOrDefault("phong", "diffuse", _GREY)
             shape, X_LS = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
-            shapes.append(Drawn(body.index(), shape, X_LS, colour))
+            shapes.append(BodyShape(body.index(), shape, X_LS, colour))
     drawn = {one.body for one in shapes}
     colourings = {Group.ARM: Category.ARM, Group.BODY: Category.ROBOT}
     for part in parts:
         if part.body not in drawn:
             shape, X_LS = inspector.GetShape(part.geometry), inspector.GetPoseInFrame(part.geometry)
-            shapes.append(Drawn(part.body, shape, X_LS, rgba(colourings[part.group].colour)))
+            shapes.append(BodyShape(part.body, shape, X_LS, rgba(colourings[part.group].colour)))
     return shapes
 
 
 def draw_shapes(
-    meshcat: Meshcat, root: str, shapes: Sequence[Drawn], *, compact: bool = False
+    meshcat: Meshcat, root: str, shapes: Sequence[BodyShape], *, compact: bool = False
 ) -> None:
-    """Give Meshcat the shapes of bodies, each body a path of its own that can be moved.
+    """Add the shapes of bodies to Meshcat, each body under a path of its own.
 
     Args:
-        meshcat: Where to.
+        meshcat: The Meshcat.
         root: Path above the bodies.
         shapes: Their shapes.
-        compact: Whether meshes are handed over as bare triangles, which take a fifth of the room
-            of their files, but seconds to read.
+        compact: Whether meshes are sent as bare triangles, a fifth of the size of their files,
+            which take seconds to read.
     """
     for number, one in enumerate(shapes):
         path = f"{root}/{int(one.body)}/{number}"
@@ -92,7 +92,7 @@ def draw_shapes(
 
 
 def draw_ground(meshcat: Meshcat) -> None:
-    """Lay a plain floor, and light it evenly."""
+    """Add a plain floor with even light."""
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
     for light, strength in _LIGHTS.items():
@@ -102,7 +102,7 @@ def draw_ground(meshcat: Meshcat) -> None:
 
 
 def rgba(colour: str) -> Rgba:
-    """Return a colour that matplotlib knows by its name or its hexadecimal digits, opaque."""
+    """Return an opaque colour from a matplotlib colour name or hexadecimal digits."""
     return Rgba(*to_rgb(colour), 1.0)
 
 

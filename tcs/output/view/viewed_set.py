@@ -1,4 +1,4 @@
-"""What a score file answers about one configuration: which goals are reached, why not the rest."""
+"""A set of a score file in the viewer, and the result of any configuration at every goal."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 @dataclass(frozen=True, eq=False)
 class ConfigurationResult:
-    """What came of one configuration at every goal."""
+    """The results of one configuration."""
 
     index: int
-    """Its flat index."""
+    """Flat index of the configuration."""
     configuration: InitialConfiguration
-    """It itself."""
+    """The configuration."""
     reasons: tuple[Reason, ...]
-    """Whether each goal is reached, or why not."""
+    """The reason at each goal."""
     pairs: tuple[tuple[str, str] | None, ...]
-    """The two bodies that block at each goal, if any do."""
+    """The bodies in contact at each goal, if a contact is the reason."""
     reachability: float
     """P_R of the configuration by itself, TCS eq. (1)."""
     manipulability: float
@@ -50,13 +50,13 @@ class ConfigurationResult:
         """Return the result as a line of text.
 
         Args:
-            goal: The goal that is shown: it is told first.
+            goal: The goal that is shown, which comes first.
         """
         return f"goal {goal} {self._goal_text(goal)}; {self.summary}"
 
     @property
     def summary(self) -> str:
-        """What is reached, the scores, and why the rest is not reached."""
+        """The goals reached, the scores, and the reasons at the other goals."""
         scores = (
             f"{len(self.reached)} of {len(self.reasons)} goals, "
             f"P_R {self.reachability:.0%}, P_M {self.manipulability:.3f}"
@@ -75,36 +75,36 @@ class ConfigurationResult:
 
 @dataclass(frozen=True, eq=False)
 class ViewedSet:
-    """One table of a score file, and the set of it that is looked at."""
+    """A state table of a score file, and one of its sets."""
 
     grid: Grid
-    """What can be chosen."""
+    """The grid of configurations."""
     scores: ScoreTable
-    """Its scores."""
+    """Scores of the grid."""
     members: tuple[int, ...]
-    """Flat indices of the set in the order of the tour; none where no goal is reached."""
+    """Flat indices of the set in the order of the tour; empty if no goal is reached."""
     success: SuccessTable | None
-    """Estimated success under error, where the file holds any."""
+    """Estimated success under error, if the file holds estimates."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int, members: tuple[int, ...]) -> ViewedSet:
-        """Return the answers of one table of a file."""
+        """Return a set of a state table of a file."""
         found = file.tables[table]
         return cls(Grid.from_dict(file.grid), found.scores, members, found.success)
 
     @property
     def goals(self) -> int:
-        """How many goals there are."""
+        """Number of goals."""
         return self.scores.goals
 
     def result(self, index: int) -> ConfigurationResult:
-        """Return what came of a configuration.
+        """Return the results of a configuration.
 
         Args:
             index: Its flat index.
 
         Raises:
-            GridError: If there is none of that index.
+            GridError: If there is no configuration of that index.
         """
         scores, configuration = self.scores, self.grid.configuration(index)
         names = scores.pair_names
@@ -126,14 +126,10 @@ class ViewedSet:
         return index // (self.grid.size // math.prod(self.grid.environment_shape))
 
     def served(self, number: int) -> tuple[int, ...]:
-        """Return the goals that a member of the set serves better than the others do.
+        """Return the goals that a member of the set serves, ascending.
 
         Args:
             number: Number of the member in the set.
-
-        Returns:
-            The goals it reaches with the greatest measure of all members, ascending; a goal that
-            several serve alike counts for the first of them.
         """
         return assigned_goals(self.assignment, number)
 

@@ -92,5 +92,10 @@ def test_too_many_states_are_refused():
 
 def test_words_of_a_panel(file):
     said = words(states_figure(file, ShownSet.of(file, None)))
-    for word in ("best place", "head rest 70 deg", "person", "Each place: best of all headings."):
+    for word in (
+        "best ",
+        "head rest 70 deg",
+        "person",
+        "Best of all headings at each base position.",
+    ):
         assert word in said

@@ -28,7 +28,7 @@ def viewer(spec, shaving, shaving_set):
 def live(page, viewer):
     """The viewer, seen in the browser."""
     page.open(viewer.url, "robot")
-    page.wait(lambda: page.has("room") and page.has("floor"))
+    page.wait(lambda: page.has("environment") and page.has("floor"))
     return page
 
 
@@ -54,11 +54,11 @@ def controller(page, name):
 
 def test_viewer_shows_and_answers(live, viewer, shaving_set):
     assert changed(live.picture(), live.picture("robot")) > 3000
-    assert changed(live.picture(), live.picture("room")) > 3000
+    assert changed(live.picture(), live.picture("environment")) > 3000
     assert changed(live.picture(), live.picture("goals")) > 50
     # The map lies under both.
-    bare = live.picture("robot", "room")
-    assert changed(bare, live.picture("robot", "room", "floor")) > 300
+    bare = live.picture("robot", "environment")
+    assert changed(bare, live.picture("robot", "environment", "floor")) > 300
     here = int(shaving_set.grid.flat(viewer.state.along))
     assert live.arrows() == expected(shaving_set, here)
     assert live.complaints() == []

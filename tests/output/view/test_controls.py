@@ -49,7 +49,7 @@ def test_standing_elsewhere_moves_that_axis_alone(bed):
     here, there = (bed.grid.configuration(controls.index(s)) for s in (before, after))
     assert there.base_x == pytest.approx(-0.3)
     assert dataclasses.replace(there, base_x=here.base_x) == here
-    assert controls.heading(after) == "stand here"
+    assert controls.heading(after) == "other configuration"
     assert controls.clicked(after, BACK) == before
 
 
@@ -106,4 +106,4 @@ def test_without_a_set_one_can_still_stand_somewhere(bed):
     state = controls.first()
     assert "set member" not in controls.values(state)
     assert controls.clicked(state, NEXT_MEMBER) == state == controls.clicked(state, BACK)
-    assert controls.heading(state) == "stand here"
+    assert controls.heading(state) == "other configuration"

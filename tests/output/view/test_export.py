@@ -124,4 +124,4 @@ def test_page_plays_through_the_set_without_a_server(browser, objects, shaving_s
     assert [name for name in browser.fetched() if not name.startswith(("data:", "blob:"))] == []
     whole = browser.picture()
     assert (abs(whole - browser.picture("robot")) > 20).any(axis=2).sum() > 3000
-    assert (abs(whole - browser.picture("room")) > 20).any(axis=2).sum() > 3000
+    assert (abs(whole - browser.picture("environment")) > 20).any(axis=2).sum() > 3000

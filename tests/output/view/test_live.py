@@ -80,12 +80,12 @@ def test_everything_that_is_shown_is_in_meshcat(viewer, meshcat, objects, shavin
 
 
 def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, shaving_set):
-    assert not viewer.look()
+    assert not viewer.update()
     assert len(told) == 1
     assert told[0].startswith("member 1 of 2: goal ")
     meshcat.SetSliderValue("base x [m]", -0.1)
-    assert viewer.look()
-    assert not viewer.look()
+    assert viewer.update()
+    assert not viewer.update()
     along = viewer.state.along
     index = int(shaving_set.grid.flat(along))
     assert shaving_set.grid.configuration(index).base_x == pytest.approx(-0.1)
@@ -95,11 +95,11 @@ def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, s
 
 def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shaving_set):
     meshcat.SetSliderValue("set member", 2.0)
-    assert viewer.look()
+    assert viewer.update()
     at = shaving_set.grid.configuration(shaving_set.members[1])
     assert meshcat.GetSliderValue("base y [m]") == pytest.approx(at.base_y)
     assert meshcat.GetSliderValue("torso [m]") == pytest.approx(at.torso)
-    assert not viewer.look()
+    assert not viewer.update()
 
 
 class Spy:
