@@ -182,7 +182,7 @@ def legend_handles(environment: Sequence[Solid], *, robot: bool) -> list[Artist]
         Patch(facecolor=one.colour, label=one.label) for one in Category if one in shown
     ]
     handles.append(Patch(facecolor=BLOCKED, label="base blocked"))
-    handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="no goal reached"))
+    handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="reaches no goal"))
     if robot:
         label = "robot's base to scale, with heading"
         handles.append(Patch(facecolor="none", edgecolor=MEMBER, lw=2.0, label=label))

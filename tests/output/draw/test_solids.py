@@ -45,7 +45,7 @@ def test_capsule_reaches_its_caps():
 
 
 def test_unknown_shape():
-    with pytest.raises(TcsError, match="kind 7"):
+    with pytest.raises(TcsError, match="shape 7"):
         primitive_corners(7, (1.0, 1.0, 1.0))
 
 

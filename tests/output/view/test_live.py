@@ -90,7 +90,7 @@ def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, s
     index = int(shaving_set.grid.flat(along))
     assert shaving_set.grid.configuration(index).base_x == pytest.approx(-0.1)
     line = shaving_set.result(index).line(viewer.state.goal)
-    assert told[1:] == [f"stand here: {line}"]
+    assert told[1:] == [f"other configuration: {line}"]
 
 
 def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shaving_set):
