@@ -22,7 +22,9 @@ def test_every_goal_of_the_set_is_shown_once_at_the_member_that_serves_it_best(b
 def test_without_a_set_something_is_shown_all_the_same(objects, shaving_set):
     nothing = ViewedSet(shaving_set.grid, shaving_set.scores, (), None)
     assert len(play_steps(nothing)) == 1
-    assert "No configuration reaches a goal" in export_page(open_meshcat(), objects, nothing, title="Nothing")
+    assert "No configuration reaches a goal" in export_page(
+        open_meshcat(), objects, nothing, title="Nothing"
+    )
 
 
 def test_page_tells_what_it_is_and_fits_into_three_megabytes(objects, shaving_set):
