@@ -32,7 +32,7 @@ def test_check_map_agrees_with_the_check_of_a_stored_map(ihcm, tiago):
 def test_accuracy_of_the_default_grid(reach, grasps):
     """At 5 cm and 22.5 deg."""
     found = check_map(reach, MapGrid.of(0.05, 16, grasps), grasps, radius=0.9, queries=6000)
-    # 98.2 to 98.8 and 0.4 to 0.6 % were measured with 40,000; a share of 2 % of 6,000 spreads by
+    # 98.2 to 98.8 and 0.4 to 0.6 % were measured with 40,000; 2 % of 6,000 has a spread of
     # 0.18 %, four of which are 0.7 %.
     assert found.accuracy >= 0.97
     assert found.false_positives <= 0.015

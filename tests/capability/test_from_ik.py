@@ -31,7 +31,7 @@ def test_a_reached_cell_is_confirmed_by_drake(ihcm, reach, rng):
         scene.restore(before)
 
 
-def test_free_lifts_are_those_at_which_drake_finds_nothing(ihcm, reach, rng):
+def test_free_torso_heights_are_those_at_which_drake_finds_nothing(ihcm, reach, rng):
     scene, before = reach.scene, reach.scene.positions()
     rows = rng.choice(len(ihcm.cells), 40, replace=False)
     some_blocked = False
@@ -50,7 +50,7 @@ def test_free_lifts_are_those_at_which_drake_finds_nothing(ihcm, reach, rng):
     assert len(np.unique(ihcm.free_torso_heights)) > 1
 
 
-def test_every_cell_is_free_at_the_lift_the_map_was_made_at(ihcm):
+def test_every_cell_is_free_at_the_torso_height_the_map_was_made_at(ihcm):
     level = int(np.flatnonzero(ihcm.torso_heights == ihcm.torso_height)[0])
     assert np.all(ihcm.free_torso_heights >> np.uint32(level) & 1)
 
@@ -124,7 +124,7 @@ def test_a_robot_without_a_head_makes_an_icm_but_no_ihcm():
 
 
 @pytest.mark.parametrize(("torso_height", "words"), [(0.5, "out of range"), (-0.1, "out of range")])
-def test_a_lift_out_of_range_is_refused(tiago, torso_height, words):
+def test_a_torso_height_out_of_range_is_refused(tiago, torso_height, words):
     with pytest.raises(GridError, match=words):
         Reach(tiago, torso_height=torso_height)
 

@@ -152,7 +152,7 @@ def test_the_best_base_pose_reaches_the_task(ihcm, reach):
         R_BF = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         R = np.stack([R_BF @ grasp.R_FT for grasp in position.grasps])
         p = R_BF @ [position.x - best.x, position.y - best.y, position.height]
-        # The torso height of the best is within half a step of the map's; the arm rides on it.
+        # The torso height of the best is within half a step of the map's; the arm moves with it.
         p[2] -= best.torso_height - reach.torso_height
         assert reach.solve(R, np.tile(p, (len(R), 1))).reached.any()
 
@@ -235,7 +235,7 @@ def test_an_unreachable_height(ihcm):
         merge(ihcm, linear_task(0.2, 2, 2.9, step=0.1))
 
 
-def test_a_lift_out_of_range(ihcm):
+def test_a_torso_height_out_of_range(ihcm):
     with pytest.raises(SelectionError, match="no torso height of this map"):
         merge(ihcm, linear_task(0.2, 2, 0.65, step=0.1), torso_height=2.0)
 

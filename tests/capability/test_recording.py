@@ -26,7 +26,7 @@ def test_names_come_in_any_order(tiago, rng):
     assert found.torso_height.tolist() == [LISTING[8]]
 
 
-def test_without_a_torso_the_lift_is_unknown(tiago):
+def test_without_a_torso_the_torso_height_is_unknown(tiago):
     assert recording_of(NAMES[:7], [LISTING[:7]], tiago).torso_height is None
 
 
@@ -117,7 +117,7 @@ def test_the_postures_of_a_map_give_the_same_map(ihcm, reach, tiago, rng):
     assert found.offsets.max() < 1e-5
 
 
-def test_the_lift_of_the_recording_does_not_move_the_map(ihcm, reach, tiago, rng):
+def test_the_torso_height_of_the_recording_does_not_move_the_map(ihcm, reach, tiago, rng):
     rows = np.sort(rng.choice(len(ihcm.cells), 50, replace=False))
     low, high = (
         map_from_recording(
