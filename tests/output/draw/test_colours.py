@@ -1,4 +1,4 @@
-"""Colours are told apart whichever cones somebody has."""
+"""Colours are distinct under every type of colour vision."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_the_simulation_knows_what_is_known():
 
 @pytest.mark.parametrize("vision", VISION)
 @pytest.mark.parametrize("palette", [IN_SPACE, FROM_ABOVE], ids=["in space", "from above"])
-def test_what_a_legend_names_is_told_apart(palette, vision):
+def test_colours_of_a_legend_are_distinct(palette, vision):
     close = {
         (first, second): round(difference(palette[first], palette[second], vision), 1)
         for first, second in itertools.combinations(palette, 2)

@@ -18,13 +18,13 @@ def axes():
     return Figure(figsize=(4, 3)).subplots()
 
 
-@pytest.mark.parametrize(("width", "said"), [(4.0, 1.0), (2.0, 0.5)])
-def test_the_scale_bar_is_as_long_as_it_says(axes, width, said):
+@pytest.mark.parametrize(("width", "wording"), [(4.0, 1.0), (2.0, 0.5)])
+def test_the_scale_bar_is_as_long_as_it_says(axes, width, wording):
     frame(axes, [np.array([[0.0, 0.0], [width, 2.0]])], margin=0.0)
     draw_scale_bar(axes)
     (bar,) = axes.lines
-    assert np.ptp(bar.get_xdata()) == pytest.approx(said)
-    assert [text.get_text() for text in axes.texts] == [f"{said:g} m"]
+    assert np.ptp(bar.get_xdata()) == pytest.approx(wording)
+    assert [text.get_text() for text in axes.texts] == [f"{wording:g} m"]
     # A metre is as long along y.
     assert axes.get_aspect() == 1.0
 

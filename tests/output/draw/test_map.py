@@ -52,17 +52,17 @@ def test_map_says_what_it_shows(places, chair):
     figure = draw_map(
         places, [chair], [stand(), stand(x=-1.0)], here=stand(y=-1), title="Shaving", subtitle="P_R"
     )
-    said = words(figure)
+    wording = words(figure)
     for word in ("Shaving", "base x [m]", "base y [m]", "furniture", "[%]", "P_M", "now: x 1.00 m"):
-        assert word in said
-    assert "1: x 1.00 m, y 2.00 m, heading 0 deg, torso 0.15 m" in said
-    assert "2: x -1.00 m" in said
-    assert "person" not in said
+        assert word in wording
+    assert "1: x 1.00 m, y 2.00 m, heading 0 deg, torso 0.15 m" in wording
+    assert "2: x -1.00 m" in wording
+    assert "person" not in wording
 
 
 def test_map_names_the_measure(places):
-    said = words(draw_map(places, [], [], title="t", measure="inverse-condition"))
-    assert "manipulability, P_M (inverse-condition)" in said
+    wording = words(draw_map(places, [], [], title="t", measure="inverse-condition"))
+    assert "manipulability, P_M (inverse-condition)" in wording
     assert "P_M (isotropy)" in words(draw_map(places, [], [], title="t"))
 
 
@@ -82,7 +82,7 @@ def test_members_outside_the_grid_are_in_the_picture(places):
     assert axes.get_ylim()[0] < -3.2
 
 
-def test_axes_of_the_environment_are_told(places):
+def test_axes_of_the_environment_are_reported(places):
     bed = {"environment": (("head_rest", 0.5), ("bed_height", 0.2))}
     figure = draw_map(places, [], [stand(**bed, environment_units=("rad", "m"))], title="t")
     assert "head rest 28.6 deg, bed height 0.20 m" in words(figure)

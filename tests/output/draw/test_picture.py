@@ -11,8 +11,8 @@ def _small(monkeypatch):
     monkeypatch.setattr("tcs.output.draw.camera.SIZE", (240, 200))
 
 
-def ball(kind, at, radius=0.3):
-    return Solid.placed(kind, primitive_corners(SPHERE, (radius, 0.0, 0.0)), np.eye(3), at)
+def sphere(category, at, radius=0.3):
+    return Solid.placed(category, primitive_corners(SPHERE, (radius, 0.0, 0.0)), np.eye(3), at)
 
 
 # Seen from +x, the picture is 1.6 m high where they are.
@@ -27,9 +27,9 @@ def picture(figure, panel=0):
     return np.asarray(figure.axes[panel].images[0].get_array())
 
 
-def share(image, kind):
-    """Share of the pixels with the hue of a kind."""
-    colour = np.array(to_rgb(kind.colour))
+def share(image, category):
+    """Share of the pixels with the hue of a category."""
+    colour = np.array(to_rgb(category.colour))
     wanted = colour / np.linalg.norm(colour)
     hue = image / np.maximum(np.linalg.norm(image, axis=-1, keepdims=True), 1e-9)
     return float(np.mean(hue @ wanted > 0.9995))
@@ -38,16 +38,18 @@ def share(image, kind):
 def test_what_is_nearer_hides_what_is_behind():
     # The camera looks from +x.
     near, far = [1.0, 0.0, 1.3], [-1.0, 0.0, 0.6]
-    for kinds in ((Category.ARM, Category.PERSON), (Category.PERSON, Category.ARM)):
+    for categories in ((Category.ARM, Category.PERSON), (Category.PERSON, Category.ARM)):
         image = picture(
-            draw_scene([view(ball(kinds[0], near), ball(kinds[1], far, 0.1))], title="")
+            draw_scene(
+                [view(sphere(categories[0], near), sphere(categories[1], far, 0.1))], title=""
+            )
         )
-        assert share(image, kinds[0]) > 0.01
-        assert share(image, kinds[1]) == 0.0
+        assert share(image, categories[0]) > 0.01
+        assert share(image, categories[1]) == 0.0
 
 
 def test_solids_that_pass_through_one_another_are_both_seen():
-    both = (ball(Category.ARM, [0.0, -0.1, 1.0]), ball(Category.PERSON, [0.0, 0.1, 1.0]))
+    both = (sphere(Category.ARM, [0.0, -0.1, 1.0]), sphere(Category.PERSON, [0.0, 0.1, 1.0]))
     image = picture(draw_scene([view(*both)], title=""))
     arm, person = share(image, Category.ARM), share(image, Category.PERSON)
     # Mirror images of one another but for the light.
@@ -60,7 +62,7 @@ def test_the_side_that_shows_the_goals_is_taken(order):
     wall = primitive_corners(BOX, (0.05, 2.0, 2.0))
     solids = (
         Solid.placed(Category.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
-        ball(Category.GOAL, [0.0, 0.0, 1.0], 0.2),
+        sphere(Category.GOAL, [0.0, 0.0, 1.0], 0.2),
     )
     # From +x the wall is in the way.
     image = picture(draw_scene([view(*solids, azimuths=order)], title=""))
@@ -72,7 +74,7 @@ def test_the_side_that_shows_the_goals_is_taken(order):
 def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     ends = {"high": [[0, 0, 0.1], [0, 0, 1.9]], "wide": [1.3 * across, -1.3 * across]}[subject]
-    solids = [ball(Category.ARM, end, 0.1) for end in ends]
+    solids = [sphere(Category.ARM, end, 0.1) for end in ends]
     points = np.concatenate([solid.corners for solid in solids])
     image = picture(draw_scene([view(*solids, azimuths=(azimuth,), subject=points)], title=""))
     hit = np.abs(image - np.array(to_rgb(Category.ARM.colour))).max(axis=-1) < 0.5
@@ -87,7 +89,7 @@ def test_the_picture_is_as_close_as_its_subject_allows(azimuth, subject):
 
 def test_the_other_side_of_the_subject_is_in_the_picture_too():
     corners = np.array(np.meshgrid([-1.0, 1.0], [-0.7, 0.7], [0.0, 1.5])).reshape(3, -1).T
-    marks = [ball(Category.CURRENT_GOAL, corner, 0.06) for corner in corners]
+    marks = [sphere(Category.CURRENT_GOAL, corner, 0.06) for corner in corners]
     for azimuth in np.linspace(0.0, 2 * np.pi, 7):
         points = np.concatenate([mark.corners for mark in marks])
         image = picture(draw_scene([view(*marks, azimuths=(azimuth,), subject=points)], title=""))
@@ -113,13 +115,13 @@ def test_no_edge_within_a_surface_that_two_solids_share():
 
 
 def test_goals_have_the_colour_of_the_legend():
-    image = picture(draw_scene([view(ball(Category.GOAL, [0.0, 0.0, 1.0]))], title=""))
+    image = picture(draw_scene([view(sphere(Category.GOAL, [0.0, 0.0, 1.0]))], title=""))
     middle = image[image.shape[0] // 2, image.shape[1] // 2]
     np.testing.assert_allclose(middle, to_rgb(Category.GOAL.colour), atol=1e-6)
 
 
 def test_one_panel_for_each_view_and_a_legend():
-    views = [view(ball(Category.ARM, [0, 0, 1])), view(ball(Category.CURRENT_GOAL, [0, 0, 1]))]
+    views = [view(sphere(Category.ARM, [0, 0, 1])), view(sphere(Category.CURRENT_GOAL, [0, 0, 1]))]
     figure = draw_scene(views, title="both stops")
     assert len(figure.axes) == 2
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -127,7 +129,7 @@ def test_one_panel_for_each_view_and_a_legend():
 
 
 def test_what_is_behind_the_camera_is_left_out():
-    image = picture(draw_scene([view(ball(Category.ARM, [18.0, 0.0, 7.0]))], title=""))
+    image = picture(draw_scene([view(sphere(Category.ARM, [18.0, 0.0, 7.0]))], title=""))
     assert share(image, Category.ARM) == 0.0
 
 
@@ -143,27 +145,30 @@ def walls(*angles, distance=1.5, height=1.2):
 
 
 @pytest.mark.parametrize("azimuths", [(0.0,), (0.5, -2.2), (0.8, 2.4, -0.8, -2.4)])
-def test_the_walls_of_a_room_do_not_hide_what_is_inside(azimuths):
-    inside = (ball(Category.PERSON, [0.0, -0.4, 1.0]), ball(Category.ARM, [0.0, 0.4, 1.0]))
+def test_walls_do_not_hide_what_is_inside(azimuths):
+    inside = (sphere(Category.PERSON, [0.0, -0.4, 1.0]), sphere(Category.ARM, [0.0, 0.4, 1.0]))
     around = walls(0.0, np.pi / 2, np.pi, -np.pi / 2)
     open_figure = draw_scene([view(*inside, azimuths=azimuths)], title="")
     figure = draw_scene([view(*inside, *around, azimuths=azimuths)], title="")
-    for kind in (Category.PERSON, Category.ARM):
-        expected = share(picture(open_figure), kind)
+    for category in (Category.PERSON, Category.ARM):
+        expected = share(picture(open_figure), category)
         assert expected > 0.01
-        assert share(picture(figure), kind) == pytest.approx(expected, rel=0.1)
+        assert share(picture(figure), category) == pytest.approx(expected, rel=0.1)
     assert "left out" in figure.axes[0].get_title()
     assert "left out" not in open_figure.axes[0].get_title()
 
 
 def test_the_wall_behind_stays():
-    person = ball(Category.PERSON, [0.0, 0.0, 1.0])
+    person = sphere(Category.PERSON, [0.0, 0.0, 1.0])
     image = picture(draw_scene([view(person, *walls(0.0, np.pi))], title=""))
     assert share(image, Category.FURNITURE) > 0.1
 
 
 def test_a_side_without_a_wall_is_preferred():
-    inside = (ball(Category.PERSON, [0.0, 0.0, 1.0]), ball(Category.GOAL, [0.25, 0.0, 1.0], 0.15))
+    inside = (
+        sphere(Category.PERSON, [0.0, 0.0, 1.0]),
+        sphere(Category.GOAL, [0.25, 0.0, 1.0], 0.15),
+    )
     # The goal is on the side of the wall.
     figure = draw_scene([view(*inside, *walls(0.0), azimuths=(0.0, np.pi / 2))], title="")
     assert share(picture(figure), Category.PERSON) > 0.01
@@ -172,6 +177,6 @@ def test_a_side_without_a_wall_is_preferred():
 
 def test_low_furniture_is_never_left_out():
     low = Solid.placed(Category.FURNITURE, WALL * [1.0, 1.0, 0.6], np.eye(3), [0.6, 0.0, 0.72])
-    figure = draw_scene([view(ball(Category.PERSON, [0.0, 0.0, 0.5]), low)], title="")
+    figure = draw_scene([view(sphere(Category.PERSON, [0.0, 0.0, 0.5]), low)], title="")
     assert share(picture(figure), Category.FURNITURE) > 0.1
     assert "left out" not in figure.axes[0].get_title()

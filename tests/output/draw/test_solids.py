@@ -21,7 +21,7 @@ def area(polygon):
 
 
 @pytest.mark.parametrize(
-    ("kind", "size", "exact", "rel"),
+    ("shape", "size", "exact", "rel"),
     [
         # A box is drawn as it is; 16 corners around a circle leave out 2.6 % of its area, and the
         # flat bands of a ball a little more.
@@ -30,9 +30,9 @@ def area(polygon):
         pytest.param(CAPSULE, (0.1, 0.4, 0.0), np.pi * (0.008 + 4e-3 / 3), 0.05, id="capsule"),
     ],
 )
-def test_surface_is_closed_and_faces_outward(kind, size, exact, rel):
+def test_surface_is_closed_and_faces_outward(shape, size, exact, rel):
     got = volume(
-        Solid.placed(Category.PERSON, primitive_corners(kind, size), EYE, ORIGIN).triangles
+        Solid.placed(Category.PERSON, primitive_corners(shape, size), EYE, ORIGIN).triangles
     )
     assert got == pytest.approx(exact, rel=rel)
     assert got <= exact * (1 + 1e-12)

@@ -64,9 +64,9 @@ def test_panels_show_the_same_part_of_the_floor_with_a_scale(panels):
     figure = draw(panels)
     limits = {(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes[:6]}
     assert len(limits) == 1
-    said = words(figure)
+    wording = words(figure)
     for word in ("head rest 35 deg", "high", "0.5 m", "base x [m]", "2: x -0.50 m", "best "):
-        assert word in said
+        assert word in wording
 
 
 def test_the_best_of_each_state_is_the_best_of_all():

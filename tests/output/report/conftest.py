@@ -24,9 +24,9 @@ def plan():
 def score_path(tmp_path_factory):
     """A score file."""
     folder = tmp_path_factory.mktemp("study")
-    room = write_environment(folder, "small-wheelchair", BESIDE)
+    environment = write_environment(folder, "small-wheelchair", BESIDE)
     path = folder / "shaving-small-wheelchair-pr2.tcs"
-    file = score("shaving", room)
+    file = score("shaving", environment)
     save_scores(path, robustify(file, sets=12, samples=32))
     return path
 

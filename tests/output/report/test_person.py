@@ -19,11 +19,11 @@ COUNTER = """
 """
 
 
-def kinds(pr2, path) -> dict[str, set[Category]]:
+def categories(pr2, path) -> dict[str, set[Category]]:
     """Return what the shapes of each model are shown as."""
     found: dict[str, set[Category]] = {}
-    for part, kind in environment_parts(Scene(SceneSpec(pr2, load_environment(path)))):
-        found.setdefault(part.name.split("::")[0], set()).add(kind)
+    for part, category in environment_parts(Scene(SceneSpec(pr2, load_environment(path)))):
+        found.setdefault(part.name.split("::")[0], set()).add(category)
     return found
 
 
@@ -41,11 +41,11 @@ def counter(tmp_path):
 
 
 def test_a_counter_with_a_body_frame_is_furniture(pr2, counter):
-    assert kinds(pr2, counter) == {"counter": {Category.FURNITURE}}
+    assert categories(pr2, counter) == {"counter": {Category.FURNITURE}}
 
 
 def test_the_person_of_the_wheelchair_is_the_person(pr2):
-    assert kinds(pr2, "wheelchair") == {
+    assert categories(pr2, "wheelchair") == {
         "wheelchair": {Category.FURNITURE},
         "person": {Category.PERSON},
     }
@@ -53,4 +53,4 @@ def test_the_person_of_the_wheelchair_is_the_person(pr2):
 
 def test_a_file_names_its_person(pr2, counter):
     counter.write_text(counter.read_text() + "person: counter\n")
-    assert kinds(pr2, counter) == {"counter": {Category.PERSON}}
+    assert categories(pr2, counter) == {"counter": {Category.PERSON}}

@@ -70,30 +70,30 @@ def test_the_page_has_every_part_and_needs_nothing_else(page):
     assert all(link.startswith(("#", "data:image/png;base64,")) for link in reader.links)
     # A map, no states in a wheelchair, and a picture of each of the two stops.
     assert reader.tags.count("img") == 3
-    said = "".join(reader.text)
+    wording = "".join(reader.text)
     for part in ("Summary", "Robot at each stop", "Goals", "Reasons over", "Verification"):
-        assert part in said
-    assert "tcs report f.tcs --out r.html" in said
-    assert "Maps by environment state" not in said
+        assert part in wording
+    assert "tcs report f.tcs --out r.html" in wording
+    assert "Maps by environment state" not in wording
     assert as_markdown(page).count("\n## ") == len(page.sections)
 
 
-def test_each_goal_is_told_as_the_file_has_it(report, score_path):
+def test_each_goal_is_reported_as_the_file_has_it(report, score_path):
     table, scores = goals_table(report), load_scores(score_path).nominal.scores
     members = list(report.shown.indices)
     best = scores.dexterity[members].argmax(axis=0)
-    for goal, said in enumerate(column(table, "Reached from")):
+    for goal, wording in enumerate(column(table, "Reached from")):
         reached = scores.reached[members, goal].any()
-        assert said == (f"stop {best[goal] + 1}" if reached else "nowhere")
+        assert wording == (f"stop {best[goal] + 1}" if reached else "nowhere")
     for number, h in enumerate(members):
-        for goal, said in enumerate(column(table, f"At stop {number + 1}")):
+        for goal, wording in enumerate(column(table, f"At stop {number + 1}")):
             if scores.reached[h, goal]:
-                assert float(said) == pytest.approx(scores.dexterity[h, goal], abs=5e-4)
+                assert float(wording) == pytest.approx(scores.dexterity[h, goal], abs=5e-4)
             else:
-                assert not said[0].isdigit()
+                assert not wording[0].isdigit()
     share = scores.reached.mean(axis=0)
-    for goal, said in enumerate(column(table, "Of the grid")):
-        assert float(said.removesuffix("%")) == pytest.approx(100 * share[goal], abs=5.1e-3)
+    for goal, wording in enumerate(column(table, "Of the grid")):
+        assert float(wording.removesuffix("%")) == pytest.approx(100 * share[goal], abs=5.1e-3)
     assert set(column(table, "Drake")) == {"confirmed"}
 
 
@@ -131,12 +131,12 @@ def test_every_configuration_counts_once_for_each_goal(report):
 
 def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
     assert single.unreached
-    said = as_markdown(make_score_page(single, command="c"))
+    wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        assert f"From stop 1, goal {goal} would be reached so: " in said
-    assert f"Not reached: {goals_text(single.unreached)}." in said
-    assert "Nothing was re-checked" in said
-    assert "Of the sets of at most 1 in the file this one has the greatest P\\_R + P\\_M" in said
+        assert f"From stop 1, goal {goal} would be reached so: " in wording
+    assert f"Not reached: {goals_text(single.unreached)}." in wording
+    assert "Nothing was re-checked" in wording
+    assert "Of the sets of at most 1 in the file this one has the greatest P\\_R + P\\_M" in wording
     assert all(single.assignment[goal] is None for goal in single.unreached)
     assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
 
@@ -144,8 +144,8 @@ def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
 def test_the_set_is_the_one_to_choose_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
     found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
-    said = as_markdown(make_score_page(found, command="c"))
-    assert "this set is chosen for a robot at x 0.60 m, y 0.70 m, heading 0 deg" in said
+    wording = as_markdown(make_score_page(found, command="c"))
+    assert "this set is chosen for a robot at x 0.60 m, y 0.70 m, heading 0 deg" in wording
 
 
 @pytest.fixture(scope="module")
@@ -161,14 +161,14 @@ def false_path(score_path, tmp_path_factory):
     return path
 
 
-def test_a_false_answer_is_told(false_path):
+def test_a_false_answer_is_reported(false_path):
     found = make_score_report(false_path, sizes=CHECK)
     assert not found.is_sound
     assert set(column(goals_table(found), "Drake")) == {"REFUTED"}
     assert column(verification_table(found), "Result")[1] == "12"
-    said = as_markdown(make_score_page(found, command="c"))
-    assert "SOME ANSWERS OF THE FILE ARE FALSE" in said
-    assert "every answer holds" not in said
+    wording = as_markdown(make_score_page(found, command="c"))
+    assert "SOME ANSWERS OF THE FILE ARE FALSE" in wording
+    assert "every answer holds" not in wording
 
 
 def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_path):
@@ -190,7 +190,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     assert column(verification_table(found), "Result")[-1].startswith("THESE HOLD, BUT SOME")
 
 
-def test_what_was_rechecked_is_told(report):
+def test_what_was_rechecked_is_reported(report):
     found = dict(
         zip(*(column(verification_table(report), t) for t in ("Check", "Result")), strict=True)
     )
@@ -205,8 +205,10 @@ def test_estimates_of_success_are_those_of_the_file(report):
     assert success is not None
     for name, most in (("most robust set of one", 1), ("most robust set of up to 2", 2)):
         row = success.row_of(success.most_robust(report.scored.sets, max_members=most))
-        said = column(table, "Under error")[column(table, "Set").index(name)]
-        assert float(said.removesuffix("%")) == pytest.approx(100 * success.success[row], abs=0.051)
+        wording = column(table, "Under error")[column(table, "Set").index(name)]
+        assert float(wording.removesuffix("%")) == pytest.approx(
+            100 * success.success[row], abs=0.051
+        )
         ends = column(table, "95% interval")[column(table, "Set").index(name)].split(" to ")
         assert list(map(float, ends)) == pytest.approx(
             [100 * success.low[row], 100 * success.high[row]], abs=0.051
@@ -234,8 +236,8 @@ def test_data_files_are_named_as_they_were_given(report, tmp_path, monkeypatch):
 
 def test_commands_make_the_same_again(report, score_path):
     words = shlex.split(score_command(report))
-    room = str(score_path.parent / "small-wheelchair.yaml")
-    assert words[:7] == ["tcs", "score", "shaving", "--environment", room, "--robot", "pr2"]
+    environment = str(score_path.parent / "small-wheelchair.yaml")
+    assert words[:7] == ["tcs", "score", "shaving", "--environment", environment, "--robot", "pr2"]
     options = dict(zip(words[7::2], words[8::2], strict=True))
     assert options == {
         "--measure": "isotropy",
@@ -243,8 +245,8 @@ def test_commands_make_the_same_again(report, score_path):
         "--max-members": "2",
         "--out": str(score_path),
     }
-    said = robustify_command(report)
-    assert said == f"tcs robustify {score_path} --sets 12 --samples 32 --seed 0"
+    wording = robustify_command(report)
+    assert wording == f"tcs robustify {score_path} --sets 12 --samples 32 --seed 0"
     digest = hashlib.sha256(score_path.read_bytes()).hexdigest()
     made = as_markdown(make_score_page(report, command="c"))
     assert digest in made
@@ -256,11 +258,11 @@ def test_on_the_command_line(score_path, tmp_path):
     words = ("report", score_path, "--out", out, "--md", "--pairs", 3, "--dense", 2, "--json")
     ran = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
     assert ran.exit_code == 0
-    told = json.loads(ran.stdout)
-    assert told["files"] == [str(out), str(out.with_suffix(".md"))]
-    assert told["bytes"] == [path.stat().st_size for path in (out, out.with_suffix(".md"))]
-    assert told["is_sound"] is True
-    assert told["verification"]["checked"] == 3
+    reported = json.loads(ran.stdout)
+    assert reported["files"] == [str(out), str(out.with_suffix(".md"))]
+    assert reported["bytes"] == [path.stat().st_size for path in (out, out.with_suffix(".md"))]
+    assert reported["is_sound"] is True
+    assert reported["verification"]["checked"] == 3
     assert out.read_text().startswith("<!doctype html>")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.md"]
 
@@ -270,12 +272,12 @@ def test_nothing_in_reach_is_a_page_too(tmp_path):
     save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR)))
     found = make_score_report(path, sizes=CHECK)
     assert found.is_sound
-    said = as_markdown(make_score_page(found, command="c"))
-    assert "No configuration of the grid reaches any of the 8 goals" in said
-    assert said.count("Those that passed the most checks failed with: too far for the arm.") == 2
-    assert "Nothing was re-checked with Drake." in said
+    wording = as_markdown(make_score_page(found, command="c"))
+    assert "No configuration of the grid reaches any of the 8 goals" in wording
+    assert wording.count("Those that passed the most checks failed with: too far for the arm.") == 2
+    assert "Nothing was re-checked with Drake." in wording
     # No claim about answers that nothing was checked for.
-    assert "every answer holds" not in said
+    assert "every answer holds" not in wording
     assert column(verification_table(found), "Result")[-1] == found.verification.verdict
     assert found.views == ()
 

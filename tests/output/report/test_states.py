@@ -27,8 +27,8 @@ SMALL_BED = {
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bed")
-    room = write_environment(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
-    return score("scratching_chest", room)
+    environment = write_environment(folder, "small-bed", SMALL_BED, based_on="bed", observed={})
+    return score("scratching_chest", environment)
 
 
 def test_each_panel_shows_its_own_state(file):
@@ -74,7 +74,7 @@ def test_the_person_is_drawn_as_the_head_rest_has_them(file):
     assert not all(np.allclose(a, b) for a, b in zip(flat, raised, strict=False))
 
 
-def test_a_room_without_states_has_one_map():
+def test_an_environment_without_states_has_one_map():
     file = score_file(grid=small_grid(nx=3, ny=2))
     assert not has_states(file)
     with pytest.raises(SelectionError, match=r"has nothing to set.*without --states"):
@@ -91,11 +91,11 @@ def test_too_many_states_are_refused():
 
 
 def test_words_of_a_panel(file):
-    said = words(states_figure(file, ShownSet.of(file, None)))
+    wording = words(states_figure(file, ShownSet.of(file, None)))
     for word in (
         "best ",
         "head rest 70 deg",
         "person",
         "Best of all headings at each base position.",
     ):
-        assert word in said
+        assert word in wording

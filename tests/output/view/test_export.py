@@ -27,7 +27,7 @@ def test_without_a_set_something_is_shown_all_the_same(objects, shaving_set):
     )
 
 
-def test_page_tells_what_it_is_and_fits_into_three_megabytes(objects, shaving_set):
+def test_page_states_what_it_is_and_fits_into_three_megabytes(objects, shaving_set):
     text = export_page(
         open_meshcat(), objects, shaving_set, title="Shaving & more", notes=["By <nobody>."]
     )
@@ -38,7 +38,7 @@ def test_page_tells_what_it_is_and_fits_into_three_megabytes(objects, shaving_se
 
 
 class Recorder:
-    """An animation that tells what it was told."""
+    """An animation that records its calls."""
 
     def __init__(self, rate):
         self.poses, self.shown = {}, {}
@@ -75,7 +75,7 @@ def test_whatever_is_shown_stands_still_until_the_next_goal(objects, shaving_set
             assert keys[max(key for key in keys if key <= number * hold)] == (path in one)
 
 
-def test_captions_tell_when_each_member_is_shown(shaving_set):
+def test_captions_state_when_each_member_is_shown(shaving_set):
     steps = play_steps(shaving_set)
     lines = export._captions(shaving_set, steps)
     times = [tuple(map(float, line.split(" s:")[0].split(" to "))) for line in lines]

@@ -25,13 +25,13 @@ def meshcat(shared_meshcat):
 
 
 @pytest.fixture
-def told():
+def reported():
     return []
 
 
 @pytest.fixture
-def viewer(meshcat, objects, shaving_set, told):
-    return Viewer(meshcat, objects, shaving_set, told.append)
+def viewer(meshcat, objects, shaving_set, reported):
+    return Viewer(meshcat, objects, shaving_set, reported.append)
 
 
 def test_snapshot_has_the_arm_where_the_table_has_it(objects, scene, shaving_set):
@@ -79,10 +79,10 @@ def test_everything_that_is_shown_is_in_meshcat(viewer, meshcat, objects, shavin
         assert meshcat.HasPath(f"goals/{goal}/too_far")
 
 
-def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, shaving_set):
+def test_a_slider_moves_the_robot_and_reports_the_result(viewer, meshcat, reported, shaving_set):
     assert not viewer.update()
-    assert len(told) == 1
-    assert told[0].startswith("member 1 of 2: goal ")
+    assert len(reported) == 1
+    assert reported[0].startswith("member 1 of 2: goal ")
     meshcat.SetSliderValue("base x [m]", -0.1)
     assert viewer.update()
     assert not viewer.update()
@@ -90,7 +90,7 @@ def test_a_slider_moves_the_robot_and_tells_the_verdict(viewer, meshcat, told, s
     index = int(shaving_set.grid.flat(along))
     assert shaving_set.grid.configuration(index).base_x == pytest.approx(-0.1)
     line = shaving_set.result(index).line(viewer.state.goal)
-    assert told[1:] == [f"other configuration: {line}"]
+    assert reported[1:] == [f"other configuration: {line}"]
 
 
 def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shaving_set):
@@ -130,12 +130,12 @@ def test_only_what_changes_is_sent_and_one_arrow_is_seen_for_each_goal(objects, 
     assert not spy.moved
 
 
-def test_run_ends_when_it_is_told(viewer):
+def test_run_ends_after_its_duration(viewer):
     begun = time.monotonic()
     viewer.run(duration=0.05)
     assert time.monotonic() - begun >= 0.05
 
 
-def test_a_port_that_is_taken_is_told(shared_meshcat):
+def test_a_port_that_is_taken_is_reported(shared_meshcat):
     with pytest.raises(OutputError, match=f"port {shared_meshcat.port()}"):
         open_meshcat(shared_meshcat.port())

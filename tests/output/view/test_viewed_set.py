@@ -30,7 +30,7 @@ def test_verdict_of_no_configuration_is_refused(bed):
         bed.result(bed.grid.size)
 
 
-def test_line_tells_each_goal_that_is_missed():
+def test_line_states_each_goal_that_is_missed():
     grid = small_grid(1, 1, 1, 1)
     scores = one_configuration(
         [Reason.REACHED, Reason.TOO_FAR, Reason.ARM_BLOCKED, Reason.TOO_FAR], [-1, -1, 0, -1]
@@ -55,7 +55,7 @@ def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
             assert bed.scores.dexterity[bed.members[number], goal] == best[goal]
 
 
-def test_a_goal_that_nobody_reaches_is_served_by_nobody():
+def test_a_goal_that_no_member_reaches_is_served_by_no_member():
     viewed = made(small_grid(), 4, (), share=0.3)
     reached = viewed.scores.reached
     first = int(np.flatnonzero(reached.sum(axis=1) == 1)[0])

@@ -1,4 +1,4 @@
-"""Findings in words: what is told, what is left out, and how numbers are rounded."""
+"""Findings in words: what is reported, what is left out, and how numbers are rounded."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ def loss(reasons, pair=None, pair_fraction=0.0, standardized_error=-1.26):
 
 
 @pytest.mark.parametrize(
-    ("p", "said"),
+    ("p", "text"),
     [(0.0, "< 0.0001"), (9.9e-5, "< 0.0001"), (1e-4, "0.0001"), (0.00312, "0.0031"), (0.5, "0.5")],
 )
-def test_a_p_is_a_number_down_to_a_ten_thousandth(p, said):
-    assert p_value(p) == said
+def test_a_p_is_a_number_down_to_a_ten_thousandth(p, text):
+    assert p_value(p) == text
 
 
-def test_reasons_are_told_from_one_in_twenty_on():
-    said = stopped_by(
+def test_reasons_are_reported_from_one_in_twenty_on():
+    text = stopped_by(
         loss({Reason.ARM_BLOCKED: 0.91, Reason.TOO_FAR: 0.05, Reason.JOINT_LIMITS: 0.04})
     )
-    assert said == "every arm posture would touch something (91 %), too far for the arm (5 %)"
+    assert text == "every arm posture would touch something (91 %), too far for the arm (5 %)"
 
 
-@pytest.mark.parametrize(("share", "is_told"), [(0.19, False), (0.2, True), (1.0, True)])
-def test_a_pair_is_told_where_it_is_in_the_way_in_one_of_five(share, is_told):
+@pytest.mark.parametrize(("share", "is_stated"), [(0.19, False), (0.2, True), (1.0, True)])
+def test_a_pair_is_reported_where_it_is_in_the_way_in_one_of_five(share, is_stated):
     pair = ("l_forearm_link", "bed::pillow")
-    said = stopped_by(loss({Reason.ARM_BLOCKED: 1.0}, pair, share))
-    assert said.endswith("; most often l forearm and pillow") == is_told
+    text = stopped_by(loss({Reason.ARM_BLOCKED: 1.0}, pair, share))
+    assert text.endswith("; most often l forearm and pillow") == is_stated
 
 
 def test_a_lost_goal_is_a_sentence():
@@ -46,9 +46,9 @@ def test_a_lost_goal_is_a_sentence():
     )
 
 
-@pytest.mark.parametrize(("tilt", "said"), [(-1.26, "person y -1.3"), (0.84, "person y +0.8")])
-def test_an_error_is_told_with_its_side(tilt, said):
-    assert goes_with(loss({Reason.TOO_FAR: 1.0}, standardized_error=tilt)) == said
+@pytest.mark.parametrize(("tilt", "text"), [(-1.26, "person y -1.3"), (0.84, "person y +0.8")])
+def test_an_error_is_reported_with_its_side(tilt, text):
+    assert goes_with(loss({Reason.TOO_FAR: 1.0}, standardized_error=tilt)) == text
 
 
 def test_shares_and_points():
