@@ -1,4 +1,4 @@
-"""The command line: every command by name, and the function that carries it out."""
+"""The command line: every command and its function."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The group class of all commands: how they end when something goes wrong."""
+"""The command group of `tcs`: turns errors and interrupts into one line and an exit code."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from tcs.output.terminal import console
 
 
 class Commands(TyperGroup):
-    """Commands that end in one line and an exit code when something goes wrong.
+    """A command group that ends a failed command with one line and an exit code.
 
-    0 done, 1 a `TcsError`, 2 misuse (reported by typer), 130 interrupted. Any other exception is a
-    defect of the program and keeps its traceback.
+    Exit codes: 0 done, 1 a `TcsError`, 2 misuse (reported by typer), 130 interrupted. Any other
+    exception is a defect of the program and keeps its traceback.
     """
 
     def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]  # typer's own class

@@ -1,4 +1,4 @@
-"""The commands that draw: `tcs map` from above, `tcs picture` in space."""
+"""The commands `tcs map`, a picture from above, and `tcs picture`, a picture in space."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tcs.cli import options
 from tcs.output import terminal
 
 if TYPE_CHECKING:
-    # `tcs list` gets by without drawing.
+    # Quick commands such as `tcs list` must not load matplotlib.
     from matplotlib.figure import Figure
 
     from tcs.output.report.shown_set import ShownSet
     from tcs.placement.store import ScoreFile
 
-_SHOWN_SET = "With --here the set chosen from there, else the one with the best scores."
+_SHOWN_SET = "Shows the set selected from --here, or the one with the best scores."
 SCORES = ("reachability", "manipulability")
 
 _Out = Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")]
@@ -36,22 +36,24 @@ def draw_map(
         bool,
         typer.Option(
             "--states",
-            help="A map for each state of the environment, e.g. bed height by head rest.",
+            help="Draw one map for each state of the environment, e.g. bed height by head rest.",
         ),
     ] = False,
     score: Annotated[
         str | None,
         typer.Option(
             metavar="reachability|manipulability",
-            help="With --states: what the places are coloured by.",
+            help="With --states: the score that colours the base positions.",
             show_default="reachability",
         ),
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draw the best score per base place, from above, and where the chosen members stand."""
+    """Draw the best score at each base position, from above, and the members of a set."""
     if score is not None and not states:
-        raise typer.BadParameter("goes with --states: else both are drawn.", param_hint="--score")
+        raise typer.BadParameter(
+            "goes with --states only; without it both scores are drawn.", param_hint="--score"
+        )
     if score not in (None, *SCORES):
         raise typer.BadParameter(f"must be one of {', '.join(SCORES)}.", param_hint="--score")
 
@@ -79,7 +81,7 @@ def draw_picture(
     observed: options.Observed = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draw the robot where it is to stand, its arm at a goal, from its collision shapes."""
+    """Draw the robot at the base poses of a set, its arm at a goal, as collision shapes."""
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         from tcs.output.report.pictures import scene_figure
@@ -104,7 +106,7 @@ def _draw(
     *,
     as_json: bool,
 ) -> None:
-    """Draw the set chosen from here, or the best one."""
+    """Draw the set selected from the current state, or the best one."""
     import tcs
     from tcs.cli.values import observed_settings, state_if_given
     from tcs.files.writing import check_writable

@@ -1,4 +1,4 @@
-"""The command `tcs report`: one page about a score file."""
+"""The command `tcs report`: a page about a score file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def report(
     max_members: options.Members = None,
     observed: options.Observed = None,
     markdown: Annotated[
-        bool, typer.Option("--md", help="Write text and tables beside it as .md, too.")
+        bool, typer.Option("--md", help="Also write text and tables as .md, under the same name.")
     ] = False,
     pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check with Drake.")] = 500,
     dense: Annotated[
@@ -38,8 +38,8 @@ def report(
 ) -> None:
     """Write a page about a score file: base poses, scores, reasons and verification.
 
-    With --here about the set chosen from there, else about the one with the best scores. Answers
-    are re-checked with Drake; if one is false the page says so, and the exit code is 1.
+    Reports the set selected from --here, or the one with the best scores. Answers are re-checked
+    with Drake; if one is false, the page states it and the exit code is 1.
     """
     from tcs.cli.values import observed_settings, state_if_given
 

@@ -1,4 +1,4 @@
-"""The commands on score files as a whole: `tcs score`, `tcs verify` and `tcs export`."""
+"""Commands that make, verify and export score files."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ def score(
     same_environment: Annotated[
         bool,
         typer.Option(
-            "--same-environment", help="Only sets whose members share the state of the environment."
+            "--same-environment",
+            help="Keep only sets whose members share the environment state.",
         ),
     ] = False,
     max_members: Annotated[
@@ -67,12 +68,14 @@ def score(
             help="Score the observed environment, e.g. person_x=0.025 (m; JOINT_deg=VALUE).",
         ),
     ] = None,
-    seen: Annotated[
+    frames: Annotated[
         list[str] | None,
         typer.Option(
+            "--frames",
+            "--seen",
             metavar="FRAME=X,Y,Z",
-            help="The same from the observed position of a frame on the person or the furniture, "
-            "in the environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
+            help="Score the environment from the observed position of a frame on the person or "
+            "the furniture, in the environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
         ),
     ] = None,
     at: options.At = None,
@@ -81,11 +84,11 @@ def score(
     """Score every initial configuration of a grid and build the sets to select from."""
     if (task is None) != everything:
         raise typer.BadParameter("name a task, or give --all for all tasks.", param_hint="TASK")
-    if task is None and (observed or seen):
+    if task is None and (observed or frames):
         raise typer.BadParameter("needs one task, not --all.", param_hint="--observed")
-    if at and not seen:
+    if at and not frames:
         raise typer.BadParameter(
-            "states how the environment was set for --seen, which is not given.", param_hint="--at"
+            "needs --frames; with it, states the setting of the environment.", param_hint="--at"
         )
 
     from tcs.placement.scoring import default_path, files
@@ -106,7 +109,7 @@ def score(
         return
     environment = environment or "wheelchair"
     path = out or default_path(task, environment, robot)
-    if not observed and not seen:
+    if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(
                 task, environment, robot, path, on_progress=on_progress, **options_of_sets
@@ -119,11 +122,11 @@ def score(
     from tcs.model.scene import load_environment
 
     if out is None:
-        # The file of the task scored offline stays.
+        # Never overwrite the file of the task scored offline by default.
         path = path.with_stem(f"{path.stem}-live")
     observation = tcs.Observation(
         joints=observed_settings(observed or (), load_environment(environment).observable_axes),
-        frames=frame_values(seen or ()),
+        frames=frame_values(frames or ()),
         setting=settings(at or (), "--at"),
     )
     result = files.score_observed_to_file(
@@ -157,7 +160,7 @@ def export(
     file: options.File,
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
     everything: Annotated[
-        bool, typer.Option("--all", help="Also configurations that reach no goal.")
+        bool, typer.Option("--all", help="Include configurations that reach no goal.")
     ] = False,
     as_json: options.Json = False,
 ) -> None:

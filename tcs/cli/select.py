@@ -1,4 +1,4 @@
-"""The commands that answer from a score file: `tcs select` and `tcs explain`."""
+"""The commands `tcs select` and `tcs explain`, which only read a score file."""
 
 from __future__ import annotations
 
@@ -36,9 +36,11 @@ def select(
     ] = "straight",
     max_members: options.Members = None,
     observed: options.Observed = None,
-    seen: Annotated[
+    frames: Annotated[
         list[str] | None,
         typer.Option(
+            "--frames",
+            "--seen",
             metavar="FRAME=X,Y,Z",
             help="Observed position of a body frame in the environment frame (m), in place of "
             "--observed.",
@@ -66,7 +68,7 @@ def select(
         ),
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
-        frames=frame_values(seen or ()),
+        frames=frame_values(frames or ()),
     )
     result = choice.to_json(loaded.metadata["measure"])
     terminal.print_result(result, tables.report_choice, as_json=as_json)
@@ -86,7 +88,8 @@ def explain(
         tuple[float, float, float] | None,
         typer.Option(
             metavar="X Y YAW_DEG",
-            help="A base pose instead, in the environment frame (m, m, deg); see --torso, --at.",
+            help="Base pose to explain instead, in the environment frame (m, m, deg), with --torso "
+            "and --at.",
         ),
     ] = None,
     torso: options.Torso = 0.0,
@@ -108,7 +111,7 @@ def explain(
     observed: options.Observed = None,
     as_json: options.Json = False,
 ) -> None:
-    """Explain why a goal is not reached, and find the least change that reaches it."""
+    """Explain why a goal is not reached, and find the cheapest change that reaches it."""
     if configuration is not None and here is not None:
         raise typer.BadParameter("give --configuration or --here, not both.", param_hint="--here")
     if here is None and (at or torso):

@@ -121,7 +121,7 @@ def frame_values(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
             frames[name] = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             raise SelectionError(
-                f"--seen is '{text}'; must be FRAME=X,Y,Z, e.g. head=0.29,0.05,0.68."
+                f"--frames is '{text}'; must be FRAME=X,Y,Z, e.g. head=0.29,0.05,0.68."
             ) from None
     return frames
 

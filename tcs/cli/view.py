@@ -1,4 +1,4 @@
-"""The command `tcs view`: look at a score file in the browser."""
+"""The command `tcs view`: show a score file in the browser."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def view(
         tuple[float, float, float] | None,
         typer.Option(
             metavar="X Y YAW_DEG",
-            help="Start with the set chosen from here (m, m, deg) instead of the best one.",
+            help="Start with the set selected from here (m, m, deg), else with the best one.",
         ),
     ] = None,
     torso: options.Torso = 0.0,

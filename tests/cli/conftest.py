@@ -25,7 +25,7 @@ TIMINGS = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Ran:
-    """What a command said, and how it ended."""
+    """Output and exit code of a command."""
 
     code: int
     out: str
@@ -39,11 +39,11 @@ class Ran:
 
 @pytest.fixture
 def tcs_command() -> Callable[..., Ran]:
-    """Runs `tcs` with these words, in this process."""
+    """Function that runs `tcs` with the given arguments in this process."""
 
     def run(*words: object) -> Ran:
         result = CliRunner().invoke(app, [str(word) for word in words])
-        # Only what a command lets through on purpose; the rest is a mistake with a traceback.
+        # Any exception other than an exit is a defect.
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
         return Ran(result.exit_code, result.stdout, result.stderr)
@@ -53,7 +53,7 @@ def tcs_command() -> Callable[..., Ran]:
 
 @pytest.fixture
 def process() -> Callable[..., Ran]:
-    """Runs `tcs` with these words, in a process of its own whose output is piped."""
+    """Function that runs `tcs` with the given arguments in a separate process with piped output."""
 
     def run(*words: object, before: str = "", cwd: Path | None = None) -> Ran:
         code = f"import sys\n{before}\nfrom tcs.cli import main\nmain()"
@@ -87,7 +87,7 @@ def corner(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def example() -> Callable[..., tcs.ScoreFile]:
-    """Makes a score file as `tcs.score` might return it."""
+    """Function that makes a score file like one of `tcs.score`."""
 
     def make(**changes: Any) -> tcs.ScoreFile:
         return score_file(metadata={**METADATA, "timings": TIMINGS}, **changes)
@@ -97,7 +97,7 @@ def example() -> Callable[..., tcs.ScoreFile]:
 
 @pytest.fixture
 def stand_in(monkeypatch, example):
-    """Calls of `tcs.score`, which returns an example at once."""
+    """Recorded calls of `tcs.score`, replaced by a function that returns an example."""
     calls = []
 
     def score(*arguments, **options):

@@ -78,7 +78,7 @@ def test_every_name_and_number_is_printed_in_full(tcs_command, stand_in, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         ((), 2, "name a task"),
         (("shaving", "--all"), 2, "name a task, or give --all"),
@@ -86,13 +86,13 @@ def test_every_name_and_number_is_printed_in_full(tcs_command, stand_in, tmp_pat
         (("--all", "--robot", "pr3"), 1, "pr2"),
     ],
 )
-def test_what_does_not_make_sense_is_told(tcs_command, tmp_path, words, code, said):
+def test_misuse_and_unknown_names_are_reported(tcs_command, tmp_path, words, code, message):
     ran = tcs_command("score", *words, "--out", tmp_path / "all")
     assert ran.code == code
-    assert said in ran.err
+    assert message in ran.err
 
 
-def test_a_folder_that_cannot_be_made_is_told(process, tmp_path):
+def test_a_folder_that_cannot_be_made_is_reported(process, tmp_path):
     (tmp_path / "file").write_text("x")
     ran = process("score", "--all", "--out", tmp_path / "file" / "all")
     assert ran.code == 1

@@ -1,4 +1,4 @@
-"""What is said while a command works, and what is left when it is interrupted."""
+"""Progress messages of commands, and their state after an interrupt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 import tcs
 
 
-def test_first_run_says_that_it_compiles(tcs_command, example, tmp_path, monkeypatch):
+def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monkeypatch):
     def score(*_arguments, on_compile, on_progress, **_options):
         on_compile()
         on_progress(1, 2)
@@ -24,7 +24,10 @@ def test_first_run_says_that_it_compiles(tcs_command, example, tmp_path, monkeyp
     monkeypatch.setattr(tcs, "score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs", "--json")
     # One line, no bar: stderr is no terminal here.
-    assert ran.err == "tcs: compiling for this machine, up to a minute; later runs do without.\n"
+    assert (
+        ran.err
+        == "tcs: compiling for this machine, up to a minute; later runs use the compiled code.\n"
+    )
     assert json.loads(ran.out)["goals"] == 5
 
 
@@ -80,9 +83,9 @@ def test_interrupt_while_scoring(tmp_path):
     ) as running:
         assert running.stdout.readline() == "0\n"
         running.send_signal(signal.SIGINT)
-        _, said = running.communicate()
+        _, message = running.communicate()
     assert running.returncode == 130
-    assert said == "tcs: interrupted; no half-written file is left.\n"
+    assert message == "tcs: interrupted; no half-written file is left.\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -34,7 +34,7 @@ def test_headings_are_those_of_the_checked_files(tcs_command):
         assert load_robot(entry["name"]).title == entry["title"]
 
 
-def test_list_for_a_person(tcs_command):
+def test_list_as_text(tcs_command):
     ran = tcs_command("list")
     assert ran.code == 0
     assert ran.err == ""

@@ -1,4 +1,4 @@
-"""Drawing on the command line: what is refused before any work, and how."""
+"""Commands that draw: input rejected before any work."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 
 @pytest.mark.parametrize("verb", ["map", "picture", "report"])
-def test_a_file_that_is_none_is_one_line(tcs_command, tmp_path, verb):
+def test_a_missing_file_is_one_line(tcs_command, tmp_path, verb):
     ending = "html" if verb == "report" else "png"
     ran = tcs_command(verb, tmp_path / "no.tcs", "--out", tmp_path / f"x.{ending}")
     assert ran.code == 1
@@ -16,7 +16,7 @@ def test_a_file_that_is_none_is_one_line(tcs_command, tmp_path, verb):
 
 
 @pytest.mark.parametrize(
-    ("verb", "out", "said"),
+    ("verb", "out", "message"),
     [
         ("map", "map.gif", "must end in one of .png, .pdf, .svg"),
         ("report", "page.pdf", "must end in one of .html, .md"),
@@ -25,15 +25,15 @@ def test_a_file_that_is_none_is_one_line(tcs_command, tmp_path, verb):
         ("map", "none/map.png", "cannot be written"),
     ],
 )
-def test_a_file_that_cannot_be_written_is_one_line(tcs_command, small_file, verb, out, said):
+def test_a_file_that_cannot_be_written_is_one_line(tcs_command, small_file, verb, out, message):
     ran = tcs_command(verb, small_file, "--out", small_file.parent / out)
     assert ran.code == 1
-    assert said in ran.err
+    assert message in ran.err
     assert ran.err.count("\n") == 1
 
 
 def test_scores_of_other_models_are_refused(tcs_command, small_file):
-    # Its scene is no digest of ours.
+    # The scene digest of the example matches no model.
     ran = tcs_command("report", small_file, "--out", small_file.parent / "page.html")
     assert ran.code == 1
     assert "from other models" in ran.err
@@ -41,17 +41,17 @@ def test_scores_of_other_models_are_refused(tcs_command, small_file):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--score", "reachability"), "goes with --states"),
         (("--states", "--score", "success"), "must be one of reachability"),
         (("--torso", 0.1), "needs --here"),
     ],
 )
-def test_options_that_do_not_go_together_are_misuse(tcs_command, small_file, words, said):
+def test_options_that_do_not_go_together_are_misuse(tcs_command, small_file, words, message):
     ran = tcs_command("map", small_file, "--out", small_file.parent / "m.png", *words)
     assert ran.code == 2
-    assert said in ran.err
+    assert message in ran.err
 
 
 def test_unknown_observed_axis_is_one_line(tcs_command, small_file):

@@ -1,4 +1,4 @@
-"""What the README shows works as it stands there."""
+"""Every command, file and program in the README works."""
 
 import re
 import shlex
@@ -46,17 +46,17 @@ def test_environment_is_read(tmp_path):
 
 def test_python_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    asked = []
+    calls = []
 
     class Sound:
         is_sound = True
 
     # The long work is tested elsewhere; here, that it is called as it can be called.
-    monkeypatch.setattr(tcs, "score", lambda *a, **o: asked.append((a, o)) or score_file())
-    monkeypatch.setattr(tcs, "verify", lambda *a, **o: asked.append((a, o)) or Sound)
+    monkeypatch.setattr(tcs, "score", lambda *a, **o: calls.append((a, o)) or score_file())
+    monkeypatch.setattr(tcs, "verify", lambda *a, **o: calls.append((a, o)) or Sound)
     exec(compile(blocks("python")[0], "README.md", "exec"), {})
     assert "base_yaw_deg" in capsys.readouterr().out
-    assert asked[0] == (("shaving",), {"environment": "wheelchair", "robot": "pr2", "jobs": 2})
+    assert calls[0] == (("shaving",), {"environment": "wheelchair", "robot": "pr2", "jobs": 2})
 
 
 @pytest.mark.parametrize("target", re.findall(r"\]\(([^)]+)\)", README))

@@ -51,8 +51,8 @@ def test_what_cannot_be_drafted_is_one_line(tcs_command, folder, arguments, mess
     assert sorted(path.name for path in folder.iterdir()) == ["made_up.urdf"]
 
 
-def test_an_arm_outside_the_classes_is_drafted_and_told(tcs_command, folder):
-    """A wrist whose last axis passes by, and a shoulder that is not round either."""
+def test_an_arm_outside_the_classes_is_drafted_and_reported(tcs_command, folder):
+    """Neither the wrist nor the shoulder of this arm is spherical."""
     text = urdf(wrist_offset=0.03).replace('xyz="0.0 0.0 0.15"', 'xyz="0.02 0.0 0.15"')
     (folder / "odd.urdf").write_text(text)
     assert tcs_command("robot", "new", "odd.urdf", "--tool", "tool").code == 0
@@ -68,7 +68,7 @@ def test_an_arm_outside_the_classes_is_drafted_and_told(tcs_command, folder):
     assert ran.json["enclosed"]["enclosed"] is True
 
 
-def test_check_for_a_person(tcs_command):
+def test_check_as_text(tcs_command):
     ran = tcs_command("robot", "check", "pr2", "--samples", "20")
     assert ran.code == 0
     assert ran.err == ""

@@ -135,7 +135,7 @@ def test_pictures_have_a_known_format_and_a_place(tcs_command, small_file, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         pytest.param(("shavin",), "unknown task 'shavin'.*Did you mean 'shaving'", id="task"),
         pytest.param(
@@ -152,28 +152,28 @@ def test_pictures_have_a_known_format_and_a_place(tcs_command, small_file, tmp_p
         pytest.param(("none.yaml",), "task file 'none.yaml' cannot be read", id="no file"),
     ],
 )
-def test_unknown_names(tcs_command, tmp_path, words, said):
+def test_unknown_names(tcs_command, tmp_path, words, message):
     path = tmp_path / "out.tcs"
     ran = tcs_command("score", *words, "--out", path)
     assert ran.code == 1
     assert ran.err.count("\n") == 1
-    assert re.search(said, ran.err)
+    assert re.search(message, ran.err)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
-    ("count", "said"),
+    ("count", "message"),
     [
         pytest.param(0, "corner.yaml", id="empty grid"),
         pytest.param(30_000_000, "360,000,000", id="huge"),
     ],
 )
-def test_impossible_grids(tcs_command, tmp_path, count, said):
+def test_impossible_grids(tcs_command, tmp_path, count, message):
     environment = write_environment(tmp_path, "corner", CORNER | {"base_x": (0.95, 0.1, count)})
     ran = tcs_command("score", "shaving", "--environment", environment, "--out", tmp_path / "o.tcs")
     assert ran.code == 1
     assert ran.err.count("\n") == 1
-    assert said in ran.err
+    assert message in ran.err
 
 
 def test_unknown_frame_names_the_nearest(tcs_command, tmp_path):
@@ -237,10 +237,10 @@ def test_the_measure_is_handed_on_and_named(tcs_command, example, tmp_path, monk
     assert measures == ["inverse-condition", "inverse-condition", "isotropy"]
 
 
-def test_score_for_a_person(tcs_command, tmp_path, stand_in):
+def test_score_as_text(tcs_command, tmp_path, stand_in):
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
     assert ran.code == 0
-    for word in ("configurations", "best set", "best place to stand", "base x [m]", "o.tcs"):
+    for word in ("configurations", "best set", "best base pose", "base x [m]", "o.tcs"):
         assert word in ran.out
 
 

@@ -32,32 +32,32 @@ def test_the_environment_is_scored_as_observed(tcs_command, corner, tmp_path, mo
     assert tcs_command("map", path, "--out", tmp_path / "map.png").code == 0
 
 
-def test_what_is_seen_is_told_with_what_is_left_over(tcs_command, corner, tmp_path):
-    # The head belongs at (0.451, 0, 1.232); nothing lifts it by 20 mm.
-    words = ("--seen", "head=0.451,0,1.252", "--out", tmp_path / "live.tcs")
+def test_observed_frames_and_their_residual_are_reported(tcs_command, corner, tmp_path):
+    # The head belongs at (0.451, 0, 1.232); no joint raises it by 20 mm.
+    words = ("--frames", "head=0.451,0,1.252", "--out", tmp_path / "live.tcs")
     ran = tcs_command("score", "shaving", "--environment", corner, *words)
     assert ran.code == 0
     assert ran.out.splitlines()[:2] == [
-        "scored as found: everything in its place",
-        "frames seen fit to 0.0200 m",
+        "scored as observed: everything at its nominal position",
+        "observed frames fit to 0.0200 m",
     ]
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         (("--observed", "head_tilt=3"), 1, "Write head_tilt_deg=VALUE"),
         (("--observed", "persn_x=0.1"), 1, "Did you mean 'person_x'"),
-        (("--seen", "head=0,0"), 1, "three finite numbers"),
-        (("--seen", "head=0.451,0,1.5"), 1, "0.268 m from the nearest"),
+        (("--frames", "head=0,0"), 1, "three finite numbers"),
+        (("--frames", "head=0.451,0,1.5"), 1, "0.268 m from the nearest"),
         (("--at", "bed_height=0.1"), 2, "--at"),
     ],
 )
-def test_what_cannot_be_is_told(tcs_command, corner, tmp_path, words, code, said):
+def test_impossible_observations_are_reported(tcs_command, corner, tmp_path, words, code, message):
     path = tmp_path / "live.tcs"
     ran = tcs_command("score", "shaving", "--environment", corner, "--out", path, *words)
     assert ran.code == code
-    assert said in ran.err
+    assert message in ran.err
     assert not path.exists()
 
 

@@ -66,7 +66,7 @@ def test_weights_reach_the_selection(tcs_command, small_file):
     assert result["members"][0] == choice.members[0].to_json()
 
 
-def test_select_for_a_person(tcs_command, small_file):
+def test_select_as_text(tcs_command, small_file):
     ran = tcs_command("select", small_file, *HERE)
     for word in ("base x [m]", "heading [deg]", "bed height [m]", "of the goals", "utility"):
         assert word in ran.out
@@ -90,7 +90,7 @@ def test_misuse_exits_with_2(tcs_command, small_file, words):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         pytest.param((*HERE, "--gamma", "-1"), "Weight gamma (travel) is -1.0", id="negative"),
         pytest.param(
@@ -117,17 +117,17 @@ def test_misuse_exits_with_2(tcs_command, small_file, words):
         ),
     ],
 )
-def test_impossible_values_are_one_line(tcs_command, small_file, words, said):
+def test_impossible_values_are_one_line(tcs_command, small_file, words, message):
     ran = tcs_command("select", small_file, *words)
     assert ran.code == 1
     assert ran.out == ""
     assert ran.err.startswith("tcs: ")
     assert ran.err.count("\n") == 1
-    assert said in ran.err
+    assert message in ran.err
 
 
 class Call:
-    """What a pickle may ask for: here, to make a folder."""
+    """A call that a pickle makes when it is loaded: it creates a folder."""
 
     def __init__(self, folder):
         self.folder = str(folder)
@@ -182,37 +182,39 @@ def test_nothing_to_choose_from(tcs_command, tmp_path):
     assert "Nothing to choose from" in ran.err
 
 
-def test_the_observed_shift_is_told(tcs_command, tmp_path):
+def test_the_observed_shift_is_reported(tcs_command, tmp_path):
     path = tmp_path / "shifts.tcs"
     tcs.save(path, score_file(tables=3, observed=[SHIFT]))
     ran = tcs_command("select", path, *HERE, "--observed", "person_y=0.04", "--json").json
     assert ran["observed"] == {"person_y": 0.05}
     assert ran["observed_error"] == {"person_y": -0.01}
-    seen = tcs_command("select", path, *HERE, "--seen", "head=0.1,0.1,0.12", "--json").json
-    assert seen["frame_error"] == pytest.approx(0.02)
-    said = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
-    assert "scored for person y 0.05 m; observed person y differs by -0.01 m" in said.out
+    for option in ("--frames", "--seen"):
+        words = (*HERE, option, "head=0.1,0.1,0.12", "--json")
+        result = tcs_command("select", path, *words).json
+        assert result["frame_error"] == pytest.approx(0.02)
+    message = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
+    assert "scored for person y 0.05 m; observed person y differs by -0.01 m" in message.out
     # A zero that comes out negative has no sign.
     exact = tcs_command("select", path, *HERE, "--observed", "person_y=-0.0")
-    assert "scored for person_y 0; person_y is as observed" in exact.out
+    assert "scored for person y 0 m; observed person y is the scored one" in exact.out
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--observed", "person_y=0.2"), "scored are only -0.05 to 0.05 m"),
         (("--observed", "person_y"), "NAME=NUMBER"),
         (("--observed", "person_y=0", "--observed", "person_y=1"), "twice"),
         (("--observed", "person_y_deg=2"), "scored in m. Write person_y=VALUE"),
-        (("--seen", "head=1,2,x"), "FRAME=X,Y,Z"),
+        (("--frames", "head=1,2,x"), "FRAME=X,Y,Z"),
     ],
 )
-def test_a_shift_that_was_not_scored_is_told(process, tmp_path, words, said):
+def test_a_shift_that_was_not_scored_is_reported(process, tmp_path, words, message):
     path = tmp_path / "shifts.tcs"
     tcs.save(path, score_file(tables=3, observed=[SHIFT]))
     ran = process("select", path, *HERE, *words)
     assert ran.code == 1
-    assert said in ran.err
+    assert message in ran.err
     assert ran.err.count("\n") == 1
 
 
@@ -252,7 +254,7 @@ def test_travel_around_the_furniture(tcs_command, tmp_path):
     assert "unreachable from here:" in tcs_command(*words, "--travel", "around").out
 
 
-def test_three_places_to_stand(tcs_command, tmp_path):
+def test_sets_of_three(tcs_command, tmp_path):
     path = tmp_path / "three.tcs"
     tcs.save(path, score_file(options={"max_members": 3}))
     words = ("select", path, *HERE, "--gamma", 0, "--json")

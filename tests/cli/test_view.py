@@ -10,7 +10,7 @@ def test_meshes_and_json_are_for_pages_only(tcs_command, small_file):
         assert "--export" in ran.err
 
 
-def test_a_page_that_cannot_be_written_is_told_before_the_work(tcs_command, tmp_path):
+def test_a_page_that_cannot_be_written_is_reported_before_the_work(tcs_command, tmp_path):
     ran = tcs_command("view", tmp_path / "no.tcs", "--export", tmp_path / "none" / "x.html")
     assert ran.code == 1
     assert "cannot be written" in ran.err

@@ -1,4 +1,4 @@
-"""The terminal: results go to stdout, messages and progress to stderr; interrupts are kept."""
+"""The terminal: results on stdout, messages and progress on stderr, and a record of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rich.console import Console
 from tcs.errors import TcsError
 
 _PIPE_WIDTH = 110
-"""Columns where stdout is no terminal; no row of our tables is wider."""
+"""Width where stdout is not a terminal, in columns; no row of our tables is wider."""
 
 
 _interrupted = threading.Event()
@@ -79,7 +79,7 @@ def exit_code_of(work: Callable[[], int]) -> int:
 
 def note_compiling() -> None:
     """Print why the first run takes longer."""
-    note("compiling for this machine, up to a minute; later runs do without.")
+    note("compiling for this machine, up to a minute; later runs use the compiled code.")
 
 
 def print_result(

@@ -1,4 +1,4 @@
-"""Explanations for a person: why a goal is not reached, and what would reach it."""
+"""Explanations as text: why a goal is not reached, and the nearest change that reaches it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from tcs.output.words import (
 from tcs.placement.tables import Reason
 
 MOST_PAIRS = 4
-"""Pairs of bodies that are printed for each reason; `--json` has them all. The base is blocked a
-thousand times as often as the arm, and would leave no room for what blocks that."""
+"""Most pairs of bodies printed for each reason; `--json` has all of them. The base is blocked a
+thousand times as often as the arm, so one common list would show pairs of the base only."""
 
 
 def report_explanation(result: Mapping[str, Any]) -> None:
@@ -36,10 +36,10 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     frame = f", on {result['body_frame']}" if result["body_frame"] else ""
     out.print(f"Goal {result['goal']} of {result['task']} in {result['environment']}{frame}")
     if result["observed"]:
-        off = "".join(
+        error = "".join(
             f"; {deviation_text(name, value)}" for name, value in result["observed_error"].items()
         )
-        out.print(f"Scored for {settings_text(result['observed'])}{off}.")
+        out.print(f"Scored for {settings_text(result['observed'])}{error}.")
     if result["explained"] is not None:
         _print_explained(out, result)
     _print_fix(out, result)
@@ -48,12 +48,13 @@ def report_explanation(result: Mapping[str, Any]) -> None:
 
 
 def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
-    """Print what came of the goal at the configuration that is explained."""
+    """Print the result at the explained configuration."""
     explained = result["explained"]
     name = f"configuration {explained['configuration']}"
     if explained["offset"]:
-        off = ", ".join(_with_unit(axis, value) for axis, value in explained["offset"].items())
-        out.print(f"The nearest that was scored is {name}; the place is off by {off}.")
+        number = explained["configuration"]
+        offset = ", ".join(_with_unit(axis, value) for axis, value in explained["offset"].items())
+        out.print(f"The nearest scored configuration is {number}; it differs by {offset}.")
     if explained["reached"]:
         out.print(f"It is reached from {name}, {result['measure']} {explained['dexterity']:.3f}.")
         return
@@ -71,14 +72,14 @@ def _print_explained(out: Console, result: Mapping[str, Any]) -> None:
 
 
 def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
-    """Print the nearest configuration that reaches the goal, or what keeps them all from it."""
+    """Print the nearest configuration that reaches the goal, or why none does."""
     fix, explained = result["nearest_reaching"], result["explained"]
     if fix is None:
         _print_hopeless(out, result)
         return
     if not fix["changes"]:
         return
-    out.print(f"Nearest that reaches it is configuration {fix['configuration']}:")
+    out.print(f"The nearest configuration that reaches it is {fix['configuration']}:")
     out.print(f"  {fix['sentence']}")
     out.print(
         members_table(
@@ -94,12 +95,12 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
     out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")
     if fix["route"] != result["weights"]["route"]:
         out.print(
-            "Driving is measured in straight lines: nobody drives from where the base can't be."
+            "Travel is measured in straight lines: the base starts in collision, so no path exists."
         )
 
 
 def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
-    """Print what keeps every configuration from the goal."""
+    """Print why no configuration reaches the goal."""
     if result["unreachable"]:
         out.print(
             f"{result['unreachable']:,} configurations reach it, but there is no way around the "
@@ -110,22 +111,22 @@ def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
     pairs = [pair for pair in result["blocking_pairs"] if pair["reason"] == farthest["reason"]]
     often = f", most often {pair_text(pairs[0]['pair'])}" if pairs else ""
     out.print(
-        "No configuration of the grid reaches it. Nearest to it came "
-        f"{farthest['stopped']:,}: {REASON_TEXTS[reason_of(farthest['reason'])]}{often}."
+        f"No configuration of the grid reaches it. {farthest['stopped']:,} passed the most checks: "
+        f"{REASON_TEXTS[reason_of(farthest['reason'])]}{often}."
     )
 
 
 def _print_reasons(out: Console, result: Mapping[str, Any]) -> None:
     """Print the reasons over the whole grid, in the order of the checks."""
     total = result["configurations"]
-    table = new_table("over the grid", ">configurations", ">of all", ">of those that came so far")
+    table = new_table("over the grid", ">configurations", ">of all", ">of those checked")
     for check in result["checks"]:
-        share = f"{check['stopped'] / check['of']:.1%}" if check["of"] else "-"
+        fraction = f"{check['stopped'] / check['of']:.1%}" if check["of"] else "-"
         table.add_row(
             REASON_TEXTS[reason_of(check["reason"])],
             f"{check['stopped']:,}",
             f"{check['stopped'] / total:.1%}",
-            share,
+            fraction,
         )
     reached = result["reasons"]["reached"]
     table.add_row(REASON_TEXTS[Reason.REACHED], f"{reached:,}", f"{reached / total:.1%}", "")
@@ -151,11 +152,11 @@ def _print_pairs(out: Console, result: Mapping[str, Any]) -> None:
 
 
 def _weights(weights: Mapping[str, Any], fix: Mapping[str, Any]) -> str:
-    """Return what each kind of change costs, in words."""
+    """Return the cost of each type of change, in words."""
     where = " around the furniture" if fix["route"] == "around" else ""
     parts = [
         f"{weights['metre']:g} per metre driven{where}",
-        f"{weights['turn']:g} per radian turned",
+        f"{weights['turn']:g} per radian of base rotation",
         f"{weights['torso']:g} per metre of torso",
     ]
     for name, cost in weights["environment"].items():

@@ -23,24 +23,24 @@ from tcs.output.words import (
 from tcs.output.words.verification import check_lines
 
 NUMERIC_NOTE = (
-    "Numeric inverse kinematics: no closed form solves this arm. That takes longer, and a few "
-    "pairs that could be reached may count as not; tcs verify says how many."
+    "Numeric inverse kinematics, since this arm has no closed-form solution: scoring takes longer "
+    "and may miss a few reachable pairs. `tcs verify` estimates how many."
 )
 _ROWS_WIDTH = 170
-"""Columns that the table of all rows needs."""
+"""Width of the table of all rows, in columns."""
 
 
 def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Print the tasks, environments and robots there are."""
+    """Print the known tasks, environments and robots."""
     out = results_console()
-    tasks = new_table("task", "what", ">goals", "environments")
+    tasks = new_table("task", "title", ">goals", "environments")
     for task in known["tasks"]:
-        places = ", ".join(task["environments"])
-        tasks.add_row(task["name"], task["title"], str(task["goals"]), places)
-    environments = new_table("environment", "what", "origin and axes")
+        names = ", ".join(task["environments"])
+        tasks.add_row(task["name"], task["title"], str(task["goals"]), names)
+    environments = new_table("environment", "title", "origin and axes")
     for environment in known["environments"]:
         environments.add_row(environment["name"], environment["title"], environment["origin"])
-    robots = new_table("robot", "what")
+    robots = new_table("robot", "title")
     for robot in known["robots"]:
         robots.add_row(robot["name"], robot["title"])
     for table in (tasks, environments, robots):
@@ -48,7 +48,7 @@ def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
 
 
 def report_scores(result: Mapping[str, Any]) -> None:
-    """Print what scoring found."""
+    """Print the summary of a scored task."""
     out = results_console()
     out.print(
         f"{result['configurations']:,} configurations x {result['goals']} goals scored in "
@@ -62,7 +62,7 @@ def report_scores(result: Mapping[str, Any]) -> None:
         fraction = percentage(count / result["pairs"])
         reasons.add_row(REASON_TEXTS[reason_of(name)], f"{count:,}", fraction)
     out.print(reasons)
-    for key, what in (("best_single", "best place to stand"), ("best", "best set")):
+    for key, what in (("best_single", "best base pose"), ("best", "best set")):
         best = result[key]
         if best is None:
             out.print(f"{what}: none, no goal is reached from anywhere.")
@@ -109,7 +109,7 @@ def report_rows(result: Mapping[str, Any]) -> None:
 
 
 def report_choice(result: Mapping[str, Any]) -> None:
-    """Print a choice."""
+    """Print a selected set."""
     out = results_console()
     out.print(members_table(result["members"]))
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
@@ -125,14 +125,16 @@ def report_choice(result: Mapping[str, Any]) -> None:
         )
     if result["unreachable"]:
         out.print(
-            f"unreachable from here: {result['unreachable']:,} configurations, which were left out"
+            f"unreachable from here: {result['unreachable']:,} configurations, not considered"
         )
     if "observed" in result:
-        off = [deviation_text(name, value) for name, value in result["observed_error"].items()]
+        errors = [deviation_text(name, value) for name, value in result["observed_error"].items()]
         if result["frame_error"] is not None:
-            off.append(f"observed frames differ by {result['frame_error']:.3f} m")
+            errors.append(f"observed frames differ by {result['frame_error']:.3f} m")
         state = settings_text(result["observed"])
-        out.print(f"scored for {state}" + (f"; {', '.join(off)}" if off else ", not observed"))
+        out.print(
+            f"scored for {state}" + (f"; {', '.join(errors)}" if errors else ", not observed")
+        )
 
 
 def report_verification(found: Mapping[str, Any]) -> None:
@@ -160,8 +162,7 @@ def new_table(*headings: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for heading in headings:
         right = heading.startswith(">")
-        # Where a terminal is too narrow, names go on in the next line: cut off, left and right
-        # arm would look the same.
+        # Names wrap in a narrow terminal: truncated, left and right arm would look the same.
         table.add_column(
             heading.removeprefix(">"), justify="right" if right else "left", overflow="fold"
         )
