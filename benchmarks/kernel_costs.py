@@ -13,7 +13,8 @@ from table import row, spread
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import UNCHECKED, Problem
-from tcs.kernel.sweep import Scores, score_slice
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import score_slice
 from tcs.placement.scoring import sweep
 from tcs.placement.scoring.sweep import SLICE
 from tcs.placement.tables import Reason

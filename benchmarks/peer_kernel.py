@@ -12,10 +12,11 @@ from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.problem import Problem
+from tcs.kernel.scores import Scores
 
 # `score_slice` is this with memory of its own, but not compiled itself: from Python, a call costs
 # more than a pair.
-from tcs.kernel.sweep import Scores, _score_slice
+from tcs.kernel.sweep import _score_slice
 from tcs.placement.tables import Reason
 
 REPEATS = 32

@@ -14,10 +14,10 @@ from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import BasePose, TaskMap
 from tcs.capability.tasks import GraspTask
 from tcs.errors import SelectionError
-from tcs.kernel.analytic.pairs import BODY_BLOCKED, REACHED
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.scores import BODY_BLOCKED, REACHED, Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, load_environment, lower

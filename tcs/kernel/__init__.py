@@ -1,5 +1,5 @@
-"""The kernel: arrays in, arrays out, compiled by numba, knowing nothing of Drake or files.
+"""Compiled scoring: kinematics, inverse kinematics, collision checks, dexterity and sets.
 
-Its modules are imported one by one: `arrays` needs no compiler, and whoever only wants the
-layout of the arrays should not have to load one.
+In: a scene, its goals and its grid as arrays (`arrays`). Out: arrays of scores (`scores`). Nothing
+here imports Drake or reads files; modules that hold only layouts and names do not load numba.
 """

@@ -1,7 +1,7 @@
-"""The arrays a scene is lowered to: all the kernel ever sees.
+"""The arrays a scene is lowered to: the input of the kernel.
 
 Frames (letters as in Drake): W environment, B robot base, A arm base (the link
-that carries joint 1 of the arm, at the torso level in force), L1..L7 the arm's
+that carries joint 1 of the arm, at the current torso level), L1..L7 the arm's
 links, T the tool, G a goal. Link frames are chosen so that joint i turns about
 the z axis of `Li` and `X_AL1..7` follow from `Chain` alone.
 """
@@ -50,8 +50,8 @@ class Shapes(NamedTuple):
     body: NDArray[np.int16]
     """Index of the body it belongs to, in the lowered scene's list of names, shape (n,)."""
     frame: NDArray[np.int8]
-    """What carries it, shape (n,). Arm shapes: 1..7, the link. Body shapes: 0 what stays when
-    the torso moves, 1 what rides on it. Environment shapes: 0."""
+    """What carries it, shape (n,). Arm shapes: 1..7, the link. Body shapes: 0 fixed to the
+    base, 1 mounted on the torso. Environment shapes: 0."""
     R: FloatArray
     """Orientations, shape (states, n, 3, 3)."""
     p: FloatArray

@@ -1,4 +1,4 @@
-"""The robot standing at one initial configuration: who is where, in which frame."""
+"""Frames at one initial configuration: environment, goal and arm base for a base pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tcs.kernel.problem import Problem
 
 @jit
 def place_base(problem: Problem, work: Workspace, place: int) -> int:
-    """Put the base at a place of the grid and move the environment into its frame.
+    """Place the base at a pose of the grid and express the environment in its frame.
 
     Args:
         problem: The scene and its grid.

@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _WRAPPERS: dict[str, Any] = {"no_cfunc_wrapper": True}
-"""Nobody passes kernel functions on as function pointers."""
+"""Kernel functions are never passed on as function pointers."""
 
 
 def kernel_digest(folder: Path) -> str:
@@ -61,11 +61,11 @@ def jit_folder() -> Path | None:
     return folder
 
 
-def is_compiled(entry: str = "sweep._score_slice") -> bool:
+def is_compiled(entry: str = "analytic_*/pairs.score_pair") -> bool:
     """Return whether an earlier run has left machine code for the whole scoring kernel.
 
     Args:
-        entry: Module and function that all the rest is compiled into.
+        entry: Package, module and function that the rest is compiled into, as a glob pattern.
     """
     folder = jit_folder()
     return folder is not None and any(folder.rglob(f"{entry}*.nbc"))

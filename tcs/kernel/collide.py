@@ -17,7 +17,7 @@ PARALLEL = 1e-12
 
 # Columns of packed shapes. A shape is one row of floats: its inner loops then touch one array.
 TYPE, BOUND, SIZE, CENTRE, ROTATION, COLUMNS = 0, 1, 2, 5, 8, 17
-"""Type; radius of the ball about the centre that holds the shape [m]; three sizes as in `Shapes`
+"""Type; radius of the bounding sphere about the centre [m]; three sizes as in `Shapes`
 [m]; centre [m]; rotation matrix row by row."""
 
 
@@ -55,10 +55,10 @@ def move(R: FloatArray, p: FloatArray, local: FloatArray, i: int, out: FloatArra
 
 @jit
 def spheres_overlap(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
-    """Return whether the balls about two shapes are closer than `gap` [m]: ask before `closer`.
+    """Return whether the bounding spheres of two shapes are closer than `gap` [m].
 
-    On its own because a function that calls another one counts references to its arrays, which
-    costs more than these few sums, and nearly every pair ends here.
+    Call it before `closer`. It is a function of its own because numba counts references to arrays
+    in functions that call others, which costs more than these sums decide for nearly every pair.
     """
     x = b[j, CENTRE] - a[i, CENTRE]
     y = b[j, CENTRE + 1] - a[i, CENTRE + 1]

@@ -13,6 +13,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.collide import BOUND, CENTRE, closer, move, spheres_overlap
+from tcs.kernel.kinematics import link_poses
 from tcs.kernel.problem import Problem
 
 NO_CONTACT = -1
@@ -21,15 +22,15 @@ ENVIRONMENT, BODY, ARM = int_constant(0), int_constant(1), int_constant(2)
 BASE_FIXED, TORSO_MOUNTED = int_constant(0), int_constant(1)
 """Mount of a body shape: fixed to the base, or mounted on the torso."""
 AT_GOAL = 1e-7
-"""How far off [m, and as entries of a rotation] a solution may be. The closed form is good to 1e-12
-except within 1e-7 rad of a singularity."""
+"""Greatest pose error [m, and as entries of a rotation] of a solution. The closed form is good to
+1e-12 except within 1e-7 rad of a singularity."""
 
 
 class Workspace(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     arm: FloatArray
-    """Arm shapes in A at the posture in hand, packed."""
+    """Arm shapes in A at the current posture, packed."""
     environment_B: FloatArray
     """Environment shapes in B, packed."""
     environment_A: FloatArray
@@ -45,11 +46,11 @@ class Workspace(NamedTuple):
     last: IntArray
     """The pair that blocked last (what the partner belongs to, arm shape, partner), shape (3,)."""
     R_BW: FloatArray
-    """Orientation of the environment W in the base B in hand, shape (3, 3)."""
+    """Orientation of the environment W in the current base B, shape (3, 3)."""
     p_BW: FloatArray
     """Origin of W in B [m], shape (3,)."""
     R_AG: FloatArray
-    """Orientation of the goal in hand in the arm base A, shape (3, 3)."""
+    """Orientation of the current goal in the arm base A, shape (3, 3)."""
     p_AG: FloatArray
     """Position of the goal in A [m], shape (3,)."""
 
@@ -129,7 +130,7 @@ def gripper_environment_contact(problem: Problem, work: Workspace, state: int, g
 
 @inner
 def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) -> int:
-    """Return the first contact of the gripper, tool at the goal in hand, with the robot's body.
+    """Return the first contact of the gripper, tool at the current goal, with the robot's body.
 
     It leaves the gripper's shapes placed in `work.arm`.
     """
@@ -162,35 +163,6 @@ def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArr
 
 
 @inner
-def place_links(
-    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, link_R: FloatArray, link_p: FloatArray
-) -> None:
-    """Fill the poses of L1..L7 in A at joint angles q; row i of the outputs is Li.
-
-    Args:
-        chain_R: Rotations of the chain, shape (8, 3, 3).
-        chain_p: Translations of the chain [m], shape (8, 3).
-        q: Joint angles [rad], shape (7,).
-        link_R: Filled, shape (8, 3, 3); row 0 becomes the identity, A itself.
-        link_p: Filled [m], shape (8, 3).
-    """
-    for r in range(3):
-        link_p[0, r] = 0.0
-        for c in range(3):
-            link_R[0, r, c] = 1.0 if r == c else 0.0
-    for i in range(7):
-        F, f = chain_R[i], chain_p[i]
-        R, S = link_R[i], link_R[i + 1]
-        cosine, sine = np.cos(q[i]), np.sin(q[i])
-        for r in range(3):
-            x = R[r, 0] * F[0, 0] + R[r, 1] * F[1, 0] + R[r, 2] * F[2, 0]
-            y = R[r, 0] * F[0, 1] + R[r, 1] * F[1, 1] + R[r, 2] * F[2, 1]
-            S[r, 0], S[r, 1] = cosine * x + sine * y, -sine * x + cosine * y
-            S[r, 2] = R[r, 0] * F[0, 2] + R[r, 1] * F[1, 2] + R[r, 2] * F[2, 2]
-            link_p[i + 1, r] = link_p[i, r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
-
-
-@inner
 def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatArray) -> int:
     """Return the first contact of the arm at joint angles q, except gripper against environment.
 
@@ -198,7 +170,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     """
     arm, environment = work.arm, work.environment_A
     gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
-    place_links(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+    link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
     partner, i, j = work.last[0], work.last[1], work.last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
         return pair_code(problem, partner, i, j)
@@ -233,9 +205,9 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
 
 @jit
 def at_goal(problem: Problem, work: Workspace) -> bool:
-    """Return whether the links, as placed last, hold the tool at the goal in hand.
+    """Return whether the links, as placed last, hold the tool at the current goal.
 
-    A safeguard: nothing leaves the kernel as reached that forward kinematics does not confirm.
+    Forward kinematics thus confirms every solution that counts as reached.
     """
     R, p, F, f = work.link_R[7], work.link_p[7], problem.chain_R[7], problem.chain_p[7]
     worst = 0.0

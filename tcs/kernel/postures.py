@@ -1,4 +1,4 @@
-"""Postures that are given: where they hold the tool, how dexterous they are, what they touch."""
+"""Tool pose, dexterity and contacts of given postures."""
 
 from __future__ import annotations
 
@@ -13,43 +13,14 @@ from tcs.kernel.contacts import (
     arm_contact,
     gripper_body_contact,
     gripper_environment_contact,
-    place_links,
 )
-from tcs.kernel.measure import measure_at
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.kinematics import tool_pose
 from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
 
 HERE = int_constant(0)
 """The one place, environment state or goal of a problem that has no more."""
-
-
-@jit
-def tool_pose(
-    chain_R: FloatArray,
-    chain_p: FloatArray,
-    q: FloatArray,
-    link_R: FloatArray,
-    link_p: FloatArray,
-    R_AT: FloatArray,
-    p_AT: FloatArray,
-) -> None:
-    """Fill the tool pose at joint angles q, and the poses of the links on the way.
-
-    Args:
-        chain_R: Rotations of the chain, shape (8, 3, 3).
-        chain_p: Translations of the chain [m], shape (8, 3).
-        q: Joint angles [rad], shape (7,).
-        link_R: Filled with the orientations of A, L1..L7 in A, shape (8, 3, 3).
-        link_p: Filled with their origins [m], shape (8, 3).
-        R_AT: Filled, shape (3, 3).
-        p_AT: Filled [m], shape (3,).
-    """
-    place_links(chain_R, chain_p, q, link_R, link_p)
-    R, F, f = link_R[7], chain_R[7], chain_p[7]
-    for r in range(3):
-        p_AT[r] = link_p[7, r] + R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
-        for c in range(3):
-            R_AT[r, c] = R[r, 0] * F[0, c] + R[r, 1] * F[1, c] + R[r, 2] * F[2, c]
 
 
 @jit

@@ -30,7 +30,7 @@ class Problem(NamedTuple):
     """One scene, its goals and its grid."""
 
     measure: Dexterity
-    """What makes one solution better than another."""
+    """Dexterity measure to maximise."""
     arm: ArmSolver
     """How the arm is solved, in reverse maybe, or that no closed form solves it (`is_outside`);
     what follows is the arm itself."""
@@ -45,7 +45,7 @@ class Problem(NamedTuple):
     link_body: IntArray
     """Robot body each belongs to, shape (n_arm,)."""
     grippers: int
-    """How many of them, the first ones, ride on the last link."""
+    """Number of them, the first ones, on the last link."""
     base_R: FloatArray
     """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
     base_p: FloatArray
@@ -55,10 +55,10 @@ class Problem(NamedTuple):
     body_A: FloatArray
     """The same in A."""
     body_spheres: FloatArray
-    """Centre and radius of a ball about all body shapes that stay (0) and that ride on the torso
-    (1), in B [m], shape (torso levels, 2, 4)."""
+    """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
+    mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
     body_mount: IntArray
-    """1 where a body shape rides on the torso, else 0, shape (n_body,)."""
+    """TORSO_MOUNTED or BASE_FIXED for each body shape, shape (n_body,)."""
     body_body: IntArray
     """Robot body each belongs to, shape (n_body,)."""
     environment: FloatArray
@@ -154,7 +154,7 @@ def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
 
 
 def _bounding_spheres(bodies: FloatArray, mount: NDArray[np.int8]) -> FloatArray:
-    """Return a ball about each of the two groups of shapes; radius -inf for an empty one."""
+    """Return the bounding sphere of each of the two groups; radius -inf for an empty one."""
     spheres = np.full((len(bodies), 2, 4), -np.inf)
     spheres[..., :3] = 0.0
     for group in (0, 1):

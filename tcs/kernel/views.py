@@ -1,18 +1,18 @@
-"""Named tuples on loan: what the inner loops are given, so that they count no references.
+"""Unowned views of named tuples, for inner loops without reference counting.
 
-Numba hands a named tuple on by value, array by array, and counts references to an array wherever a
+Numba passes a named tuple by value, array by array, and counts references to an array wherever a
 function takes one out of it, by an atomic operation on a counter that all threads share. In the
 sweep that took a third of the time of one thread and kept two from being twice as fast, and most
-of the compiler's time went into the hundreds of values that every call hands on. On loan, a named
-tuple is the address of one copy, and its arrays have no owner to count for. Whoever borrows must
-see to it that the owner outlives the loan: entry points borrow their own arguments, which their
-callers hold, and the copy lives as long as the entry point runs.
+of the compile time went into the hundreds of values that every call passes. An unowned view is the
+address of one copy of the tuple, and its arrays have no owner. The owner must outlive the view:
+entry points take views of their own arguments, which their callers hold, and the copy lives as long
+as the entry point runs.
 """
 
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 from llvmlite import ir
@@ -28,7 +28,7 @@ class UnownedView(types.Type):
     """The address of a named tuple whose arrays have no owner."""
 
     def __init__(self, owned: Any) -> None:
-        """Take the type of the named tuple that is lent."""
+        """Take the type of the named tuple."""
         # Names of types become names of functions: the tuple's own runs over pages.
         mark = hashlib.sha256(str(owned).encode()).hexdigest()[:12]
         super().__init__(name=f"UnownedView[{owned.instance_class.__name__},{mark}]")
@@ -42,8 +42,10 @@ class UnownedView(types.Type):
 
 @register_model(UnownedView)
 class _UnownedViewModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: UnownedView) -> None:
-        super().__init__(manager, kind, manager[kind.owned].get_value_type().as_pointer())
+    def __init__(self, manager: Any, numba_type: UnownedView) -> None:
+        super().__init__(
+            manager, numba_type, manager[numba_type.owned].get_value_type().as_pointer()
+        )
 
 
 @infer_getattr
@@ -52,31 +54,33 @@ class _UnownedViewFields(AttributeTemplate):
 
     # Numba declares it as NotImplemented, for subclasses to fill in.
     def generic_resolve(self, value: Any, attr: str) -> Any:  # type: ignore[override]
-        """Return the type of a field; named tuples in it are on loan too."""
+        """Return the type of a field; a named tuple in it becomes a view too."""
         if attr not in value.owned.fields:
             return None
-        kind = value.owned.types[value.owned.fields.index(attr)]
-        return UnownedView(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+        numba_type = value.owned.types[value.owned.fields.index(attr)]
+        return (
+            UnownedView(numba_type) if isinstance(numba_type, types.BaseNamedTuple) else numba_type
+        )
 
 
 @lower_getattr_generic(UnownedView)
-def _field(context: Any, builder: Any, loan: Any, address: Any, name: str) -> Any:
+def _field(context: Any, builder: Any, view: Any, address: Any, name: str) -> Any:
     """Return the field of that name, or its address if it is a named tuple."""
-    which = loan.owned.fields.index(name)
+    which = view.owned.fields.index(name)
     zero, index = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.IntType(32), which)
     at = builder.gep(address, [zero, index], inbounds=True)
-    return at if isinstance(loan.owned.types[which], types.BaseNamedTuple) else builder.load(at)
+    return at if isinstance(view.owned.types[which], types.BaseNamedTuple) else builder.load(at)
 
 
-def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+def _without_owner(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
     """Return the value with every array in it, however deep in tuples, stripped of its owner."""
-    if isinstance(kind, types.Array):
-        array = cgutils.create_struct_proxy(kind)(context, builder, value)
+    if isinstance(numba_type, types.Array):
+        array = cgutils.create_struct_proxy(numba_type)(context, builder, value)
         array.meminfo = ir.Constant(array.meminfo.type, None)
         array.parent = ir.Constant(array.parent.type, None)
         return array._getvalue()
-    if isinstance(kind, types.BaseTuple):
-        members: Any = kind
+    if isinstance(numba_type, types.BaseTuple):
+        members: Any = numba_type
         for i, member in enumerate(members):
             inner = builder.extract_value(value, i)
             stripped = _without_owner(context, builder, member, inner)
@@ -84,10 +88,16 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
+def tuple_class(numba_type: Any) -> type:
+    """Return the class of the named tuple that a value of a numba type is, or is a view of."""
+    owned = numba_type.owned if isinstance(numba_type, UnownedView) else numba_type
+    return cast(type, owned.instance_class)
+
+
 if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
 
     def unowned(owned: _Owned) -> _Owned:
-        """Return a named tuple on loan: its fields can be read, and its arrays written."""
+        """Return an unowned view of a named tuple: fields can be read, and arrays written."""
         # Without a compiler there is no counting.
         return owned
 
@@ -95,7 +105,7 @@ else:
 
     @intrinsic
     def unowned(_typing_context, owned):
-        """Return a named tuple on loan: its fields can be read, and its arrays written."""
+        """Return an unowned view of a named tuple: fields can be read, and arrays written."""
 
         def codegen(context, builder, signature, arguments):
             value = _without_owner(context, builder, signature.args[0], arguments[0])

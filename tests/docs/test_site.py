@@ -10,7 +10,7 @@ import pytest
 import tcs
 from tcs.kernel.analytic.pairs import score_pair
 from tcs.kernel.analytic.samples import solve_samples
-from tcs.kernel.measure import isotropy_at, limit_penalty
+from tcs.kernel.dexterity.measures import isotropy_at, limit_penalty
 from tcs.placement.selection import select, shortest_tour, utility
 from tcs.placement.tables import tc_manipulability, tc_reachability
 from tests.docs.building import CHECKOUT, DOCS, build

@@ -1,10 +1,10 @@
-"""The plain-loop twin as the judge of the kernel's answers."""
+"""The plain-loop reference as the judge of the kernel's answers."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.pairs import ARM_BLOCKED, REACHED
+from tcs.kernel.scores import ARM_BLOCKED, REACHED
 from tcs.kernel.verification import reference_pairs
 from tcs.kernel.verification.reference import free_joint
 from tests.kernel.arms import drake_arm
@@ -15,11 +15,11 @@ ROUNDING = 2e-6
 
 
 def chain_of(seed, lowered, *, spherical_shoulder=False):
-    """Return the arm of the PR2, or the Panda's if mirrored; a random one for odd seeds."""
+    """Return the arm of the PR2 or the Panda (spherical shoulder); a random one for odd seeds."""
     if seed % 2 == 0:
         return drake_arm("panda").chain if spherical_shoulder else lowered.arrays.chain
     chain = random_arm(np.random.default_rng(seed), spherical_shoulder=spherical_shoulder)
-    # The twin walks the arcs of the free joint between limits only.
+    # The reference walks the arcs of the free joint between limits only.
     lower, upper = chain.lower.copy(), chain.upper.copy()
     free = free_joint(chain)
     lower[free], upper[free] = -2.0, 2.5
@@ -27,7 +27,7 @@ def chain_of(seed, lowered, *, spherical_shoulder=False):
 
 
 def is_true(scene, grid, h, g, q):
-    """Return whether the twin finds joints q at the goal, in their limits and free."""
+    """Return whether the reference finds joints q at the goal, in their limits and free."""
     eased = scene._replace(
         margin=scene.margin - ROUNDING,
         environment=scene.environment._replace(
@@ -38,12 +38,12 @@ def is_true(scene, grid, h, g, q):
 
 
 def compare(scene, grid, scores, pairs, measure="isotropy"):
-    """Hold the kernel's answers against the twin's, away from contact."""
+    """Hold the kernel's answers against the reference's, away from contact."""
     for h, g in pairs:
         expected = reference_pairs.score(scene, grid, int(h), int(g), measure)
         reason = int(scores.reason[h, g])
         if reason == REACHED and expected.reason == ARM_BLOCKED:
-            # The kernel looks between two contacts as well; the twin can judge what it found.
+            # The kernel looks between two contacts as well; the reference can judge what it found.
             assert is_true(scene, grid, h, g, scores.joints[h, g])
         elif expected.clearance > 1e-6:  # at contact, rounding decides
             assert reason == expected.reason, (h, g)

@@ -71,7 +71,8 @@ def random_arm(rng, *, spherical_shoulder=False):
 
     Args:
         rng: Random numbers.
-        mirrored: Whether axes 1, 2 and 3 meet, and 5 and 6, instead of 2 and 3, and 5, 6 and 7.
+        spherical_shoulder: Whether axes 1, 2 and 3 meet, and 5 and 6, instead of 2 and 3,
+            and 5, 6 and 7.
     """
     R = np.array([rotation(rng) for _ in range(8)])
     p = rng.uniform(-0.3, 0.3, (8, 3))
@@ -118,7 +119,7 @@ def around(angle):
     return np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
 
 
-KINDS = {"sphere": SPHERE, "capsule": CAPSULE, "box": BOX}
+SHAPE_TYPES = {"sphere": SPHERE, "capsule": CAPSULE, "box": BOX}
 
 
 def turned_by(R):

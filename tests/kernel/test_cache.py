@@ -127,7 +127,7 @@ def test_a_function_for_compiled_callers_refuses_to_be_called_from_python():
 SCRIPT = """
 import numpy as np
 from tcs.kernel.cache import jit_folder
-from tcs.kernel.measure import isotropy_at
+from tcs.kernel.dexterity.measures import isotropy_at
 
 R, p = np.tile(np.eye(3)[[1, 2, 0]], (8, 1, 1)), np.full((8, 3), 0.2)
 value = isotropy_at(R, p, np.linspace(0.1, 0.9, 7))
@@ -136,10 +136,10 @@ print(value, len(isotropy_at.stats.cache_hits), jit_folder())
 
 
 def test_an_edit_in_an_imported_file_is_not_answered_with_old_machine_code(tmp_path):
-    # `measure.isotropy_at` calls `contacts.place_links`: numba's own cache looks at measure.py
+    # `measures.isotropy_at` calls `kinematics.link_poses`: numba's own cache looks at measures.py
     # alone and would go on with the old placement.
     shutil.copytree(ROOT / "tcs", tmp_path / "tcs", ignore=shutil.ignore_patterns("__pycache__"))
-    source = tmp_path / "tcs" / "kernel" / "contacts.py"
+    source = tmp_path / "tcs" / "kernel" / "kinematics.py"
 
     def run():
         done = subprocess.run(

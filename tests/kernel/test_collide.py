@@ -1,4 +1,4 @@
-"""Are two shapes closer than a gap? Against the twin, bounded least squares, and Drake."""
+"""Are two shapes closer than a gap? Against the reference, bounded least squares, and Drake."""
 
 from __future__ import annotations
 
@@ -23,9 +23,17 @@ from scipy.optimize import lsq_linear
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
 from tcs.kernel.collide import closer, move, pack, spheres_overlap
 from tcs.kernel.verification.reference import distance
-from tests.kernel.shapes import KINDS, about, as_shapes, placed, random_size, right_angles, rotation
+from tests.kernel.shapes import (
+    SHAPE_TYPES,
+    about,
+    as_shapes,
+    placed,
+    random_size,
+    right_angles,
+    rotation,
+)
 
-PAIRS = list(itertools.combinations_with_replacement(KINDS, 2))
+PAIRS = list(itertools.combinations_with_replacement(SHAPE_TYPES, 2))
 FAR = 20.0
 
 
@@ -77,7 +85,9 @@ def drake_distance(a, b):
 
 def near_pair(rng, first, second):
     """Return two shapes from overlapping to 5 cm apart, often with parallel edges and faces."""
-    a = placed(KINDS[first], random_size(rng, KINDS[first]), rotation(rng), rng.normal(size=3))
+    a = placed(
+        SHAPE_TYPES[first], random_size(rng, SHAPE_TYPES[first]), rotation(rng), rng.normal(size=3)
+    )
     R = [
         rotation(rng),
         a.R,
@@ -85,7 +95,7 @@ def near_pair(rng, first, second):
         a.R @ right_angles(rng) @ about(rng.normal(size=3), 10 ** rng.uniform(-9, -2)),
         a.R @ about(np.eye(3)[rng.integers(3)], rng.uniform(-3, 3)),
     ][rng.integers(5)]
-    b = placed(KINDS[second], random_size(rng, KINDS[second]), R)
+    b = placed(SHAPE_TYPES[second], random_size(rng, SHAPE_TYPES[second]), R)
     way = a.R[:, rng.integers(3)] if rng.random() < 0.4 else rng.normal(size=3)
     way /= np.linalg.norm(way)
     aside = rng.choice([0.0, 0.3]) * rng.normal(size=3)
@@ -117,7 +127,7 @@ def tolerance(a, b):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_the_kernel_agrees_with_the_twin(first, second, rng):
+def test_the_kernel_agrees_with_the_reference(first, second, rng):
     for _ in range(60):
         a, b = near_pair(rng, first, second)
         exact = max(distance(a, b), 0.0)
@@ -125,7 +135,7 @@ def test_the_kernel_agrees_with_the_twin(first, second, rng):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_the_twin_agrees_with_bounded_least_squares(first, second, rng):
+def test_the_reference_agrees_with_bounded_least_squares(first, second, rng):
     for _ in range(40):
         a, b = near_pair(rng, first, second)
         # Normal equations of the active set lose half the digits where faces are parallel.
@@ -174,13 +184,13 @@ def test_balls_hold_their_shapes(first, second, rng):
                 assert spheres_overlap(A, 0, B, 0, gap)
 
 
-@pytest.mark.parametrize("first", KINDS)
-@pytest.mark.parametrize("second", KINDS)
+@pytest.mark.parametrize("first", SHAPE_TYPES)
+@pytest.mark.parametrize("second", SHAPE_TYPES)
 def test_one_inside_the_other_touches(first, second, rng):
     for _ in range(50):
-        a = placed(KINDS[first], [0.5, 0.5, 0.5], rotation(rng), rng.normal(size=3))
+        a = placed(SHAPE_TYPES[first], [0.5, 0.5, 0.5], rotation(rng), rng.normal(size=3))
         b = placed(
-            KINDS[second], [0.02, 0.01, 0.01], rotation(rng), a.p + rng.uniform(-0.2, 0.2, 3)
+            SHAPE_TYPES[second], [0.02, 0.01, 0.01], rotation(rng), a.p + rng.uniform(-0.2, 0.2, 3)
         )
         assert closer(row(a), 0, row(b), 0, 1e-3)
         assert closer(row(b), 0, row(a), 0, 1e-9)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.verification import reference_pairs
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian
@@ -51,7 +51,7 @@ def test_what_the_scan_finds_is_true(lowered, seed, rng):
         q = np.full(7, np.nan)
         value = dense_scan(problem, h, g, 2000, q)
         if value >= 0.0:
-            # The twin's chain of rotations rounds otherwise, to 1e-15.
+            # The reference's chain of rotations rounds otherwise, to 1e-15.
             eased = scene._replace(margin=scene.margin - 1e-9)
             assert reference_pairs.confirms(eased, grid, int(h), int(g), q)
             exact = isotropy(jacobian(scene.chain, q))
@@ -81,7 +81,9 @@ def test_nothing_is_found_too_far_away(lowered):
     assert dense_scan(problem, 0, 0, 500, np.empty(7)) == -1.0
 
 
-@pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
+@pytest.mark.parametrize(
+    "spherical_shoulder", [False, True], ids=["spherical-wrist", "spherical-shoulder"]
+)
 @pytest.mark.parametrize("samples", [2, 511, 512, 513, 514, 1025])
 def test_every_number_of_samples_is_walked_to_its_end(lowered, samples, spherical_shoulder):
     # Samples come in blocks of 512; a goal reached only at the last angle shows a lost block.

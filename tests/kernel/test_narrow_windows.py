@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.scores import REACHED, Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.placement.scoring import load_job
 
@@ -52,7 +52,7 @@ def test_a_window_between_two_limits_is_found(scratching, h, g):
 
 
 @pytest.mark.parametrize(("h", "g"), NEXT_TO_A_LIMIT, ids=str)
-def test_room_between_a_contact_and_a_limit_is_found(feeding, h, g):
+def test_an_interval_between_a_contact_and_a_limit_is_found(feeding, h, g):
     check(feeding, h, g)
 
 

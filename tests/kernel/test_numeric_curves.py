@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tcs.kernel.dexterity import INVERSE_CONDITION, ISOTROPY
-from tcs.kernel.numeric.arm import FULL_TURN, WIDER, figures_at, numeric_arm
+from tcs.kernel.kinematics import SMALL_ANGLE_COSINE
+from tcs.kernel.numeric.arm import CONTINUOUS_HALF_RANGE, WIDER, figures_at, numeric_arm
 from tcs.kernel.numeric.curves import new_curves, point_between, slack_of, trace
 from tcs.kernel.numeric.newton import (
-    FAR_TURN,
     converge,
     evaluate,
     factorise,
@@ -66,7 +66,7 @@ def test_every_start_of_the_table_is_in_its_cell(chain, rng):
     assert arm.first[0] == 0
     assert arm.first[-1] == len(arm.postures)
     assert np.all(np.diff(arm.first) >= 0)
-    limited = arm.half < FULL_TURN
+    limited = arm.half < CONTINUOUS_HALF_RANGE
     off = np.abs(arm.postures - arm.middle[1:6])
     assert np.all(off <= np.where(limited, arm.half + WIDER, np.pi)[1:6] + 1e-12)
     X_0 = (chain.R[0], chain.p[0])
@@ -88,7 +88,7 @@ def test_every_start_of_the_table_is_in_its_cell(chain, rng):
         assert inside or np.any(np.abs(place - np.round(place)) < 1e-8)
 
 
-def test_a_look_sees_error_and_jacobian(chain, rng):
+def test_evaluation_fills_error_and_jacobian(chain, rng):
     arm, newton = numeric_arm(chain), new_newton_workspace()
     for _ in range(20):
         q = random_joints(rng, chain)
@@ -103,17 +103,17 @@ def test_a_look_sees_error_and_jacobian(chain, rng):
 
 
 @pytest.mark.parametrize("angle", [0.01, 0.3, 1.0, 2.0, 3.0])
-def test_a_large_turn_is_told_by_its_angle(angle):
+def test_a_large_rotation_is_given_by_its_angle(angle):
     chain = straight_arm(np.full(7, 3.0), 0.0)
     arm, newton = numeric_arm(chain), new_newton_workspace()
     R, p = pose(chain, np.zeros(7))
     evaluate(arm, R @ reference.rot_z(angle), p, np.zeros(7), newton)
     # A small one by its sine, which is all that Newton's method needs.
-    told = angle if np.cos(angle) < FAR_TURN else np.sin(angle)
-    np.testing.assert_allclose(newton.error, [0, 0, told, 0, 0, 0], atol=1e-12)
+    value = angle if np.cos(angle) < SMALL_ANGLE_COSINE else np.sin(angle)
+    np.testing.assert_allclose(newton.error, [0, 0, value, 0, 0, 0], atol=1e-12)
 
 
-def test_factor_step_and_way_are_those_of_linear_algebra(chain, rng):
+def test_factor_step_and_tangent_are_those_of_linear_algebra(chain, rng):
     arm, newton = numeric_arm(chain), new_newton_workspace()
     for _ in range(20):
         q = random_joints(rng, chain)

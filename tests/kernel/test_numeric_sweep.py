@@ -1,4 +1,4 @@
-"""The sweep of arms that no closed form solves, held against closed form, twin and dense scan."""
+"""The sweep of arms without a closed form, against closed form, reference and dense scan."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import (
+from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import (
     ARM_BLOCKED,
     BODY_BLOCKED,
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
@@ -19,8 +21,6 @@ from tcs.kernel.analytic.pairs import (
     REACHED,
     TOO_FAR,
 )
-from tcs.kernel.analytic.solver import is_outside
-from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.dense import dense_scan
 from tcs.kernel.verification.reference import isotropy, jacobian
 from tests.kernel.arms import drake_arm

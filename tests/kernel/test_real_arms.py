@@ -8,7 +8,7 @@ import pytest
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.measure import isotropy_at
+from tcs.kernel.dexterity.measures import isotropy_at
 from tcs.kernel.verification.reference import free_joint, link_poses, solutions
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, random_joints
@@ -88,7 +88,7 @@ def test_every_posture_is_among_the_solutions(arm, rng):
     assert np.median(worst) < 1e-11
 
 
-def test_the_solutions_are_those_of_the_twin(arm, rng):
+def test_the_solutions_are_those_of_the_reference(arm, rng):
     chain, free = arm.chain, free_joint(arm.chain)
     for _ in range(40):
         q = random_joints(rng, chain)

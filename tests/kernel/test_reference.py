@@ -1,4 +1,4 @@
-"""The plain-loop twin against Drake: poses, Jacobians, distances, inverse kinematics."""
+"""The plain-loop reference against Drake: poses, Jacobians, distances, inverse kinematics."""
 
 from __future__ import annotations
 

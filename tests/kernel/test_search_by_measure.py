@@ -1,13 +1,13 @@
-"""The search by other measures than isotropy: against the twin, and against the dense scan."""
+"""The search by other measures than isotropy: against the reference, and against the dense scan."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import REACHED
 from tcs.kernel.dexterity import MEASURES
 from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import REACHED
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.kernel.verification.reference import jacobian, measured
 from tests.kernel.judge import chain_of, compare, stratified
@@ -22,7 +22,7 @@ def scenes(lowered, seeds):
 
 
 @pytest.mark.parametrize("measure", OTHERS)
-def test_the_kernel_agrees_with_the_twin_by_every_measure(lowered, measure):
+def test_the_kernel_agrees_with_the_reference_by_every_measure(lowered, measure):
     for seed, (scene, grid) in enumerate(scenes(lowered, (2, 3))):
         scores = scores_of(scene, grid, measure=measure)
         reached = np.where(scores.reason == REACHED, scores.reason, 99)

@@ -1,4 +1,4 @@
-"""The compiled sweep against the plain-loop twin, and laws that any sweep must keep."""
+"""The compiled sweep against the plain-loop reference, and laws that any sweep must keep."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.pairs import (
+from tcs.kernel.arrays import BOX, SPHERE, GridArrays
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import (
     ARM_BLOCKED,
     BODY_BLOCKED,
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
     GRIPPER_BLOCKED_BY_ROBOT,
     REACHED,
 )
-from tcs.kernel.arrays import BOX, SPHERE, GridArrays
-from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference import (
     compose,
     isotropy,
@@ -44,8 +44,8 @@ ROOT = Path(__file__).parents[2]
 MASKS = ("arm_vs_arm", "arm_vs_body", "arm_vs_environment", "body_vs_environment")
 
 
-# The Panda (even seeds, mirrored) has all eight branches within its limits: the twin takes seconds
-# a pair there.
+# The Panda (even seeds, spherical shoulder) has all eight branches within its limits: the reference
+# takes seconds for a pair there.
 FEW = [(seed, False, 2) for seed in range(2, 8)] + [(seed, True, 2) for seed in (3, 5, 7, 9)]
 MANY = [(seed, False, 6) for seed in range(100, 160)] + [
     (seed, True, 6 if seed % 2 else 2) for seed in range(100, 130)
@@ -53,18 +53,22 @@ MANY = [(seed, False, 6) for seed in range(100, 160)] + [
 
 
 @pytest.mark.parametrize(
-    ("seed", "mirrored", "number"),
+    ("seed", "spherical_shoulder", "number"),
     [*FEW, *(pytest.param(*case, marks=pytest.mark.slow) for case in MANY)],
 )
-def test_the_kernel_agrees_with_the_twin_in_random_rooms(lowered, seed, spherical_shoulder, number):
+def test_the_kernel_agrees_with_the_reference_in_random_scenes(
+    lowered, seed, spherical_shoulder, number
+):
     chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
     scene, grid = toy_scene(chain, seed, obstacles=seed % 14), toy_grid()
     scores = scores_of(scene, grid)
     compare(scene, grid, scores, stratified(np.random.default_rng(seed), scores.reason, number))
 
 
-@pytest.mark.parametrize("mirrored", [False, True], ids=["upright", "mirrored"])
-def test_random_rooms_show_every_reason(lowered, spherical_shoulder):
+@pytest.mark.parametrize(
+    "spherical_shoulder", [False, True], ids=["spherical-wrist", "spherical-shoulder"]
+)
+def test_random_scenes_show_every_reason(lowered, spherical_shoulder):
     # The tests above look at what occurs; so everything must occur.
     counts = np.zeros(len(Reason), int)
     for seed in range(8):
@@ -97,7 +101,7 @@ def test_every_reached_pair_is_at_its_goal_and_free(lowered, seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_moving_room_goals_and_robot_together_changes_nothing(lowered, seed):
+def test_moving_environment_goals_and_robot_together_changes_nothing(lowered, seed):
     chain = chain_of(seed, lowered, spherical_shoulder=bool(seed & 2))
     scene, grid = toy_scene(chain, seed), toy_grid()
     quarter, shift = rot_z(np.pi / 2), np.array([0.7, -1.3, 0.0])
@@ -128,7 +132,7 @@ def test_moving_room_goals_and_robot_together_changes_nothing(lowered, seed):
     assert np.mean(different) < 0.002
     both = (turned(after.reason) == REACHED) & (before.reason == REACHED)
     assert both.any()
-    # As between kernel and twin above.
+    # As between kernel and reference above.
     gap = np.abs(turned(after.dexterity) - before.dexterity)[both]
     assert np.quantile(gap, 0.75) < 1e-6
     assert gap.max() < 1e-4
@@ -235,7 +239,7 @@ def test_a_grid_of_one_value_is_one_row_of_a_larger_one(lowered):
     np.testing.assert_array_equal(one.joints, whole.joints[h : h + 2])
 
 
-def test_a_room_without_shapes_blocks_nothing(lowered):
+def test_an_environment_without_shapes_blocks_nothing(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=0, states=1), toy_grid(states=1)
     environment = scene.environment
     empty = scene._replace(
@@ -312,7 +316,8 @@ SCRIPT = """
 import pickle, sys
 import numpy as np
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.scores import Scores
 with open(sys.argv[1], "rb") as file:
     scene, grid, rows = pickle.load(file)
 problem = build_problem(scene, grid)

@@ -9,7 +9,8 @@ import numpy as np
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, GridArrays, SceneArrays, Shapes
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.kernel.verification.reference import compose, inverse, link_poses, rot_z
 from tests.kernel.shapes import as_shapes, placed, random_joints, rotation
 
@@ -25,7 +26,7 @@ def along(vector):
 
 
 def arm_shapes(chain):
-    """Return a ball at the shoulder, capsules along the links, and a palm with a finger."""
+    """Return a sphere at the shoulder, capsules along the links, and a palm with a finger."""
     upper, fore, tool = chain.p[3], chain.p[4], chain.p[7]
     parts = [
         (2, placed(SPHERE, [0.05, 0, 0], body=2)),
@@ -40,7 +41,7 @@ def arm_shapes(chain):
 
 
 def body_shapes():
-    """Return a base that stays, and a trunk and a head that ride on a torso of two levels."""
+    """Return a fixed base, and a trunk and a head mounted on a torso of two levels."""
     parts = [
         (0, placed(BOX, [0.25, 0.25, 0.15], p=[0, 0, 0.2], body=0)),
         (1, placed(BOX, [0.1, 0.12, 0.3], p=[-0.25, 0, 0.7], body=1)),
@@ -55,7 +56,7 @@ def body_shapes():
 
 
 def environment_shapes(rng, number, states):
-    """Return boxes, capsules and balls, some padded, elsewhere in every state; and a floor."""
+    """Return boxes, capsules and spheres, some padded, elsewhere in every state; and a floor."""
     parts = [placed(BOX, [3.0, 3.0, 0.05], p=[0, 0, -0.05])]
     for i in range(number):
         shape_type = (BOX, CAPSULE, SPHERE)[i % 3]

@@ -1,4 +1,4 @@
-"""Where the free joint may stand at all, in closed form, and where it is worth a closer look."""
+"""Arcs of the free joint that the elbow can span, and windows in which to refine the search."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 
 @jit
 def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int, int]:
-    """Fill the arcs of the free joint at which the elbow can span the way from shoulder to wrist.
+    """Fill the arcs of the free joint at which the elbow can span shoulder to wrist.
 
     |SW|^2 is a cosine of q1, the free joint, about the direction of the goal, and a cosine of q4:
     the limits of joint 4 bound the first cosine from both sides.

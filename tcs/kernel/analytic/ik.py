@@ -1,7 +1,7 @@
-"""Inverse kinematics of one goal: the goal on its way in, a solution's joints on their way out.
+"""Inverse kinematics of one goal: the goal as the samples need it, and the joints of one sample.
 
-Here the real arm and the arm as it is solved part: of a mirrored arm, joints 1 .. 7 are inside
-those of the reversed one.
+An arm of the spherical-shoulder class is solved as the reversed chain: the conversion from and to
+the real arm happens here, and everything between uses the joints 1 .. 7 of the chain as solved.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatAr
     for i in range(3):
         a, b, c, w = R_AG[i, 0], R_AG[i, 1], R_AG[i, 2], p_AG[i]
         if arm.free == LAST:
-            # Base and tool have changed places: this arm has to bring its tool A to X_GA.
+            # Base and tool change places: the reversed chain has to bring its tool A to X_GA.
             a, b, c = R_AG[0, i], R_AG[1, i], R_AG[2, i]
             w = -(a * p_AG[0] + b * p_AG[1] + c * p_AG[2])
         x = a * arm.R[7, 0, 0] + b * arm.R[7, 0, 1] + c * arm.R[7, 0, 2]
@@ -43,7 +43,7 @@ def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatAr
             goal[0, j] += arm.R[0, i, j] * w
             goal[1, j] += arm.R[0, i, j] * z
             goal[2, j] += arm.R[0, i, j] * x
-        # The real tool stays at the origin of the reversed arm's base.
+        # The real tool is at the origin of the base of the reversed chain.
         goal[3, i] = -(w + arm.p[0, i]) if arm.free == LAST else offset
     a, b, c = goal[3, 0], goal[3, 1], goal[3, 2]
     for j in range(3):

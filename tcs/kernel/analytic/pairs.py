@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.ik import sample_joints
+from tcs.kernel.analytic.arcs import IN_REACH, OUT_OF_REACH, elbow_arcs
+from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.search import (
     MAX_CANDIDATES,
@@ -22,15 +23,12 @@ from tcs.kernel.contacts import (
     arm_contact,
     at_goal,
     pair_touches,
-    place_links,
 )
 from tcs.kernel.dexterity import ISOTROPY, UNLIMITED
-from tcs.kernel.measure import measure_at
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.kinematics import link_poses
 from tcs.kernel.problem import Problem
-
-REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
-GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
-"""Reasons, the numbers of `tcs.placement.tables.Reason`."""
+from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 
 ONE_SAMPLE, NOTHING = int_constant(1), int_constant(-1)
 
@@ -215,7 +213,7 @@ def _between(
         middle = 0.5 * (low + high)
         angle = first + middle * width
         sample_joints(arm, search.goal, arm.branches[b], angle, search.q)
-        place_links(problem.chain_R, problem.chain_p, search.q, work.link_R, work.link_p)
+        link_poses(problem.chain_R, problem.chain_p, search.q, work.link_R, work.link_p)
         if pair_touches(problem, work, body_A, partner, i, j):
             low = middle
         elif pair_touches(problem, work, body_A, other, k, m):
@@ -291,22 +289,37 @@ def refine(
 
 
 @inner
+def out_of_reach(problem: Problem, work: Workspace, search: Search) -> int:
+    """Return TOO_FAR or JOINT_LIMITS if no angle of the free joint can do, else REACHED.
+
+    Args:
+        problem: The scene.
+        work: The goal is placed.
+        search: `goal`, `arcs` and `arc_count` get filled.
+    """
+    wrist_goal(problem.arm, work.R_AG, work.p_AG, search.goal)
+    search.arc_count[0], reach = elbow_arcs(problem.arm, search.goal, search.arcs)
+    if reach == IN_REACH:
+        return REACHED
+    return TOO_FAR if reach == OUT_OF_REACH else JOINT_LIMITS
+
+
+@inner
 def score_pair(
-    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, arcs: int
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search
 ) -> tuple[int, int]:
     """Score one goal within reach; base and gripper are free already.
 
     Args:
         problem: The scene.
-        work: Environment, base and gripper are placed.
-        body_A: The robot's other shapes in A at the torso level in hand.
-        search: `goal` and `arcs` are set; `best` gets filled with joint angles [rad] when reached.
-        arcs: How many arcs there are.
+        work: Environment, base, gripper and goal are placed.
+        body_A: The robot's other shapes in A at the current torso level.
+        search: From `out_of_reach`; `best` gets filled with joint angles [rad] when reached.
 
     Returns:
         Reason and contact code.
     """
-    found = find_candidates(problem.arm, search, arcs)
+    found = find_candidates(problem.arm, search, search.arc_count[0])
     if found == 0:
         return JOINT_LIMITS, NO_CONTACT
     if not samples_hold_measure(problem):

@@ -1,8 +1,8 @@
-"""Inverse kinematics of many values of the free joint at once.
+"""Inverse kinematics of many samples of the free joint at once.
 
-One straight-line loop over "samples", each a value of joint 1 on one branch: no test inside, so the
-compiler turns it into vector instructions. Joints 1 .. 7 are those of the arm as it is solved: of
-a mirrored arm, those of the reversed one.
+A sample is a value of joint 1 on one branch. The loop over samples has no branches, so the compiler
+vectorises it. Joints 1 .. 7 are those of the chain as solved, which is reversed for an arm of the
+spherical-shoulder class.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def solve_samples(
         slack: Filled: >= 0 where the branch exists and every joint keeps its limits. It measures
             the worst condition, as a difference of cosines, and varies continuously with q1.
         measure: Filled: kinematic isotropy to the sixth power where slack >= 0; elsewhere, from
-            -1 to 0, how far the wrist is from straight, less the squared sine of its bend.
+            -1 to 0, minus the squared sine of joint 6's angle from where the wrist is straight.
 
     Source:
         Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
@@ -190,8 +190,8 @@ def solve_samples(
         # Of length 1 but where wrist or aim are out of reach: as for joint 2.
         D = np.sqrt(c7 * c7 + s7 * s7 + TINY)
         c7, s7 = c7 / D, s7 / D
-        bend = wrist_left / N6
-        left = min(elbow_left, min(aim_left / N, bend))
+        sine_squared = wrist_left / N6
+        left = min(elbow_left, min(aim_left / N, sine_squared))
         # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
         # directions are no solutions. Elsewhere these terms are far above any slack.
         left = min(left, min(min(N, D2) * SHARP - square, D5 * SHARP - 1.0))
@@ -270,4 +270,4 @@ def solve_samples(
         scale = 6.0 / trace
         scale = scale * scale * scale
         isotropy = det * scale * scale
-        measure[i] = isotropy if left >= 0.0 else -max(bend, 0.0)
+        measure[i] = isotropy if left >= 0.0 else -max(sine_squared, 0.0)

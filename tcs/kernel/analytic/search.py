@@ -1,4 +1,4 @@
-"""Which values of the free joint are worth a collision check: arcs, windows, candidates."""
+"""Search over the free joint: arcs, windows, and candidates for the collision check."""
 
 from __future__ import annotations
 
@@ -13,24 +13,28 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 
 FIRST_SAMPLES = 48
-"""Samples over all arcs together in the first look: enough to find the feasible windows."""
+"""Samples over all arcs together in the first pass: enough to find the feasible windows."""
 FINE_STEP = 0.0125
-"""Spacing [rad] of the second look inside the windows. Chosen by measurement: recall against a
+"""Spacing [rad] of the second pass, inside the windows. Chosen by measurement: recall against a
 dense scan of 11,520 samples (benchmarks/)."""
 MIN_SAMPLES = int_constant(8)
 """Samples that even the smallest window or arc gets: one vector of the processor."""
 FINE_SAMPLES = int_constant(8)
 """Samples at each end of a feasible stretch, and about a peak that is closed in on."""
 PEAK_REFINEMENTS = 4
-"""How often samples close in on an infeasible peak, each time to 2/7 of their spacing: down to 8e-5
+"""Number of refinements about an infeasible peak, each to 2/7 of the spacing: down to 8e-5
 rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
 as the two happen to let them be."""
 STRAIGHT = 0.05
-"""Squared sine of the wrist's bend below which joints 5 and 7 (of a mirrored arm, 1 and 3) swing by
-half a turn within a few hundredths of a radian, past the window in which both keep their limits."""
+"""Squared sine of the wrist angle below which joints 5 and 7 (1 and 3 of the spherical-shoulder
+class) turn by 180 degrees within a few hundredths of a radian, past the window in which both keep
+their limits."""
 NONE = int_constant(0)
+BY_SLACK, BY_WRIST = int_constant(0), int_constant(1)
+"""What a refinement follows: the greatest slack, or the straightest wrist."""
+ANYWHERE = (-np.inf, np.inf)
 STRAIGHT_REFINEMENTS = 5
-"""How often samples close in on a straight wrist, each time to 2/7 of their spacing: from 0.05 rad
+"""Number of refinements about a straight wrist, each to 2/7 of the spacing: from 0.05 rad
 down to 1e-4 rad."""
 MAX_SAMPLES = 512
 MAX_WINDOWS = 32
@@ -42,6 +46,9 @@ class Search(NamedTuple):
 
     goal: FloatArray
     arcs: FloatArray
+    """Arcs of the free joint (first, last) [rad], shape (MAX_ARCS, 2)."""
+    arc_count: IntArray
+    """How many arcs there are, shape (1,)."""
     windows: FloatArray
     ends: FloatArray
     """Outer and inner side of the ends of feasible stretches [rad], shape (MAX_WINDOWS, 2)."""
@@ -61,18 +68,18 @@ class Search(NamedTuple):
     found_step: FloatArray
     """Spacing [rad] of the samples it was found with."""
     found_measure: FloatArray
-    """Its isotropy to the sixth power, or another measure if one was asked for; -1 once it was
-    found to collide."""
+    """Its isotropy to the sixth power, or another measure if one was requested; -1 once it is
+    known to collide."""
     found_branch: IntArray
     """Row of its branch in `arm.branches`."""
     key: FloatArray
-    """What the candidates are put in order by."""
+    """Sort key of the candidates."""
     order: IntArray
     """Indices of the candidates in that order."""
     spare: IntArray
     """Scratch of the merge sort."""
     q: FloatArray
-    """Joint angles in hand, shape (7,)."""
+    """Current joint angles, shape (7,)."""
     best: FloatArray
     """Joint angles of the best solution so far, shape (7,)."""
 
@@ -82,6 +89,7 @@ def new_search() -> Search:
     return Search(
         np.empty((4, 3)),
         np.empty((MAX_ARCS, 2)),
+        np.zeros(1, np.int64),
         np.empty((MAX_WINDOWS, 2)),
         np.empty((MAX_WINDOWS, 2)),
         np.empty(MAX_WINDOWS),
@@ -175,7 +183,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
         share = FIRST_SAMPLES * (last - first) / length if length > 0.0 else 0.0
-        # Rounded: cut off, rounding errors would decide over a sample where arcs mirror each other.
+        # Rounded, not truncated: else rounding errors decide on a sample where arcs are symmetric.
         count = max(MIN_SAMPLES, int(share + 0.5))
         for b in range(len(arm.branches)):
             step = fill_samples(search, first, last, count)
@@ -192,7 +200,12 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
                 straight = _record_straight(search, b, count, step, first, straight)
     if found == 0:
         for n in range(straight):
-            found = _refine_straight(arm, search, n, found)
+            middle, step, b = (
+                search.straight[n, 0],
+                search.straight[n, 1],
+                int(search.straight[n, 2]),
+            )
+            found = _refine_about(arm, search, b, middle, step, (-np.inf, np.inf), True, found)
     return found
 
 
@@ -202,40 +215,19 @@ def _record_straight(
 ) -> int:
     """Append the samples at which the wrist is straighter than at both their neighbours.
 
-    No sample is feasible, so `measure` tells of the bend.
+    No sample is feasible, so `measure` holds minus the squared sine of the wrist.
     """
-    bend = search.measure
+    straightness = search.measure
     for i in range(count):
-        if bend[i] > -STRAIGHT and straight < MAX_WINDOWS:
-            left = bend[i - 1] if i > 0 else -np.inf
-            right = bend[i + 1] if i + 1 < count else -np.inf
-            if left <= bend[i] and right < bend[i]:
+        if straightness[i] > -STRAIGHT and straight < MAX_WINDOWS:
+            left = straightness[i - 1] if i > 0 else -np.inf
+            right = straightness[i + 1] if i + 1 < count else -np.inf
+            if left <= straightness[i] and right < straightness[i]:
                 search.straight[straight, 0] = first + i * step
                 search.straight[straight, 1] = step
                 search.straight[straight, 2] = b
                 straight += 1
     return straight
-
-
-@inner
-def _refine_straight(arm: ArmSolver, search: Search, n: int, found: int) -> int:
-    """Append feasible angles about one at which the wrist is all but straight, if there are any."""
-    middle, step = search.straight[n, 0], search.straight[n, 1]
-    b = int(search.straight[n, 2])
-    for _ in range(STRAIGHT_REFINEMENTS):
-        step = fill_samples(search, middle - step, middle + step, FINE_SAMPLES)
-        solve_samples(
-            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES,
-            search.slack, search.measure,
-        )  # fmt: skip
-        before = found
-        for i in range(FINE_SAMPLES):
-            if search.slack[i] >= 0.0:
-                found = _add(search, b, i, step, found)
-        if found > before:
-            break
-        middle = search.angle[best_of(search.measure, FINE_SAMPLES)]
-    return found
 
 
 @inner
@@ -267,24 +259,40 @@ def _refine_window(
     for e in range(ends):
         found = _refine_end(arm, search, b, search.ends[e, 0], search.ends[e, 1], found)
     for k in range(peaks):
-        found = _refine_peak(arm, search, b, search.peaks[k], step, first, last, found)
+        peak = search.peaks[k]
+        found = _refine_about(arm, search, b, peak, step, (first, last), BY_SLACK, found)
     return found
 
 
 @inner
-def _refine_peak(
+def _refine_about(
     arm: ArmSolver,
     search: Search,
     b: int,
     middle: float,
     step: float,
-    first: float,
-    last: float,
+    ends: tuple[float, float],
+    guide: int,
     found: int,
 ) -> int:
-    """Append feasible angles about an infeasible peak, within first .. last, if there are any."""
-    for _ in range(PEAK_REFINEMENTS):
-        low, high = max(middle - step, first), min(middle + step, last)
+    """Append feasible angles about an infeasible one, found with ever narrower samples.
+
+    Args:
+        arm: The arm.
+        search: Its candidates get filled.
+        b: The branch.
+        middle: The angle: a peak of the slack, or where the wrist is straightest [rad].
+        step: Spacing of the samples it was found with [rad].
+        ends: Where to stay within [rad].
+        guide: BY_SLACK or BY_WRIST, what to follow.
+        found: How many candidates there are.
+
+    Returns:
+        How many candidates there are now.
+    """
+    value = search.slack if guide == BY_SLACK else search.measure
+    for _ in range(PEAK_REFINEMENTS if guide == BY_SLACK else STRAIGHT_REFINEMENTS):
+        low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
         step = fill_samples(search, low, high, FINE_SAMPLES)
         solve_samples(
             arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES,
@@ -294,10 +302,10 @@ def _refine_peak(
         for i in range(FINE_SAMPLES):
             if search.slack[i] >= 0.0:
                 found = _add(search, b, i, step, found)
-        peak = best_of(search.slack, FINE_SAMPLES)
-        if found > before or search.slack[peak] < -PEAK_SLOPE * step:
+        top = best_of(value, FINE_SAMPLES)
+        if found > before or (guide == BY_SLACK and value[top] < -PEAK_SLOPE * step):
             break
-        middle = search.angle[peak]
+        middle = search.angle[top]
     return found
 
 

@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of a seven-joint arm: what can be worked out once per arm.
+"""Constants of the closed-form inverse kinematics of a seven-joint arm, computed once per arm.
 
 The class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axes 5, 6 and 7 meet
 (point W, the wrist); any other offsets. Joint 1 is the free parameter. Given its angle,
@@ -9,10 +9,9 @@ The class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axe
 
 each with two solutions in general: a branch is a triple of signs.
 
-The mirror image: axes 1, 2 and 3 meet, and axes 5 and 6. Seen from its tool such an arm is one of
-the class above: its joints come in the order 7 .. 1, and it has to bring the arm base to where the
-goal sees it. So it is solved as that reversed arm, with joint 7 free; `ik` turns the goal round
-on the way in and the joints on the way out, and nothing between knows of it.
+This is the spherical-wrist class. In the spherical-shoulder class axes 1, 2 and 3 meet, and axes 5
+and 6. Such an arm is solved as the reversed chain, from tool to base: its joints come in the order
+7 .. 1, joint 7 is free, and the goal pose is inverted. `ik` converts the goal and the joints.
 """
 
 from __future__ import annotations
@@ -24,16 +23,12 @@ import numpy as np
 
 from tcs.errors import ArmClassError
 from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.lines import axis_distance
 
 MEETING_TOLERANCE = 1e-9
 """Axes that pass each other closer than this [m] meet. Lowering puts the common origins of
 meeting axes at one point, so only rounding is left, while the least offset built into a real arm
 is millimetres."""
-
-
-PARALLEL_TOLERANCE = 1e-6
-"""Sine of the angle between two axes below which they count as one: built arms have 90 degrees, or
-some tens of degrees; figures in a URDF carry six digits or more."""
 
 
 FIRST, LAST = 0, 6
@@ -43,7 +38,8 @@ FIRST, LAST = 0, 6
 class ArmSolver(NamedTuple):
     """One arm's constants of the closed form. L1..L7 as in `Chain`; u is SW expressed in L3.
 
-    Of a mirrored arm, all but `free`, `lower` and `upper` is that of the reversed one.
+    For the spherical-shoulder class all fields except `free`, `lower` and `upper` describe the
+    reversed chain.
     """
 
     free: int
@@ -79,19 +75,20 @@ def arm_solver(chain: Chain) -> ArmSolver:
     """Return the closed-form constants of `chain`.
 
     An arm that fits both classes, such as one with a spherical shoulder and a spherical wrist, is
-    solved as it stands.
+    solved as one of the spherical-wrist class.
 
     Raises:
         ArmClassError: If the arm is outside both classes; the message says which axes fail to meet
             and by how much.
     """
     misses = _misses(chain, (2, 3), (5, 6, 7))
-    mirror_misses = _misses(chain, (1, 2, 3), (5, 6))
-    if misses and mirror_misses:
+    shoulder_misses = _misses(chain, (1, 2, 3), (5, 6))
+    if misses and shoulder_misses:
         raise ArmClassError(
-            "the arm is outside the closed-form classes. One needs axes 2 and 3 to meet, and 5, 6 "
-            f"and 7 in one point, but {'; '.join(misses)}. Its mirror image needs axes 1, 2 and 3 "
-            f"to meet in one point, and 5 and 6, but {'; '.join(mirror_misses)}."
+            "the arm is outside the closed-form classes. The spherical-wrist class needs axes 2 "
+            f"and 3 to meet, and 5, 6 and 7 in one point, but {'; '.join(misses)}. The "
+            "spherical-shoulder class needs axes 1, 2 and 3 to meet in one point, and 5 and 6, but "
+            f"{'; '.join(shoulder_misses)}."
         )
     real = chain
     if misses:
@@ -141,7 +138,7 @@ def arm_solver(chain: Chain) -> ArmSolver:
 
 
 def outside_solver(chain: Chain) -> ArmSolver:
-    """Return what there is to say of an arm outside the classes: its limits.
+    """Return the limits of an arm outside the classes, without constants of the closed form.
 
     It has no branches, and `is_outside` goes by that; every constant of the closed form is zero.
     """
@@ -205,7 +202,7 @@ def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
     """
     found = []
     for axes in groups:
-        passes = [closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
+        passes = [axis_distance(chain.R[i], chain.p[i]) for i in axes[:-1]]
         reasons = []
         for i, passing in zip(axes, passes, strict=False):
             if passing is None:
@@ -221,22 +218,6 @@ def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
             reasons.append(f"link frames {names} do not lie where their axes meet")
         found += reasons
     return found
-
-
-def closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
-    """Return how the z axis of a frame passes that of another one at the pose (R, p) in it.
-
-    Returns:
-        Their distance, and where they come closest, on each axis from its origin [m]; None where
-        they are parallel.
-    """
-    square = float(R[0, 2] ** 2 + R[1, 2] ** 2)
-    if square < PARALLEL_TOLERANCE**2:
-        return None
-    cosine, along = float(R[2, 2]), float(R[:, 2] @ p)
-    apart = abs(float(R[0, 2] * p[1] - R[1, 2] * p[0])) / np.sqrt(square)
-    first, second = p[2] - cosine * along, cosine * p[2] - along
-    return apart, float(first / square), float(second / square)
 
 
 def _signs_within(lower: float, upper: float, limited: bool) -> list[int]:

@@ -1,9 +1,9 @@
-"""What numeric inverse kinematics needs of an arm: how far it can reach, and where to start.
+"""Constants of an arm for numeric inverse kinematics: bounds of its reach and a table of starts.
 
 A seven-joint arm that no closed form solves. Axis 1 and axis 7 still are simple. Joint 1 turns the
 whole arm about axis 1, and joint 7 moves no point of axis 7; so joints 2 to 6 alone decide how far
 axis 7 is from axis 1, how high, and at what angles. A table of random postures of these five, by
-these four figures, gives postures that all but hold the tool where it should be: joints 1 and 7
+these four figures, gives postures that nearly hold the tool at a goal: joints 1 and 7
 follow in closed form, and Newton's method does the rest.
 """
 
@@ -14,9 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.kernel.analytic.solver import closest, cos_range
+from tcs.kernel.analytic.solver import cos_range
 from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.cache import jit
+from tcs.kernel.kinematics import link_poses
+from tcs.kernel.lines import axis_distance
 from tcs.kernel.problem import Problem
 
 SAMPLES = 1 << 18
@@ -28,8 +30,8 @@ WIDER = 0.25
 goals that need one would find no start near."""
 ROUNDING = 1e-9
 """Taken off bounds of what is within reach [m], far above the rounding of a sum of lengths."""
-FULL_TURN = 1e3
-"""Half range [rad] of a joint that may turn all the way round: none of its angles is beyond it."""
+CONTINUOUS_HALF_RANGE = 1e3
+"""Half range [rad] of a continuous joint: none of its angles is beyond it."""
 
 
 class NumericArm(NamedTuple):
@@ -39,10 +41,12 @@ class NumericArm(NamedTuple):
     """Rotations of the chain, shape (8, 3, 3)."""
     p: FloatArray
     """Translations of the chain [m], shape (8, 3)."""
+    R_F: FloatArray
+    """Rotations of the chain from F on: as R, but the first is the identity."""
     middle: FloatArray
     """Middle of the joint limits [rad], 0 where continuous, shape (7,)."""
     half: FloatArray
-    """Half their width [rad], FULL_TURN where the joint may turn all the way round, shape (7,)."""
+    """Half their width [rad], CONTINUOUS_HALF_RANGE for a continuous joint, shape (7,)."""
     ends: FloatArray
     """Where on axis 1, from the origin of F, and on axis 7, from that of L7, points lie that both
     stay at a distance within `span` [m], shape (2,)."""
@@ -84,7 +88,9 @@ def _numeric_arm(R_bytes: bytes, p_bytes: bytes, low_bytes: bytes, high_bytes: b
     wide_low, wide_high = np.where(limited, low - WIDER, low), np.where(limited, high + WIDER, high)
     postures = wide_low[1:6] + spread(SAMPLES, 5) * (wide_high - wide_low)[1:6]
     figures, azimuth = np.empty((SAMPLES, 4)), np.empty(SAMPLES)
-    _figures_of(R, p.copy(), slides[6], postures, figures, azimuth)
+    R_F, p_F = R.copy(), p.copy()
+    R_F[0], p_F[0] = np.eye(3), 0.0
+    _figures_of(R_F, p_F, slides[6], postures, figures, azimuth)
     least = np.array([0.0, figures[:, 1].min(), -1.0, -np.pi])
     most = np.array([figures[:, 0].max(), figures[:, 1].max(), 1.0, np.pi])
     cell = np.stack([least, (most - least) / (ACROSS, UP, TILTS, TURNS)], axis=1)
@@ -95,8 +101,9 @@ def _numeric_arm(R_bytes: bytes, p_bytes: bytes, low_bytes: bytes, high_bytes: b
     return NumericArm(
         R=R,
         p=p.copy(),
+        R_F=R_F,
         middle=np.where(limited, (low + high) / 2.0, 0.0),
-        half=np.where(limited, (high - low) / 2.0, FULL_TURN),
+        half=np.where(limited, (high - low) / 2.0, CONTINUOUS_HALF_RANGE),
         ends=slides[[0, 6]],
         span=_span(R, p, slides, float(lower[3]), float(upper[3])),
         cell=cell,
@@ -132,7 +139,7 @@ def _slides(R: FloatArray, p: FloatArray) -> FloatArray:
     """
     slides = np.zeros(7)
     for i in (0, 5, 1, 4):
-        passing = closest(R[i + 1], p[i + 1])
+        passing = axis_distance(R[i + 1], p[i + 1])
         if passing is not None:
             slides[i], slides[i + 1] = passing[1:]
     return slides
@@ -172,24 +179,16 @@ def _figures_of(
     figures: FloatArray,
     azimuth: FloatArray,
 ) -> None:
-    """Fill the four figures of each posture of joints 2 to 6, and the azimuth, in F."""
-    S, T, o = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    """Fill the four figures of each posture of joints 2 to 6, and the azimuth, in F.
+
+    R and p are the chain from F on: the first rotation is the identity, the first translation 0.
+    """
+    link_R, link_p, q = np.empty((8, 3, 3)), np.empty((8, 3)), np.zeros(7)
     for n in range(len(postures)):
-        for r in range(3):
-            o[r] = 0.0
-            for c in range(3):
-                S[r, c] = 1.0 if r == c else 0.0
-        for i in range(1, 7):
-            cosine, sine = 1.0, 0.0
-            if i < 6:
-                cosine, sine = np.cos(postures[n, i - 1]), np.sin(postures[n, i - 1])
-            for r in range(3):
-                o[r] += S[r, 0] * p[i, 0] + S[r, 1] * p[i, 1] + S[r, 2] * p[i, 2]
-                x = S[r, 0] * R[i, 0, 0] + S[r, 1] * R[i, 1, 0] + S[r, 2] * R[i, 2, 0]
-                y = S[r, 0] * R[i, 0, 1] + S[r, 1] * R[i, 1, 1] + S[r, 2] * R[i, 2, 1]
-                T[r, 2] = S[r, 0] * R[i, 0, 2] + S[r, 1] * R[i, 1, 2] + S[r, 2] * R[i, 2, 2]
-                T[r, 0], T[r, 1] = cosine * x + sine * y, -sine * x + cosine * y
-            S[:] = T
+        for i in range(5):
+            q[i + 1] = postures[n, i]
+        link_poses(R, p, q, link_R, link_p)
+        S, o = link_R[7], link_p[7]
         x, y, z = o[0] + S[0, 2] * slide, o[1] + S[1, 2] * slide, o[2] + S[2, 2] * slide
         azimuth[n] = figures_at(x, y, z, S[0, 2], S[1, 2], S[2, 2], figures[n])
 

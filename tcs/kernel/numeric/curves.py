@@ -1,7 +1,7 @@
-"""All solutions of one goal: the curves along which the arm moves while its tool stands still.
+"""All solutions of one goal: the curves of self-motion, on which the tool does not move.
 
 With seven joints the solutions of a goal form curves. One solution on a curve leads to all of it:
-go a step along, come back to the goal, and so on. Between neighbouring points a cubic stands in.
+a step along the tangent, a correction back to the goal, and so on. Cubics interpolate the points.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.dexterity import ISOTROPY
-from tcs.kernel.measure import inverse_condition
+from tcs.kernel.dexterity.measures import inverse_condition
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
@@ -25,7 +25,7 @@ from tcs.kernel.numeric.newton import (
     step_to_goal,
 )
 
-TURN_BACK = 6.283185307179586
+FULL_TURN = 6.283185307179586
 LEAST_STRIDE = 1e-3
 """Shortest stride along a curve [rad, as a norm of the joints]: where it would have to be shorter,
 next to a singularity, the curve is given up."""
@@ -40,10 +40,10 @@ MAX_CORRECTED_ERROR = 3e-4
 MAX_PREDICTED_ERROR = 3e-2
 """Error after a stride [rad and m] with which the stride is taken back."""
 CORRECTIONS = int_constant(4)
-"""Looks that a place on a cubic gets to come to the goal; it takes 2."""
+"""Most Newton iterations from a place on a cubic to the goal; it takes 2."""
 SAME_CURVE = 0.04
 """How far beside a known curve [rad, as a norm] a solution may lie and count as on it: points are
-up to a stride apart, and the curve bends away from their chord."""
+up to a stride apart, and the curve departs from their chord."""
 
 
 class Curves(NamedTuple):
@@ -63,7 +63,7 @@ class Curves(NamedTuple):
     """Where each curve begins, and where the last one ends, shape (curves + 1,)."""
     newton: NewtonWorkspace
     q_now: FloatArray
-    """Joints in hand, shape (7,)."""
+    """Current joint angles [rad], shape (7,)."""
     tangent_now: FloatArray
     trial: FloatArray
 
@@ -94,7 +94,7 @@ def slack_of(arm: NumericArm, q: FloatArray) -> float:
     worst = np.inf
     for i in range(7):
         off = q[i] - arm.middle[i]
-        off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+        off -= FULL_TURN * np.floor(off / FULL_TURN + 0.5)
         worst = min(worst, arm.half[i] - abs(off))
     return worst
 
@@ -120,7 +120,7 @@ def is_known(curves: Curves, count: int, q: FloatArray, beside: float) -> bool:
             square = along = 0.0
             for i in range(7):
                 off = q[i] - curves.q[n, i]
-                off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+                off -= FULL_TURN * np.floor(off / FULL_TURN + 0.5)
                 square += off * off
                 along += off * curves.tangent[n, i]
                 if square > reach * reach:
@@ -175,7 +175,7 @@ def trace(
 def _append_point(
     arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int
 ) -> float:
-    """Write the joints and the direction in hand as point n of a curve; return its slack."""
+    """Write the current joints and tangent as point n of a curve; return its slack."""
     J = curves.newton.J
     if of == ISOTROPY:
         total = 0.0
@@ -211,7 +211,7 @@ def _trace_side(
     stride: float,
     of: int,
 ) -> tuple[int, bool]:
-    """Walk one way from the solution in `q_now`; leave it there in the end.
+    """Trace a curve to one side of the solution in `q_now`, which is restored in the end.
 
     Returns:
         One after the last point, and whether the walk has come back to its start.
@@ -237,13 +237,13 @@ def _trace_side(
     while n < len(curves.slack):
         last = n - 1
         # Predict to second order by how the direction has turned.
-        bend = 0.0
+        curvature = 0.0
         if last > start:
-            bend = 0.5 * h * h / curves.length[last - 1]
+            curvature = 0.5 * h * h / curves.length[last - 1]
         for i in range(7):
             q[i] = curves.q[last, i] + h * curves.tangent[last, i]
-            if bend > 0.0:
-                q[i] += bend * (curves.tangent[last, i] - curves.tangent[last - 1, i])
+            if curvature > 0.0:
+                q[i] += curvature * (curves.tangent[last, i] - curves.tangent[last - 1, i])
         worst = evaluate(arm, R_AG, p_AG, q, newton)
         good = worst < MAX_PREDICTED_ERROR
         if good:
@@ -284,7 +284,7 @@ def _has_closed(curves: Curves, start: int, n: int) -> bool:
     before = after = apart = 0.0
     for i in range(7):
         off = curves.q[start, i] - curves.q[n, i]
-        off -= TURN_BACK * np.floor(off / TURN_BACK + 0.5)
+        off -= FULL_TURN * np.floor(off / FULL_TURN + 0.5)
         step = curves.q[n, i] - curves.q[n - 1, i]
         apart += off * off
         after += off * step

@@ -1,8 +1,8 @@
-"""Newton's method for a tool pose: error, Jacobian, the shortest step to the goal, the way along.
+"""Newton's method for a tool pose: error, Jacobian, the shortest step to the goal, the null space.
 
-The arm has one joint more than a pose has figures. Of all steps that take the error away to first
-order, Newton's is the shortest one; the direction in which the tool stands still is what is left.
-Both come from one factorisation of J J^T.
+The arm has one joint more than a pose has coordinates. Of all steps that remove the error to first
+order Newton's is the shortest; the null-space direction moves the joints but not the tool. One
+factorisation of J J^T gives both.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
+from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_error
 from tcs.kernel.numeric.arm import NumericArm
 
 LEAST_PIVOT = 1e-14
@@ -21,25 +22,25 @@ LONGEST_STEP = 0.6
 """Greatest change of the joints in one step [rad, as a norm]: beyond, J is another one."""
 DAMPING = 0.1
 """Of J J^T, whose entries are about 1, per square of the error."""
-FAR_TURN = 0.9
-"""Cosine of a turn below which its sine is no longer taken for the angle."""
 
 
 class NewtonWorkspace(NamedTuple):
-    """Scratch of one look at a posture."""
+    """Kinematics and linear algebra at one posture, reused from posture to posture."""
 
-    z: FloatArray
-    """Directions of the seven axes in A, shape (7, 3)."""
-    o: FloatArray
-    """Points on them [m], shape (7, 3)."""
-    S: FloatArray
-    """Orientations in hand, shape (2, 3, 3)."""
+    link_R: FloatArray
+    """Orientations of the links in A, shape (8, 3, 3)."""
+    link_p: FloatArray
+    """Origins of the links in A [m], shape (8, 3)."""
+    R_AT: FloatArray
+    """Orientation of the tool in A, shape (3, 3)."""
+    p_AT: FloatArray
+    """Position of the tool in A [m], shape (3,)."""
     J: FloatArray
     """Jacobian of the tool, shape (6, 7), rows [angular; linear]."""
     G: FloatArray
     """Factor of J J^T, its diagonal inverted, shape (6, 6)."""
     error: FloatArray
-    """What is left to the goal: turn [rad] and way [m] in A, shape (6,)."""
+    """Pose error: rotation vector [rad] and translation [m] in A, shape (6,)."""
     x: FloatArray
     """Right-hand side and solution, shape (6,)."""
     step: FloatArray
@@ -50,9 +51,10 @@ class NewtonWorkspace(NamedTuple):
 def new_newton_workspace() -> NewtonWorkspace:
     """Return scratch memory."""
     return NewtonWorkspace(
-        np.empty((7, 3)),
-        np.empty((7, 3)),
-        np.empty((2, 3, 3)),
+        np.empty((8, 3, 3)),
+        np.empty((8, 3)),
+        np.empty((3, 3)),
+        np.empty(3),
         np.empty((6, 7)),
         np.zeros((6, 6)),
         np.empty(6),
@@ -66,53 +68,10 @@ def evaluate(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, q: FloatArray, newton: NewtonWorkspace
 ) -> float:
     """Fill error and Jacobian at joint angles q; return the greatest entry of the error."""
-    S, T = newton.S[0], newton.S[1]
-    z, o, J, error = newton.z, newton.o, newton.J, newton.error
-    x0, x1, x2 = 0.0, 0.0, 0.0
-    for r in range(3):
-        for c in range(3):
-            S[r, c] = 1.0 if r == c else 0.0
-    for i in range(8):
-        F, f = arm.R[i], arm.p[i]
-        cosine, sine = 1.0, 0.0
-        if i < 7:
-            cosine, sine = np.cos(q[i]), np.sin(q[i])
-        x0 += S[0, 0] * f[0] + S[0, 1] * f[1] + S[0, 2] * f[2]
-        x1 += S[1, 0] * f[0] + S[1, 1] * f[1] + S[1, 2] * f[2]
-        x2 += S[2, 0] * f[0] + S[2, 1] * f[1] + S[2, 2] * f[2]
-        for r in range(3):
-            x = S[r, 0] * F[0, 0] + S[r, 1] * F[1, 0] + S[r, 2] * F[2, 0]
-            y = S[r, 0] * F[0, 1] + S[r, 1] * F[1, 1] + S[r, 2] * F[2, 1]
-            T[r, 2] = S[r, 0] * F[0, 2] + S[r, 1] * F[1, 2] + S[r, 2] * F[2, 2]
-            T[r, 0], T[r, 1] = cosine * x + sine * y, -sine * x + cosine * y
-        if i < 7:
-            z[i, 0], z[i, 1], z[i, 2] = T[0, 2], T[1, 2], T[2, 2]
-            o[i, 0], o[i, 1], o[i, 2] = x0, x1, x2
-        S, T = T, S
-    for i in range(7):
-        dx, dy, dz = x0 - o[i, 0], x1 - o[i, 1], x2 - o[i, 2]
-        J[0, i], J[1, i], J[2, i] = z[i, 0], z[i, 1], z[i, 2]
-        J[3, i] = z[i, 1] * dz - z[i, 2] * dy
-        J[4, i] = z[i, 2] * dx - z[i, 0] * dz
-        J[5, i] = z[i, 0] * dy - z[i, 1] * dx
-    # Half the sum of the cross products of the tool's axes with the goal's: axis times sine.
-    ex, ey, ez, trace = 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        ex += S[1, k] * R_AG[2, k] - S[2, k] * R_AG[1, k]
-        ey += S[2, k] * R_AG[0, k] - S[0, k] * R_AG[2, k]
-        ez += S[0, k] * R_AG[1, k] - S[1, k] * R_AG[0, k]
-        trace += S[0, k] * R_AG[0, k] + S[1, k] * R_AG[1, k] + S[2, k] * R_AG[2, k]
-    scale, cosine = 0.5, 0.5 * (trace - 1.0)
-    if cosine < FAR_TURN:
-        sine = 0.5 * np.sqrt(ex * ex + ey * ey + ez * ez)
-        # Half a turn off, the axis is lost: any does for a start.
-        scale = 0.5 * np.arctan2(sine, cosine) / max(sine, 1e-9)
-    error[0], error[1], error[2] = scale * ex, scale * ey, scale * ez
-    error[3], error[4], error[5] = p_AG[0] - x0, p_AG[1] - x1, p_AG[2] - x2
-    worst = 0.0
-    for k in range(6):
-        worst = max(worst, abs(error[k]))
-    return worst
+    link_poses(arm.R, arm.p, q, newton.link_R, newton.link_p)
+    place_tool(arm.R, arm.p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
+    fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
+    return pose_error(newton.R_AT, newton.p_AT, R_AG, p_AG, newton.error)
 
 
 @jit
@@ -177,7 +136,7 @@ def step_to_goal(newton: NewtonWorkspace, q: FloatArray, longest: float) -> floa
 
 @jit
 def null_space_direction(newton: NewtonWorkspace, before: FloatArray, tangent: FloatArray) -> float:
-    """Fill the unit direction in which the tool stands still, on the side of `before`.
+    """Fill the unit vector of the null space that points to the side of `before`.
 
     Args:
         newton: Factorised.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tcs.kernel.analytic.pairs import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.analytic.search import best_of
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
@@ -12,20 +11,23 @@ from tcs.kernel.contacts import (
     arm_contact,
     at_goal,
     pair_touches,
-    place_links,
 )
-from tcs.kernel.measure import measure_at
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.kinematics import link_poses
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.curves import correct, point_between, slack_of
 from tcs.kernel.numeric.search import (
     LAST_FRACTION,
     SPACING,
     CurveSearch,
+    NumericSolver,
     find_candidates,
     find_curves,
+    is_within_span,
     turn_into_limits,
 )
 from tcs.kernel.problem import Problem
+from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 
 EXACT = 1e-9
 """Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""
@@ -67,11 +69,11 @@ def contact_at(
         arm: Its arm.
         work: Environment, base, gripper and goal are placed.
         body_A: The robot's other shapes in A.
-        search: `q_now` gets filled with the joint angles looked at last [rad].
+        search: `q_now` gets filled with the joint angles checked last [rad].
         at: The place.
-        first: ROUGH or SOLVED, what to look at first: the cubic's joints, 1e-5 rad off, or those
-            of a solution. What touches something roughly is not worth a solution.
-        last: What to look at last.
+        first: First check, APPROXIMATE (joints of the cubic, with an error of 1e-5 rad) or SOLVED
+            (joints of a solution). Where the cubic's joints touch something, none is computed.
+        last: Last check.
         least: A solution whose measure is not above this counts as none.
     """
     q, contact = search.curves.q_now, NO_CONTACT
@@ -168,7 +170,7 @@ def bisect_contacts(
             middle = 0.5 * (low + high)
             point = int(middle)
             point_between(search.curves, point, middle - point, search.curves.q_now)
-            place_links(
+            link_poses(
                 problem.chain_R, problem.chain_p, search.curves.q_now, work.link_R, work.link_p
             )
             if pair_touches(problem, work, body_A, partner, i, j):
@@ -216,21 +218,33 @@ def refine(
 
 
 @inner
-def score_numeric_pair(
-    problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch
+def out_of_reach(problem: Problem, work: Workspace, solver: NumericSolver) -> int:
+    """Return TOO_FAR if the sum of the lengths from axis to axis rules the goal out, else REACHED.
+
+    Args:
+        problem: The scene.
+        work: The goal is placed.
+        solver: The arm's solver.
+    """
+    return REACHED if is_within_span(solver.arm, work.R_AG, work.p_AG) else TOO_FAR
+
+
+@inner
+def score_pair(
+    problem: Problem, work: Workspace, body_A: FloatArray, solver: NumericSolver
 ) -> tuple[int, int]:
     """Score one goal within reach; base and gripper are free already.
 
     Args:
         problem: The scene.
-        arm: Its arm.
         work: Environment, base, gripper and goal are placed.
-        body_A: The robot's other shapes in A at the torso level in hand.
-        search: Scratch; `best` gets filled with joint angles [rad] when reached.
+        body_A: The robot's other shapes in A at the current torso level.
+        solver: `best` gets filled with joint angles [rad] when reached.
 
     Returns:
         Reason and contact code.
     """
+    arm, search = solver.arm, solver.search
     count = find_curves(arm, work.R_AG, work.p_AG, search, problem.measure.of)
     if count == 0:
         return JOINT_LIMITS, NO_CONTACT

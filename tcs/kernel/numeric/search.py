@@ -14,8 +14,9 @@ from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.dexterity import UNLIMITED
-from tcs.kernel.measure import limit_penalty
-from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at
+from tcs.kernel.dexterity.measures import limit_penalty
+from tcs.kernel.kinematics import link_poses
+from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at, numeric_arm_of
 from tcs.kernel.numeric.curves import (
     SAME_CURVE,
     Curves,
@@ -38,7 +39,7 @@ come back, and a start may converge a little beyond."""
 STARTS = 96
 """Postures of the table that are brought to the goal, at most."""
 ITERATIONS = int_constant(10)
-"""Looks that a start gets; most take 4."""
+"""Most Newton iterations of a start; typically 4."""
 ON_CURVE = 1e-5
 """Error [rad and m] of a start that has arrived."""
 SPACING = 0.05
@@ -87,6 +88,21 @@ def new_curve_search(points: int, curves: int, candidates: int) -> CurveSearch:
     )
 
 
+class NumericSolver(NamedTuple):
+    """Constants of an arm and the search over its curves."""
+
+    arm: NumericArm
+    search: CurveSearch
+    best: FloatArray
+    """The array `best` of the search."""
+
+
+def new_numeric_solver(problem: Problem) -> NumericSolver:
+    """Return the solver of a problem's arm, with scratch memory for one worker."""
+    search = new_curve_search(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
+    return NumericSolver(numeric_arm_of(problem), search, search.best)
+
+
 @jit
 def is_within_span(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray) -> bool:
     """Return whether lengths alone let the arm come to a goal.
@@ -115,7 +131,7 @@ def is_within_span(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray) -> bool:
 def find_curves(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, search: CurveSearch, of: int
 ) -> int:
-    """Trace all curves of solutions that the table leads to.
+    """Trace all curves of solutions that the starts of the table lead to.
 
     Args:
         arm: The arm.
@@ -194,8 +210,8 @@ def _start(arm: NumericArm, search: CurveSearch, n: int, azimuth: float, R_F7: F
         return False
     q[6] = 0.0
     newton = search.curves.newton
-    place_last(arm, q, newton.S)
-    S = newton.S[0]
+    link_poses(arm.R_F, arm.p, q, newton.link_R, newton.link_p)
+    S = newton.link_R[7]
     cosine = sine = 0.0
     for r in range(3):
         cosine += S[r, 0] * R_F7[r, 0] + S[r, 1] * R_F7[r, 1]
@@ -203,26 +219,6 @@ def _start(arm: NumericArm, search: CurveSearch, n: int, azimuth: float, R_F7: F
     q[6] = np.arctan2(sine, cosine)
     q[6] -= TURN * np.floor((q[6] - arm.middle[6]) / TURN + 0.5)
     return abs(q[6] - arm.middle[6]) <= arm.half[6] + BEYOND
-
-
-@inner
-def place_last(arm: NumericArm, q: FloatArray, both: FloatArray) -> None:
-    """Fill both[0] with the orientation of L7 in F at joint angles q; both[1] is scratch."""
-    S, T = both[0], both[1]
-    for r in range(3):
-        for c in range(3):
-            S[r, c] = 1.0 if r == c else 0.0
-    for i in range(7):
-        F = arm.R[i]
-        cosine, sine = np.cos(q[i]), np.sin(q[i])
-        for r in range(3):
-            x, y, z = S[r, 0], S[r, 1], S[r, 2]
-            if i > 0:
-                x = S[r, 0] * F[0, 0] + S[r, 1] * F[1, 0] + S[r, 2] * F[2, 0]
-                y = S[r, 0] * F[0, 1] + S[r, 1] * F[1, 1] + S[r, 2] * F[2, 1]
-                z = S[r, 0] * F[0, 2] + S[r, 1] * F[1, 2] + S[r, 2] * F[2, 2]
-            T[r, 0], T[r, 1], T[r, 2] = cosine * x + sine * y, -sine * x + cosine * y, z
-        S[:] = T
 
 
 @inner
@@ -358,7 +354,7 @@ def _at_peak(
             high = second
         else:
             low = first
-    # The cubic cannot tell: whoever takes the candidate has to find a solution that keeps limits.
+    # The cubic is too coarse to decide; a candidate counts only once its solution keeps limits.
     if max(before, after) >= -INSIDE:
         found = _add(problem, search, n, 0.5 * (low + high), found)
     return found

@@ -1,5 +1,5 @@
-"""What the kernel is checked against: the plain-loop reference and the dense scans.
+"""Checks of the kernel: the plain-loop reference implementation and the dense scans.
 
-In: the same arrays as the kernel. Out: the same answers, computed slowly and independently. Only
-tests and `tcs.placement.scoring.verify` use it.
+In: the arrays that the kernel reads. Out: the same results, computed slowly and independently. Used
+by tests, benchmarks and `tcs.placement.scoring.verify`.
 """

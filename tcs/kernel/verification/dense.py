@@ -1,4 +1,4 @@
-"""A dense scan of the free joint: the yardstick for what the search may have missed."""
+"""A dense scan of the free joint, to find solutions that the search misses."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from tcs.kernel.contacts import (
     gripper_body_contact,
     new_workspace,
 )
-from tcs.kernel.measure import measure_at
+from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
+from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scan
 from tcs.kernel.views import unowned
 
 DENSE_SAMPLES = 11_520
@@ -31,25 +32,24 @@ DENSE_SAMPLES = 11_520
 def dense_scan(
     problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
 ) -> float:
-    """Return the best measure of any collision-free solution, or -1 when there is none.
+    """Return the dexterity of the best collision-free sample of the free joint, -1 if none is free.
 
-    Every sample of the free joint is tried on every branch; nothing is skipped and nothing
-    refined. The base is not checked: ask only for configurations whose base is free.
+    With a closed form, every sample is solved on every branch, and those within the joint limits
+    are checked for contacts in the order of their measure; the best is not refined. Without one,
+    `numeric_dense_scan` is called. Neither base against environment nor gripper against environment
+    is checked.
 
     Args:
         problem: The scene, its goals and its grid.
-        configuration: Flat index of the initial configuration.
-        goal: Index of the goal, one whose gripper is free.
-        samples: How many angles, spread evenly over the limits of the free joint. An arm outside
-            the closed form has none: there it is `numeric_dense.STARTS` starts in any case.
+        configuration: Flat index of an initial configuration whose base is free of contact.
+        goal: Index of a goal at which the gripper is free of contact with the environment.
+        samples: Number of angles, spread evenly over the limits of the free joint; ignored without
+            a closed form.
         joints: Filled with the solution [rad] when there is one, shape (7,).
     """
     if is_outside(problem.arm):
-        # Imported where it is needed: most arms have a closed form.
-        from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scan
-
         return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
-    # Made here, where they outlive the call: the compiled code only borrows them.
+    # Allocated here, to outlive the call: the compiled code takes unowned views of them.
     work, search = new_workspace(problem), new_search()
     return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))
 

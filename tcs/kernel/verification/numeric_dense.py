@@ -1,4 +1,4 @@
-"""Many starts from everywhere: the yardstick for what numeric IK may have missed."""
+"""Newton's method from many starts, to find solutions that the numeric search misses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import int_constant, jit
 from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
-from tcs.kernel.measure import measure_at
+from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.numeric.arm import NumericArm, joint_ranges, numeric_arm_of, spread
 from tcs.kernel.numeric.pairs import NOWHERE, bisect_contacts, choose
 from tcs.kernel.numeric.search import CurveSearch, find_candidates, new_curve_search, trace_from
@@ -16,11 +16,11 @@ from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
 
 STARTS = 400
-"""Postures spread over the joint limits, each brought to the goal."""
+"""Number of starts."""
 ITERATIONS = int_constant(60)
-"""Looks that a start gets: it may be half a turn and a whole arm off."""
+"""Most Newton iterations of a start, which may be 180 degrees and an arm's length away."""
 STRIDE, SPACING = 0.08, 0.0125
-"""As in `numeric_pairs`, but finer [rad]."""
+"""As in `tcs.kernel.numeric.search`, but finer [rad]."""
 EVERYWHERE = np.inf
 """How far beyond their limits joints are followed [rad]: to the end of every curve."""
 POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
@@ -29,23 +29,25 @@ POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
 def numeric_dense_scan(
     problem: Problem, configuration: int, goal: int, starts: int, joints: FloatArray
 ) -> float:
-    """Return the best measure of any collision-free solution found, or -1 when there is none.
+    """Return the dexterity of a collision-free solution, -1 if none was found.
 
-    Every start that arrives is followed along its whole curve, limits or not. The table that the
-    sweep starts from is not used, and nothing is refined. The base is not checked: ask only for
-    configurations whose base is free.
+    Starts are spread over the joint limits; the table of the sweep is not used. Each curve that a
+    start arrives on is traced once, beyond the joint limits too, until the scratch memory is full.
+    The result is the free candidate with the highest interpolated measure, not refined; or, if all
+    candidates touch something, any free place between two of them. Neither base against
+    environment nor gripper against environment is checked.
 
     Args:
         problem: The scene, its goals and its grid.
-        configuration: Flat index of the initial configuration.
-        goal: Index of the goal, one whose gripper is free.
-        starts: How many postures to start from.
+        configuration: Flat index of an initial configuration whose base is free of contact.
+        goal: Index of a goal at which the gripper is free of contact with the environment.
+        starts: Number of postures to start from.
         joints: Filled with the solution [rad] when there is one, shape (7,).
     """
     arm = numeric_arm_of(problem)
     low, high = joint_ranges(problem.arm.lower, problem.arm.upper)
     postures = low + spread(starts, 7) * (high - low)
-    # Made here, where they outlive the call: the compiled code only borrows them.
+    # Allocated here, to outlive the call: the compiled code takes unowned views of them.
     work, search = new_workspace(problem), new_curve_search(POINTS, CURVES, CANDIDATES)
     return float(_scan(problem, arm, work, search, configuration, goal, postures, joints))
 

@@ -1,8 +1,9 @@
-"""The kernel's mathematics once more, in plain loops: written to be read, never to be tuned.
+"""Reference implementation of the kernel in plain Python, written for clarity.
 
-Tests hold the compiled kernel against this twin, and this twin against Drake. Nothing else uses
-it. Where the kernel has a shortcut (packed rows, samples, a determinant by minors, contacts in the
-order of likelihood) the twin takes the definition.
+Tests compare the compiled kernel with it, and it with Drake; `tcs verify` recomputes the stored
+dexterity with it, and benchmarks measure speed-ups over it. It shares no code with the kernel, so
+that a mistake cannot cancel out. Where the kernel takes a shortcut (packed rows, samples, a
+determinant by minors, contacts in the order of likelihood), the reference applies the definition.
 """
 
 from __future__ import annotations
@@ -119,8 +120,8 @@ class Solution:
     """Joint angles [rad], turned into the limits where they can be, shape (7,)."""
     slack: float
     """>= 0 where the branch exists and every joint keeps its limits."""
-    bend: float
-    """Squared sine of how far the wrist (of a mirrored arm, the shoulder) is bent."""
+    sine_squared: float
+    """Squared sine of the wrist angle (of the shoulder, in the spherical-shoulder class)."""
 
 
 def has_spherical_shoulder(chain: Chain) -> bool:
@@ -202,8 +203,8 @@ def spherical_shoulder_solutions(
             R_36 = X_35[0] @ rot_z(q5) @ chain.R[5] @ rot_z(q6)
             M = chain.R[0].T @ X_A6[0] @ R_36.T
             f = chain.R[2][:, 2]
-            shoulder_left, lifts = angles_to_height(chain.R[1], f, M[2, 2])
-            for lift_sign, q2 in zip((1, -1), lifts, strict=True):
+            shoulder_left, shoulders = angles_to_height(chain.R[1], f, M[2, 2])
+            for shoulder_sign, q2 in zip((1, -1), shoulders, strict=True):
                 # From the inside out, as the kernel: it matters to the slack where there is none.
                 R_13 = chain.R[1] @ rot_z(q2) @ chain.R[2]
                 q3 = math.atan2(R_13[2, 1], R_13[2, 0]) - math.atan2(M[2, 1], M[2, 0])
@@ -211,17 +212,17 @@ def spherical_shoulder_solutions(
                 q1 = math.atan2(-N[0, 1], N[0, 0])
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
-                found[elbow_sign, aim_sign, lift_sign] = limited(chain, q, left, shoulder_left)
+                found[elbow_sign, aim_sign, shoulder_sign] = limited(chain, q, left, shoulder_left)
     return found
 
 
-def limited(chain: Chain, angles: list[float], left: float, bend: float) -> Solution:
+def limited(chain: Chain, angles: list[float], left: float, sine_squared: float) -> Solution:
     """Return a solution turned into its limits, its slack no more than what is `left` anyway."""
     q = np.array(angles)
     for i in range(7):
         q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
         left = min(left, kept)
-    return Solution(q, left, max(bend, 0.0))
+    return Solution(q, left, max(sine_squared, 0.0))
 
 
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:

@@ -16,17 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.analytic.arcs import INSET, PEAK_SLOPE
-from tcs.kernel.analytic.pairs import (
-    ARM_BLOCKED,
-    BODY_BLOCKED,
-    GRIPPER_BLOCKED_BY_ENVIRONMENT,
-    GRIPPER_BLOCKED_BY_ROBOT,
-    JOINT_LIMITS,
-    REACHED,
-    REFINE_SAMPLES,
-    REFINEMENTS,
-    TOO_FAR,
-)
+from tcs.kernel.analytic.pairs import REFINE_SAMPLES, REFINEMENTS
 from tcs.kernel.analytic.search import (
     FINE_SAMPLES,
     FINE_STEP,
@@ -38,6 +28,15 @@ from tcs.kernel.analytic.search import (
 )
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
+from tcs.kernel.scores import (
+    ARM_BLOCKED,
+    BODY_BLOCKED,
+    GRIPPER_BLOCKED_BY_ENVIRONMENT,
+    GRIPPER_BLOCKED_BY_ROBOT,
+    JOINT_LIMITS,
+    REACHED,
+    TOO_FAR,
+)
 from tcs.kernel.verification.reference import (
     Placed,
     Pose,
@@ -64,7 +63,7 @@ class Verdict:
 
     reason: int
     dexterity: float = 0.0
-    """The measure, isotropy if no other was asked for."""
+    """Dexterity by the requested measure."""
     q: FloatArray | None = None
     clearance: float = math.inf
     """How far the nearest pair that decided is from deciding otherwise [m]; for tests."""
@@ -83,7 +82,7 @@ class PlacedScene:
     def touches(self, a: Placed, b: Placed) -> bool:
         """Return whether two shapes are closer than they may be, and note how clear that is."""
         required = max(self.scene.margin, a.pad + b.pad)
-        # Balls that are well apart spare the exact distance; they cannot decide a verdict.
+        # Bounding spheres well apart make the exact distance unnecessary.
         if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + 0.01:
             return False
         excess = distance(a, b) - required
@@ -269,9 +268,9 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
             step = (last - first) / (count - 1)
             for i, j in windows_of(slack, step):
                 found += refine_window(chain, X_AG, branch, angles[i], angles[j])
-            bend = [math.inf, *(look[branch].bend for look in looks), math.inf]
+            sines = [math.inf, *(look[branch].sine_squared for look in looks), math.inf]
             for i in range(1, count + 1):
-                if bend[i] < STRAIGHT and bend[i] <= bend[i - 1] and bend[i] < bend[i + 1]:
+                if sines[i] < STRAIGHT and sines[i] <= sines[i - 1] and sines[i] < sines[i + 1]:
                     straight.append((branch, angles[i - 1], step))
     if not found:
         for branch, middle, step in straight:
@@ -282,14 +281,14 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
 def refine_straight(
     chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
 ) -> list[Candidate]:
-    """Return the feasible angles about one at which the wrist is all but straight."""
+    """Return the feasible angles about one at which the wrist is nearly straight."""
     for _ in range(STRAIGHT_REFINEMENTS):
         low, step = middle - step, 2 * step / (FINE_SAMPLES - 1)
         angles = [low + i * step for i in range(FINE_SAMPLES)]
         found = candidates_at(chain, X_AG, branch, angles, step)
         if found:
             return found
-        middle = min(angles, key=lambda angle: solutions(chain, X_AG, angle)[branch].bend)
+        middle = min(angles, key=lambda angle: solutions(chain, X_AG, angle)[branch].sine_squared)
     return []
 
 

@@ -14,6 +14,7 @@ from tcs.errors import ArmClassError
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.lines import axis_distance
 from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.model.scene import Scene, arm_chain
 
@@ -193,24 +194,9 @@ def _distance_from_meeting(chain: Chain, axes: tuple[int, ...]) -> float | None:
     and of the distance, along the middle axis, between the points where the outer ones come
     closest. Joint angles do not matter.
     """
-    approaches = [_closest(chain.R[i], chain.p[i]) for i in axes[:-1]]
+    approaches = [axis_distance(chain.R[i], chain.p[i]) for i in axes[:-1]]
     known = [approach for approach in approaches if approach is not None]
     if len(known) < len(approaches):
         return None
     offsets = (abs(after[1] - before[2]) for before, after in itertools.pairwise(known))
     return max(max(approach[0] for approach in known), *offsets, 0.0)
-
-
-def _closest(R: FloatArray, p: FloatArray) -> tuple[float, float, float] | None:
-    """Return the closest approach of the z axes of a frame and of a frame at (R, p) in it.
-
-    Returns:
-        Their distance, and the position of the closest point on each axis from its origin [m]; None
-        if the axes are parallel.
-    """
-    directions = np.column_stack([[0.0, 0.0, 1.0], -R[:, 2]])
-    # A sine below a millionth comes from the rounding of the figures of a URDF.
-    along, _, rank, _ = np.linalg.lstsq(directions, p, rcond=1e-6)
-    if rank < 2:
-        return None
-    return float(np.linalg.norm(directions @ along - p)), float(along[0]), float(along[1])

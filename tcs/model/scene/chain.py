@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.lines import closest_points
 
 AXES_MEET = 1e-6
 """Axes closer than this intersect [m]: far above the rounding of a URDF's figures (1e-9), far below
@@ -96,10 +97,9 @@ def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, Flo
     sine_squared = 1.0 - cosine * cosine
     if sine_squared < _PARALLEL:
         return None
-    along_first = float(a @ offset - cosine * (b @ offset)) / sine_squared
-    along_second = float(cosine * (a @ offset) - b @ offset) / sine_squared
-    on_first = first.p_AJ + along_first * a
-    on_second = second.p_AJ + along_second * b
+    along = closest_points(a, b, offset, sine_squared)
+    on_first = first.p_AJ + along[0] * a
+    on_second = second.p_AJ + along[1] * b
     if np.linalg.norm(on_first - on_second) >= AXES_MEET:
         return None
     return on_first, on_second

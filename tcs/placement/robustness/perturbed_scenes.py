@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import Problem
-from tcs.kernel.sweep import Scores, score_slice
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import score_slice
 from tcs.placement.tables import Reason
 
 BATCH = 500

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from tcs.errors import SelectionError, TcsError
 from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
-from tcs.kernel.sets import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
+from tcs.kernel.sets.pairs import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.triples import kept_triples

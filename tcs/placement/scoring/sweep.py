@@ -15,7 +15,8 @@ from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.sweep import Scores, gripper_contacts, score_slice
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.scene import LoweredScene
 from tcs.placement.tables import ScoreTable
 
@@ -25,8 +26,8 @@ is visible, with scratch memory that stays in the processor's cache."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
-_ENTRIES = {ANALYTIC: "sweep._score_slice", NUMERIC: "sweep._score_numeric_slice"}
-"""Kernel entry points into which everything else is compiled, as module and function."""
+_ENTRIES = {ANALYTIC: "analytic_*/pairs.score_pair", NUMERIC: "numeric_*/pairs.score_pair"}
+"""Pair scorers, compiled last but for the sweep: package, module and function as patterns."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray, IntArray
-from tcs.kernel.sets import BestPairs, MemberPairs, SetArrays
-from tcs.kernel.triples import KeptTriples, fill_pairs, find_triples
+from tcs.kernel.sets.pairs import BestPairs, MemberPairs, SetArrays
+from tcs.kernel.sets.triples import KeptTriples, fill_pairs, find_triples
 from tcs.placement.tables.groups import Groups
 from tcs.placement.tables.rounding import float32_above
 

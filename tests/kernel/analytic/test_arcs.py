@@ -68,7 +68,7 @@ def goals(rng, chain, number):
             yield rotation(rng), rng.uniform(-length, length, 3)
 
 
-@pytest.fixture(params=["pr2", "panda", *range(15), *(f"mirrored {i}" for i in range(15))], ids=str)
+@pytest.fixture(params=["pr2", "panda", *range(15), *(f"shoulder {i}" for i in range(15))], ids=str)
 def chain(request, lowered):
     """Real arms, and random arms of either class."""
     if request.param == "pr2":
@@ -120,7 +120,7 @@ def test_feasible_angles_lie_in_the_arcs(chain):
     assert seen > 100
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("spherical_shoulder", [False, True])
 @pytest.mark.parametrize("seed", range(15))
 def test_out_of_reach_and_out_of_limits_are_told_apart(seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
@@ -185,7 +185,7 @@ def test_arcs_wrap_where_the_goal_lies_behind(lowered, centre):
 
 
 @pytest.mark.parametrize("seed", range(200))
-def test_windows_are_those_of_the_twin(seed):
+def test_windows_are_those_of_the_reference(seed):
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 48))
     slack = rng.normal(size=count) * 10 ** rng.uniform(-2, 0.3)

@@ -1,4 +1,4 @@
-"""The closed form in samples: against forward kinematics and against the plain-loop twin."""
+"""The closed form in samples: against forward kinematics and against the plain-loop reference."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tcs.kernel.verification.reference import free_joint, isotropy, jacobian, li
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 
-ARMS = ["pr2", "tiago", "panda", *range(12), *(f"mirrored {i}" for i in range(12))]
+ARMS = ["pr2", "tiago", "panda", *range(12), *(f"shoulder {i}" for i in range(12))]
 
 
 @pytest.fixture(params=ARMS, ids=str)
@@ -96,7 +96,7 @@ def test_every_feasible_lane_reaches_the_goal_within_the_limits(chain, rng):
     assert seen > 20
 
 
-def test_lanes_agree_with_the_twin_branch_by_branch(chain, rng):
+def test_samples_agree_with_the_reference_branch_by_branch(chain, rng):
     arm = arm_solver(chain)
     for _ in range(25):
         X_AG = rotation(rng), rng.uniform(-0.7, 0.7, 3)

@@ -9,7 +9,7 @@ import pytest
 
 from tcs.errors import UnknownNameError
 from tcs.kernel.dexterity import MEASURES, NORMALISED, THESIS, UNLIMITED, dexterity
-from tcs.kernel.measure import (
+from tcs.kernel.dexterity.measures import (
     eigenvalue_from,
     inverse_condition,
     limit_penalty,
@@ -83,7 +83,7 @@ def test_every_measure_is_its_equation_on_drakes_finite_differences(scene, lower
 
 @pytest.mark.parametrize("arm", ["pr2", "panda"])
 @pytest.mark.parametrize("measure", MEASURES)
-def test_every_measure_agrees_with_the_twin(lowered, rng, arm, measure):
+def test_every_measure_agrees_with_the_reference(lowered, rng, arm, measure):
     chain = lowered.arrays.chain if arm == "pr2" else drake_arm("panda").chain
     problem = build_problem(toy_scene(chain, 0), toy_grid(), measure)
     for _ in range(30):

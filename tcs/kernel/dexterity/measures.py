@@ -6,8 +6,8 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.contacts import place_links
 from tcs.kernel.dexterity import INVERSE_CONDITION, THESIS, UNLIMITED
+from tcs.kernel.kinematics import jacobian
 from tcs.kernel.problem import Problem
 
 THESIS_SCALE = 1e6
@@ -19,29 +19,6 @@ NEWTON_STEPS = 200
 """More than any eigenvalue takes: some 4 to 8, and where all six coincide each step leaves 5/6."""
 CLOSE_ENOUGH = 1e-13
 """Relative step of an eigenvalue that ends the search; the next would be far below rounding."""
-
-
-@jit
-def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatArray) -> None:
-    """Fill the Jacobian of tool T in the arm base A.
-
-    Args:
-        chain_R: Rotations of the chain, shape (8, 3, 3).
-        chain_p: Translations of the chain [m], shape (8, 3).
-        q: Joint angles [rad], shape (7,).
-        J: Filled, shape (6, 7), rows [angular; linear] [rad/rad; m/rad].
-    """
-    R, p = np.empty((8, 3, 3)), np.empty((8, 3))
-    place_links(chain_R, chain_p, q, R, p)
-    tool, f = np.empty(3), chain_p[7]
-    for r in range(3):
-        offset = R[7, r, 0] * f[0] + R[7, r, 1] * f[1] + R[7, r, 2] * f[2]
-        tool[r] = p[7, r] + offset
-    for i in range(7):
-        x, y, z = R[i + 1, 0, 2], R[i + 1, 1, 2], R[i + 1, 2, 2]
-        dx, dy, dz = tool[0] - p[i + 1, 0], tool[1] - p[i + 1, 1], tool[2] - p[i + 1, 2]
-        J[0, i], J[1, i], J[2, i] = x, y, z
-        J[3, i], J[4, i], J[5, i] = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
 
 
 @inner

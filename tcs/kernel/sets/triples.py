@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.sets import BestPairs, MemberPairs, SetArrays, pair_manipulability
+from tcs.kernel.sets.pairs import BestPairs, MemberPairs, SetArrays, pair_manipulability
 
 ROUNDING = 1e-6
 """Allowance for rounding in the bounds: pairs are held in single precision, good to 6e-8."""

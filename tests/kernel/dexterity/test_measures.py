@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tcs.kernel.measure import isotropy_at, jacobian, rounded_inward
+from tcs.kernel.dexterity.measures import isotropy_at, rounded_inward
+from tcs.kernel.kinematics import jacobian
 from tcs.kernel.verification import reference
 from tests.kernel.arms import drake_arm
 from tests.kernel.shapes import random_arm, random_joints, turned_by
@@ -46,7 +47,7 @@ def test_jacobian_is_the_derivative_of_the_tool_pose(chain, rng):
             np.testing.assert_allclose(J[:3, i], spin, atol=1e-8)
 
 
-def test_jacobian_agrees_with_the_twin(chain, rng):
+def test_jacobian_agrees_with_the_reference(chain, rng):
     for _ in range(20):
         q = random_joints(rng, chain)
         # The same sums in another order.

@@ -1,7 +1,7 @@
-"""The dexterity measures by name: how well the arm can move its tool in every direction.
+"""Dexterity measures: how well the arm can move its tool in every direction.
 
-Which function computes what stands in `measure`; here are only names and codes, so that a name can
-be checked without the compiler.
+In: joint angles. Out: a measure in [0, 1]. Names and codes are here, so that a name can be checked
+without the compiler; `measures` computes them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ UNLIMITED, NORMALISED, THESIS = 0, 1, 2
 
 
 class Dexterity(NamedTuple):
-    """One measure, as the compiled code is told of it."""
+    """One measure, as codes for the compiled code."""
 
     of: int
     """ISOTROPY or INVERSE_CONDITION."""
