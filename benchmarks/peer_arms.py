@@ -1,4 +1,4 @@
-"""Peers that know the arm alone: EAIK, TRAC-IK and pinocchio; none of them asks about contact.
+"""Peers that know the arm alone: EAIK, TRAC-IK and pinocchio; none of them checks contact.
 
 Each is an optional package (`pip install '.[benchmarks]'`) and is imported only when it is made.
 All take the arm from the lowered chain: frames, limits and tool are those of our own kernel.
@@ -125,8 +125,8 @@ class PinocchioClik:
             X = pinocchio.SE3(chain.R[i], chain.p[i])
             joint = self._model.addJoint(joint, pinocchio.JointModelRZ(), X, f"arm_{i + 1}")
         X = pinocchio.SE3(chain.R[7], chain.p[7])
-        kind = pinocchio.FrameType.OP_FRAME
-        self._tool = self._model.addFrame(pinocchio.Frame("tool", joint, 0, X, kind))
+        frame_type = pinocchio.FrameType.OP_FRAME
+        self._tool = self._model.addFrame(pinocchio.Frame("tool", joint, 0, X, frame_type))
         self._data = self._model.createData()
         self._lower, self._upper = chain.lower, chain.upper
         self._starts = start_limits(chain.lower, chain.upper)
@@ -168,15 +168,15 @@ def urdf(chain: Chain) -> str:
         child = f"link_{i + 1}" if i < 7 else "tool"
         xyz = " ".join(repr(float(v)) for v in chain.p[i])
         rpy = " ".join(repr(v) for v in _roll_pitch_yaw(chain.R[i]))
-        kind, limit = "fixed", ""
+        joint_type, limit = "fixed", ""
         if i < 7:
-            kind, limit = "continuous", '<limit effort="1" velocity="1"/>'
+            joint_type, limit = "continuous", '<limit effort="1" velocity="1"/>'
             if np.isfinite(chain.lower[i]) and np.isfinite(chain.upper[i]):
                 ends = f'lower="{float(chain.lower[i])!r}" upper="{float(chain.upper[i])!r}"'
-                kind, limit = "revolute", f'<limit effort="1" velocity="1" {ends}/>'
+                joint_type, limit = "revolute", f'<limit effort="1" velocity="1" {ends}/>'
         lines += [
             f'<link name="{child}"/>',
-            f'<joint name="{"arm" if i < 7 else "hand"}_{i + 1}" type="{kind}">',
+            f'<joint name="{"arm" if i < 7 else "hand"}_{i + 1}" type="{joint_type}">',
             f'<parent link="{parent}"/><child link="{child}"/>',
             f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="0 0 1"/>{limit}</joint>',
         ]

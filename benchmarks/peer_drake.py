@@ -82,9 +82,9 @@ def add_arm(
     if joints:
         parent = plant.world_frame()
         for name, along in zip(BASE, np.eye(3), strict=True):
-            kind = RevoluteJoint if name == "base_yaw" else PrismaticJoint
+            joint_class = RevoluteJoint if name == "base_yaw" else PrismaticJoint
             body = plant.AddRigidBody(name, robot, inertia)
-            plant.AddJoint(kind(name, parent, body.body_frame(), along))
+            plant.AddJoint(joint_class(name, parent, body.body_frame(), along))
             parent = body.body_frame()
         torso = plant.AddRigidBody("torso", robot, inertia).body_frame()
         plant.AddJoint(PrismaticJoint("torso", parent, torso, axis))
@@ -157,8 +157,8 @@ class DrakeIk:
 
     def __init__(self, lowered: LoweredScene, *, distance: bool) -> None:
         """Build the plant; `distance` adds the minimum distance constraint to every problem."""
-        kind = "Drake IK, min distance" if distance else "Drake IK"
-        self.labels = tuple(f"{kind}, {n} {'try' if n == 1 else 'tries'}" for n in TRIES)
+        title = "Drake IK, min distance" if distance else "Drake IK"
+        self.labels = tuple(f"{title}, {n} {'try' if n == 1 else 'tries'}" for n in TRIES)
         self._distance = distance
         builder = RobotDiagramBuilder(time_step=0.0)
         self._parts = add_arm(builder.plant(), builder.scene_graph(), lowered, joints=False)
@@ -167,7 +167,7 @@ class DrakeIk:
         self._root = self._diagram.CreateDefaultContext()
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
         arrays = lowered.arrays
-        self._lifts = arrays.arm_base_p - arrays.arm_base_p[0]
+        self._torso_offsets = arrays.arm_base_p - arrays.arm_base_p[0]
         self._margin = arrays.margin
         self._starts = start_limits(arrays.chain.lower, arrays.chain.upper)
         self._solver = SnoptSolver()
@@ -177,7 +177,7 @@ class DrakeIk:
         x, y, yaw = pair.base
         X_WB = RigidTransform(RotationMatrix.MakeZRotation(yaw), [x, y, 0.0])
         self._parts.base.SetPoseInParentFrame(self._context, X_WB)
-        X_BT = RigidTransform(self._lifts[pair.torso_level])
+        X_BT = RigidTransform(self._torso_offsets[pair.torso_level])
         self._parts.torso.SetPoseInParentFrame(self._context, X_BT)
         begun = time.process_time()
         ik = InverseKinematics(self._plant, self._context, with_joint_limits=True)
@@ -227,9 +227,9 @@ class WinnersChecker:
         self._checker = SceneGraphCollisionChecker(
             model=builder.Build(),
             robot_model_instances=[parts.robot],
-            # Only for paths, which nobody asks about here.
+            # Only for paths, which are not checked here.
             edge_step_size=0.1,
-            # Overlaps only: the least that can be asked of it.
+            # Overlaps only: its cheapest query.
             env_collision_padding=0.0,
             self_collision_padding=0.0,
             # By default it heeds OMP_NUM_THREADS, and OMP_NUM_THREADS=1 would leave one context.
@@ -268,7 +268,7 @@ class WinnersChecker:
         )
 
     def overlaps(self, configurations: FloatArray) -> tuple[float, int]:
-        """Ask the scene graph only whether anything overlaps, one by one on one thread.
+        """Query the scene graph for overlaps only, one by one on one thread.
 
         Returns:
             Processor time [s], and how many do.
@@ -286,9 +286,9 @@ class WinnersChecker:
 
 def torso_axis(arm_base_p: FloatArray) -> FloatArray:
     """Return the direction in which the torso lifts the arm base, upward if it does not."""
-    lift = arm_base_p[-1] - arm_base_p[0]
-    length = float(np.linalg.norm(lift))
-    return lift / length if length > 0.0 else np.eye(3)[2]
+    rise = arm_base_p[-1] - arm_base_p[0]
+    length = float(np.linalg.norm(rise))
+    return rise / length if length > 0.0 else np.eye(3)[2]
 
 
 def _register(

@@ -20,7 +20,7 @@ from tcs.kernel.sweep import _score_slice
 from tcs.placement.tables import Reason
 
 REPEATS = 32
-"""How often a pair is solved in one call for its own time: the clock does not tell microseconds."""
+"""Repetitions of a pair in one call: the clock does not resolve microseconds."""
 
 
 @jit

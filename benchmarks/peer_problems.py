@@ -126,7 +126,7 @@ def draw(bench: Bench, judge: Judge, count: int, seed: int) -> ProblemSet:
     drawn = unconfirmed = 0
     q = np.empty(7)
     for h, g in candidates[order]:
-        if all(len(found[kind]) == wanted[kind] for kind in found):
+        if all(len(found[key]) == wanted[key] for key in found):
             break
         reachable = dense_scan(bench.problem, int(h), int(g), DENSE_SAMPLES, q) >= 0.0
         drawn += 1
@@ -173,7 +173,7 @@ class Judge:
     """Drake's verdict on answers, with the whole robot in the whole environment.
 
     Peers know one distance that everything has to keep, the contact margin; the paddings of some
-    of the person's shapes, which our kernel keeps as well, are not asked of them.
+    of the person's shapes, which our kernel respects as well, are not required of them.
     """
 
     def __init__(self, bench: Bench) -> None:

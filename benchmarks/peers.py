@@ -1,12 +1,12 @@
-"""Measure our kernel beside what one would use instead, on the same problems, in the same run.
+"""Measure the kernel and other solvers on the same problems, in the same run.
 
 Usage: python benchmarks/peers.py [--problems 100] [--seed 0] [--repeats 5]
            [--peers drake,eaik,tracik,pinocchio]
 
 The peers EAIK, TRAC-IK and pinocchio are optional: `pip install '.[benchmarks]'`; an absent one is
-skipped with a line. docs/benchmarks.md says what each line means. Times of one run compare with
+skipped with a message. docs/benchmarks.md explains each line. Times of one run compare with
 each other: solvers take turns from problem to problem, and times of single problems are the
-processor's, which others on the machine do not add to. Nothing here is a test.
+processor's, which others on the machine do not add to.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ OPTIONAL = {
 """Peers that are packages of their own, by the name on the command line."""
 NAMES = ("drake", *OPTIONAL)
 BLOCKS = 5
-"""Into how many parts the problems are cut: the range of ratios is that over them."""
-YARDSTICK = "Drake IK, min distance, 5 tries"
+"""Number of blocks of problems; the range of ratios is taken over them."""
+REFERENCE_PEER = "Drake IK, min distance, 5 tries"
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What one solver did with every problem, arrays of shape (problems,)."""
+    """Results of one solver on every problem, arrays of shape (problems,)."""
 
     seconds: NDArray[np.float64]
     at_goal: NDArray[np.bool_]
@@ -52,12 +52,12 @@ class Record:
 
     @classmethod
     def empty(cls, count: int) -> Record:
-        """Return a record of nothing yet."""
+        """Return a record without results."""
         no = np.zeros(count, np.bool_)
         return cls(np.zeros(count), no, no.copy(), np.zeros(count, np.int64))
 
     def note(self, i: int, answer: Answer, judge: Judge, pair: Pair) -> None:
-        """Keep an answer to problem i and what Drake says of it."""
+        """Record an answer to problem i and Drake's verdict on it."""
         self.seconds[i], self.solutions[i] = answer.seconds, len(answer.postures)
         for q in answer.postures:
             verdict = judge.check(pair, q)
@@ -70,7 +70,7 @@ class Record:
 def main(arguments: list[str] | None = None) -> int:
     """Run every measurement and print it."""
     options = parse(arguments)
-    # Drake tells of every context it makes.
+    # Drake logs every context it makes.
     logging.getLogger("drake").setLevel(logging.WARNING)
     header("eaik", "pytracik", "pin")
     bench = Bench.build()
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
     row(
         "  base free, goal within reach",
         f"{np.sum(reachable)} reachable, {np.sum(~reachable)} not, of {problems.drawn} that a "
-        f"dense scan looked at; Drake refused {problems.unconfirmed} of its solutions",
+        f"dense scan checked; Drake refused {problems.unconfirmed} of its solutions",
     )
     kernel = Kernel(bench)
     peers = [kernel, *chosen(options.peers, bench)]
@@ -90,8 +90,8 @@ def main(arguments: list[str] | None = None) -> int:
     ours = np.zeros(len(pairs))
     blocks = [np.arange(len(pairs))[b::BLOCKS] for b in range(BLOCKS)]
     for block in blocks:
-        for kind in (True, False):
-            same = [int(i) for i in block if reachable[i] == kind]
+        for is_reachable in (True, False):
+            same = [int(i) for i in block if reachable[i] == is_reachable]
             if same:
                 ours[same] = kernel.seconds(tuple(pairs[i] for i in same)) / len(same)
         for i in block:
@@ -130,20 +130,20 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 
 def chosen(names: list[str], bench: Bench) -> list[Peer]:
-    """Return the peers of these names that are there, and say which are not."""
+    """Return the installed peers of these names, and print which are absent."""
     found: list[Peer] = []
     if "drake" in names:
         found += [DrakeIk(bench.lowered, distance=False), DrakeIk(bench.lowered, distance=True)]
-    for name, (title, kind) in OPTIONAL.items():
+    for name, (title, make) in OPTIONAL.items():
         if name in names:
-            found += made(title, kind, bench.lowered.arrays.chain)
+            found += made(title, make, bench.lowered.arrays.chain)
     return found
 
 
-def made(title: str, kind: Callable[[Chain], Peer], chain: Chain) -> list[Peer]:
-    """Return the peer, or nothing but a line that says why it is left out."""
+def made(title: str, make: Callable[[Chain], Peer], chain: Chain) -> list[Peer]:
+    """Return the peer in a list; an empty list, with a message, if it cannot be used."""
     try:
-        return [kind(chain)]
+        return [make(chain)]
     except ModuleNotFoundError as error:
         row(title, f"skipped: no module '{error.name}' (pip install '.[benchmarks]')")
     except (ImportError, UnfitArmError) as error:
@@ -156,18 +156,18 @@ def show_answers(records: dict[str, Record], reachable: NDArray[np.bool_]) -> No
     _cells("answers", "at goal", "free", "unreach. at goal", "unreach. free", "solutions")
     for label, record in records.items():
         counts = [
-            f"{np.sum(kept[kind])} of {np.sum(kind)}"
-            for kind in (reachable, ~reachable)
+            f"{np.sum(kept[subset])} of {np.sum(subset)}"
+            for subset in (reachable, ~reachable)
             for kept in (record.at_goal, record.free)
         ]
         _cells(f"  {label}", *counts, f"{np.mean(record.solutions[reachable]):.1f}")
 
 
 def show_times(records: dict[str, Record], reachable: NDArray[np.bool_]) -> None:
-    """Print what a problem takes: median, and from the 10th to the 90th in a hundred."""
+    """Print the time of a problem: median, and 10th to 90th percentile."""
     _cells("time of one problem [ms]", "reachable", "unreachable", width=32)
     for label, record in records.items():
-        texts = [_quantiles(1e3 * record.seconds[kind]) for kind in (reachable, ~reachable)]
+        texts = [_quantiles(1e3 * record.seconds[subset]) for subset in (reachable, ~reachable)]
         _cells(f"  {label}", *texts, width=32)
 
 
@@ -177,7 +177,7 @@ def show_ratios(
     ours: NDArray[np.float64],
     blocks: list[NDArray[np.int64]],
 ) -> None:
-    """Print how many times as long as ours the problems take, all together and of each kind.
+    """Print the ratios of all times to ours: over all problems, and over each subset.
 
     Args:
         records: Of all solvers, ours first.
@@ -188,20 +188,22 @@ def show_ratios(
     row("our problems a second, 1 thread", f"{len(ours) / np.sum(ours):.3g}")
     if len(records) == 1:
         return
-    kinds = (np.ones_like(reachable), reachable, ~reachable)
+    subsets = (np.ones_like(reachable), reachable, ~reachable)
     _cells("time / ours", "all", "reachable", "unreachable", width=32)
     for label, record in list(records.items())[1:]:
         texts = []
-        for kind in kinds:
-            parts = [block[kind[block]] for block in blocks]
+        for subset in subsets:
+            parts = [block[subset[block]] for block in blocks]
             ratios = [np.sum(record.seconds[p]) / np.sum(ours[p]) for p in parts if p.size]
-            whole = np.sum(record.seconds[kind]) / np.sum(ours[kind])
+            whole = np.sum(record.seconds[subset]) / np.sum(ours[subset])
             texts.append(f"{whole:.4g}x ({min(ratios):.4g} .. {max(ratios):.4g})")
         _cells(f"  {label}", *texts, width=32)
-    if YARDSTICK in records:
-        theirs, own = records[YARDSTICK], next(iter(records.values()))
-        times = [f"{np.sum(theirs.seconds[kind]) / np.sum(ours[kind]):.0f}" for kind in kinds]
-        row("ours against", YARDSTICK)
+    if REFERENCE_PEER in records:
+        theirs, own = records[REFERENCE_PEER], next(iter(records.values()))
+        times = [
+            f"{np.sum(theirs.seconds[subset]) / np.sum(ours[subset]):.0f}" for subset in subsets
+        ]
+        row("ours against", REFERENCE_PEER)
         row(
             "  problems a second",
             f"{times[0]} times as many; {times[1]} on reachable, {times[2]} on unreachable ones",

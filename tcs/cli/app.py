@@ -51,7 +51,7 @@ def _top(
 
 @app.command("list")
 def list_known(as_json: options.Json = False) -> None:
-    """List the tasks, environments and robots that ship with tcs."""
+    """List the tasks, environments and robots included in tcs."""
     from tcs.model.catalogue import catalogue
     from tcs.output.terminal import tables
 

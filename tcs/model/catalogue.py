@@ -1,7 +1,7 @@
-"""What ships with `tcs`: names and titles of tasks, environments and robots.
+"""The catalogue: names and titles of the tasks, environments and robots included in `tcs`.
 
-Reads headings only. Checking a file against the models it names takes seconds, and happens when
-it is used.
+It reads headings only: checking a file against the models it names takes seconds, and happens when
+the file is used.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from tcs.files.documents import read_mapping
 from tcs.files.paths import data_folder
 
 _BASED_ON = "based_on"
-"""Key of an environment file that takes over from another one whatever it does not say itself."""
+"""Key of an environment file: the environment that supplies the keys this file lacks."""
 
 
 def catalogue() -> dict[str, list[dict[str, Any]]]:
-    """Return the tasks, environments and robots there are, each sorted by name.
+    """Return the included tasks, environments and robots, each sorted by name.
 
     Raises:
-        DataFileError: If a file that ships with `tcs` is damaged.
+        DataFileError: If an included file is damaged.
     """
     folder = data_folder()
     return {
@@ -54,7 +54,7 @@ def catalogue() -> dict[str, list[dict[str, Any]]]:
 
 
 def _files(folder: Path, pattern: str, *keys: str) -> list[tuple[Path, dict[str, Any]]]:
-    """Return the YAML files that match, and what they hold; each must have the keys."""
+    """Return the matching YAML files with their contents; each must have the keys."""
     found = []
     for path in sorted(folder.glob(pattern), key=lambda path: path.stem):
         try:
@@ -68,7 +68,7 @@ def _files(folder: Path, pattern: str, *keys: str) -> list[tuple[Path, dict[str,
 
 
 def _read(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return what a file holds, with what it takes over from the one it is based on."""
+    """Return the content of a file, merged over that of the file it is based on."""
     content = read_mapping(path, f"'{path}'", DataFileError, known=keys)
     if _BASED_ON not in content:
         return content

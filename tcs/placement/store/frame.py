@@ -1,4 +1,4 @@
-"""Scores as one wide table, for spreadsheets and data analysis."""
+"""Scores as one wide table (a pandas DataFrame and CSV)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
 
     Args:
         file: A score file.
-        everything: Also the configurations that reach no goal.
+        everything: Whether to include configurations that reach no goal.
 
     Returns:
         Columns: the observed axes and the axes of the grid (angles as `..._deg`), `reachability`
@@ -55,10 +55,10 @@ def _frame(
 
 
 def write_csv(path: Path, frame: pd.DataFrame) -> None:
-    """Write a table as CSV, wholly or not at all; nine digits, which keep float32 exactly.
+    """Write a table as CSV, whole or not at all, with nine digits, which keep float32 exactly.
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the file cannot be written.
     """
     with whole_file(path, "Table") as stream:
         frame.to_csv(stream, float_format="%.9g")
