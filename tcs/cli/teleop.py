@@ -64,8 +64,8 @@ def live(
     condition: Annotated[
         Condition,
         typer.Option(
-            help="Control of the tool, and null-space control beside it: end-effector without it, "
-            "novel with it; assisted and drake keep the arm off limits by themselves."
+            help="Control of the tool alone (end-effector), or with manual null-space control "
+            "(novel); assisted and drake avoid joint limits automatically."
         ),
     ] = Condition.NOVEL,
     start_deg: Annotated[
@@ -99,7 +99,7 @@ def live(
         given = [name for name, one in sources.items() if one and one.name == "COMMANDLINE"]
         if given:
             raise typer.BadParameter(
-                f"is for the live page; write the options of '{ctx.invoked_subcommand}' behind it.",
+                f"is for the live page; write the options of '{ctx.invoked_subcommand}' after it.",
                 param_hint="--" + given[0].replace("_", "-"),
             )
         return
@@ -220,8 +220,8 @@ def _report_page(result: dict[str, Any]) -> None:
     )
     if result["meshes"]:
         typer.echo(
-            "The page holds the robot's meshes; mind their licence when you pass it on. Source "
-            f"according to the robot file: {result['source']}"
+            "The page contains the robot's meshes; their licence applies when you share it. "
+            f"Origin and licence, from the robot file: {result['source']}"
         )
 
 
@@ -247,7 +247,7 @@ def experiment(
         bool, typer.Option("--maps", help="Also write the capability map of each controller.")
     ] = False,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; results are the same.")
+        int, typer.Option(min=1, help="Number of processes; does not change the results.")
     ] = 2,
     as_json: options.Json = False,
 ) -> None:

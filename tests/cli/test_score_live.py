@@ -49,7 +49,7 @@ def test_observed_frames_and_their_residual_are_reported(tcs_command, corner, tm
         (("--observed", "head_tilt=3"), 1, "Write head_tilt_deg=VALUE"),
         (("--observed", "persn_x=0.1"), 1, "Did you mean 'person_x'"),
         (("--frames", "head=0,0"), 1, "three finite numbers"),
-        (("--frames", "head=0.451,0,1.5"), 1, "0.268 m from the nearest"),
+        (("--frames", "head=0.451,0,1.5"), 1, "0.268 m from the scene's"),
         (("--at", "bed_height=0.1"), 2, "--at"),
     ],
 )
