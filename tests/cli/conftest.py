@@ -104,5 +104,5 @@ def stand_in(monkeypatch, example):
         calls.append((arguments, options))
         return example()
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     return calls

@@ -33,7 +33,7 @@ def stand_in(monkeypatch):
         names = {"task": {"name": task}, "environment": {"name": environment}}
         return score_file(metadata={**METADATA, "timings": TIMINGS}, **names)
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     return calls
 
 

@@ -12,8 +12,6 @@ import sys
 import joblib
 import pytest
 
-import tcs
-
 
 def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monkeypatch):
     def score(*_arguments, on_compile, on_progress, **_options):
@@ -21,7 +19,7 @@ def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monk
         on_progress(1, 2)
         return example()
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs", "--json")
     # One line, no bar: stderr is no terminal here.
     assert (
@@ -111,7 +109,7 @@ def test_interrupt_that_compiled_code_swallows_still_counts(tcs_command, tmp_pat
         on_progress(1, 2)
         raise AssertionError("must not get here")
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
     assert ran.code == 130
     assert "interrupted" in ran.err

@@ -225,7 +225,7 @@ def test_the_measure_is_handed_on_and_named(tcs_command, example, tmp_path, monk
         file = example()
         return dataclasses.replace(file, metadata={**file.metadata, "measure": measure})
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     path = tmp_path / "o.tcs"
     words = ("score", "shaving", "--measure", "inverse-condition", "--out", path)
     assert "(inverse-condition)" in tcs_command(*words).out
@@ -245,7 +245,7 @@ def test_score_as_text(tcs_command, tmp_path, stand_in):
 
 
 def test_nothing_reached_is_an_answer(tcs_command, example, tmp_path, monkeypatch):
-    monkeypatch.setattr(tcs, "score", lambda *_, **__: example(share=0.0))
+    monkeypatch.setattr("tcs.placement.scoring.files.score", lambda *_, **__: example(share=0.0))
     path = tmp_path / "o.tcs"
     ran = tcs_command("score", "shaving", "--out", path)
     assert ran.code == 0
@@ -263,7 +263,7 @@ def test_mistakes_of_ours_are_not_swallowed(tcs_command, tmp_path, monkeypatch):
     def score(*_arguments, **_options):
         raise ZeroDivisionError("a mistake")
 
-    monkeypatch.setattr(tcs, "score", score)
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
     with pytest.raises(ZeroDivisionError):
         tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
 
