@@ -128,7 +128,7 @@ def test_quick_and_light(process, stored):
     [
         (("--goal", 5), "no goal 5: task 'shaving' has 5, numbered 0 to 4"),
         (("--goal", -1), "no goal -1"),
-        (("--goal", 0, "--configuration", GRID.size), f"numbered 0 to {GRID.size - 1}"),
+        (("--goal", 0, "--configuration", GRID.size), f"indices are 0 to {GRID.size - 1}"),
         (("--goal", 0, "--configuration", -1), "no configuration -1"),
         (("--goal", 0, "--here", 9, 0.3, 0, *AT), "base_x 9 m, beyond the grid"),
         (("--goal", 0, "--here", 0, 0.3, 0), "lacks bed_height, head_rest"),

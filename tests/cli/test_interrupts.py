@@ -30,12 +30,13 @@ def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monk
 
 
 SLOW_SCORE = """
-import time, tcs
+import time
+import tcs.placement.scoring.files as files
 def score(*arguments, on_progress, **options):
     for done in range(200):
         on_progress(done, 200)
         time.sleep(0.05)
-tcs.score = score
+files.score = score
 """
 
 
@@ -90,12 +91,13 @@ def test_interrupt_while_scoring(tmp_path):
 def test_interrupt_in_a_callback_of_compiled_code_is_one_line(process, tmp_path):
     """Python prints such an interrupt and carries on, as llvmlite's callbacks cannot raise."""
     before = """
-import ctypes, signal, tcs
+import ctypes, signal
+import tcs.placement.scoring.files as files
 callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
 def score(*arguments, on_progress, **options):
     callback()
     on_progress(1, 2)
-tcs.score = score
+files.score = score
 """
     ran = process("score", "shaving", "--out", tmp_path / "o.tcs", before=before)
     assert ran.code == 130

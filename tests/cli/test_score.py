@@ -72,7 +72,7 @@ def test_verify_gives_no_figure_for_what_it_did_not_scan(tcs_command, corner_fil
     assert ran.code == 0
     printed = " ".join(ran.out.split())
     assert "recall not estimated: no unreached pair was scanned" in printed
-    assert "isotropy left behind not estimated: no reached pair was scanned" in printed
+    assert "mean shortfall of isotropy not estimated: no reached pair was scanned" in printed
     scanned = tcs_command("verify", corner_file, "--pairs", 5, "--dense", 6)
     assert "not estimated" not in scanned.out
 
