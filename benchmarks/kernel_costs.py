@@ -1,4 +1,4 @@
-"""What the sweep costs: threads, grid size, its parts, and Drake's floor under it."""
+"""Cost of the sweep: threads, grid size, its parts, and Drake's collision checks as a bound."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 import numpy as np
 from peer_drake import WinnersChecker
 from peer_problems import Bench, Pair
-from sample_costs import measure_shares
+from sample_costs import measure_fractions
 from table import row, spread
 
 from tcs.kernel.arrays import FloatArray, IntArray
@@ -20,9 +20,9 @@ from tcs.placement.scoring.sweep import SLICE
 from tcs.placement.tables import Reason
 
 GRID_PARTS = (8, 4, 2, 1)
-"""Every how manieth base x of the grid is scored."""
+"""Strides over the base x of the grid."""
 EVERY = 4
-"""Every how manieth slice of the grid the parts are timed on."""
+"""Stride over the slices of the grid that the parts are timed on."""
 SERIES = ("1", "2", "cpu", "floor", "floor cpu", "overlaps")
 ARM_GAPS = ("gap_environment", "gap_body", "gap_arm")
 
@@ -58,7 +58,7 @@ def sweep_costs(bench: Bench, repeats: int) -> None:
 
 
 def grid_costs(bench: Bench, repeats: int) -> None:
-    """Print what a configuration costs on parts of the grid: the same all along if linear."""
+    """Print the cost of a configuration on parts of the grid, constant if the cost is linear."""
     size = len(bench.scores.reason)
     each: dict[int, list[float]] = {part: [] for part in GRID_PARTS}
     count = dict.fromkeys(GRID_PARTS, size)
@@ -75,12 +75,12 @@ def grid_costs(bench: Bench, repeats: int) -> None:
 
 
 def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
-    """Print how the kernel's time splits up, found by leaving parts of the work out.
+    """Print how the kernel's time divides, found by leaving out parts of the work.
 
     The sweep itself runs on altered data: without goals only the base is checked; with an elbow
-    that spans no distance the reach test turns every goal away; with no shape of the arm to check
+    that spans no distance the reach test excludes every goal; with no shape of the arm to check
     there is no collision. The differences are the parts. Inverse kinematics and the measure share
-    a loop: `sample_costs` tells them apart.
+    a loop: `sample_costs` separates them.
     """
     problem = bench.problem
     no_goals = {"goal_R": problem.goal_R[:, :0].copy(), "goal_p": problem.goal_p[:, :0].copy()}
@@ -100,7 +100,7 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
     row(f"kernel on 1/{EVERY} of the grid, jobs 1", f"{spread(list(whole))}, of which")
     _part("base check", base / whole)
     _part("prefilter: too far", (reach - base) / whole)
-    shares = np.array(measure_shares(problem.arm, pairs, repeats))
+    shares = np.array(measure_fractions(problem.arm, pairs, repeats))
     if shares.size:
         _part("inverse kinematics", (solved - reach) / whole * (1.0 - shares))
         _part("measure", (solved - reach) / whole * shares)

@@ -1,4 +1,4 @@
-"""How much of the samples' time the measure takes, by compiling their loop without it."""
+"""Share of the measure in the time of the sample loop, by compiling the loop without it."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ ROUNDS = 20
 """Passes over all goals in one timing: milliseconds, so that the clock is fine enough."""
 
 
-def measure_shares(arm: ArmSolver, pairs: tuple[Pair, ...], repeats: int) -> list[float]:
-    """Return which share of the samples' time goes into the measure, once for each repeat.
+def measure_fractions(arm: ArmSolver, pairs: tuple[Pair, ...], repeats: int) -> list[float]:
+    """Return the fraction of the sample loop's time that the measure takes, once for each repeat.
 
     Empty if the loop does not store the measure in a way that can be taken out.
     """

@@ -54,7 +54,7 @@ def test_files_added_renamed_and_removed_change_the_digest(copy):
     (copy / "extra.py").rename(copy / "other.py")
     digests.add(kernel_digest(copy))
     (copy / "other.py").unlink()
-    (copy / "samples.py").unlink()
+    (copy / "scores.py").unlink()
     digests.add(kernel_digest(copy))
     assert len(digests) == 4
 
