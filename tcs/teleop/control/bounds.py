@@ -1,4 +1,4 @@
-"""How fast joints may move: up to their limits, within their velocities, without a jolt."""
+"""Bounds of joint rates, from position limits, velocity limits and acceleration."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def rate_bounds(
     Returns:
         Lowest rates (<= 0) and highest rates (>= 0) [rad/s], shapes (7,).
     """
-    room = np.array([joints - arm.lower, arm.upper - joints])
-    np.maximum(room, 0.0, out=room)
-    steps = room / (acceleration * period * period)
-    # Joints without limits; more steps than this take longer than a robot lives.
+    distance = np.array([joints - arm.lower, arm.upper - joints])
+    np.maximum(distance, 0.0, out=distance)
+    steps = distance / (acceleration * period * period)
+    # Continuous joints: a finite number of steps that is never reached.
     np.minimum(steps, 1e12, out=steps)
     whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0))
     part = (steps - 0.5 * whole * (whole + 1.0)) / (whole + 1.0)
@@ -47,7 +47,7 @@ def stops_in_time(
     period: float,
     acceleration: float | FloatArray,
 ) -> bool:
-    """Return whether rates are surely within `rate_bounds`, for a third of the time it takes.
+    """Return whether rates are certainly within `rate_bounds`, at a third of its cost.
 
     Args:
         arm: The arm.
@@ -57,13 +57,13 @@ def stops_in_time(
         acceleration: Greatest change of a rate [rad/s^2], one for all joints or shape (7,).
     """
     size = np.abs(rates)
-    room = np.where(rates > 0.0, arm.upper - joints, joints - arm.lower)
+    distance = np.where(rates > 0.0, arm.upper - joints, joints - arm.lower)
     # Coming to rest takes v^2 / 2a and half a step more, in whole steps at most half of one again.
-    return bool((size * (size * (0.5 / acceleration) + period) <= room).all())
+    return bool((size * (size * (0.5 / acceleration) + period) <= distance).all())
 
 
 def scale_to_bounds(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
-    """Return by how much rates must be scaled down to keep within bounds, and for which joint.
+    """Return the factor that scales rates into bounds, and the joint that requires it.
 
     Scaling all joints alike keeps the direction in which the tool moves.
 
@@ -73,7 +73,7 @@ def scale_to_bounds(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> 
         upper: Highest rates, at least 0, shape (7,).
 
     Returns:
-        A factor in [0, 1], and the joint that asks for it, -1 at factor 1.
+        A factor in [0, 1], and the joint that requires it, -1 at factor 1.
     """
     bound = np.where(rates > 0.0, upper, lower)
     # A joint at its limit that is not meant to move must not stop the others by its rounding.
@@ -86,15 +86,15 @@ def scale_to_bounds(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> 
     return float(factors[i]), i
 
 
-def approach(
+def limit_rate_change(
     before: FloatArray,
     wanted: FloatArray,
     change: float,
 ) -> tuple[FloatArray, bool]:
-    """Return the next rates on the way from those before to those wanted.
+    """Return the next rates between the present and the wanted ones.
 
-    All joints go the same share of the way, so that on the way from one motion in the null space
-    to another, or to rest, the tool is held as well.
+    All joints change by the same fraction of the difference, so a mixture of two motions that
+    hold the tool at one posture holds it as well.
 
     Args:
         before: Rates of the step before [rad/s], shape (7,).

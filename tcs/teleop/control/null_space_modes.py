@@ -22,7 +22,7 @@ from tcs.teleop.control.state import (
 _SLIP = 1e-4
 """A tool that would slip faster than this [m/s] is not held: against feedback at the default gain
 it would stand 0.01 mm off."""
-_RACING = 3.0
+_FAST_RATIO = 3.0
 """Ratio of a joint's rate to the lead joint's at which the group has slowed down by a third."""
 _AT_LIMIT = 1e-5
 """A joint this close to its limit counts as at rest there [rad]."""
@@ -124,10 +124,10 @@ def _next_speed(sign: float, full: FloatArray, state: ControlState) -> float:
     fastest = max(float(np.abs(full).max()), 1e-9)
     wanted = float(sign)
     if state.group_rates is not None:
-        bend = abs(state.speed) * float(np.abs(full - state.group_rates).max())
+        change_needed = abs(state.speed) * float(np.abs(full - state.group_rates).max())
         # The change grows with the square of the speed: with distance, and with the rates.
-        if bend > change:
-            most = abs(state.speed) * math.sqrt(change / bend)
+        if change_needed > change:
+            most = abs(state.speed) * math.sqrt(change / change_needed)
             wanted = min(max(wanted, -most), most)
     # Slowing down may be urgent; speeding up is not.
     step = change / fastest * (2.0 if abs(wanted) < abs(state.speed) else 1.0)
@@ -161,7 +161,7 @@ def _ease(rates: FloatArray, lead: int) -> float:
     Holding the tool leaves the lead joint only part of its range. At the end of that part the
     others would need unbounded rates; the group's speed is led to zero there instead.
     """
-    faster = float(np.abs(rates).max()) / (abs(float(rates[lead])) * _RACING)
+    faster = float(np.abs(rates).max()) / (abs(float(rates[lead])) * _FAST_RATIO)
     # Smooth, to avoid a jerk; 0.99 where all joints turn as fast as the lead joint.
     return float(1.0 / math.sqrt(1.0 + faster**4))
 

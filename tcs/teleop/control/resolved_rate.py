@@ -137,7 +137,7 @@ def clamped_rates(
     length: float,
     damping: float = 0.0,
 ) -> tuple[FloatArray, BoolArray]:
-    """Return joint rates between bounds that come closest to the tool velocity asked for.
+    """Return joint rates between bounds that come closest to the required tool velocity.
 
     A joint that would run into its limit stays at its bound, and the others take over its part
     as far as they can: with six joints left the tool still moves as commanded; with fewer, the

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import JOINTS, Arm
-from tcs.teleop.control.bounds import approach, rate_bounds, stops_in_time
+from tcs.teleop.control.bounds import limit_rate_change, rate_bounds, stops_in_time
 from tcs.teleop.control.joint_groups import holding_rates
 from tcs.teleop.control.modes import rate_command
 from tcs.teleop.control.null_space_modes import elbow_sign
@@ -220,7 +220,7 @@ class Teleoperation:
         period, acceleration = settings.period, settings.acceleration
         change = acceleration * period
         before = self._rates
-        rates, arrived = approach(before, wanted, change)
+        rates, arrived = limit_rate_change(before, wanted, change)
         in_time = stops_in_time(arm, self._joints, rates, period, acceleration)
         if not (in_time and arrived):
             # A joint that has to brake for its limit does so even where the others take longer.

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tcs.teleop import load_arm
-from tcs.teleop.control.bounds import approach, rate_bounds, scale_to_bounds, stops_in_time
+from tcs.teleop.control.bounds import limit_rate_change, rate_bounds, scale_to_bounds, stops_in_time
 
 PERIOD, ACCELERATION = 0.01, 5.0
 CHANGE = PERIOD * ACCELERATION
@@ -23,7 +23,7 @@ def test_a_joint_that_races_for_its_limit_stops_there_in_time(iiwa, start, befor
     rates = np.clip(rates, lower, upper)
     for _ in range(600):
         lower, upper = rate_bounds(iiwa, joints, period, ACCELERATION)
-        after, _ = approach(rates, np.full(7, 3.0), change)
+        after, _ = limit_rate_change(rates, np.full(7, 3.0), change)
         if stops_in_time(iiwa, joints, after, period, ACCELERATION):
             assert ((after >= lower) & (after <= upper)).all()
         after = np.clip(after, lower, upper)
@@ -72,10 +72,10 @@ def test_all_joints_slow_down_alike():
 
 def test_rates_go_straight_from_one_motion_to_the_next():
     before, wanted = np.zeros(7), np.array([1.0, -0.5, 0, 0, 0, 0, 0])
-    after, arrived = approach(before, wanted, 0.05)
+    after, arrived = limit_rate_change(before, wanted, 0.05)
     assert not arrived
     np.testing.assert_allclose(after, 0.05 * wanted)
-    after, arrived = approach(after, 1.04 * after, 0.05)
+    after, arrived = limit_rate_change(after, 1.04 * after, 0.05)
     assert arrived
 
 
