@@ -58,7 +58,7 @@ def experiment_page(
     """
     plan, arm = experiment.plan, experiment.arm
     return Page(
-        title="Following a line that needs the arm reshaped",
+        title="Following a line that needs null-space motion",
         lead=(
             f"{plan.operators} {SCRIPTED}, drive {arm.robot.title} along a straight line on which "
             f"joint {experiment.course.blocking + 1} meets its limit after three quarters of the "
@@ -81,7 +81,7 @@ def experiment_page(
 def findings(experiment: Experiment) -> list[str]:
     """Return the main findings in a sentence each."""
     tests = experiment.tested()
-    said = [
+    sentences = [
         f"These are {SCRIPTED}: what follows tells what the controllers do to one way of driving, "
         "and nothing about what people feel."
     ]
@@ -89,7 +89,7 @@ def findings(experiment: Experiment) -> list[str]:
         test, ratio = tests[name], median_ratio(experiment, name)
         theirs = PAPER[name][1] / PAPER[name][0]
         there, here = (median_of(experiment, one, name) for one in (END_EFFECTOR.name, NOVEL.name))
-        said.append(
+        sentences.append(
             f"{NAMES[name]}: median {there} with end-effector control, {here} with the novel "
             f"controller, {ratio:.2f} of it (paper: {theirs:.2f}); signed rank p "
             f"{p_value(test.p)}, r {test.effect:+.2f}."
@@ -97,12 +97,12 @@ def findings(experiment: Experiment) -> list[str]:
     for name in experiment.drives:
         finished = float(experiment.sample(name, "finished").mean())
         if finished < 1.0:
-            said.append(
+            sentences.append(
                 f"With {title_of(experiment, name)} {100 * finished:.0f} % of the trials came to "
                 f"the end within {experiment.plan.time_limit:g} s; the others count with that "
                 "time, and with the planes that they met."
             )
-    return said
+    return sentences
 
 
 def _compared(experiment: Experiment) -> list[Block]:
@@ -211,8 +211,8 @@ def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
                         "No people, so no questionnaires and no preference.",
                         "The line is found by search; the paper does not give the coordinates of "
                         "its own.",
-                        "A third controller that reshapes the arm by itself.",
-                        "Contacts are not looked at during trials, as in the paper; the way that "
+                        "A third controller that uses the redundancy automatically.",
+                        "Contacts are not checked during trials, as in the paper; the way that "
                         "the search found is free of the robot's own body.",
                     ]
                 )

@@ -25,7 +25,7 @@ NAMES = {
     "arc_length": "spectral arc length [-]",
     "stops": "times the arm stopped",
     "turned": "joint 1 turned through its group [rad]",
-    "finished": "share of trials that came to the end",
+    "finished": "fraction of completed trials",
     "planes_met": "normal planes met, of 30",
 }
 SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
@@ -65,12 +65,12 @@ def group_table(experiment: Experiment) -> Table:
 def signed_rank_table(experiment: Experiment) -> Table:
     """Return the paper's Table III."""
     rows = []
-    asked = {"greater": "EE > NV", "less": "EE < NV", "two-sided": "EE ≠ NV"}
+    tails = {"greater": "EE > NV", "less": "EE < NV", "two-sided": "EE ≠ NV"}
     for name, test in experiment.tested().items():
         rows.append(
             [
                 NAMES[name],
-                asked[test.tail],
+                tails[test.tail],
                 number(test.levene_f),
                 p_value(test.levene_p),
                 number(test.statistic),
@@ -79,7 +79,7 @@ def signed_rank_table(experiment: Experiment) -> Table:
                 f"{test.effect:.3f}",
             ]
         )
-    titles = ("measure", "asked", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
+    titles = ("measure", "alternative", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
     return Table(
         "End-effector control (EE) against the novel controller (NV), as the paper's Table III: "
         f"Levene's test, Wilcoxon's signed ranks; {SCRIPTED}.",
@@ -201,8 +201,8 @@ def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:
     return [
         Text(
             "All that was driven with a controller is one recording, and its map (ITCM) says from "
-            "where an operator with that controller reaches a tool pose. The grasp that all are "
-            f"asked for: tool {maps.height:.2f} m above the floor, pitch "
+            "where an operator with that controller reaches a tool pose. They are compared by one "
+            f"grasp: tool {maps.height:.2f} m above the floor, pitch "
             f"{math.degrees(maps.pitch):.1f} deg, roll {math.degrees(maps.roll):.1f} deg; base "
             "poses are seen from the tool."
         ),

@@ -55,11 +55,11 @@ def group_motion(
     """Return the motion of a joint group in the null space: N_Jp xi of eq. (11).
 
     The paper solves 0 = J_p theta' (eq. 10) for a 7 x 4 basis whose columns turn one joint group
-    each (eq. 12), and does not say how that basis is made. Only the column of the commanded group is
-    computed, as xi has one entry that is not zero. Here the lead joint turns at rate k,
-    and of all motions that hold the tool we take the one in which the joints outside the group
-    move least (least squares; among equals, the smallest rates within the group). With L the lead
-    joint, F the others of its group, O the rest, v the required velocity of the tool,
+    each (eq. 12), and does not say how that basis is made. Only the column of the commanded group
+    is computed, as xi has one entry that is not zero. Here the lead joint turns at rate k, and of
+    all motions that hold the tool we take the one in which the joints outside the group move least
+    (least squares; among equals, the smallest rates within the group). With L the lead joint, F
+    the others of its group, O the rest, v the required velocity of the tool,
 
         w = v - J_L k,  N = 1 - J_F J_F^+,  r_O = (N J_O)^+ N w,  r_F = J_F^+ (w - J_O r_O).
 

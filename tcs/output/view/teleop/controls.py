@@ -1,8 +1,8 @@
-"""What a person asks of the arm: keys, sliders and gamepad become a command; no browser is needed.
+"""Operator input: keys, sliders and gamepad become commands; no browser is needed.
 
-Meshcat tells how often a key was pressed, and not when it was let go of. So a press moves the arm
-for a moment only, and a key that is held goes on by the repeats that the browser makes of it: an
-arm whose operator is gone stops by itself.
+Meshcat counts key presses and does not report releases. A press therefore moves the arm for a
+moment only, and a held key continues by the keyboard's repeats: an arm whose operator is gone stops
+by itself.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.output.view.teleop.gamepad import DOWN as PAD_DOWN
-from tcs.output.view.teleop.gamepad import UP, A, Asked, Gamepad, GamepadState
+from tcs.output.view.teleop.gamepad import UP, A, Gamepad, GamepadCommand, GamepadState
 from tcs.teleop import Command, Mode
 from tcs.teleop.control.settings import NULL_SPACE_MODES
 
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 TAP = 0.15
 """How long a press moves the arm [s]: keyboards repeat a held key every 0.03 to 0.1 s."""
 MOST_LINEAR, MOST_ANGULAR = 0.25, 1.0
-"""Fastest that may be asked for [m/s, rad/s]."""
+"""Greatest commanded velocities [m/s, rad/s]."""
 DEAD_LINEAR, DEAD_ANGULAR = 0.02, 0.05
 """Sliders closer to zero than this count as at zero [m/s, rad/s]."""
 SPEED, TURN_SPEED = "key speed [m/s]", "key turn [rad/s]"
@@ -44,7 +44,7 @@ MOVES: Mapping[str, tuple[int, float, str]] = {
     "turn left": (5, 1.0, "KeyJ"),
     "turn right": (5, -1.0, "KeyL"),
 }
-"""Buttons that move the tool: which of x, y, z and turns about them, which way, and the key."""
+"""Buttons that move the tool: axis of the twist, direction, and key."""
 OTHERS: Mapping[str, str] = {
     TURN_DOWN: "KeyQ",
     TURN_UP: "KeyE",
@@ -78,7 +78,7 @@ def buttons(groups: int) -> dict[str, str]:
     """Return every button with its key.
 
     Args:
-        groups: How many joint groups there are.
+        groups: Number of joint groups.
     """
     of_groups = {group_button(i): f"Digit{i + 1}" for i in range(groups)}
     return {name: key for name, (_, _, key) in MOVES.items()} | of_groups | dict(OTHERS)
@@ -86,21 +86,21 @@ def buttons(groups: int) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How the controls stand."""
+    """State of the controls."""
 
     sliders: Mapping[str, float]
     clicks: Mapping[str, int]
-    """How often each button has been pressed since it is there."""
+    """Presses of each button since it was added."""
     pad: GamepadState | None
     watched: bool
-    """Whether a browser looks at the page."""
+    """Whether a browser is connected to the page."""
 
 
 class Source(Protocol):
-    """Where readings come from."""
+    """Source of readings."""
 
     def read(self) -> Reading:
-        """Return how the controls stand now."""
+        """Return the present state of the controls."""
         ...
 
     def zero(self) -> None:
@@ -110,30 +110,30 @@ class Source(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class OperatorCommand:
-    """What a person wants in one step."""
+    """Input of the operator for one step."""
 
     command: Command
     lost: str = ""
-    """Why the input counts as lost, in which case the command holds the arm; else empty."""
+    """Why the input counts as lost, so that the command holds the arm; else empty."""
     hint: str = ""
-    """What to do instead of what was just tried; may be empty."""
+    """Advice after an input that has no effect; may be empty."""
     back: bool = False
-    """Whether the arm is to be put back to where it began."""
+    """Whether to put the arm back to its start."""
     watched: bool = True
-    """Whether a browser looks at the page."""
+    """Whether a browser is connected to the page."""
 
 
 @dataclass
 class OperatorInput:
-    """A person at the controls, over time."""
+    """Operator input over time."""
 
     source: Source
     modes: tuple[Mode, ...]
     groups: int
     group: int = 0
-    """The joint group that is chosen, counted from 0."""
+    """The selected joint group, counted from 0."""
     clutch: bool = False
-    """Whether the clutch is in by key or button."""
+    """Whether the clutch is engaged by key or button."""
     _mode: int = 0
     _gamepad: Gamepad = field(default_factory=Gamepad)
     _counts: dict[str, int] = field(default_factory=dict)
@@ -142,25 +142,25 @@ class OperatorInput:
 
     @property
     def mode(self) -> Mode:
-        """What commands move."""
+        """The control mode."""
         return self.modes[self._mode]
 
     def listen(self, now: float) -> OperatorCommand:
-        """Return what is asked for.
+        """Return the operator's input.
 
         Args:
             now: Time [s].
         """
         reading = self.source.read()
         pressed = self._pressed(reading, now)
-        asked = self._gamepad.look(reading.pad, now)
-        self._obey(pressed, asked, now)
+        pad = self._gamepad.look(reading.pad, now)
+        self._obey(pressed, pad, now)
         back = BACK in pressed
-        lost = asked.lost
+        lost = pad.lost
         if not reading.watched:
-            # Meshcat goes on telling what the last browser has said.
+            # Meshcat keeps the state of the last browser.
             self._gamepad.forget()
-            lost = "no browser looks at this page: the arm holds still until one does."
+            lost = "no browser is connected to this page: the arm holds still until one is."
         if STOP in pressed:
             self._gamepad.give_up()
         if back or lost or STOP in pressed:
@@ -170,10 +170,10 @@ class OperatorInput:
         if lost or back or STOP in pressed:
             command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
             return OperatorCommand(command, lost, back=back, watched=reading.watched)
-        return OperatorCommand(self._command(reading, asked, now), hint=self._hint_at(now))
+        return OperatorCommand(self._command(reading, pad, now), hint=self._hint_at(now))
 
     def _pressed(self, reading: Reading, now: float) -> dict[str, int]:
-        """Return the buttons pressed since the last look, and how often."""
+        """Return the buttons pressed since the last reading, and how often."""
         found = {}
         for name, count in reading.clicks.items():
             fresh = count - self._counts.get(name, 0)
@@ -183,20 +183,20 @@ class OperatorInput:
                 self._until[name] = now + TAP
         return found
 
-    def _obey(self, pressed: Mapping[str, int], asked: Asked, now: float) -> None:
+    def _obey(self, pressed: Mapping[str, int], pad: GamepadCommand, now: float) -> None:
         """Change mode, group and clutch."""
-        reshaping = self.mode in NULL_SPACE_MODES
+        in_null_space = self.mode in NULL_SPACE_MODES
         for number in range(self.groups):
             if group_button(number) in pressed:
                 self.group = number
-        step = (UP in asked.clicks) - (PAD_DOWN in asked.clicks)
+        step = (UP in pad.clicks) - (PAD_DOWN in pad.clicks)
         self.group = (self.group + step) % self.groups
-        changes = pressed.get(NEXT_MODE, 0) + (A in asked.clicks)
+        changes = pressed.get(NEXT_MODE, 0) + (A in pad.clicks)
         if changes:
             if len(self.modes) == 1:
                 self._hint = (f"this condition has {self.mode} control only.", now + 2.0)
             self._mode = (self._mode + changes) % len(self.modes)
-            # What was asked of the mode before is not meant for this one.
+            # Input for the previous mode is not meant for this one.
             self._until.clear()
             return
         if pressed.get(CLUTCH, 0) % 2:
@@ -204,16 +204,16 @@ class OperatorInput:
         moves = any(name in pressed for name in MOVES)
         turns = TURN_DOWN in pressed or TURN_UP in pressed
         if len(self.modes) > 1:
-            if reshaping and moves:
-                self._hint = ("the tool is held in this mode: M goes on to the next.", now + 2.0)
-            if not reshaping and turns:
-                self._hint = ("groups turn in null-space mode: M goes on to it.", now + 2.0)
+            if in_null_space and moves:
+                self._hint = ("the tool is held in this mode: M selects the next mode.", now + 2.0)
+            if not in_null_space and turns:
+                self._hint = ("groups move in null-space mode: M selects it.", now + 2.0)
 
-    def _command(self, reading: Reading, asked: Asked, now: float) -> Command:
-        clutch = self.clutch or asked.clutch
+    def _command(self, reading: Reading, pad: GamepadCommand, now: float) -> Command:
+        clutch = self.clutch or pad.clutch
         if self.mode in NULL_SPACE_MODES:
             down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
-            sign = int(np.sign(int(up) - int(down) + asked.turn))
+            sign = int(np.sign(int(up) - int(down) + pad.turn))
             group = self.group if self.mode is Mode.NULL_SPACE and sign else None
             return Command(group=group, sign=sign, mode=self.mode, clutch=clutch)
         wanted = np.array([reading.sliders[name] for name in RATE_SLIDERS])
@@ -224,7 +224,7 @@ class OperatorInput:
         for name, (axis, way, _) in MOVES.items():
             if now < self._until.get(name, -1.0):
                 keys[axis] += way
-        wanted += speeds * (keys + np.array([*asked.linear, *asked.angular]))
+        wanted += speeds * (keys + np.array([*pad.linear, *pad.angular]))
         most = np.repeat((MOST_LINEAR, MOST_ANGULAR), 3)
         wanted = np.clip(wanted, -most, most)
         return Command(linear=wanted[:3], angular=wanted[3:], mode=self.mode, clutch=clutch)

@@ -1,4 +1,4 @@
-"""The live page: a person drives an arm, and sees what it does and why it stops."""
+"""The live page: an operator teleoperates an arm and sees its motion and why it stops."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation
 
 FloatArray = NDArray[np.float64]
 SHOW_EVERY = 3
-"""Steps from picture to picture: 33 in a second, at 100 steps."""
-_SAID_FOR = 0.7
-"""How long what is said stays to be read, at least [s]."""
-_LOOK_EVERY = 7
-"""Pictures between two looks at whether the robot touches itself: five in a second."""
+"""Steps per frame: 33 frames a second at 100 steps."""
+_MESSAGE_TIME = 0.7
+"""Least time that a message stays visible [s]."""
+_CHECK_EVERY = 7
+"""Frames between two self-contact checks: five checks a second."""
 
 
 class MeshcatControls:
@@ -81,7 +81,7 @@ def key_name(key: str) -> str:
 
 
 class LivePage:
-    """An arm on show, driven by the controls of its page."""
+    """An arm in Meshcat, teleoperated by the controls of its page."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class LivePage:
         *,
         settings: Settings,
         modes: tuple[Mode, ...],
-        tell: Callable[[str], None],
+        on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
     ) -> None:
         """Lay out the page.
@@ -101,12 +101,12 @@ class LivePage:
             meshcat: An empty one.
             stage: The robot.
             arm: Its arm.
-            start: Where its joints stand at first [rad], shape (7,).
-            settings: How commands become motion.
-            modes: What a person can change between; the first one comes first.
-            tell: Called with a line of text whenever the arm stops anew, or for another reason.
-            on_step: Called after each step with the command and what came of it, once a browser
-                has looked at the page.
+            start: Joint positions at the start [rad], shape (7,).
+            settings: Settings of the controller.
+            modes: Modes that the operator can switch between, the initial one first.
+            on_stop: Called with the reason whenever the arm stops, or its reason changes.
+            on_step: Called after each step with the command and the step, once a browser has
+                connected.
 
         Raises:
             TcsError: If the start posture is not seven finite numbers.
@@ -119,62 +119,62 @@ class LivePage:
         self.dropped = 0
         self._meshcat, self._stage, self._arm = meshcat, stage, arm
         self._start = np.array(start, dtype=np.float64)
-        self._tell, self._on_step = tell, on_step
-        self._said, self._said_until = "", 0.0
+        self._on_stop, self._on_step = on_stop, on_step
+        self._message, self._message_until = "", 0.0
         self._touching = ""
         self._seen = False
         self._shown = 0
         stage.set_up(meshcat, arm.kinematics(self._start).p)
         self._panel = Panel(meshcat, arm)
         self._trail = Trail(meshcat)
-        self._heard = OperatorCommand(Command())
+        self._input = OperatorCommand(Command())
         self.last = self.session.step(Command(clutch=True))
         self.show()
 
     def step(self) -> Step:
-        """Listen to the controls and move the arm on by one period."""
+        """Read the controls and advance the arm by one period."""
         begun = time.perf_counter()
-        heard = self._heard = self.hand.listen(begun)
-        if heard.back:
+        operator_input = self._input = self.hand.listen(begun)
+        if operator_input.back:
             self.session.place(self._start)
             self._trail.clear()
-        listened = time.perf_counter()
-        self.last = self.session.step(heard.command)
+        read = time.perf_counter()
+        self.last = self.session.step(operator_input.command)
         now = time.perf_counter()
-        self.steps.add(now - listened)
+        self.steps.add(now - read)
         self.worked.add(now - begun)
-        if heard.lost:
-            self.last = dataclasses.replace(self.last, stopped=True, reason=heard.lost)
+        if operator_input.lost:
+            self.last = dataclasses.replace(self.last, stopped=True, reason=operator_input.lost)
         reason = self.last.reason
         if reason:
-            # What can still be read on the page is not told again.
-            if reason != self._said or now >= self._said_until:
-                self._tell(reason)
-            self._said, self._said_until = reason, now + _SAID_FOR
-        self._seen = self._seen or heard.watched
+            # A message that is still visible is not repeated.
+            if reason != self._message or now >= self._message_until:
+                self._on_stop(reason)
+            self._message, self._message_until = reason, now + _MESSAGE_TIME
+        self._seen = self._seen or operator_input.watched
         if self._seen and self._on_step is not None:
-            self._on_step(heard.command, self.last)
+            self._on_step(operator_input.command, self.last)
         return self.last
 
     def show(self) -> None:
-        """Send what has changed to the browser."""
+        """Send the changes to the browser."""
         begun = time.perf_counter()
         last, meshcat = self.last, self._meshcat
         for path, pose in self._stage.poses(last.joints).items():
             meshcat.SetTransform(path, pose)
-        if self._shown % _LOOK_EVERY == 0:
+        if self._shown % _CHECK_EVERY == 0:
             touching = self._stage.contacts()
             self._touching = "" if touching is None else f"{touching[0]} touches {touching[1]}"
         self._shown += 1
         meshcat.SetTransform(TOOL, pose_of(last.R, last.p))
         meshcat.SetTransform(TARGET, pose_of(last.target_R, last.target_p))
         self._trail.add(last.p)
-        mode, said = self.mode_line(), self.said(time.perf_counter())
-        self._panel.show(readout(self._arm, last.joints, last.limits, last.singular, mode, said))
+        mode, message = self.mode_line(), self.message(time.perf_counter())
+        self._panel.show(readout(self._arm, last.joints, last.limits, last.singular, mode, message))
         self.pictures.add(time.perf_counter() - begun)
 
     def run(self, duration: float | None = None) -> None:
-        """Drive the arm for so long [s], or until interrupted."""
+        """Run the control loop for a time [s], or until interrupted."""
         pace = StepClock(self.session.settings.period)
         end = None if duration is None else time.monotonic() + duration
         since = 0
@@ -197,22 +197,22 @@ class LivePage:
         )
 
     def mode_line(self) -> str:
-        """Return what commands move, in one line."""
+        """Return the control mode in one line."""
         number = self.hand.group
         chosen = self.last.mode is Mode.NULL_SPACE
         group = self.session.settings.groups[number] if chosen else None
-        clutch = self._heard.command.clutch and not self._heard.lost
+        clutch = self._input.command.clutch and not self._input.lost
         return mode_line(self.last.mode, group, number, clutch)
 
-    def said(self, now: float) -> str:
-        """Return what the person is told: why the arm stops, or what else there is to know.
+    def message(self, now: float) -> str:
+        """Return the message for the operator: why the arm stops, joint limits, contacts.
 
         Args:
             now: Time [s].
         """
-        if now < self._said_until:
-            return self._said
+        if now < self._message_until:
+            return self._message
         facts = [state_facts(self.last.limits, self.last.singular)]
         if self._touching:
-            facts.append(f"{self._touching} (nothing prevents that)")
-        return self._heard.hint or "; ".join(one for one in facts if one)
+            facts.append(f"{self._touching} (contacts are not prevented)")
+        return self._input.hint or "; ".join(one for one in facts if one)

@@ -1,7 +1,7 @@
-"""The panel over the picture: seven joint bars and what the person is told, from any camera.
+"""The panel: seven joint bars and messages for the operator, fixed to the camera.
 
-Its things hang on Meshcat's camera, so they stay where they are in the picture, offline and in a
-page without a server as well. Lengths on the panel are shares of half the picture's height.
+Its objects are children of Meshcat's camera, so they keep their place in the image, also in an
+exported page. Lengths on the panel are fractions of half the image's height.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ FREE, LIMIT, SINGULAR = "free", "limit", "singular"
 COLOURS: Mapping[str, str] = {FREE: "#2ca02c", LIMIT: "#ff2020", SINGULAR: "#ff00ff"}
 """Of a bar, as the paper has them: green, red at a limit, magenta at a singularity."""
 _TRACKS: Mapping[str, str] = {FREE: "#c8ccd4", LIMIT: "#ff9a9a", SINGULAR: "#ffa6ff"}
-"""Of what a joint has left to go: a joint at its lower limit has a bar of no length."""
-LINES = ("mode", "said")
-_INK = {"mode": "#ffffff", "said": "#ffd24d"}
+"""Of the rest of a joint's range: at its lower limit the bar has no length."""
+LINES = ("mode", "message")
+_INK = {"mode": "#ffffff", "message": "#ffd24d"}
 _DISTANCE = 0.05
 """From the camera [m]: behind its nearest plane (0.01 m), before anything that one looks at."""
 _HALF_HEIGHT = math.tan(math.radians(37.5))
@@ -42,32 +42,32 @@ _BAR = (0.185, 0.04)
 _PITCH = _WIDTH / 7.0
 _BARS_AT, _NAMES_AT, _ENDS_AT = -0.815, -0.765, -0.895
 _MARK = 0.012
-"""Width of the mark where the joint stands: seen where the bar has no length."""
-_LINE_AT = {"mode": -0.55, "said": -0.625}
+"""Width of the mark at the joint's position: visible where the bar has no length."""
+_LINE_AT = {"mode": -0.55, "message": -0.625}
 _FONT, _SMALL = 0.044, 0.034
 _MOST_LETTERS = int((_WIDTH - 0.06) / (_FONT * ADVANCE))
 _KEPT = 40
-"""Lines of text that stay in Meshcat, hidden: what is said comes in turns."""
+"""Lines of text kept in Meshcat, hidden: messages recur."""
 
 
 @dataclass(frozen=True, slots=True)
 class Readout:
-    """What the panel shows."""
+    """Content of the panel."""
 
     shares: tuple[float, ...]
-    """Where each joint stands between its limits, 0 to 1."""
+    """Position of each joint in its range, 0 to 1."""
     states: tuple[str, ...]
     """`FREE`, `LIMIT` or `SINGULAR` of each joint."""
     mode: str
-    """What commands move, in one line."""
-    said: str
-    """Why the arm stops, or what else there is to know; may be empty."""
+    """The control mode in one line."""
+    message: str
+    """Message for the operator; may be empty."""
 
 
 def readout(
-    arm: Arm, joints: FloatArray, limits: ShortArray, singular: bool, mode: str, said: str
+    arm: Arm, joints: FloatArray, limits: ShortArray, singular: bool, mode: str, message: str
 ) -> Readout:
-    """Return what the panel shows of a posture.
+    """Return the panel's content for a posture.
 
     A singularity belongs to the posture, not to a joint: every bar that is not red turns magenta.
 
@@ -76,15 +76,15 @@ def readout(
         joints: Joint positions [rad], shape (7,).
         limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
         singular: Whether the posture is singular.
-        mode: What commands move.
-        said: What the person is told.
+        mode: The control mode in one line.
+        message: Message for the operator.
     """
-    # A joint without limits stands where it has turned to, from half a turn back to half a turn on.
+    # A continuous joint is shown from -pi to pi.
     turned = (np.asarray(joints) + math.pi) % (2.0 * math.pi) / (2.0 * math.pi)
     shares = np.where(arm.bounded, range_fraction(arm, np.asarray(joints)), turned)
     other = SINGULAR if singular else FREE
     states = tuple(LIMIT if flag else other for flag in limits)
-    return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, said)
+    return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, message)
 
 
 def state_facts(limits: ShortArray, singular: bool) -> str:
@@ -103,13 +103,13 @@ def state_facts(limits: ShortArray, singular: bool) -> str:
 
 
 def mode_line(mode: str, group: tuple[int, ...] | None, number: int, clutch: bool) -> str:
-    """Return what commands move, in one line.
+    """Return the control mode in one line.
 
     Args:
         mode: Name of the mode.
         group: Joints of the group that is chosen, counted from 0; None where there is none.
         number: Number of that group, counted from 0.
-        clutch: Whether the clutch parts arm and person.
+        clutch: Whether the clutch decouples master and slave.
 
     >>> mode_line("null-space", (0, 1, 2), 0, False)
     'null-space mode, group 1 (joints 1 2 3)'
@@ -118,7 +118,7 @@ def mode_line(mode: str, group: tuple[int, ...] | None, number: int, clutch: boo
     if group is not None:
         joints = " ".join(str(joint + 1) for joint in group)
         line += f", group {number + 1} (joints {joints})"
-    return f"{line}; clutch in" if clutch else line
+    return f"{line}; clutch engaged" if clutch else line
 
 
 class Panel:
@@ -144,7 +144,7 @@ class Panel:
             self._draw_bar(arm, i)
 
     def show(self, now: Readout) -> None:
-        """Show a readout; only what has changed is sent."""
+        """Show a readout; only changes are sent."""
         before = self._shown
         for i, (share, state) in enumerate(zip(now.shares, now.states, strict=True)):
             if before is None or before.states[i] != state:
@@ -153,7 +153,7 @@ class Panel:
             if before is None or before.shares[i] != share:
                 for path, name, value in bar_properties(i, share, bool(self._bounded[i])):
                     self._meshcat.SetProperty(path, name, value)
-        for line, text in (("mode", now.mode), ("said", now.said)):
+        for line, text in (("mode", now.mode), ("message", now.message)):
             if before is None or getattr(before, line) != text:
                 self._say(line, text)
         self._shown = now
@@ -172,7 +172,7 @@ class Panel:
             self._written += 1
             path = f"{PANEL}/{line}/{self._written}"
             rows = textwrap.wrap(text, _MOST_LETTERS)
-            # Whatever is longer than two rows is written smaller.
+            # Text longer than two rows is written smaller.
             font = _FONT
             if len(rows) > 2:
                 rows = textwrap.wrap(text, math.ceil(len(text) / 2) + 8)[:2]
@@ -239,7 +239,7 @@ class Panel:
         self._draw(path, font * corners + np.array(at)[:, None], faces, colour)
 
     def _draw(self, path: str, corners: FloatArray, faces: NDArray[np.int32], colour: str) -> None:
-        """Draw triangles that shine by themselves: no lamp of the scene changes their colour."""
+        """Draw emissive triangles: no light of the scene changes their colour."""
         self._meshcat.SetTriangleMesh(
             path, np.asfortranarray(corners), np.asfortranarray(faces), Rgba(0.0, 0.0, 0.0)
         )

@@ -37,7 +37,7 @@ _FRAME_PERIOD = 0.03
 
 @dataclass(frozen=True, eq=False)
 class RunView:
-    """What there is to see of a run."""
+    """A run with the arm that it belongs to."""
 
     arm: Arm
     run: Run
@@ -144,24 +144,24 @@ def load_run_view(path: Path, robot: str | None = None) -> RunView:
 
 
 class Replay:
-    """A film in a Meshcat, with a slider for its time."""
+    """Playback of a run in a Meshcat, with a slider for its time."""
 
-    def __init__(self, meshcat: Meshcat, stage: RobotDisplay, film: RunView) -> None:
+    def __init__(self, meshcat: Meshcat, stage: RobotDisplay, view: RunView) -> None:
         """Show the first sample, and play on from there.
 
         Args:
             meshcat: An empty one.
             stage: The robot.
-            film: The run.
+            view: The run.
         """
-        self._meshcat, self._stage, self.film = meshcat, stage, film
-        stage.set_up(meshcat, film.run.position[0], target=False)
-        film.draw(meshcat)
-        self._panel = Panel(meshcat, film.arm)
+        self._meshcat, self._stage, self.view = meshcat, stage, view
+        stage.set_up(meshcat, view.run.position[0], target=False)
+        view.draw(meshcat)
+        self._panel = Panel(meshcat, view.arm)
         meshcat.AddButton(PLAY, "Space")
         meshcat.AddButton(AGAIN, "KeyX")
         # A hundredth of a second is one sample at the paper's rate.
-        meshcat.AddSlider(PLACE, 0.0, max(film.length, 0.01), 0.01, 0.0)
+        meshcat.AddSlider(PLACE, 0.0, max(view.length, 0.01), 0.01, 0.0)
         meshcat.AddSlider(SPEED, 0.1, 4.0, 0.1, 1.0)
         self._clicks = {PLAY: 0, AGAIN: 0}
         self._slider = 0.0
@@ -169,34 +169,34 @@ class Replay:
         self.show()
 
     def advance(self, seconds: float) -> None:
-        """Do what was asked for, and play on for so long [s] by the clock."""
-        asked = self._meshcat.GetSliderValue(PLACE)
+        """Do what was requested for, and play on for so long [s] by the clock."""
+        requested = self._meshcat.GetSliderValue(PLACE)
         # Where it was put is rounded to the slider's step.
-        if abs(asked - self._slider) > 1e-9:
-            self.place, self.playing = asked, False
+        if abs(requested - self._slider) > 1e-9:
+            self.place, self.playing = requested, False
         for name, before in self._clicks.items():
             self._clicks[name] = self._meshcat.GetButtonClicks(name)
             pressed = self._clicks[name] - before
             if name == AGAIN and pressed:
                 self.place, self.playing = 0.0, True
             elif name == PLAY and pressed % 2:
-                ended = self.place >= self.film.length
+                ended = self.place >= self.view.length
                 self.place = 0.0 if ended else self.place
                 self.playing = ended or not self.playing
         if self.playing:
             self.place += seconds * self._meshcat.GetSliderValue(SPEED)
-            if self.place >= self.film.length:
-                self.place, self.playing = self.film.length, False
+            if self.place >= self.view.length:
+                self.place, self.playing = self.view.length, False
         self._slider = self._meshcat.SetSliderValue(PLACE, self.place)
         self.show()
 
     def show(self) -> None:
         """Show the sample of this time."""
-        i = self.film.sample(self.place)
-        for path, pose in self._stage.poses(self.film.run.joints[i]).items():
+        i = self.view.sample(self.place)
+        for path, pose in self._stage.poses(self.view.run.joints[i]).items():
             self._meshcat.SetTransform(path, pose)
-        self._meshcat.SetTransform(TOOL, self.film.tool(i))
-        self._panel.show(self.film.readout(i))
+        self._meshcat.SetTransform(TOOL, self.view.tool(i))
+        self._panel.show(self.view.readout(i))
 
     def run(self, duration: float | None = None) -> None:
         """Play for so long [s], or until interrupted."""

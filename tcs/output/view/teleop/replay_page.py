@@ -75,26 +75,26 @@ def export_run(path: Path, page: Path, robot: str | None = None, *, meshes: bool
 
 
 def replay_page(
-    meshcat: Meshcat, stage: RobotDisplay, film: RunView, *, title: str, notes: Sequence[str] = ()
+    meshcat: Meshcat, stage: RobotDisplay, view: RunView, *, title: str, notes: Sequence[str] = ()
 ) -> str:
     """Return one page that plays the run without a server.
 
     Args:
         meshcat: An empty one.
         stage: The robot.
-        film: The run.
+        view: The run.
         title: First line, for a person.
         notes: Further lines.
     """
-    rate = min(_FRAME_RATE, _MOST_FRAMES / max(film.length, 1e-9))
-    count = math.ceil(film.length * rate) + 1
-    samples = [film.sample(number / rate) for number in range(count)]
-    stage.set_up(meshcat, film.run.position[0], target=False, compact=True)
-    film.draw(meshcat)
-    panel = Panel(meshcat, film.arm)
-    readouts = [film.readout(i) for i in samples]
+    rate = min(_FRAME_RATE, _MOST_FRAMES / max(view.length, 1e-9))
+    count = math.ceil(view.length * rate) + 1
+    samples = [view.sample(number / rate) for number in range(count)]
+    stage.set_up(meshcat, view.run.position[0], target=False, compact=True)
+    view.draw(meshcat)
+    panel = Panel(meshcat, view.arm)
+    readouts = [view.readout(i) for i in samples]
     panel.show(readouts[0])
-    shots = [{**stage.poses(film.run.joints[i]), TOOL: film.tool(i)} for i in samples]
+    shots = [{**stage.poses(view.run.joints[i]), TOOL: view.tool(i)} for i in samples]
     for path, pose in shots[0].items():
         meshcat.SetTransform(path, pose)
     animation = MeshcatAnimation(rate)
@@ -102,7 +102,7 @@ def replay_page(
         poses = [shot[path].GetAsMatrix34() for shot in shots]
         for at in _keys([pose.tobytes() for pose in poses]):
             animation.SetTransform(at, path, shots[at][path])
-    _play_bars(animation, film.arm, readouts)
+    _play_bars(animation, view.arm, readouts)
     _play_lines(animation, panel, readouts)
     meshcat.SetAnimation(animation)
     text = overlay(title, notes)
@@ -124,11 +124,11 @@ def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -
 def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readout]) -> None:
     """Let the lines of text change."""
     for line in LINES:
-        said = [getattr(one, line) for one in readouts]
-        for text in dict.fromkeys(said):
+        texts = [getattr(one, line) for one in readouts]
+        for text in dict.fromkeys(texts):
             path = panel.text(line, text)
             if path:
-                _play_visible(animation, path, [one == text for one in said])
+                _play_visible(animation, path, [one == text for one in texts])
 
 
 def _play_visible(animation: MeshcatAnimation, path: str, shown: list[bool]) -> None:

@@ -1,4 +1,4 @@
-"""The driven arm in the picture: its robot, its tool and where that is to be, the way it went."""
+"""The teleoperated arm in Meshcat: robot, tool, target and path of the tool."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _BESIDE = 0.02
 
 
 class RobotDisplay:
-    """One robot whose arm is driven."""
+    """A robot whose arm is teleoperated."""
 
     def __init__(self, arm: Arm, *, meshes: bool) -> None:
         """Build the robot.

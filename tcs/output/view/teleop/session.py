@@ -104,7 +104,7 @@ class LiveSession:
             start_posture(self.arm, display) if start is None else start,
             settings=Settings(limits=options.behaviour),
             modes=CONDITION_MODES[options.condition],
-            tell=on_stop,
+            on_stop=on_stop,
             on_step=self._recorder.add if record or self.course is not None else None,
         )
         if self.course is not None:

@@ -1,4 +1,4 @@
-"""Where the arm stands when a person begins to drive it."""
+"""Start posture of the live page, far from limits and singularities."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _AREA = ((0.4, 0.75), (-0.3, 0.3), (-0.4, 0.4))
 
 
 def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
-    """Return a posture from which there is room to move, the same each time [rad], shape (7,).
+    """Return a start posture far from limits and singularities [rad], shape (7,).
 
-    Of postures within the limits whose tool points ahead, one with much room: the smallest
-    singular value of the tool's Jacobian times how far the joint closest to a limit
-    is from it. Postures in which the robot touches itself are passed over.
+    The result is deterministic. Of postures within the limits whose tool points forward, it has a
+    large product of the smallest singular value of the tool's Jacobian and the distance of the
+    closest joint from its limit, as a fraction of its range. Postures in self-contact are skipped.
 
     Args:
         arm: The arm.
@@ -32,15 +32,17 @@ def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
     """
     rng = np.random.default_rng(0)
     area = _area(arm)
-    drawn = [(_room(arm, joints, *area), joints) for joints in arm.random_joints(rng, _CANDIDATES)]
+    drawn = [
+        (_margin(arm, joints, *area), joints) for joints in arm.random_joints(rng, _CANDIDATES)
+    ]
     drawn.sort(key=lambda one: -one[0])
     for found, at in drawn[:_TRIED]:
         best, joints = found, at
         for spread in np.geomspace(0.3, 0.01, _CLIMB):
             near = joints + rng.normal(0.0, spread, len(joints))
-            room = _room(arm, near, *area)
-            if room > best:
-                best, joints = room, near
+            margin = _margin(arm, near, *area)
+            if margin > best:
+                best, joints = margin, near
         stage.poses(joints)
         if best > 0.0 and stage.contacts() is None:
             return np.array(joints)
@@ -57,11 +59,11 @@ def _area(arm: Arm) -> tuple[FloatArray, FloatArray]:
     return shoulder + low, shoulder + high
 
 
-def _room(arm: Arm, joints: FloatArray, low: FloatArray, high: FloatArray) -> float:
-    """Return how much room a posture has to move; 0 where the tool is not as it should be."""
+def _margin(arm: Arm, joints: FloatArray, low: FloatArray, high: FloatArray) -> float:
+    """Return the margin of a posture to limits and singularities; 0 where the tool is misplaced."""
     at = arm.kinematics(joints)
     if at.R[0, 0] < _AHEAD or (at.p < low).any() or (at.p > high).any():
         return 0.0
     shares = range_fraction(arm, joints)
-    room = float(np.minimum(shares, 1.0 - shares)[arm.bounded].min(initial=0.5))
-    return max(room, 0.0) * smallest_singular_value(at.jacobian, Settings().length)
+    margin = float(np.minimum(shares, 1.0 - shares)[arm.bounded].min(initial=0.5))
+    return max(margin, 0.0) * smallest_singular_value(at.jacobian, Settings().length)

@@ -1,4 +1,4 @@
-"""Steps of equal length by the clock on the wall."""
+"""Steps of equal length in real time, and durations."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 MOST_AT_ONCE = 5
-"""Steps that a late loop makes up for at once. What is later than that is dropped: the arm then
-stands still for as long, and never takes a larger step than any other."""
+"""Steps that a late loop catches up at once. Later ones are dropped: the arm then stands still for
+as long, and never takes a larger step."""
 _KEPT = 100_000
-"""Times that are kept of each kind: the last quarter of an hour at 100 Hz."""
+"""Durations that are kept: the last quarter of an hour at 100 Hz."""
 
 
 class StepClock:
-    """Says when steps are due; it does not drift, as every one has its own time."""
+    """Clock of steps; without drift, as each step has its own due time."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class StepClock:
 
         Args:
             period: From one step to the next [s].
-            clock: Where the time comes from [s].
+            clock: Source of the time [s].
             sleep: Waits for so long [s].
         """
         self._period, self._clock, self._sleep = period, clock, sleep
@@ -51,24 +51,24 @@ class StepClock:
 
 @dataclass
 class Durations:
-    """How long something took, each time."""
+    """Durations of a repeated action."""
 
     taken: array[float] = field(default_factory=lambda: array("d"))
     """[s]."""
 
     def add(self, seconds: float) -> None:
-        """Note one more; of very many, the oldest are forgotten."""
+        """Add a duration; beyond the capacity the oldest are dropped."""
         self.taken.append(seconds)
         if len(self.taken) > 2 * _KEPT:
             del self.taken[:_KEPT]
 
     @property
     def count(self) -> int:
-        """How many of them are kept."""
+        """Number of durations kept."""
         return len(self.taken)
 
     def summary(self) -> str:
-        """Return median and 99th percentile as words."""
+        """Return median and 99th percentile in words."""
         if not self.taken:
             return "none"
         middle, late = np.percentile(np.array(self.taken), (50.0, 99.0)) * 1e3

@@ -94,7 +94,7 @@ def told():
 def page(meshcat, iiwa_stage, iiwa, ready, told, desk):
     """A live page whose controls are the desk's."""
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=told.append
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=told.append
     )
     found.hand.source = desk
     return found

@@ -34,7 +34,7 @@ def page(iiwa, iiwa_stage, ready, browser, told):
     """A live page, seen in the browser."""
     meshcat = open_meshcat()
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=told.append
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=told.append
     )
     browser.open(meshcat.web_url(), "tool")
     until(found, lambda: meshcat.GetNumActiveConnections() == 1)

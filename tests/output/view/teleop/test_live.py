@@ -68,7 +68,7 @@ def test_a_lost_browser_is_told_once_and_recorded_as_a_stop(page, desk, told):
     drive(page, 200)
     assert page.last.stopped
     assert not page.last.rates.any()
-    assert told == ["no browser looks at this page: the arm holds still until one does."]
+    assert told == ["no browser is connected to this page: the arm holds still until one is."]
 
 
 def test_what_is_said_stays_to_be_read(page, desk):
@@ -78,9 +78,9 @@ def test_what_is_said_stays_to_be_read(page, desk):
     desk.watched = True
     drive(page, 1)
     assert page.last.reason == ""
-    begun = page._said_until
-    assert page.said(begun - 0.01) == said
-    assert page.said(begun + 0.01) == ""
+    begun = page._message_until
+    assert page.message(begun - 0.01) == said
+    assert page.message(begun + 0.01) == ""
 
 
 def test_a_limit_turns_its_bar_red_and_names_the_joint(page, desk, iiwa):
@@ -91,7 +91,7 @@ def test_a_limit_turns_its_bar_red_and_names_the_joint(page, desk, iiwa):
     assert len(at)
     now = readout(iiwa, page.last.joints, page.last.limits, page.last.singular, "", "")
     assert all(now.states[i] == LIMIT for i in at)
-    assert f"joint {at[0] + 1}" in page.said(page._said_until + 1.0)
+    assert f"joint {at[0] + 1}" in page.message(page._message_until + 1.0)
 
 
 def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
@@ -100,13 +100,13 @@ def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
     assert page.last.singular
     now = readout(iiwa, page.last.joints, page.last.limits, True, "", "")
     assert SINGULAR in now.states
-    assert "singular" in page.said(page._said_until + 1.0)
+    assert "singular" in page.message(page._message_until + 1.0)
 
 
 def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, desk):
     recorder = Recorder(iiwa)
     page = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, tell=lambda _: None,
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=lambda _: None,
         on_step=recorder.add,
     )  # fmt: skip
     page.hand.source = desk
@@ -153,7 +153,7 @@ def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
     assert stage.contacts() is None
     np.testing.assert_array_equal(start, start_posture(arm, stage))
     page = LivePage(
-        meshcat, stage, arm, start, settings=Settings(), modes=MODES, tell=lambda _: None
+        meshcat, stage, arm, start, settings=Settings(), modes=MODES, on_stop=lambda _: None
     )
     before = page.last.p.copy()
     assert before[0] > arm.frames[0, 0, 3]
@@ -189,7 +189,7 @@ def test_a_posture_that_touches_itself_is_told(page, iiwa_stage, iiwa, ready):
     drive(page, 1)
     for _ in range(8):
         page.show()
-    assert "touches" in page.said(page._said_until + 1.0)
+    assert "touches" in page.message(page._message_until + 1.0)
 
 
 def test_a_port_that_is_taken_is_told(shared_meshcat):
@@ -215,7 +215,7 @@ def test_a_reason_that_comes_and_goes_is_told_once(page, desk, told):
         desk.watched = bool(i % 2)
         drive(page, 1)
     assert len(told) == 1
-    page._said_until = 0.0
+    page._message_until = 0.0
     desk.watched = False
     drive(page, 1)
     assert len(told) == 2
@@ -225,7 +225,7 @@ def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
     assert page.mode_line() == "end-effector mode"
     desk.press("clutch")
     drive(page, 1)
-    assert page.mode_line() == "end-effector mode; clutch in"
+    assert page.mode_line() == "end-effector mode; clutch engaged"
     desk.press("clutch")
     desk.watched = False
     drive(page, 1)
@@ -248,16 +248,16 @@ def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
 def test_a_key_moves_the_arm_for_a_moment_of_the_clock(page, desk):
     desk.press("ahead")
     drive(page, 5)
-    assert np.any(page._heard.command.linear)
+    assert np.any(page._input.command.linear)
     time.sleep(TAP)
     drive(page, 1)
-    assert not np.any(page._heard.command.linear)
+    assert not np.any(page._input.command.linear)
 
 
 def test_hints_are_said(page, desk):
     desk.press(TURN_UP)
     drive(page, 1)
-    assert "null-space mode" in page.said(time.perf_counter())
+    assert "null-space mode" in page.message(time.perf_counter())
 
 
 def test_postures_that_touch_are_passed_over(iiwa, iiwa_stage):

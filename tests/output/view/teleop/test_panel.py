@@ -52,8 +52,8 @@ def spy():
     return Spy()
 
 
-def shown(arm, joints, limits=NO_LIMITS, singular=False, said=""):
-    return readout(arm, np.asarray(joints), limits, singular, "end-effector mode", said)
+def shown(arm, joints, limits=NO_LIMITS, singular=False, message=""):
+    return readout(arm, np.asarray(joints), limits, singular, "end-effector mode", message)
 
 
 def test_bars_stand_between_the_limits(iiwa):
@@ -98,13 +98,13 @@ def test_one_colour_of_each_bar_is_seen(spy, iiwa, ready):
 
 def test_only_what_changes_is_sent(spy, iiwa, ready):
     panel = Panel(spy, iiwa)
-    panel.show(shown(iiwa, ready, said="one"))
+    panel.show(shown(iiwa, ready, message="one"))
     spy.sent = 0
-    panel.show(shown(iiwa, ready, said="one"))
+    panel.show(shown(iiwa, ready, message="one"))
     assert spy.sent == 0
     moved = ready.copy()
     moved[2] += 0.1
-    panel.show(shown(iiwa, moved, said="one"))
+    panel.show(shown(iiwa, moved, message="one"))
     expected = bar_properties(2, shown(iiwa, moved).shares[2], True)
     assert spy.sent == len(expected)
     for path, name, value in expected:
@@ -115,15 +115,15 @@ def test_one_line_is_seen_at_a_time_and_old_ones_are_forgotten(spy, iiwa, ready)
     panel = Panel(spy, iiwa)
     texts = [f"reason {i}" for i in range(60)]
     for text in ("", *texts, "", texts[0], texts[-1]):
-        panel.show(shown(iiwa, ready, said=text))
+        panel.show(shown(iiwa, ready, message=text))
         lines = {
             path
             for path, name in spy.properties
-            if name == "visible" and path.startswith(f"{PANEL}/said/")
+            if name == "visible" and path.startswith(f"{PANEL}/message/")
         }
         assert len(spy.visible(*lines - set(spy.deleted))) == (1 if text else 0)
     assert len(spy.deleted) >= 20
-    drawn = [path for path in spy.drawn if path.startswith(f"{PANEL}/said/")]
+    drawn = [path for path in spy.drawn if path.startswith(f"{PANEL}/message/")]
     # The first one had been forgotten and was written again; the last one was still there.
     assert len(drawn) == 61
 
@@ -139,7 +139,7 @@ def test_long_texts_stay_on_the_panel(iiwa, meshcat):
     spy = Wide()
     panel = Panel(spy, iiwa)
     edge = spy.farthest
-    panel.text("said", "the arm stands still and says why, at length; " * 8)
+    panel.text("message", "the arm stands still and says why, at length; " * 8)
     assert spy.farthest <= edge
 
 
@@ -151,7 +151,7 @@ def test_everything_hangs_on_the_camera(iiwa, meshcat):
 
 def test_words():
     assert state_facts(NO_LIMITS, False) == ""
-    assert mode_line("pose", None, 0, True) == "pose mode; clutch in"
+    assert mode_line("pose", None, 0, True) == "pose mode; clutch engaged"
 
 
 def test_limits_stand_below_the_bars(spy, monkeypatch):

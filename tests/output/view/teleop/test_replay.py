@@ -48,13 +48,13 @@ def test_the_panel_tells_modes_limits_and_singularities(film):
     at = int(np.flatnonzero(run.limits.any(axis=1))[0])
     joint = int(np.flatnonzero(run.limits[at])[0])
     assert film.readout(at).states[joint] == LIMIT
-    assert f"joint {joint + 1}" in film.readout(at).said
+    assert f"joint {joint + 1}" in film.readout(at).message
     stretched = int(np.flatnonzero(run.singular)[-1])
     assert SINGULAR in film.readout(stretched).states
     held = dataclasses.replace(run, clutch=np.ones(len(run), bool))
-    assert RunView(film.arm, held).readout(0).mode == "end-effector mode; clutch in"
+    assert RunView(film.arm, held).readout(0).mode == "end-effector mode; clutch engaged"
     stopped = dataclasses.replace(run, stopped=np.ones(len(run), bool))
-    assert RunView(film.arm, stopped).readout(0).said == "stopped"
+    assert RunView(film.arm, stopped).readout(0).message == "stopped"
 
 
 def test_it_plays_by_the_clock_and_ends(replay, film):
