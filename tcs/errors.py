@@ -31,16 +31,16 @@ class TcsError(Exception):
 class UnknownNameError(TcsError):
     """A name that is not known where it was used."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
+    def __init__(self, what: str, name: str, known: Iterable[str], *, where: str = "") -> None:
         """Compose a message with the unknown name, the known ones and the nearest of them.
 
         Args:
-            kind: Type of the name, e.g. "task".
+            what: Type of the name, e.g. "task".
             name: The unknown name.
             known: The names that would have been accepted.
             where: Location of the name, e.g. "goal 3 of task 'shaving'".
         """
-        self.kind = kind
+        self.what = what
         self.name = name
         self.known = tuple(sorted(known))
         self.where = where
@@ -48,7 +48,7 @@ class UnknownNameError(TcsError):
         hint = f" Did you mean '{near[0]}'?" if near else ""
         prefix = f"{where}: " if where else ""
         listed = ", ".join(self.known) or "none"
-        super().__init__(f"{prefix}unknown {kind} '{name}'. Known: {listed}.{hint}")
+        super().__init__(f"{prefix}unknown {what} '{name}'. Known: {listed}.{hint}")
 
 
 class DataFileError(TcsError):

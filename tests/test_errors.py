@@ -46,7 +46,7 @@ def test_unknown_name_says_what_was_asked_what_there_is_and_what_was_meant():
     assert str(error) == (
         "goal 3 of task 'shaving': unknown frame 'haed'. Known: head, torso. Did you mean 'head'?"
     )
-    assert (error.kind, error.name, error.known) == ("frame", "haed", ("head", "torso"))
+    assert (error.what, error.name, error.known) == ("frame", "haed", ("head", "torso"))
 
 
 def test_unknown_name_guesses_nothing_far_off():

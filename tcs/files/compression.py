@@ -41,14 +41,14 @@ def smallest_unsigned(values: NDArray[np.int64]) -> NDArray[Any]:
 
 
 def decompress(
-    encoded: dict[str, Any], name: str, kind: str, shape: tuple[int | None, ...]
+    encoded: dict[str, Any], name: str, element: str, shape: tuple[int | None, ...]
 ) -> NDArray[Any]:
     """Return the array stored under a name, decompressed and checked.
 
     Args:
         encoded: The containers it is stored in.
         name: Its name there.
-        kind: Its element type, or "u" for any unsigned one.
+        element: Its element type, or "u" for any unsigned one.
         shape: Shape it must have, None where any length will do.
 
     Raises:
@@ -57,33 +57,35 @@ def decompress(
     compressed = encoded.get(name)
     if not isinstance(compressed, dict):
         raise StoreFormatError(f"lacks the array '{name}'")
-    found, said, data = compressed.get("type"), compressed.get("shape"), compressed.get("bytes")
+    found, stated, data = compressed.get("type"), compressed.get("shape"), compressed.get("bytes")
     if (
         found not in _TYPES
-        or not isinstance(said, list)
-        or not all(type(n) is int and 0 <= n <= MAX_BYTES for n in said)
+        or not isinstance(stated, list)
+        or not all(type(n) is int and 0 <= n <= MAX_BYTES for n in stated)
         or not isinstance(data, np.ndarray)
         or data.dtype != np.uint8
         or data.ndim != 1
     ):
         raise StoreFormatError(f"has an array '{name}' that is none")
-    fits = found[0] == "u" if kind == "u" else found == kind
+    fits = found[0] == "u" if element == "u" else found == element
     if (
         not fits
-        or len(said) != len(shape)
-        or any(n is not None and n != m for n, m in zip(shape, said, strict=True))
+        or len(stated) != len(shape)
+        or any(n is not None and n != m for n, m in zip(shape, stated, strict=True))
     ):
         raise StoreFormatError(
-            f"has an array '{name}' of type {found} and shape {said}, which does not belong there"
+            f"has an array '{name}' of type {found} and shape {stated}, which does not belong there"
         )
     dtype = np.dtype(f"<{found}")
-    planes = np.frombuffer(_inflated(name, data, math.prod(said) * dtype.itemsize), dtype=np.uint8)
+    planes = np.frombuffer(
+        _inflated(name, data, math.prod(stated) * dtype.itemsize), dtype=np.uint8
+    )
     values = np.ascontiguousarray(planes.reshape(dtype.itemsize, -1).T).view(dtype)
-    return values.reshape(said).astype(dtype.newbyteorder("="), copy=False)
+    return values.reshape(stated).astype(dtype.newbyteorder("="), copy=False)
 
 
 def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
-    """Return the decompressed bytes, which must be as many as were said."""
+    """Return the decompressed bytes, which must be as many as were stated."""
     if size > MAX_BYTES:
         raise StoreFormatError(f"has an array '{name}' of {size} bytes; at most {MAX_BYTES}")
     decompressor = zlib.decompressobj()

@@ -124,7 +124,7 @@ def checked(
     except UnknownNameError as reason:
         # Raised by a validator of the model, which knows the field but not the file.
         located = f"{where}, {reason.where}" if reason.where else where
-        raise UnknownNameError(reason.kind, reason.name, reason.known, where=located) from None
+        raise UnknownNameError(reason.what, reason.name, reason.known, where=located) from None
 
 
 _KEY_TAGS = ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge")

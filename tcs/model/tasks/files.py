@@ -107,7 +107,7 @@ def _read(path: Path) -> Task:
         raise TaskError(f"{where}, {error}") from None
     except UnknownNameError as error:
         raise UnknownNameError(
-            error.kind, error.name, error.known, where=f"{where}, {error.where}"
+            error.what, error.name, error.known, where=f"{where}, {error.where}"
         ) from None
 
 

@@ -90,14 +90,14 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True)
-class Folded:
+class Collapsible:
     """Blocks that expand when their title is clicked, and are always printed."""
 
     title: str
     blocks: Sequence[Block]
 
 
-Block = Text | Bullets | Code | Facts | Table | Picture | Folded
+Block = Text | Bullets | Code | Facts | Table | Picture | Collapsible
 
 
 @dataclass(frozen=True, slots=True)

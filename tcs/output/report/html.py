@@ -13,9 +13,9 @@ from tcs.output.report.blocks import (
     Bullets,
     Cell,
     Code,
+    Collapsible,
     Column,
     Facts,
-    Folded,
     Page,
     Picture,
     Section,
@@ -109,20 +109,20 @@ def _(block: Table) -> str:
 
 @_written.register
 def _(block: Picture) -> str:
-    said = escape(block.description)
+    description = escape(block.description)
     if block.format == "svg":
         # From its root element on: an XML declaration has no place within HTML.
         drawing = block.content.decode("utf-8")
         drawing = drawing[drawing.index("<svg") :]
-        drawing = re.sub(r"^<svg", f'<svg role="img" aria-label="{said}"', drawing)
+        drawing = re.sub(r"^<svg", f'<svg role="img" aria-label="{description}"', drawing)
     else:
         data = base64.b64encode(block.content).decode("ascii")
-        drawing = f'<img alt="{said}" src="data:image/png;base64,{data}">'
+        drawing = f'<img alt="{description}" src="data:image/png;base64,{data}">'
     return f"<figure>\n{drawing}\n<figcaption>{escape(block.caption)}</figcaption>\n</figure>"
 
 
 @_written.register
-def _(block: Folded) -> str:
+def _(block: Collapsible) -> str:
     inner = "\n".join(_written(inside) for inside in block.blocks)
     return f"<details>\n<summary>{escape(block.title)}</summary>\n{inner}\n</details>"
 

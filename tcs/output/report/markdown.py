@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from functools import singledispatch
 
-from tcs.output.report.blocks import Block, Bullets, Code, Facts, Folded, Page, Picture, Table, Text
+from tcs.output.report.blocks import (
+    Block,
+    Bullets,
+    Code,
+    Collapsible,
+    Facts,
+    Page,
+    Picture,
+    Table,
+    Text,
+)
 
 
 def as_markdown(page: Page) -> str:
@@ -57,7 +67,7 @@ def _(block: Picture) -> str:
 
 
 @_written.register
-def _(block: Folded) -> str:
+def _(block: Collapsible) -> str:
     return f"**{_plain(block.title)}**\n\n" + "\n\n".join(_written(b) for b in block.blocks)
 
 

@@ -11,8 +11,8 @@ from tcs.output.report.blocks import (
     Block,
     Bullets,
     Code,
+    Collapsible,
     Facts,
-    Folded,
     Page,
     Picture,
     Section,
@@ -257,7 +257,7 @@ def _table_3(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
             "with and without TC-manipulability.",
             "Symbols as above. Both methods are evaluated on the same samples.",
         ),
-        Folded("All comparisons", [contrasts_table(rows)]),
+        Collapsible("All comparisons", [contrasts_table(rows)]),
     ]
 
 
@@ -322,7 +322,7 @@ def _losses(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
         if is_short(row, paper):
             blocks += [Text(f"Below the paper: {_reading(row)}"), losses_table(row)]
         else:
-            blocks.append(Folded(row.name, [losses_table(row)]))
+            blocks.append(Collapsible(row.name, [losses_table(row)]))
     if lossless:
         blocks.append(Text(f"Every goal is reached in every sample: {'; '.join(lossless)}."))
     return blocks
@@ -360,7 +360,7 @@ def _chosen(rows: Sequence[RowStudy], pictures: Sequence[RowPictures]) -> list[B
                 f"{row.titles[0]} – {row.titles[1]}. P_R {row.best.reachability:.2f}, P_M "
                 f"{row.best.manipulability:.3f}; under error {mean_and_std(row.best)} %. {words}.",
             ),
-            Folded(
+            Collapsible(
                 f"{row.name}: map",
                 [Picture(drawn.map, "png", f"Map of {row.name} with the best set.", row.name)],
             ),
@@ -409,5 +409,5 @@ def _made(
             "base are not checked again; on the bed the person is at the nominal position (shift "
             "0)."
         ),
-        Folded("Score files", [Facts(scores)]),
+        Collapsible("Score files", [Facts(scores)]),
     ]

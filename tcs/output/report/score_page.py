@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from tcs.output.report.blocks import Block, Code, Facts, Folded, Page, Picture, Section, Text
+from tcs.output.report.blocks import Block, Code, Collapsible, Facts, Page, Picture, Section, Text
 from tcs.output.report.check_tables import success_table, verification_table
 from tcs.output.report.goal_tables import goals_table, joints_table
 from tcs.output.report.grid_tables import pairs_table, reasons_table
@@ -99,7 +99,7 @@ def _goals(report: ScoreReport) -> list[Block]:
         if fix is not None:
             blocks.append(Text(f"From stop 1, goal {goal} would be reached so: {fix.sentence}"))
     if report.shown.members:
-        blocks.append(Folded("Arm joints", [joints_table(report)]))
+        blocks.append(Collapsible("Arm joints", [joints_table(report)]))
     return blocks
 
 

@@ -13,9 +13,9 @@ from tcs.output.report.blocks import (
     Block,
     Bullets,
     Code,
+    Collapsible,
     Column,
     Facts,
-    Folded,
     Page,
     Picture,
     Section,
@@ -82,7 +82,7 @@ def findings(experiment: Experiment) -> list[str]:
     """Return the main findings in a sentence each."""
     tests = experiment.tested()
     sentences = [
-        f"These are {SCRIPTED}: what follows tells what the controllers do to one way of driving, "
+        f"These are {SCRIPTED}: the results show how the controllers affect one way of driving, "
         "and nothing about what people feel."
     ]
     for name in HYPOTHESES:
@@ -203,7 +203,7 @@ def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
                 ("Paper", "N. S. Hoeba, VR mediated teleoperation, Delft: Tables II and III"),
             ]
         ),
-        Folded(
+        Collapsible(
             "What differs from the paper",
             [
                 Bullets(

@@ -12,9 +12,9 @@ from tcs.output.report.blocks import (
     Bullets,
     Cell,
     Code,
+    Collapsible,
     Column,
     Facts,
-    Folded,
     Picture,
     Table,
     Text,
@@ -70,7 +70,7 @@ def everything():
         table,
         Picture(PNG, "png", HOSTILE, HOSTILE),
         Picture(SVG, "svg", HOSTILE, "drawn"),
-        Folded(HOSTILE, [Text("within"), table]),
+        Collapsible(HOSTILE, [Text("within"), table]),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from tcs.capability import read_csv
 from tcs.errors import TcsError
 from tcs.output.report import as_html, as_markdown
-from tcs.output.report.blocks import Folded, Picture, Table
+from tcs.output.report.blocks import Collapsible, Picture, Table
 from tcs.output.report.teleop import experiment_page
 from tcs.teleop import load_arm
 from tcs.teleop.experiment.course import find_course
@@ -124,7 +124,7 @@ def test_rows_of_all_trials(saved):
 
 def tables(blocks):
     for block in blocks:
-        if isinstance(block, Folded):
+        if isinstance(block, Collapsible):
             yield from tables(block.blocks)
         elif isinstance(block, Table | Picture):
             yield block
