@@ -1,0 +1,73 @@
+"""Every measured table in README and docs is what the benchmarks saved."""
+
+import importlib.util
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+SAVED = sorted((CHECKOUT / "benchmarks" / "figures").glob("*.json"))
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Return the script as a module."""
+    spec = importlib.util.spec_from_file_location("figures", CHECKOUT / "scripts" / "figures.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_no_page_differs_from_the_saved_figures(figures):
+    differing = [
+        page.name
+        for page in figures.pages()
+        if figures.rewritten(text := page.read_text(encoding="utf-8")) != text
+    ]
+    assert differing == [], "run `make figures`"
+
+
+def test_every_block_is_read(figures):
+    # A mistyped opening would be a comment that nothing checks.
+    for page in figures.pages():
+        text = page.read_text(encoding="utf-8")
+        assert len(figures.BLOCK.findall(text)) == len(re.findall(r"<!--\s*figures\b", text)), page
+
+
+def test_an_edited_figure_is_noticed(figures):
+    page = next(p for p in figures.pages() if figures.BLOCK.search(p.read_text(encoding="utf-8")))
+    text = page.read_text(encoding="utf-8")
+    end = text.index(figures.END)
+    forged = text[:end] + "| forged | 1 |\n" + text[end:]
+    assert figures.rewritten(forged) == text
+
+
+def test_check_writes_nothing_and_fails(figures, tmp_path, monkeypatch, capsys):
+    (tmp_path / "docs").mkdir()
+    shutil.copytree(CHECKOUT / "benchmarks" / "figures", tmp_path / "benchmarks" / "figures")
+    script, saved = SAVED[0].stem, json.loads(SAVED[0].read_text(encoding="utf-8"))
+    page = tmp_path / "docs" / "page.md"
+    stale = f"<!-- figures: {script}/{next(iter(saved['tables']))} -->\n{figures.END}\n"
+    page.write_text(stale, encoding="utf-8")
+    (tmp_path / "README.md").write_text("# tcs\n", encoding="utf-8")
+    monkeypatch.setattr(figures, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(figures, "FIGURES", tmp_path / "benchmarks" / "figures")
+    monkeypatch.setattr(sys, "argv", ["figures.py", "--check"])
+    assert figures.main() == 1
+    assert page.read_text(encoding="utf-8") == stale
+    assert "page.md: differs" in capsys.readouterr().out
+    monkeypatch.setattr(sys, "argv", ["figures.py"])
+    assert figures.main() == 0
+    assert saved["machine"] in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
+def test_saved_figures_say_where_they_were_measured(path):
+    saved = json.loads(path.read_text(encoding="utf-8"))
+    assert {"command", "date", "machine", "load", "python", "versions"} <= set(saved)
+    assert (CHECKOUT / saved["command"].split()[1]).is_file()
+    assert saved["tables"]
