@@ -300,7 +300,7 @@ def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
         poses = link_poses(chain, q)
         for shape, frame in zip(shapes_of(scene.arm, 0), scene.arm.frame, strict=True):
             placed_there = shape.moved(poses[frame - 1])
-            extents.append(np.linalg.norm(placed_there.p) + placed_there.ball)
+            extents.append(np.linalg.norm(placed_there.p) + placed_there.sphere)
     assert 0.9 * radius < max(extents) <= radius - scene.margin
 
 

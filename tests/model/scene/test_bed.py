@@ -84,8 +84,8 @@ def test_raising_the_bed_raises_all_except_feet_posts_and_wall(environment):
             found[part] = environment.query().GetPoseInWorld(part.geometry).GetAsMatrix34().copy()
     for part, before in still.items():
         stays = part.name in ("wall", "floor") or " post " in part.name or " disc " in part.name
-        raised = before + (0.0 if stays else 0.3) * np.eye(3, 4, 3)[[1, 2, 0]]
-        np.testing.assert_allclose(raised[part], raised, atol=1e-12, err_msg=part.name)
+        expected = before + (0.0 if stays else 0.3) * np.eye(3, 4, 3)[[1, 2, 0]]
+        np.testing.assert_allclose(raised[part], expected, atol=1e-12, err_msg=part.name)
 
 
 @pytest.mark.parametrize("head_rest_deg", [0, 20, 35, 70, 80])
