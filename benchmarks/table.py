@@ -19,7 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tcs.files.writing import whole_file
+from tcs.files.writing import make_folder, whole_file
 
 if TYPE_CHECKING:
     from tcs.placement.scoring import Verification
@@ -101,6 +101,7 @@ def save(options: argparse.Namespace) -> None:
         **_began,
         "tables": _tables,
     }
+    make_folder(FIGURES)
     path = FIGURES / f"{script.stem}.json"
     with whole_file(path, "Figures") as file:
         file.write(json.dumps(saved, indent=1, ensure_ascii=False).encode() + b"\n")
