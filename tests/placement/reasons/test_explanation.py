@@ -182,7 +182,7 @@ def test_distances_are_straight_from_a_base_in_contact(bedside):
     assert explained.explained.reason == Reason.BODY_BLOCKED
     assert explained.weights.route == "around"
     assert (explained.fix.route, explained.fix.index) == ("straight", 52)
-    # A robot that is a little off really is there, on the side of the bed that it is on.
+    # A robot with a pose error is where it is, on its own side of the bed.
     place = dataclasses.replace(grid.configuration(blocked), base_x=0.06)
     explained = tcs.explain(file, 0, place)
     assert explained.explained.index == blocked

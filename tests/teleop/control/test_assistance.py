@@ -40,15 +40,15 @@ def test_a_joint_near_a_limit_wants_away_from_it(iiwa, ready, side):
     for joint in range(7):
         joints = ready.copy()
         joints[joint] = side * (iiwa.upper[joint] - 0.02)
-        wish = posture_rates(iiwa, joints, iiwa.kinematics(joints).jacobian, 0.3)
-        assert side * wish[joint] < -0.2
-        assert np.abs(wish).max() <= 0.9 + 1e-12
+        rates = posture_rates(iiwa, joints, iiwa.kinematics(joints).jacobian, 0.3)
+        assert side * rates[joint] < -0.2
+        assert np.abs(rates).max() <= 0.9 + 1e-12
 
 
 def test_no_wish_is_endless_at_a_limit_or_without_one(iiwa):
     for arm, joints in [(iiwa, iiwa.upper.copy()), (load_arm("pr2"), np.full(7, 40.0))]:
-        wish = posture_rates(arm, joints, arm.kinematics(joints).jacobian, 0.3)
-        assert np.isfinite(wish).all()
+        rates = posture_rates(arm, joints, arm.kinematics(joints).jacobian, 0.3)
+        assert np.isfinite(rates).all()
 
 
 def test_shares_of_range_run_from_limit_to_limit():
