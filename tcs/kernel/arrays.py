@@ -1,8 +1,8 @@
-"""The arrays a scene is lowered to: the input of the kernel.
+"""Arrays that describe a scene, its goals and its grid: the input of the kernel.
 
 Frames (letters as in Drake): W environment, B robot base, A arm base (the link
 that carries joint 1 of the arm, at the current torso level), L1..L7 the arm's
-links, T the tool, G a goal. Link frames are chosen so that joint i turns about
+links, T the tool, G a goal. Link frames are chosen so that joint i rotates about
 the z axis of `Li` and `X_AL1..7` follow from `Chain` alone.
 """
 
@@ -39,19 +39,19 @@ class Chain(NamedTuple):
 
 
 class Shapes(NamedTuple):
-    """Collision shapes, in one or several states of whatever carries them."""
+    """Collision shapes, posed in one or several states (torso levels or environment states)."""
 
     type: NDArray[np.int8]
     """SPHERE, CAPSULE or BOX, shape (n,)."""
     size: FloatArray
     """Sizes [m], shape (n, 3)."""
     pad: FloatArray
-    """How far the true surface may stand out of the shape [m], shape (n,)."""
+    """Greatest distance by which the true surface may exceed the shape [m], shape (n,)."""
     body: NDArray[np.int16]
-    """Index of the body it belongs to, in the lowered scene's list of names, shape (n,)."""
+    """Index of the body of each shape, in the lowered scene's list of names, shape (n,)."""
     frame: NDArray[np.int8]
-    """What carries it, shape (n,). Arm shapes: 1..7, the link. Body shapes: 0 fixed to the
-    base, 1 mounted on the torso. Environment shapes: 0."""
+    """Parent of each shape, shape (n,). Arm shapes: number of the link, 1..7. Body shapes: 0 fixed
+    to the base, 1 mounted on the torso. Environment shapes: 0."""
     R: FloatArray
     """Orientations, shape (states, n, 3, 3)."""
     p: FloatArray
@@ -70,21 +70,21 @@ class SceneArrays(NamedTuple):
     arm_base_p: FloatArray
     """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
     arm: Shapes
-    """Shapes the arm moves, one state: poses in link frames. Frame 7 is the gripper."""
+    """Shapes of the moving links, one state: poses in link frames. Frame 7 is the gripper."""
     body: Shapes
-    """Every other shape of the robot: poses in B, one state for each torso level."""
+    """All other shapes of the robot: poses in B, one state for each torso level."""
     environment: Shapes
     """Furniture, person, obstacles: poses in W, one state for each environment state."""
     arm_vs_arm: BoolArray
-    """Pairs that are checked, shape (n_arm, n_arm); symmetric, diagonal False."""
+    """Whether each pair is checked, shape (n_arm, n_arm); symmetric, diagonal False."""
     arm_vs_body: BoolArray
-    """Pairs that are checked, shape (n_arm, n_body)."""
+    """Whether each pair is checked, shape (n_arm, n_body)."""
     arm_vs_environment: BoolArray
-    """Pairs that are checked, shape (n_arm, n_environment)."""
+    """Whether each pair is checked, shape (n_arm, n_environment)."""
     body_vs_environment: BoolArray
-    """Pairs that are checked, shape (n_body, n_environment)."""
+    """Whether each pair is checked, shape (n_body, n_environment)."""
     margin: float
-    """Contacts closer than this count as collision [m]."""
+    """Least clearance [m]: shapes closer than this collide."""
     goal_R: FloatArray
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray
@@ -98,10 +98,12 @@ class GridArrays(NamedTuple):
     """
 
     environment_states: int
+    """Number of environment states."""
     base_x: FloatArray
-    """[m], shape (nx,)."""
+    """Values of base x in W [m], shape (nx,)."""
     base_y: FloatArray
-    """[m], shape (ny,)."""
+    """Values of base y in W [m], shape (ny,)."""
     base_yaw: FloatArray
-    """[rad], shape (nyaw,)."""
+    """Values of base yaw [rad], shape (nyaw,)."""
     torso_levels: int
+    """Number of torso levels."""

@@ -1,4 +1,4 @@
-"""Frames at one initial configuration: environment, goal and arm base for a base pose."""
+"""Poses of environment and goal in base and arm base at one initial configuration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def place_base(problem: Problem, work: Workspace, place: int) -> int:
 
     Args:
         problem: The scene and its grid.
-        work: `R_BW`, `p_BW` and `environment_B` get filled.
+        work: `R_BW`, `p_BW` and `environment_B` are filled.
         place: Flat index over (environment state, base x, base y, base yaw).
 
     Returns:
@@ -63,7 +63,7 @@ def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, 
 
 @inner
 def environment_in_arm_base(problem: Problem, work: Workspace, torso: int) -> None:
-    """Move the environment from B to A and list the shapes that the arm could touch at all."""
+    """Transform the environment from B to A and list the shapes within the arm's reach."""
     A, a = problem.base_R[torso], problem.base_p[torso]
     environment_B, environment_A = work.environment_B, work.environment_A
     count = 0

@@ -1,8 +1,8 @@
-"""Compile kernel functions once per machine, into a folder that cannot go stale.
+"""Compile kernel functions, and cache the machine code in a folder that cannot go stale.
 
-Numba's own cache looks only at the file a cached function stands in: after an edit in a file it
-imports from, it would serve machine code of the old text. So every function here is cached in a
-folder named by a hash of all kernel sources, the numba version and the processor.
+Numba's cache depends only on the source file of the function: after an edit of a module that this
+file imports, it would load outdated machine code. Kernel functions are therefore cached in a folder
+named by a hash of all kernel sources, the versions of numba and Python, and the processor.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def kernel_digest(folder: Path) -> str:
     """Return a hash of everything that decides the machine code, as 16 hex digits.
 
     Args:
-        folder: The folder whose `*.py` files, down to the deepest, are the kernel's sources.
+        folder: The folder whose `*.py` files, at any depth, are the kernel's sources.
     """
     digest = hashlib.sha256()
     for source in sorted(folder.rglob("*.py")):
@@ -49,7 +49,7 @@ def kernel_digest(folder: Path) -> str:
 
 @cache
 def jit_folder() -> Path | None:
-    """Return the folder of today's machine code, or None when no folder can be written."""
+    """Return the folder of the current machine code, or None if it is not writable."""
     try:
         folder = cache_folder() / "jit" / kernel_digest(Path(__file__).parent)
         folder.mkdir(parents=True, exist_ok=True)
@@ -62,36 +62,36 @@ def jit_folder() -> Path | None:
 
 
 def is_compiled(entry: str = "analytic_*/pairs.score_pair") -> bool:
-    """Return whether an earlier run has left machine code for the whole scoring kernel.
+    """Return whether the cache holds machine code of the whole scoring kernel.
 
     Args:
-        entry: Package, module and function that the rest is compiled into, as a glob pattern.
+        entry: Package, module and function into which the rest is compiled, as a glob pattern.
     """
     folder = jit_folder()
     return folder is not None and any(folder.rglob(f"{entry}*.nbc"))
 
 
 def int_constant(number: int) -> int:
-    """Return a constant to hand to kernel functions, whose type says nothing of its value.
+    """Return an integer constant to pass to kernel functions, of a type without its value.
 
-    Numba compiles a function anew for every literal, and every plain constant, it is handed.
+    Numba compiles a function anew for every literal, and every global int, passed as an argument.
     """
     return cast(int, np.int64(number))
 
 
 def jit(function: _Function) -> _Function:
-    """Compile `function` without the GIL, IEEE arithmetic, and keep its machine code on disk.
+    """Compile `function` with IEEE arithmetic, releasing the GIL, and cache its machine code.
 
-    Division by zero gives inf or nan as in numpy. No `fastmath`: verdicts must not depend on how
+    Division by zero gives inf or nan as in numpy. No `fastmath`: results must not depend on how
     a compiler reorders sums. Contraction to fused multiply-add is off for the same reason.
     """
     return cast(_Function, _compiled(function))
 
 
 def inner(function: _Function) -> _Function:
-    """Compile `function` as `jit` does, to be called by compiled functions only.
+    """Compile `function` as `jit` does, for calls from compiled functions only.
 
-    Without what Python needs to call it, the whole kernel compiles in about 6/7 of the time.
+    Without the wrappers for calls from Python, the kernel compiles in about 6/7 of the time.
     """
     compiled = _compiled(function, no_cpython_wrapper=True)
     if isinstance(compiled, CPUDispatcher):
@@ -100,7 +100,7 @@ def inner(function: _Function) -> _Function:
 
 
 class _Inner(CPUDispatcher):
-    """Refuses to be called from Python, where numba would follow a null pointer."""
+    """Dispatcher that rejects calls from Python, in which numba would follow a null pointer."""
 
     def __call__(self, *args: object) -> NoReturn:
         raise TypeError(
@@ -110,10 +110,11 @@ class _Inner(CPUDispatcher):
 
 
 def _compiled(function: _Function, **options: Any) -> object:
+    """Return `function` decorated with `numba.njit`, cached in `jit_folder()`."""
     folder = jit_folder()
     settings = vars(numba.config)
     before = settings["CACHE_DIR"]
-    # Numba takes the cache folder from this global while it decorates, and only then.
+    # Numba reads the cache folder from this global, only while it decorates.
     settings["CACHE_DIR"] = str(folder) if folder else ""
     try:
         decorate: Callable[[_Function], object] = numba.njit(

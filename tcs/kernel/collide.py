@@ -1,7 +1,7 @@
-"""Are two shapes closer than a gap? Exact, for spheres, capsules and boxes.
+"""Exact tests whether two shapes are closer than a gap, for spheres, capsules and boxes.
 
-Every shape is a core (point, segment, box) grown by a radius (0 for boxes), so each question is a
-distance between cores. Distances are exact, not bounds: Drake must give the same verdict.
+Every shape is a core (point, segment, box) grown by a radius (0 for boxes), so each test compares a
+distance between cores. Distances are exact, not bounds, so that results agree with Drake's.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray, Shapes
 from tcs.kernel.cache import inner, jit
 
 PARALLEL = 1e-12
-"""Squared sine below which two edges count as parallel: their cross product is no axis then."""
+"""Squared sine below which two edges are parallel, so that their cross product gives no axis."""
 
 
-# Columns of packed shapes. A shape is one row of floats: its inner loops then touch one array.
+# Columns of packed shapes. A shape is one row of floats, so that inner loops read a single array.
 TYPE, BOUND, SIZE, CENTRE, ROTATION, COLUMNS = 0, 1, 2, 5, 8, 17
 """Type; radius of the bounding sphere about the centre [m]; three sizes as in `Shapes`
 [m]; centre [m]; rotation matrix row by row."""
@@ -57,8 +57,8 @@ def move(R: FloatArray, p: FloatArray, local: FloatArray, i: int, out: FloatArra
 def spheres_overlap(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
     """Return whether the bounding spheres of two shapes are closer than `gap` [m].
 
-    Call it before `closer`. It is a function of its own because numba counts references to arrays
-    in functions that call others, which costs more than these sums decide for nearly every pair.
+    Call it before `closer`: it rules out nearly every pair. It is a separate function because numba
+    counts references to arrays in functions that call others, which costs more than these sums.
     """
     x = b[j, CENTRE] - a[i, CENTRE]
     y = b[j, CENTRE + 1] - a[i, CENTRE + 1]
@@ -147,8 +147,8 @@ def _line_box(
     """Return the squared distance between p + t d, t in [0, 1], and the box of half sizes h.
 
     Half the derivative of the squared distance, g(t) = d . beyond(p + t d), grows with t and is
-    linear between the values of t at which a coordinate passes a face: narrow down to the piece
-    that holds the root, then interpolate.
+    linear between the values of t at which a coordinate passes a face: find the interval between
+    two such values that contains the root, then interpolate.
     """
     low, high = 0.0, 1.0
     g_low = dx * _beyond(px, hx) + dy * _beyond(py, hy) + dz * _beyond(pz, hz)
@@ -183,11 +183,11 @@ def _line_box(
 
 @inner
 def _boxes_closer(a: FloatArray, i: int, b: FloatArray, j: int, gap: float) -> bool:
-    """Return whether two boxes are closer than `gap`.
+    """Return whether two boxes are closer than `gap` [m].
 
-    The 15 separating axes decide nearly every case: a projected distance above the gap keeps the
-    boxes apart, none above zero means overlap. In between, the least distance is attained on an
-    edge of one box, so the 24 edges are measured.
+    The 15 separating axes decide nearly every case: if a projected distance is above the gap, the
+    boxes are apart; if none is above zero, they overlap. Otherwise the least distance is attained
+    on an edge of one box, so the distances of the 24 edges are computed.
     """
     x, y, z = (
         b[j, CENTRE] - a[i, CENTRE],
@@ -280,7 +280,7 @@ def _edge_gap(
     t1: float, t2: float, m1: float, m2: float,
     a1: float, a2: float, b1: float, b2: float, k1: float, k2: float,
 ) -> float:  # fmt: skip
-    """Return the projected distance of two boxes along the cross product of two of their edges.
+    """Return the projected distance [m] of two boxes along the cross product of two edges.
 
     The axis is a_i x b_j. (1, 2) are the cyclic successors of i: t, a and m hold the offset, the
     half sizes and b_j along them. b1, b2 are the half sizes of the other two edges of b, and

@@ -1,6 +1,6 @@
-"""Which pair of shapes touches first: base, gripper and arm, each in the frame that suits it.
+"""First contact found of base, gripper and arm with the environment and with the robot itself.
 
-A contact is a code `robot_body * bodies + other`, where `other` counts the bodies of the
+A contact is a code `robot_body * bodies + other`, where `other` numbers the bodies of the
 environment first and then those of the robot; NO_CONTACT where nothing touches.
 """
 
@@ -18,7 +18,7 @@ from tcs.kernel.problem import Problem
 
 NO_CONTACT = -1
 ENVIRONMENT, BODY, ARM = int_constant(0), int_constant(1), int_constant(2)
-"""What the arm touched."""
+"""Partner of the arm in a contact."""
 BASE_FIXED, TORSO_MOUNTED = int_constant(0), int_constant(1)
 """Mount of a body shape: fixed to the base, or mounted on the torso."""
 AT_GOAL = 1e-7
@@ -38,13 +38,14 @@ class Workspace(NamedTuple):
     near: IntArray
     """Indices of the environment shapes within the arm's reach, shape (n_environment,)."""
     near_count: IntArray
-    """How many there are, shape (1,)."""
+    """Number of entries in `near`, shape (1,)."""
     link_R: FloatArray
-    """Orientations of L1..L7 in A, shape (8, 3, 3)."""
+    """Orientations of A, L1..L7 in A, shape (8, 3, 3)."""
     link_p: FloatArray
-    """Origins of L1..L7 in A [m], shape (8, 3)."""
+    """Origins of A, L1..L7 in A [m], shape (8, 3)."""
     last: IntArray
-    """The pair that blocked last (what the partner belongs to, arm shape, partner), shape (3,)."""
+    """Last pair in contact: partner of the arm (-1 for none), arm shape, partner's shape; shape
+    (3,)."""
     R_BW: FloatArray
     """Orientation of the environment W in the current base B, shape (3, 3)."""
     p_BW: FloatArray
@@ -75,7 +76,7 @@ def new_workspace(problem: Problem) -> Workspace:
 
 @inner
 def contact_code(problem: Problem, robot_body: int, other: int, partner: int) -> int:
-    """Return the code of a contact of a robot body with `other`, numbered within its partner."""
+    """Return the code of a contact between a robot body and body `other` of a partner."""
     if partner != ENVIRONMENT:
         other += problem.environment_bodies
     return robot_body * (problem.environment_bodies + problem.robot_bodies) + other
@@ -111,7 +112,7 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
 
 @inner
 def gripper_environment_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
-    """Return the first contact of the gripper, tool at a goal, with the environment; all in W."""
+    """Return the first contact of the gripper with the environment, the tool being at a goal."""
     _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
     arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
     for i in range(problem.grippers):
@@ -130,9 +131,9 @@ def gripper_environment_contact(problem: Problem, work: Workspace, state: int, g
 
 @inner
 def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) -> int:
-    """Return the first contact of the gripper, tool at the current goal, with the robot's body.
+    """Return the first contact of the gripper with the robot's body, the tool being at the goal.
 
-    It leaves the gripper's shapes placed in `work.arm`.
+    The gripper's shapes in A remain in `work.arm`.
     """
     _place_gripper(problem, work, work.R_AG, work.p_AG)
     arm, gaps = work.arm, problem.gap_body
@@ -150,7 +151,7 @@ def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) 
 
 @inner
 def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
-    """Place the shapes of the last link such that the tool stands at (R, p)."""
+    """Place the shapes of the last link such that the tool is at the pose (R, p)."""
     R7, p7 = work.link_R[7], work.link_p[7]
     F, f = problem.chain_R[7], problem.chain_p[7]
     for r in range(3):
@@ -164,9 +165,10 @@ def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArr
 
 @inner
 def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatArray) -> int:
-    """Return the first contact of the arm at joint angles q, except gripper against environment.
+    """Return the first contact of the arm at joint angles q [rad], shape (7,).
 
-    `gripper_body_contact` must have placed the gripper. The pair that blocked last is tried first.
+    Contacts of the gripper with environment and body are not checked: they depend on the goal only.
+    `gripper_body_contact` must have placed the gripper. The last pair in contact is checked first.
     """
     arm, environment = work.arm, work.environment_A
     gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
@@ -205,7 +207,7 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
 
 @jit
 def at_goal(problem: Problem, work: Workspace) -> bool:
-    """Return whether the links, as placed last, hold the tool at the current goal.
+    """Return whether the tool is at the current goal, within AT_GOAL, for the current link poses.
 
     Forward kinematics thus confirms every solution that counts as reached.
     """
@@ -224,7 +226,7 @@ def at_goal(problem: Problem, work: Workspace) -> bool:
 def pair_touches(
     problem: Problem, work: Workspace, body_A: FloatArray, partner: int, i: int, j: int
 ) -> bool:
-    """Return whether arm shape i touches shape j of a partner, the links being placed."""
+    """Return whether arm shape i touches shape j of a partner, for the current link poses."""
     arm = work.arm
     _place_link(problem, work, i)
     if partner == ENVIRONMENT:

@@ -2,7 +2,7 @@
 
 `tcs.kernel.arrays.Chain` defines the frames. `tool_pose` and `jacobian` can be called from Python,
 the others from compiled code only. The reference implementation in `tcs.kernel.verification`
-deliberately computes the same on its own, to check these.
+deliberately repeats these computations, to check them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 
 SMALL_ANGLE_COSINE = 0.9
-"""Cosine of a rotation angle above which the sine stands for the angle."""
+"""Cosine of a rotation angle above which the sine approximates the angle."""
 
 
 @inner
@@ -26,8 +26,8 @@ def link_poses(
         chain_R: Rotations of the chain, shape (8, 3, 3).
         chain_p: Translations of the chain [m], shape (8, 3).
         q: Joint angles [rad], shape (7,).
-        link_R: Filled, shape (8, 3, 3); row 0 becomes the identity, A itself.
-        link_p: Filled [m], shape (8, 3).
+        link_R: Filled with orientations, shape (8, 3, 3); row 0 is the identity, A itself.
+        link_p: Filled with origins [m], shape (8, 3).
     """
     for r in range(3):
         link_p[0, r] = 0.0
@@ -139,7 +139,7 @@ def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatAr
 def pose_error(
     R: FloatArray, p: FloatArray, R_goal: FloatArray, p_goal: FloatArray, error: FloatArray
 ) -> float:
-    """Fill the rotation vector and the translation from a pose to a goal; all in one frame.
+    """Fill the rotation vector and the translation from a pose to a goal, both in the same frame.
 
     Args:
         R: Orientation, shape (3, 3).
@@ -147,10 +147,10 @@ def pose_error(
         R_goal: Orientation of the goal, shape (3, 3).
         p_goal: Position of the goal [m], shape (3,).
         error: Filled, shape (6,): rotation vector [rad], translation [m]. Below about 26 degrees
-            the sine stands for the angle.
+            the sine approximates the angle.
 
     Returns:
-        The largest absolute entry of the error.
+        Largest absolute entry of the error [rad or m].
     """
     # Half the sum of the cross products of the axes with those of the goal: axis times sine.
     ex, ey, ez, trace = 0.0, 0.0, 0.0, 0.0
@@ -162,7 +162,7 @@ def pose_error(
     scale, cosine = 0.5, 0.5 * (trace - 1.0)
     if cosine < SMALL_ANGLE_COSINE:
         sine = 0.5 * np.sqrt(ex * ex + ey * ey + ez * ez)
-        # At 180 degrees the axis is undetermined; any axis is good for a start.
+        # At 180 degrees the axis is undetermined; any error will do to start iterating from.
         scale = 0.5 * np.arctan2(sine, cosine) / max(sine, 1e-9)
     error[0], error[1], error[2] = scale * ex, scale * ey, scale * ez
     worst = 0.0

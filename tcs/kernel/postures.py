@@ -1,4 +1,4 @@
-"""Tool pose, dexterity and contacts of given postures."""
+"""Tool poses, dexterity and contacts of given postures."""
 
 from __future__ import annotations
 
@@ -20,14 +20,22 @@ from tcs.kernel.problem import Problem
 from tcs.kernel.views import unowned
 
 HERE = int_constant(0)
-"""The one place, environment state or goal of a problem that has no more."""
+"""Index of the first base pose and the first environment state."""
 
 
 @jit
 def tool_poses(
     chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, R_AT: FloatArray, p_AT: FloatArray
 ) -> None:
-    """Fill the tool poses of many postures: q of shape (n, 7), R_AT (n, 3, 3), p_AT (n, 3)."""
+    """Fill the tool poses in the arm base A of many postures.
+
+    Args:
+        chain_R: Rotations of the chain, shape (8, 3, 3).
+        chain_p: Translations of the chain [m], shape (8, 3).
+        q: Joint angles [rad], shape (n, 7).
+        R_AT: Filled, shape (n, 3, 3).
+        p_AT: Filled [m], shape (n, 3).
+    """
     link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
     for i in range(len(q)):
         tool_pose(chain_R, chain_p, q[i], link_R, link_p, R_AT[i], p_AT[i])
@@ -35,7 +43,7 @@ def tool_poses(
 
 @jit
 def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
-    """Fill the problem's dexterity measure of many postures: q of shape (n, 7), value (n,)."""
+    """Fill `value`, shape (n,), with the problem's measure at joint angles q, shape (n, 7)."""
     problem = unowned(owned_problem)
     for i in range(len(q)):
         value[i] = measure_at(problem, q[i])
@@ -45,13 +53,13 @@ def measures(owned_problem: Problem, q: FloatArray, value: FloatArray) -> None:
 def free_postures(
     owned_problem: Problem, owned_work: Workspace, torso: int, q: FloatArray, free: BoolArray
 ) -> None:
-    """Fill whether postures touch nothing: neither the environment nor the robot itself.
+    """Fill whether the arm touches neither the environment nor the robot itself at given postures.
 
-    The base stands at place 0 of the problem's grid. Goal i of environment state 0 must be the
-    pose at which posture i holds the tool.
+    The base is at the first base pose of the problem's grid. Goal i of the first environment state
+    must be the tool pose of posture i. Base and torso are not checked against the environment.
 
     Args:
-        owned_problem: Robot and environment.
+        owned_problem: The scene, its goals and its grid.
         owned_work: Scratch.
         torso: Torso level.
         q: Joint angles [rad], shape (n, 7).

@@ -1,4 +1,4 @@
-"""Scene arrays, arranged for speed: what the compiled sweep reads."""
+"""Scene arrays arranged for speed, as the compiled sweep reads them."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
 
 UNCHECKED = -1.0
-"""Gap of a pair of shapes that is never checked."""
+"""Gap of a pair of shapes that is not checked."""
 TOUCH = 1e-9
-"""Least gap of a pair that is checked [m], far below what any distance is computed to."""
+"""Least gap of a pair that is checked [m], negligible against any clearance that matters."""
 
 
 class Problem(NamedTuple):
@@ -32,8 +32,8 @@ class Problem(NamedTuple):
     measure: Dexterity
     """Dexterity measure to maximise."""
     arm: ArmSolver
-    """How the arm is solved, in reverse maybe, or that no closed form solves it (`is_outside`);
-    what follows is the arm itself."""
+    """Constants of the closed form, which may describe the reversed chain; without branches if
+    there is no closed form (`is_outside`). The other fields describe the arm itself."""
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
@@ -41,11 +41,11 @@ class Problem(NamedTuple):
     links: FloatArray
     """The arm's shapes, packed, in link frames, nearest to the tool first, shape (n_arm, 17)."""
     link_frame: IntArray
-    """Link that carries each, 7 .. 1, shape (n_arm,)."""
+    """Link of each shape in `links`, 7 .. 1, shape (n_arm,)."""
     link_body: IntArray
-    """Robot body each belongs to, shape (n_arm,)."""
+    """Robot body of each shape in `links`, shape (n_arm,)."""
     grippers: int
-    """Number of them, the first ones, on the last link."""
+    """Number of shapes of the gripper, on link 7: the first rows of `links`."""
     base_R: FloatArray
     """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
     base_p: FloatArray
@@ -53,22 +53,22 @@ class Problem(NamedTuple):
     body: FloatArray
     """Shapes of the rest of the robot in B, packed, shape (torso levels, n_body, 17)."""
     body_A: FloatArray
-    """The same in A."""
+    """The shapes in `body`, in A."""
     body_spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
     body_mount: IntArray
-    """TORSO_MOUNTED or BASE_FIXED for each body shape, shape (n_body,)."""
+    """BASE_FIXED or TORSO_MOUNTED for each body shape, shape (n_body,)."""
     body_body: IntArray
-    """Robot body each belongs to, shape (n_body,)."""
+    """Robot body of each body shape, shape (n_body,)."""
     environment: FloatArray
     """Shapes of the environment in W, packed, shape (environment states, n_environment, 17)."""
     environment_body: IntArray
-    """Environment body each belongs to, shape (n_environment,)."""
+    """Environment body of each environment shape, shape (n_environment,)."""
     environment_bodies: int
-    """How many bodies the environment has."""
+    """Number of bodies of the environment."""
     robot_bodies: int
-    """How many the robot has."""
+    """Number of bodies of the robot."""
     gap_environment: FloatArray
     """Distance [m] that arm and environment shapes must keep, or UNCHECKED, shape
     (n_arm, n_environment)."""
@@ -79,7 +79,7 @@ class Problem(NamedTuple):
     gap_base: FloatArray
     """The same for body and environment shapes, shape (n_body, n_environment)."""
     widest_gap: float
-    """The greatest of all these distances [m]."""
+    """Upper bound of all these distances [m]."""
     arm_radius: float
     """Distance from the origin of A beyond which nothing touches the arm [m]."""
     goal_R: FloatArray
@@ -87,6 +87,7 @@ class Problem(NamedTuple):
     goal_p: FloatArray
     """Goal positions in W [m], shape (environment states, goals, 3)."""
     base_x: FloatArray
+    """As in `GridArrays`, also the fields below."""
     base_y: FloatArray
     base_yaw: FloatArray
     torso_levels: int
@@ -94,7 +95,12 @@ class Problem(NamedTuple):
 
 
 def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_MEASURE) -> Problem:
-    """Return `scene` and `grid` arranged for the kernel, to be scored by a measure.
+    """Return `scene` and `grid` arranged for the kernel.
+
+    Args:
+        scene: The scene and its goals.
+        grid: The initial configurations.
+        measure: Name of the dexterity measure to maximise.
 
     Raises:
         UnknownNameError: If there is no measure of that name.
@@ -147,14 +153,14 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
 
 
 def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
-    """Return how far from the origin of A the arm's shapes can get [m]."""
+    """Return an upper bound of the distance of the arm's shapes from the origin of A [m]."""
     reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain.p[:7], axis=1))])
     out = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1) + links[:, BOUND]
     return float(np.max(reach[frame] + out, initial=0.0))
 
 
 def _bounding_spheres(bodies: FloatArray, mount: NDArray[np.int8]) -> FloatArray:
-    """Return the bounding sphere of each of the two groups; radius -inf for an empty one."""
+    """Return the bounding sphere of each of the two mounts; radius -inf if it has no shapes."""
     spheres = np.full((len(bodies), 2, 4), -np.inf)
     spheres[..., :3] = 0.0
     for group in (0, 1):
@@ -170,18 +176,18 @@ def _bounding_spheres(bodies: FloatArray, mount: NDArray[np.int8]) -> FloatArray
 
 
 def _count(shapes: Shapes) -> int:
-    """Return how many bodies the shapes belong to, counted by the highest index."""
+    """Return the number of bodies that the shapes belong to: the highest index plus one."""
     return int(shapes.body.max(initial=-1)) + 1
 
 
 def _own(array: FloatArray) -> FloatArray:
-    """Return a writable copy: to numba, read-only arrays are another type to compile for."""
+    """Return a writable copy: numba compiles anew for read-only arrays, which are another type."""
     return np.array(array, dtype=np.float64, order="C")
 
 
 def _gaps(checked: BoolArray, pad_a: FloatArray, pad_b: FloatArray, margin: float) -> FloatArray:
-    """Return the distance each pair must keep [m], UNCHECKED where it is not looked at."""
+    """Return the distance that each pair must keep [m], or UNCHECKED."""
     required = np.maximum(margin, pad_a[:, None] + pad_b[None, :])
-    # The loops take a gap of 0 for "not looked at"; a touch must count in any case.
+    # The loops skip pairs whose gap is not above 0; shapes that touch must collide all the same.
     required = np.maximum(required, TOUCH)
     return np.ascontiguousarray(np.where(checked, required, UNCHECKED))

@@ -1,4 +1,4 @@
-"""Scores of a slice of the grid, and the codes of the reasons."""
+"""Scores of a slice of the grid, and the codes of reasons."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
-"""Reasons, the numbers of `tcs.placement.tables.Reason`."""
+"""Reasons, equal to the values of `tcs.placement.tables.Reason`."""
 
 
 class Scores(NamedTuple):
-    """Output of a slice; row 0 is the first configuration of the slice."""
+    """Scores of a slice; row 0 is the first configuration of the slice."""
 
     reason: NDArray[np.uint8]
-    """Codes of the reasons, shape (n, goals)."""
+    """Codes of reasons, shape (n, goals)."""
     contact: NDArray[np.int32]
     """Contact code or NO_CONTACT, shape (n, goals)."""
     dexterity: NDArray[np.float32]
-    """Dexterity measure of the winning joints, 0 where not reached, shape (n, goals)."""
+    """Dexterity measure of the best solution, unchanged where not reached, shape (n, goals)."""
     joints: NDArray[np.float32]
-    """Winning joints [rad], left as they are where not reached, shape (n, goals, 7)."""
+    """Joint angles of the best solution [rad], unchanged where not reached, shape
+    (n, goals, 7)."""

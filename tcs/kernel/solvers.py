@@ -1,9 +1,9 @@
-"""The inverse kinematics of an arm as the sweep uses it: reach test and pair scorer by solver.
+"""Reach test and pair scorer of the sweep, for either solver of the inverse kinematics.
 
 A solver is a named tuple of constants and scratch memory: `analytic.search.Search` for an arm with
-a closed form, `numeric.search.NumericSolver` for any other. `out_of_reach` and `score_pair` choose
-the implementation by its type when numba compiles their caller, so a sweep compiles and runs the
-code of its own solver only.
+a closed form, `numeric.search.NumericSolver` for any other. `out_of_reach` and `score_pair` select
+the implementation by the type of the solver when numba compiles their caller, so a sweep compiles
+the code of its own solver only.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ def new_solver(problem: Problem) -> Solver:
 
 
 def out_of_reach(problem: Problem, work: Workspace, solver: Solver) -> int:
-    """Return TOO_FAR or JOINT_LIMITS if the goal is out of reach by its pose alone, else REACHED.
+    """Return TOO_FAR or JOINT_LIMITS if the pose of the goal alone is out of reach, else REACHED.
 
     Args:
         problem: The scene.
-        work: The goal is placed.
-        solver: Prepared for the goal.
+        work: Workspace with the goal in A.
+        solver: Prepared for `score_pair` at this goal.
     """
     if isinstance(solver, Search):
         return analytic.out_of_reach(problem, work, solver)
@@ -47,13 +47,14 @@ def out_of_reach(problem: Problem, work: Workspace, solver: Solver) -> int:
 def score_pair(
     problem: Problem, work: Workspace, body_A: FloatArray, solver: Solver
 ) -> tuple[int, int]:
-    """Score one goal within reach; base and gripper are free already.
+    """Score one goal within reach, base and gripper being free of contact.
 
     Args:
         problem: The scene.
-        work: Environment, base, gripper and goal are placed.
+        work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A at the current torso level.
-        solver: Prepared by `out_of_reach`; `best` gets filled with joint angles [rad] when reached.
+        solver: Prepared by `out_of_reach`; `best` is filled with the joint angles [rad] of the
+            solution if the goal is reached.
 
     Returns:
         Reason and contact code.
@@ -63,7 +64,7 @@ def score_pair(
     return numeric.score_pair(problem, work, body_A, solver)
 
 
-# Not strict: numba takes annotations as part of the names of arguments.
+# Not strict: a strict overload would compare the annotations of the arguments too.
 @overload(out_of_reach, strict=False)
 def _compiled_out_of_reach(problem: Any, work: Any, solver: Any) -> Callable[..., int]:
     if tuple_class(solver) is Search:

@@ -1,4 +1,4 @@
-"""Every initial configuration of a slice of the grid against every goal."""
+"""Score every initial configuration in a slice of the grid at every goal."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from tcs.kernel.views import unowned
 
 
 def gripper_contacts(problem: Problem) -> IntArray:
-    """Return the gripper's contact with the environment at every goal, shape (states, goals).
+    """Return the contact codes of the gripper with the environment, shape (states, goals).
 
-    It is independent of the base pose.
+    With the tool at a goal they are independent of the base pose.
     """
     codes = np.empty(problem.goal_p.shape[:2], np.int64)
     _gripper_contacts(problem, new_workspace(problem), codes)
@@ -57,10 +57,11 @@ def score_slice(
         problem: The scene, its goals and its grid.
         grippers: From `gripper_contacts`.
         start: First configuration.
-        stop: One after the last.
-        scores: Filled; every array holds stop - start rows.
+        stop: One after the last configuration.
+        scores: Filled; every array has stop - start rows. `dexterity` and `joints` are written only
+            where a goal is reached, `reason` and `contact` everywhere.
     """
-    # Allocated here, to outlive the call: the compiled code takes unowned views of them.
+    # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     _score_slice(
         problem, new_workspace(problem), new_solver(problem), grippers, start, stop, scores
     )
@@ -94,7 +95,7 @@ def _score_slice(
             scores.contact[row] = code
             continue
         body_A = problem.body_A[torso]
-        # What blocks here must not depend on what was scored before.
+        # The reported contact must not depend on the configurations scored before.
         work.last[0] = -1
         environment_placed = False
         for g in range(problem.goal_p.shape[1]):
@@ -127,7 +128,7 @@ def _score_slice(
 def write_winner(
     problem: Problem, best: FloatArray, rounded: FloatArray, scores: Scores, row: int, g: int
 ) -> None:
-    """Write the winning joints, rounded, and the measure of the rounded joints."""
+    """Store the joint angles of the best solution, rounded to float32, and the measure at these."""
     rounded_inward(best, problem.arm.lower, problem.arm.upper, rounded)
     for i in range(7):
         scores.joints[row, g, i] = rounded[i]

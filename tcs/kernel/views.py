@@ -1,12 +1,12 @@
 """Unowned views of named tuples, for inner loops without reference counting.
 
-Numba passes a named tuple by value, array by array, and counts references to an array wherever a
-function takes one out of it, by an atomic operation on a counter that all threads share. In the
-sweep that took a third of the time of one thread and kept two from being twice as fast, and most
-of the compile time went into the hundreds of values that every call passes. An unowned view is the
-address of one copy of the tuple, and its arrays have no owner. The owner must outlive the view:
-entry points take views of their own arguments, which their callers hold, and the copy lives as long
-as the entry point runs.
+Numba passes a named tuple by value, array by array, and counts references wherever a function reads
+an array from it, by an atomic operation on a counter shared by all threads. In the sweep this took
+a third of the time of one thread and prevented two threads from being twice as fast, and most of
+the compile time went into the hundreds of values that every call passes. An unowned view is the
+address of one copy of the tuple, whose arrays have no owner. The owner must outlive the view: entry
+points take views of their own arguments, which their callers own, and the copy lives until the
+entry point returns.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class UnownedView(types.Type):
     """The address of a named tuple whose arrays have no owner."""
 
     def __init__(self, owned: Any) -> None:
-        """Take the type of the named tuple."""
-        # Names of types become names of functions: the tuple's own runs over pages.
+        """Create the type of views of named tuples of the numba type `owned`."""
+        # Type names become part of function names; that of the tuple has thousands of characters.
         mark = hashlib.sha256(str(owned).encode()).hexdigest()[:12]
         super().__init__(name=f"UnownedView[{owned.instance_class.__name__},{mark}]")
         self.owned = owned
 
     @property
     def key(self) -> Any:
-        """What makes two of these types the same."""
+        """Identity of the type: the type of the named tuple."""
         return self.owned
 
 
@@ -52,9 +52,9 @@ class _UnownedViewModel(models.PrimitiveModel):
 class _UnownedViewFields(AttributeTemplate):
     key = UnownedView
 
-    # Numba declares it as NotImplemented, for subclasses to fill in.
+    # Numba declares this attribute as NotImplemented, for subclasses to define.
     def generic_resolve(self, value: Any, attr: str) -> Any:  # type: ignore[override]
-        """Return the type of a field; a named tuple in it becomes a view too."""
+        """Return the type of a field, a view if the field is a named tuple; None if unknown."""
         if attr not in value.owned.fields:
             return None
         numba_type = value.owned.types[value.owned.fields.index(attr)]
@@ -65,7 +65,7 @@ class _UnownedViewFields(AttributeTemplate):
 
 @lower_getattr_generic(UnownedView)
 def _field(context: Any, builder: Any, view: Any, address: Any, name: str) -> Any:
-    """Return the field of that name, or its address if it is a named tuple."""
+    """Return the value of a field, or its address if it is a named tuple."""
     which = view.owned.fields.index(name)
     zero, index = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.IntType(32), which)
     at = builder.gep(address, [zero, index], inbounds=True)
@@ -73,7 +73,7 @@ def _field(context: Any, builder: Any, view: Any, address: Any, name: str) -> An
 
 
 def _without_owner(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
-    """Return the value with every array in it, however deep in tuples, stripped of its owner."""
+    """Return the value with the owner removed from every array, in nested tuples too."""
     if isinstance(numba_type, types.Array):
         array = cgutils.create_struct_proxy(numba_type)(context, builder, value)
         array.meminfo = ir.Constant(array.meminfo.type, None)
@@ -89,7 +89,7 @@ def _without_owner(context: Any, builder: Any, numba_type: Any, value: Any) -> A
 
 
 def tuple_class(numba_type: Any) -> type:
-    """Return the class of the named tuple that a value of a numba type is, or is a view of."""
+    """Return the class of a named tuple from its numba type or the type of a view of it."""
     owned = numba_type.owned if isinstance(numba_type, UnownedView) else numba_type
     return cast(type, owned.instance_class)
 
@@ -98,7 +98,7 @@ if TYPE_CHECKING or vars(numba.config)["DISABLE_JIT"]:
 
     def unowned(owned: _Owned) -> _Owned:
         """Return an unowned view of a named tuple: fields can be read, and arrays written."""
-        # Without a compiler there is no counting.
+        # Uncompiled code counts no references.
         return owned
 
 else:

@@ -1,5 +1,5 @@
-"""Arms with a closed-form inverse: samples of the free joint, solved in batches.
+"""Arms with closed-form inverse kinematics: samples of the free joint, solved in batches.
 
-In: a goal pose in the arm base frame and the arm's solver constants. Out: candidate joint angles,
-and the best collision-free one.
+In: a goal pose in the arm base frame and the constants of the closed form. Out: candidate joint
+angles, and the best collision-free solution.
 """

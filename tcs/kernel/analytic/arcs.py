@@ -1,4 +1,4 @@
-"""Arcs of the free joint that the elbow can span, and windows in which to refine the search."""
+"""Arcs of the free joint at which the goal is within reach, and windows to refine the search in."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 
 MAX_ARCS = 6
-"""Two arcs mirror each other about the direction of the goal; limits cut each at most in two, and
-the full turn of a continuous joint once more."""
+"""Greatest number of arcs: two, symmetric about the direction of the goal, each shifted by -1, 0
+and 1 full turns."""
 
 INSET = 1e-9
-"""How far inside the limits of free joint and elbow arcs end [rad]: a slack of about 1e-9, far
-above its rounding, which must not decide whether the outermost sample is feasible."""
+"""Distance of the ends of the arcs from the limits of free joint and elbow [rad]. The slack there
+is about 1e-9, so that rounding does not decide whether the outermost sample is feasible."""
 
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
+"""Result of `elbow_arcs`."""
 
 
 @jit
 def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int, int]:
-    """Fill the arcs of the free joint at which the elbow can span shoulder to wrist.
+    """Fill the arcs of the free joint at which the elbow can span the distance shoulder to wrist.
 
-    |SW|^2 is a cosine of q1, the free joint, about the direction of the goal, and a cosine of q4:
-    the limits of joint 4 bound the first cosine from both sides.
+    |SW|^2 varies as a cosine of q1, the free joint, about the direction of the goal, and as a
+    cosine of q4: the limits of joint 4 bound the first cosine from both sides.
 
     Args:
         arm: The arm.
@@ -32,8 +33,8 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
         arcs: Filled with (first, last) [rad], shape (MAX_ARCS, 2); within the joint's limits.
 
     Returns:
-        The number of arcs, and IN_REACH, OUT_OF_REACH (no angle at all would do) or OUT_OF_LIMITS
-        (the free joint would have to pass its limits).
+        Number of arcs, and IN_REACH, OUT_OF_REACH (no angle of the free joint suffices) or
+        OUT_OF_LIMITS (only angles beyond the limits of the free joint do).
     """
     wx, wy, wz = goal[0, 0], goal[0, 1], goal[0, 2]
     sx, sy, sz = arm.p[1, 0], arm.p[1, 1], arm.p[1, 2]
@@ -55,7 +56,7 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
         return 0, OUT_OF_REACH
     lower, upper = arm.lower[arm.free], arm.upper[arm.free]
     if not upper - lower < 2.0 * np.pi:
-        # One full turn about the direction of the goal holds all there is.
+        # One full turn about the direction of the goal contains every solution.
         if inner == 0.0:
             arcs[0, 0], arcs[0, 1] = centre - outer, centre + outer
             return 1, IN_REACH
@@ -72,7 +73,7 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
             first, last = max(first, lower + INSET), min(last, upper - INSET)
             if first > last:
                 continue
-            # Where arcs join, half a turn away from the goal, rounding leaves a gap.
+            # Arcs that join half a turn away from the goal are separated by rounding only.
             if count and arcs[count - 1, 1] >= first - INSET:
                 arcs[count - 1, 1] = last
             elif count < MAX_ARCS:
@@ -83,13 +84,13 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
 
 @inner
 def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
-    """Return whether a window narrower than the spacing may hide about infeasible sample i.
+    """Return whether a feasible window narrower than the spacing may lie next to sample i.
 
     Args:
-        slack: Of neighbouring samples, shape (>= count,).
-        i: The sample.
-        count: How many samples there are.
-        step: Their spacing [rad].
+        slack: Slack of consecutive samples, shape (>= count,).
+        i: Index of the sample.
+        count: Number of samples.
+        step: Spacing of the samples [rad].
     """
     if slack[i] >= 0.0 or slack[i] <= -PEAK_SLOPE * step:
         return False
@@ -100,21 +101,21 @@ def is_peak(slack: FloatArray, i: int, count: int, step: float) -> bool:
 
 @jit
 def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, found: int) -> int:
-    """Append the stretches of a row of samples in which feasible angles lie or may hide.
+    """Append the windows of consecutive samples that contain, or may contain, feasible angles.
 
-    A stretch is a run of feasible samples with its two neighbours, or the two neighbours of an
-    infeasible sample that comes closer to feasible than both: a window narrower than the spacing
-    shows as such a peak.
+    A window is a run of feasible samples with the sample on either side, or the two neighbours of
+    an infeasible sample whose slack is a local maximum: a feasible interval narrower than the
+    spacing shows as such a peak.
 
     Args:
-        slack: Of neighbouring samples, shape (>= count,).
-        count: How many samples there are.
-        step: Their spacing [rad].
-        windows: Filled with (first, last) as sample indices, shape (most windows, 2).
-        found: How many windows are there already.
+        slack: Slack of consecutive samples, shape (>= count,).
+        count: Number of samples.
+        step: Spacing of the samples [rad].
+        windows: Filled with (first, last) as sample indices, shape (capacity, 2).
+        found: Number of windows already present.
 
     Returns:
-        How many windows are there now.
+        Updated number of windows.
     """
     i = 0
     while i < count and found < windows.shape[0]:
@@ -134,7 +135,7 @@ def windows_of(slack: FloatArray, count: int, step: float, windows: FloatArray, 
 
 
 PEAK_SLOPE = 10.0
-"""How far below feasible a peak may lie, per spacing, and still hide a window. Slack is a
-difference of cosines of joint angles, which move a few radians per radian of the free joint, and
-up to 13 where one limit is left just as another is met. A peak lies at most half a spacing from
-its best sample, so this allows for slopes of 20."""
+"""A peak whose slack is above -PEAK_SLOPE times the spacing may hide a feasible window. Slack is a
+difference of cosines of joint angles, which change by a few radians per radian of the free joint,
+and by up to 13 where one joint leaves a limit just as another meets one. The true maximum lies at
+most half a spacing from the best sample, so this allows for slopes of 20."""

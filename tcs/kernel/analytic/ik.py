@@ -1,7 +1,7 @@
-"""Inverse kinematics of one goal: the goal as the samples need it, and the joints of one sample.
+"""Closed-form inverse kinematics of one goal, at one value of the free joint.
 
-An arm of the spherical-shoulder class is solved as the reversed chain: the conversion from and to
-the real arm happens here, and everything between uses the joints 1 .. 7 of the chain as solved.
+An arm of the spherical-shoulder class is solved as the reversed chain. This module converts goals
+to that chain and joint angles back from it; `samples` only deals with the chain as solved.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from tcs.kernel.cache import inner, jit
 
 @jit
 def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatArray) -> None:
-    """Express a tool goal as the samples need it: all in the frame that joint 1 turns about.
+    """Express a goal in the frame about whose z axis joint 1 rotates.
 
     Args:
         arm: The arm.
         R_AG: Goal orientation in the arm base A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        goal: Filled, shape (4, 3): wrist centre, axis 7, x axis of L7, wrist centre to the point
-            whose velocity counts, the real tool.
+        goal: Filled, shape (4, 3): wrist centre [m], direction of axis 7, x axis of L7, and the
+            vector from the wrist centre to the real tool, whose velocity the Jacobian describes
+            [m].
     """
     for i in range(3):
         for k in range(3):
@@ -31,7 +32,7 @@ def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatAr
     for i in range(3):
         a, b, c, w = R_AG[i, 0], R_AG[i, 1], R_AG[i, 2], p_AG[i]
         if arm.free == LAST:
-            # Base and tool change places: the reversed chain has to bring its tool A to X_GA.
+            # Base and tool swap roles: the reversed chain must bring its tool A to X_GA.
             a, b, c = R_AG[0, i], R_AG[1, i], R_AG[2, i]
             w = -(a * p_AG[0] + b * p_AG[1] + c * p_AG[2])
         x = a * arm.R[7, 0, 0] + b * arm.R[7, 0, 1] + c * arm.R[7, 0, 2]
@@ -54,14 +55,14 @@ def wrist_goal(arm: ArmSolver, R_AG: FloatArray, p_AG: FloatArray, goal: FloatAr
 def sample_joints(
     arm: ArmSolver, goal: FloatArray, branch: IntArray, q1: float, q: FloatArray
 ) -> None:
-    """Fill the seven joint angles of one sample [rad], each turned into its limits.
+    """Fill the seven joint angles of one sample [rad], each shifted by full turns into its limits.
 
     Args:
         arm: The arm.
         goal: From `wrist_goal`, shape (4, 3).
         branch: Three signs, one row of `arm.branches`.
-        q1: The free joint [rad].
-        q: Filled in the real arm's order, shape (7,). Where a joint has no limits, in (-pi, pi].
+        q1: Angle of the free joint [rad].
+        q: Filled in the real arm's order, shape (7,); a joint without limits is in (-pi, pi].
     """
     R = arm.R
     v, z, x = goal[0].copy(), goal[1].copy(), goal[2].copy()
@@ -113,10 +114,10 @@ def sample_joints(
 
 @jit
 def within(angle: float, lower: float, upper: float) -> float:
-    """Return `angle` turned by full turns into [lower, upper], and clipped to it.
+    """Return `angle` [rad] shifted by full turns into [lower, upper], and clipped to it.
 
-    The clip takes away rounding only: callers have checked the limits through the slack.
-    Without limits, the angle in (-pi, pi].
+    The clip removes rounding only: callers have checked the limits by the slack. Without limits,
+    the result is in (-pi, pi].
     """
     turn = 2.0 * np.pi
     if not np.isfinite(lower):
@@ -130,7 +131,10 @@ def within(angle: float, lower: float, upper: float) -> float:
 def _angle_to_height(
     R: FloatArray, x: float, y: float, z: float, height: float, sign: int
 ) -> float:
-    """Return the turn about z after which R (x, y, z) has the z component `height`."""
+    """Return the angle t [rad] for which R Rz(t) (x, y, z) has the z component `height`.
+
+    Of the two such angles, `sign` selects one.
+    """
     P = R[2, 0] * x + R[2, 1] * y
     Q = R[2, 1] * x - R[2, 0] * y
     m = height - R[2, 2] * z
@@ -140,7 +144,7 @@ def _angle_to_height(
 
 @inner
 def _inverse_rot_z(angle: float, v: FloatArray) -> None:
-    """Turn v by -angle about z, in place."""
+    """Rotate v by -angle about z, in place."""
     c, s = np.cos(angle), np.sin(angle)
     v[0], v[1] = c * v[0] + s * v[1], -s * v[0] + c * v[1]
 

@@ -1,4 +1,7 @@
-"""One initial configuration against one goal: is it reached, how well, and if not, why not?"""
+"""Score of one initial configuration at one goal, for an arm with a closed form.
+
+The score is the best collision-free solution, or the reason why there is none.
+"""
 
 from __future__ import annotations
 
@@ -33,29 +36,30 @@ from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 ONE_SAMPLE, NOTHING = int_constant(1), int_constant(-1)
 
 REFINEMENTS = 3
-"""Rounds in which the neighbourhood of the best solution is divided by REFINE_SAMPLES / 2."""
+"""Number of refinement rounds; each multiplies the spacing by 2 / (REFINE_SAMPLES - 1)."""
 REFINE_SAMPLES = int_constant(8)
 BISECTIONS = 8
 """Bisections of the interval between two contacts: down to FINE_STEP / 256, below the spacing of
 the dense scan."""
 BISECTION_PARTS = 16.0
-"""How finely the neighbourhood of an angle found by halving is refined."""
+"""The refinement of an angle found by bisection starts with the distance between the two contacts
+divided by this as its spacing."""
 END_HALVINGS = 12
-"""Halvings towards the end of a feasible stretch: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
+"""Bisections towards the end of a feasible interval: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
 SAME_STRETCH = 1.01
-"""Candidates within this many of their spacings have nothing infeasible between them that was
-seen; the hundredth is for rounding."""
+"""Candidates closer than this many sample spacings have no infeasible sample between them; the
+excess over 1 allows for rounding."""
 
 
 @inner
 def samples_hold_measure(problem: Problem) -> bool:
-    """Return whether what the samples are filled with, isotropy, is the measure that counts."""
+    """Return whether isotropy, which `solve_samples` computes, is the measure to maximise."""
     return problem.measure.of == ISOTROPY and problem.measure.penalty == UNLIMITED
 
 
 @inner
 def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
-    """Return the measure that counts at an angle of the free joint on branch b; fills `q`."""
+    """Return the measure to maximise at an angle [rad] of the free joint on branch b; fills `q`."""
     sample_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
     return measure_at(problem, search.q)
 
@@ -64,12 +68,13 @@ def measure_of(problem: Problem, search: Search, b: int, angle: float) -> float:
 def best_free(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> tuple[int, int]:
-    """Return the best collision-free candidate, and the contact of the best one of all.
+    """Return the best collision-free candidate, and the contact of the best candidate.
 
-    Candidates are tried in descending order of their measure. Those tried in vain are marked.
+    Candidates are checked in descending order of their measure.
 
     Returns:
-        Index of the candidate or -1; contact code of the very best candidate or NO_CONTACT.
+        Index of the best collision-free candidate or -1; contact code of the candidate with the
+        highest measure, or NO_CONTACT if it touches nothing.
     """
     first_contact = NO_CONTACT
     top = best_of(search.found_measure, found)
@@ -94,15 +99,15 @@ def best_free(
 def bisect_contacts(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
 ) -> int:
-    """Look for a free angle where every candidate touches something.
+    """Search for a collision-free angle when every candidate is in contact.
 
-    A free stretch narrower than the spacing lies where one contact has ended and another not
-    begun, or where a contact has ended and a joint limit is about to be passed. So the very ends
-    of the feasible stretches join the candidates, all are walked in the order of their angles, and
-    where the pair in contact changes, bisection finds whether a free interval separates the two.
+    A collision-free interval narrower than the spacing lies between the end of one contact and the
+    start of another, or between the end of a contact and a joint limit. So the ends of the feasible
+    intervals are added to the candidates, all candidates are checked in the order of their angles,
+    and where the pair in contact changes, bisection searches between the two angles.
 
     Returns:
-        Index of the candidate that now holds a free angle, or -1.
+        Index of the candidate that now holds a collision-free angle, or -1.
     """
     arm = problem.arm
     found = _add_ends(problem, search, found)
@@ -133,16 +138,16 @@ def bisect_contacts(
 
 @inner
 def _by_angle(search: Search, found: int) -> None:
-    """Put the candidates in order: branch by branch, by their angles."""
+    """Sort the candidates by branch, then by angle."""
     for n in range(found):
-        # No angle of the free joint is anywhere near this far from zero.
+        # The offset exceeds any angle of the free joint [rad].
         search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
     sort_candidates(search, found)
 
 
 @inner
 def _are_neighbours(search: Search, m: int, n: int) -> bool:
-    """Return whether nothing infeasible was seen between two candidates that follow each other."""
+    """Return whether no infeasible sample lies between two consecutive candidates."""
     width = search.found_angle[n] - search.found_angle[m]
     spacing = max(search.found_step[m], search.found_step[n])
     return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
@@ -150,10 +155,10 @@ def _are_neighbours(search: Search, m: int, n: int) -> bool:
 
 @inner
 def _add_ends(problem: Problem, search: Search, found: int) -> int:
-    """Append the last angle that keeps all limits at each end of the feasible stretches.
+    """Append the outermost feasible angle at each end of the feasible intervals.
 
     Returns:
-        How many candidates there are now.
+        Updated number of candidates.
     """
     _by_angle(search, found)
     order, before = search.order, found
@@ -171,7 +176,18 @@ def _add_ends(problem: Problem, search: Search, found: int) -> int:
 
 @inner
 def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) -> int:
-    """Append where the stretch ends that candidate n is the outermost of, to one side."""
+    """Append the end of a feasible interval, on the given side of its outermost candidate n.
+
+    Args:
+        problem: The scene.
+        search: The candidates.
+        n: Index of the candidate.
+        side: -1 towards smaller angles, 1 towards greater ones.
+        found: Number of candidates.
+
+    Returns:
+        Updated number of candidates.
+    """
     b, angle = search.found_branch[n], search.found_angle[n]
     inside, outside, value = 0.0, search.found_step[n], -1.0
     for _ in range(END_HALVINGS):
@@ -201,9 +217,9 @@ def _between(
     i: int,
     j: int,
 ) -> float:
-    """Return a free angle in first .. first + width, or nan.
+    """Return a collision-free angle in [first, first + width] [rad], or nan if none is found.
 
-    At `first` the pair (partner, i, j) touches, at the other end the pair in `work.last`.
+    At `first` the pair (partner, i, j) is in contact, at the other end the pair in `work.last`.
     """
     arm = problem.arm
     other, k, m = work.last[0], work.last[1], work.last[2]
@@ -231,7 +247,7 @@ def _between(
 
 @inner
 def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float) -> float:
-    """Return what a candidate at this angle on branch b is worth, or -1 if it is none."""
+    """Return the measure at an angle [rad] on branch b, or -1 where the angle is infeasible."""
     arm = problem.arm
     search.cosine[0], search.sine[0] = np.cos(angle), np.sin(angle)
     solve_samples(
@@ -251,10 +267,10 @@ def _measure_if_feasible(problem: Problem, search: Search, b: int, angle: float)
 def refine(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search, winner: int
 ) -> None:
-    """Climb from a collision-free candidate to the best angle nearby; fills `search.best`.
+    """Improve a collision-free candidate by sampling angles near it; fills `search.best`.
 
-    Each round spreads samples over one spacing to either side, takes the best one that is feasible
-    and free, and narrows the spacing.
+    Each round spreads samples over one spacing to either side, moves to the best sample that is
+    feasible and collision-free, and reduces the spacing.
     """
     arm = problem.arm
     branch = arm.branches[search.found_branch[winner]]
@@ -290,12 +306,12 @@ def refine(
 
 @inner
 def out_of_reach(problem: Problem, work: Workspace, search: Search) -> int:
-    """Return TOO_FAR or JOINT_LIMITS if no angle of the free joint can do, else REACHED.
+    """Return TOO_FAR or JOINT_LIMITS if no angle of the free joint reaches the goal, else REACHED.
 
     Args:
         problem: The scene.
-        work: The goal is placed.
-        search: `goal`, `arcs` and `arc_count` get filled.
+        work: Workspace with the goal in A.
+        search: `goal`, `arcs` and `arc_count` are filled.
     """
     wrist_goal(problem.arm, work.R_AG, work.p_AG, search.goal)
     search.arc_count[0], reach = elbow_arcs(problem.arm, search.goal, search.arcs)
@@ -308,13 +324,14 @@ def out_of_reach(problem: Problem, work: Workspace, search: Search) -> int:
 def score_pair(
     problem: Problem, work: Workspace, body_A: FloatArray, search: Search
 ) -> tuple[int, int]:
-    """Score one goal within reach; base and gripper are free already.
+    """Score one goal within reach, base and gripper being free of contact.
 
     Args:
         problem: The scene.
-        work: Environment, base, gripper and goal are placed.
+        work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A at the current torso level.
-        search: From `out_of_reach`; `best` gets filled with joint angles [rad] when reached.
+        search: As filled by `out_of_reach`; `best` is filled with the joint angles [rad] of the
+            solution if the goal is reached.
 
     Returns:
         Reason and contact code.

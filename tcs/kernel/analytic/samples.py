@@ -1,8 +1,8 @@
 """Inverse kinematics of many samples of the free joint at once.
 
-A sample is a value of joint 1 on one branch. The loop over samples has no branches, so the compiler
-vectorises it. Joints 1 .. 7 are those of the chain as solved, which is reversed for an arm of the
-spherical-shoulder class.
+A sample is a value of joint 1 on one branch of the solution. The loop over samples contains no
+conditional jumps, so the compiler vectorises it. Joints 1 .. 7 are those of the chain as solved,
+which is reversed for an arm of the spherical-shoulder class.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
 
 TINY = 1e-300
-"""Keeps 0/0 at a singularity finite; such samples are infeasible."""
+"""Avoids 0/0 at a singularity; such samples are infeasible."""
 SHARP = 1e14
-"""Inverse of the squared sine of the angle to an axis below which a direction lies along it. An
-angle of 1e-7 rad still determines the joint to 1e-9 rad."""
+"""A direction is along an axis where the squared sine of their angle is below 1 / SHARP. An angle
+of 1e-7 rad still determines the joint to 1e-9 rad."""
 
 
 @jit
@@ -38,12 +38,13 @@ def solve_samples(
         goal: From `wrist_goal`, shape (4, 3).
         branch: Three signs, one row of `arm.branches`.
         cosines: cos(q1) for the values of the free joint, shape (>= count,).
-        sines: sin(q1), likewise.
-        count: How many samples to fill.
-        slack: Filled: >= 0 where the branch exists and every joint keeps its limits. It measures
-            the worst condition, as a difference of cosines, and varies continuously with q1.
-        measure: Filled: kinematic isotropy to the sixth power where slack >= 0; elsewhere, from
-            -1 to 0, minus the squared sine of joint 6's angle from where the wrist is straight.
+        sines: sin(q1) for the same values, shape (>= count,).
+        count: Number of samples.
+        slack: Filled, shape (>= count,): >= 0 where the branch exists and every joint is within its
+            limits. It measures the worst condition, as a difference of cosines, and varies
+            continuously with q1.
+        measure: Filled, shape (>= count,): kinematic isotropy to the sixth power where slack >= 0;
+            elsewhere minus the squared sine of joint 6 from the straight wrist, in [-1, 0].
 
     Source:
         Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
@@ -99,7 +100,7 @@ def solve_samples(
     root6 = np.sqrt(N6)
     for i in range(count):
         c1, s1 = cosines[i], sines[i]
-        # Into L1, then from the shoulder S into the frame that joint 2 turns about.
+        # SW in L1, then in the frame about whose z axis joint 2 rotates.
         vx, vy, vz = c1 * wx + s1 * wy - sx, -s1 * wx + c1 * wy - sy, wz - sz
         square = vx * vx + vy * vy + vz * vz
         v2x = a00 * vx + a10 * vy + a20 * vz
@@ -119,18 +120,18 @@ def solve_samples(
         N = P * P + Q * Q + TINY
         m = v2z - b22 * uz
         aim_left = N - m * m
-        # Out of reach, the nearest turn stands in, so that slack goes on smoothly.
+        # Out of reach, the nearest angle is used, so that slack remains continuous.
         root = np.sqrt(N)
         m = min(max(m, -root), root)
         h = aim * np.sqrt(max(aim_left, 0.0))
         c3, s3 = (P * m - Q * h) / N, (Q * m + P * h) / N
-        # Joint 2: turn the rest onto the goal.
+        # Joint 2: rotate SW towards the wrist centre of the goal.
         rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
         kx = b00 * rx + b01 * ry + b02 * uz
         ky = b10 * rx + b11 * ry + b12 * uz
         D2 = kx * kx + ky * ky
-        # Where the aim succeeds, D is D2; out of reach it keeps (c2, s2) an angle, so that slack
-        # goes on as smoothly as the search for narrow windows takes it to.
+        # Where the aim succeeds, D equals D2; out of reach it keeps (c2, s2) of length 1, so that
+        # slack remains continuous, as the search for narrow windows requires.
         D = np.sqrt(D2 * (v2x * v2x + v2y * v2y) + TINY)
         c2, s2 = (kx * v2x + ky * v2y) / D, (kx * v2y - ky * v2x) / D
         # Axis 7, its x axis and the tool offset, into L3.
@@ -155,7 +156,7 @@ def solve_samples(
         px, py, pz = b00 * gx + b10 * gy + b20 * gz, b01 * gx + b11 * gy + b21 * gz, 0.0
         pz = b02 * gx + b12 * gy + b22 * gz
         ox, oy, oz = c3 * px + s3 * py, -s3 * px + c3 * py, pz
-        # Axis 7 and its x axis on into the frame that joint 5 turns about.
+        # Axis 7 and its x axis, into the frame about whose z axis joint 5 rotates.
         px, py, pz = c00 * a7x + c10 * a7y + c20 * a7z, c01 * a7x + c11 * a7y + c21 * a7z, 0.0
         pz = c02 * a7x + c12 * a7y + c22 * a7z
         gx, gy, gz = c4 * px + s4 * py, -s4 * px + c4 * py, pz
@@ -187,13 +188,13 @@ def solve_samples(
         px, py = c6 * gx + s6 * gy, -s6 * gx + c6 * gy
         c7 = f00 * px + f10 * py + f20 * gz
         s7 = f01 * px + f11 * py + f21 * gz
-        # Of length 1 but where wrist or aim are out of reach: as for joint 2.
+        # Its length is 1 except where wrist or aim is out of reach: normalise as for joint 2.
         D = np.sqrt(c7 * c7 + s7 * s7 + TINY)
         c7, s7 = c7 / D, s7 / D
         sine_squared = wrist_left / N6
         left = min(elbow_left, min(aim_left / N, sine_squared))
         # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
-        # directions are no solutions. Elsewhere these terms are far above any slack.
+        # samples are infeasible. Elsewhere these terms are far above any slack.
         left = min(left, min(min(N, D2) * SHARP - square, D5 * SHARP - 1.0))
         left = min(left, c1 * mc1 + s1 * ms1 - h1)
         left = min(left, c2 * mc2 + s2 * ms2 - h2)
@@ -252,7 +253,7 @@ def solve_samples(
         d56 = kx * x56 + ky * y56 + kz * z56
         n_square = n1 * n1 + n2 * n2 + n3 * n3 + n4 * n4
         det = n_square * d567 * d567 + d67 * d67 + d57 * d57 + d56 * d56
-        # The trace, at the tool: each joint moves T by l + a x o, and turns it by a unit vector.
+        # The trace at the tool: each column of J is a unit axis a and a linear part l + a x o.
         kx, ky, kz = l1x + a1y * oz - a1z * oy, l1y + a1z * ox - a1x * oz, l1z + a1x * oy - a1y * ox
         trace = 7.0 + kx * kx + ky * ky + kz * kz
         kx, ky, kz = l2x + a2y * oz - a2z * oy, l2y + a2z * ox - a2x * oz, l2z + a2x * oy - a2y * ox

@@ -13,32 +13,33 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 
 FIRST_SAMPLES = 48
-"""Samples over all arcs together in the first pass: enough to find the feasible windows."""
+"""Number of samples over all arcs together in the first pass, which finds the feasible windows."""
 FINE_STEP = 0.0125
 """Spacing [rad] of the second pass, inside the windows. Chosen by measurement: recall against a
 dense scan of 11,520 samples (benchmarks/)."""
 MIN_SAMPLES = int_constant(8)
-"""Samples that even the smallest window or arc gets: one vector of the processor."""
+"""Least number of samples of a window or arc: one SIMD vector."""
 FINE_SAMPLES = int_constant(8)
-"""Samples at each end of a feasible stretch, and about a peak that is closed in on."""
+"""Number of samples at each end of a feasible interval, and about a peak that is refined."""
 PEAK_REFINEMENTS = 4
 """Number of refinements about an infeasible peak, each to 2/7 of the spacing: down to 8e-5
-rad. Between a limit that a joint leaves and one that another joint meets, windows are as narrow
-as the two happen to let them be."""
+rad. A window between a limit that one joint leaves and a limit that another meets may be
+arbitrarily narrow."""
 STRAIGHT = 0.05
 """Squared sine of the wrist angle below which joints 5 and 7 (1 and 3 of the spherical-shoulder
-class) turn by 180 degrees within a few hundredths of a radian, past the window in which both keep
-their limits."""
+class) rotate by 180 degrees within a few hundredths of a radian of the free joint, so that samples
+may miss the window in which both are within their limits."""
 NONE = int_constant(0)
 BY_SLACK, BY_WRIST = int_constant(0), int_constant(1)
-"""What a refinement follows: the greatest slack, or the straightest wrist."""
+"""What a refinement maximises: the slack, or how straight the wrist is."""
 ANYWHERE = (-np.inf, np.inf)
 STRAIGHT_REFINEMENTS = 5
-"""Number of refinements about a straight wrist, each to 2/7 of the spacing: from 0.05 rad
-down to 1e-4 rad."""
+"""Number of refinements about a straight wrist, each to 2/7 of the spacing: from 0.05 rad to 1e-4
+rad."""
 MAX_SAMPLES = 512
 MAX_WINDOWS = 32
 MAX_CANDIDATES = 4096
+"""Capacities of the scratch arrays."""
 
 
 class Search(NamedTuple):
@@ -48,13 +49,13 @@ class Search(NamedTuple):
     arcs: FloatArray
     """Arcs of the free joint (first, last) [rad], shape (MAX_ARCS, 2)."""
     arc_count: IntArray
-    """How many arcs there are, shape (1,)."""
+    """Number of arcs, shape (1,)."""
     windows: FloatArray
     ends: FloatArray
-    """Outer and inner side of the ends of feasible stretches [rad], shape (MAX_WINDOWS, 2)."""
+    """Samples just outside and just inside each end of a feasible interval [rad], shape
+    (MAX_WINDOWS, 2)."""
     peaks: FloatArray
-    """Infeasible angles that are nearer to feasible than their neighbours [rad], shape
-    (MAX_WINDOWS,)."""
+    """Infeasible angles at which the slack has a local maximum [rad], shape (MAX_WINDOWS,)."""
     straight: FloatArray
     """Where the wrist is straightest: angle [rad], spacing of the samples [rad] and branch, shape
     (MAX_WINDOWS, 3)."""
@@ -66,22 +67,23 @@ class Search(NamedTuple):
     found_angle: FloatArray
     """Free joint of each candidate [rad], shape (MAX_CANDIDATES,)."""
     found_step: FloatArray
-    """Spacing [rad] of the samples it was found with."""
+    """Spacing of the samples among which each candidate was found [rad], shape
+    (MAX_CANDIDATES,)."""
     found_measure: FloatArray
-    """Its isotropy to the sixth power, or another measure if one was requested; -1 once it is
-    known to collide."""
+    """Isotropy of each candidate to the sixth power, or its measure if another one is maximised,
+    shape (MAX_CANDIDATES,)."""
     found_branch: IntArray
-    """Row of its branch in `arm.branches`."""
+    """Row of each candidate's branch in `arm.branches`, shape (MAX_CANDIDATES,)."""
     key: FloatArray
-    """Sort key of the candidates."""
+    """Sort key of each candidate, shape (MAX_CANDIDATES,)."""
     order: IntArray
-    """Indices of the candidates in that order."""
+    """Indices of the candidates by ascending key, shape (MAX_CANDIDATES,)."""
     spare: IntArray
-    """Scratch of the merge sort."""
+    """Scratch of the merge sort, shape (MAX_CANDIDATES,)."""
     q: FloatArray
-    """Current joint angles, shape (7,)."""
+    """Current joint angles [rad], shape (7,)."""
     best: FloatArray
-    """Joint angles of the best solution so far, shape (7,)."""
+    """Joint angles of the best solution so far [rad], shape (7,)."""
 
 
 def new_search() -> Search:
@@ -115,8 +117,8 @@ def new_search() -> Search:
 def fill_samples(search: Search, first: float, last: float, count: int) -> float:
     """Spread `count` >= 2 samples evenly from first to last, ends included; return their spacing.
 
-    Cosines and sines follow by turning the first ones on: 512 turns lose about 1e-13, and the
-    joint angles of a solution are computed anew from its angle.
+    Each cosine and sine follows from the previous one by a rotation: 512 rotations lose about
+    1e-13, and the joint angles of a solution are recomputed from its angle.
     """
     step = (last - first) / (count - 1)
     c, s = np.cos(first), np.sin(first)
@@ -130,7 +132,7 @@ def fill_samples(search: Search, first: float, last: float, count: int) -> float
 
 @inner
 def best_of(measure: FloatArray, count: int) -> int:
-    """Return the index of the greatest value, the first one of equals."""
+    """Return the index of the greatest value, the first one if several are equal."""
     best = 0
     for i in range(1, count):
         if measure[i] > measure[best]:
@@ -140,9 +142,9 @@ def best_of(measure: FloatArray, count: int) -> int:
 
 @inner
 def sort_candidates(search: Search, count: int) -> None:
-    """Fill `order` with the first candidates by ascending `key`, equal ones as they come.
+    """Fill `order` with the first `count` candidates by ascending `key`; the sort is stable.
 
-    A merge sort of our own: numpy's costs the compiler three seconds.
+    The merge sort is written out because numpy's takes three seconds to compile.
     """
     key, order, spare = search.key, search.order, search.spare
     for i in range(count):
@@ -166,15 +168,15 @@ def sort_candidates(search: Search, count: int) -> None:
 
 @jit
 def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
-    """Collect angles of the free joint, on every branch, at which all joints keep their limits.
+    """Collect feasible angles of the free joint, on every branch: all joints within their limits.
 
     Args:
         arm: The arm.
-        search: Its `goal` and `arcs` are set; its candidates get filled.
-        arcs: How many arcs there are.
+        search: `goal` and `arcs` are read; the candidates are filled.
+        arcs: Number of arcs.
 
     Returns:
-        How many candidates were found.
+        Number of candidates.
     """
     length = 0.0
     for k in range(arcs):
@@ -183,7 +185,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     for k in range(arcs):
         first, last = search.arcs[k, 0], search.arcs[k, 1]
         share = FIRST_SAMPLES * (last - first) / length if length > 0.0 else 0.0
-        # Rounded, not truncated: else rounding errors decide on a sample where arcs are symmetric.
+        # To nearest: truncation would let rounding decide the number of samples of symmetric arcs.
         count = max(MIN_SAMPLES, int(share + 0.5))
         for b in range(len(arm.branches)):
             step = fill_samples(search, first, last, count)
@@ -213,9 +215,9 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
 def _record_straight(
     search: Search, b: int, count: int, step: float, first: float, straight: int
 ) -> int:
-    """Append the samples at which the wrist is straighter than at both their neighbours.
+    """Append the samples at which the wrist is straighter than at both neighbouring samples.
 
-    No sample is feasible, so `measure` holds minus the squared sine of the wrist.
+    No sample is feasible, so `measure` holds minus the squared sine of the wrist angle.
     """
     straightness = search.measure
     for i in range(count):
@@ -234,7 +236,7 @@ def _record_straight(
 def _refine_window(
     arm: ArmSolver, search: Search, b: int, first: float, last: float, found: int
 ) -> int:
-    """Append the feasible angles of one window on branch b; return how many there are now."""
+    """Append the feasible angles of one window on branch b; return the number of candidates."""
     count = min(max(MIN_SAMPLES, int((last - first) / FINE_STEP) + 1), MAX_SAMPLES)
     step = fill_samples(search, first, last, count)
     solve_samples(
@@ -248,7 +250,7 @@ def _refine_window(
         if inside:
             found = _add(search, b, i, step, found)
         if inside != before and ends < MAX_WINDOWS:
-            # The outer and the inner side of an end of a feasible stretch.
+            # The samples just outside and just inside an end of a feasible interval.
             search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
             search.ends[ends, 1] = search.angle[i] if inside else search.angle[i - 1]
             ends += 1
@@ -275,20 +277,20 @@ def _refine_about(
     guide: int,
     found: int,
 ) -> int:
-    """Append feasible angles about an infeasible one, found with ever narrower samples.
+    """Append feasible angles near an infeasible one, found by refining the samples about it.
 
     Args:
         arm: The arm.
-        search: Its candidates get filled.
-        b: The branch.
-        middle: The angle: a peak of the slack, or where the wrist is straightest [rad].
-        step: Spacing of the samples it was found with [rad].
-        ends: Where to stay within [rad].
-        guide: BY_SLACK or BY_WRIST, what to follow.
-        found: How many candidates there are.
+        search: The candidates are filled.
+        b: Row of the branch in `arm.branches`.
+        middle: The infeasible angle: a peak of the slack, or where the wrist is straightest [rad].
+        step: Spacing of the samples among which it was found [rad].
+        ends: Bounds of the angles to try [rad].
+        guide: What to maximise, BY_SLACK or BY_WRIST.
+        found: Number of candidates.
 
     Returns:
-        How many candidates there are now.
+        Updated number of candidates.
     """
     value = search.slack if guide == BY_SLACK else search.measure
     for _ in range(PEAK_REFINEMENTS if guide == BY_SLACK else STRAIGHT_REFINEMENTS):
@@ -313,9 +315,9 @@ def _refine_about(
 def _refine_end(
     arm: ArmSolver, search: Search, b: int, outer: float, inner: float, found: int
 ) -> int:
-    """Append feasible angles between two neighbouring samples, themselves left out.
+    """Append feasible angles strictly between two neighbouring samples.
 
-    Close to a joint limit, where a feasible stretch ends, the best measure often is.
+    The best measure is often close to a joint limit, where a feasible interval ends.
     """
     step = fill_samples(search, outer, inner, FINE_SAMPLES)
     solve_samples(
@@ -330,7 +332,7 @@ def _refine_end(
 
 @inner
 def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
-    """Append sample i as a candidate on branch b; return how many there are now."""
+    """Append sample i as a candidate on branch b; return the number of candidates."""
     if found == MAX_CANDIDATES:
         return found
     search.found_angle[found] = search.angle[i]

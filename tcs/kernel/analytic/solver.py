@@ -1,7 +1,8 @@
 """Constants of the closed-form inverse kinematics of a seven-joint arm, computed once per arm.
 
-The class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axes 5, 6 and 7 meet
-(point W, the wrist); any other offsets. Joint 1 is the free parameter. Given its angle,
+The spherical-wrist class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axes 5,
+6 and 7 meet (point W, the wrist); other offsets are arbitrary. Joint 1 is the free parameter. Given
+its angle,
 
 * joint 4 follows from the distance |SW|, which depends on nothing else,
 * joints 2 and 3 aim the vector SW, and
@@ -9,9 +10,9 @@ The class: seven revolute joints; axes 2 and 3 meet (point S, the shoulder); axe
 
 each with two solutions in general: a branch is a triple of signs.
 
-This is the spherical-wrist class. In the spherical-shoulder class axes 1, 2 and 3 meet, and axes 5
-and 6. Such an arm is solved as the reversed chain, from tool to base: its joints come in the order
-7 .. 1, joint 7 is free, and the goal pose is inverted. `ik` converts the goal and the joints.
+The spherical-shoulder class: axes 1, 2 and 3 meet, and axes 5 and 6 meet. Such an arm is solved as
+the reversed chain, from tool to base: its joints are in the order 7 .. 1, joint 7 is free, and the
+goal pose is inverted. `ik` converts the goal and the joints.
 """
 
 from __future__ import annotations
@@ -26,9 +27,8 @@ from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.lines import axis_distance
 
 MEETING_TOLERANCE = 1e-9
-"""Axes that pass each other closer than this [m] meet. Lowering puts the common origins of
-meeting axes at one point, so only rounding is left, while the least offset built into a real arm
-is millimetres."""
+"""Greatest distance [m] of axes that count as meeting. Lowering places the link frames of meeting
+axes at one point, so only rounding remains; the smallest offset of a real arm is millimetres."""
 
 
 FIRST, LAST = 0, 6
@@ -36,18 +36,18 @@ FIRST, LAST = 0, 6
 
 
 class ArmSolver(NamedTuple):
-    """One arm's constants of the closed form. L1..L7 as in `Chain`; u is SW expressed in L3.
+    """Constants of the closed form of one arm. L1..L7 as in `Chain`; u is SW expressed in L3.
 
     For the spherical-shoulder class all fields except `free`, `lower` and `upper` describe the
     reversed chain.
     """
 
     free: int
-    """Index of the free joint in the real arm: FIRST, or LAST where it is solved in reverse."""
+    """Index of the free joint in the real arm: FIRST, or LAST for a reversed chain."""
     R: FloatArray
-    """Rotations of the chain as it is solved, shape (8, 3, 3)."""
+    """Rotations of the chain as solved, shape (8, 3, 3)."""
     p: FloatArray
-    """Translations of the chain as it is solved [m], shape (8, 3)."""
+    """Translations of the chain as solved [m], shape (8, 3)."""
     u0: FloatArray
     """u = u0 + uc cos(q4) + us sin(q4) [m], shape (3,)."""
     uc: FloatArray
@@ -58,7 +58,7 @@ class ArmSolver(NamedTuple):
     """Least and greatest cos(q4 - phase) within the limits of joint 4, shape (2,)."""
     limit_cos: FloatArray
     """A limited joint is within its limits when cos(q - middle) >= limit_cos; shape (7,).
-    -1 where the joint may turn all the way round."""
+    -1 for a joint whose range is a full turn or more."""
     middle_cos: FloatArray
     """cos(middle of the limits), 0 where there are none, shape (7,)."""
     middle_sin: FloatArray
@@ -67,19 +67,19 @@ class ArmSolver(NamedTuple):
     """Joint limits [rad] in the real arm's order, shape (7,); infinite where continuous."""
     upper: FloatArray
     branches: IntArray
-    """Signs of sin(q4 - phase), of the aim and of the wrist that can occur within the limits,
-    shape (branches, 3)."""
+    """Signs of sin(q4 - phase), of the aim and of the wrist that occur within the limits, shape
+    (branches, 3)."""
 
 
 def arm_solver(chain: Chain) -> ArmSolver:
     """Return the closed-form constants of `chain`.
 
-    An arm that fits both classes, such as one with a spherical shoulder and a spherical wrist, is
-    solved as one of the spherical-wrist class.
+    An arm in both classes, such as one with a spherical shoulder and a spherical wrist, is solved
+    as one of the spherical-wrist class.
 
     Raises:
-        ArmClassError: If the arm is outside both classes; the message says which axes fail to meet
-            and by how much.
+        ArmClassError: If the arm is outside both classes (the message lists the axes that fail to
+            meet, and by how much), or if its elbow does not change the distance |SW|.
     """
     misses = _misses(chain, (2, 3), (5, 6, 7))
     shoulder_misses = _misses(chain, (1, 2, 3), (5, 6))
@@ -98,7 +98,7 @@ def arm_solver(chain: Chain) -> ArmSolver:
     u0 = chain.p[3] + R3[:, 2] * w[2]
     uc = R3[:, 0] * w[0] + R3[:, 1] * w[1]
     us = -R3[:, 0] * w[1] + R3[:, 1] * w[0]
-    # uc and us are orthogonal and equally long, so |u|^2 is one cosine of q4.
+    # uc and us are orthogonal and of equal length, so |u|^2 is a single cosine of q4.
     swing = 2.0 * np.array([u0 @ uc, u0 @ us])
     amplitude = float(np.hypot(*swing))
     if amplitude < MEETING_TOLERANCE:
@@ -138,9 +138,9 @@ def arm_solver(chain: Chain) -> ArmSolver:
 
 
 def outside_solver(chain: Chain) -> ArmSolver:
-    """Return the limits of an arm outside the classes, without constants of the closed form.
+    """Return a solver with the chain and limits of an arm outside the closed-form classes.
 
-    It has no branches, and `is_outside` goes by that; every constant of the closed form is zero.
+    It has no branches, which is what `is_outside` tests; the constants of the closed form are zero.
     """
     none = np.zeros(3)
     return ArmSolver(
@@ -162,7 +162,7 @@ def outside_solver(chain: Chain) -> ArmSolver:
 
 
 def any_solver(chain: Chain) -> ArmSolver:
-    """Return the closed form's constants, or `outside_solver` where there is none."""
+    """Return `arm_solver(chain)`, or `outside_solver(chain)` for an arm without a closed form."""
     try:
         return arm_solver(chain)
     except ArmClassError:
@@ -170,15 +170,15 @@ def any_solver(chain: Chain) -> ArmSolver:
 
 
 def is_outside(arm: ArmSolver) -> bool:
-    """Return whether an arm is outside the classes of the closed form: numeric IK solves it."""
+    """Return whether an arm is outside the closed-form classes, so that numeric IK solves it."""
     return len(arm.branches) == 0
 
 
 def reversed_chain(chain: Chain) -> Chain:
-    """Return the same arm from tool to base: its own arm base is T and its tool A.
+    """Return the arm reversed, from tool to base: its arm base is T and its tool is A.
 
-    Joint i of the result is joint 8 - i of `chain`, with the same angle: half a turn about x on
-    either side of every joint makes up for the sense in which it turns.
+    Joint i of the result is joint 8 - i of `chain`, with the same angle: a half turn about x on
+    either side of every joint restores its sense of rotation.
     """
     R = np.swapaxes(chain.R[::-1], 1, 2)
     p = -np.einsum("ijk,ik->ij", R, chain.p[::-1])
@@ -194,11 +194,11 @@ def reversed_chain(chain: Chain) -> Chain:
 
 
 def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
-    """Return what keeps groups of neighbouring axes from meeting, each group in one point.
+    """Return why groups of axes fail to meet, each group in one point; empty if all meet.
 
     Args:
         chain: The arm.
-        groups: Axes, two or three in a row.
+        groups: Numbers of two or three consecutive axes.
     """
     found = []
     for axes in groups:
@@ -221,17 +221,17 @@ def _misses(chain: Chain, *groups: tuple[int, ...]) -> list[str]:
 
 
 def _signs_within(lower: float, upper: float, limited: bool) -> list[int]:
-    """Return the signs that sin takes on [lower, upper]."""
+    """Return the signs that the sine takes on [lower, upper] [rad]."""
     if not limited:
         return [1, -1]
-    # sin is >= 0 on [2k pi, (2k + 1) pi]: does any such interval meet [lower, upper]?
+    # sin is >= 0 on [2k pi, (2k + 1) pi]: list the half turns that intersect [lower, upper].
     first = np.floor(lower / np.pi)
     halves = {int(k) % 2 for k in np.arange(first, np.floor(upper / np.pi) + 1)}
     return [sign for sign, half in ((1, 0), (-1, 1)) if half in halves]
 
 
 def cos_range(lower: float, upper: float, limited: bool) -> FloatArray:
-    """Return the least and the greatest cosine on [lower, upper]."""
+    """Return the least and the greatest cosine on [lower, upper] [rad], shape (2,)."""
     if not limited:
         return np.array([-1.0, 1.0])
     ends = np.cos([lower, upper])

@@ -1,7 +1,7 @@
 """Dexterity measures: how well the arm can move its tool in every direction.
 
 In: joint angles. Out: a measure in [0, 1]. Names and codes are here, so that a name can be checked
-without the compiler; `measures` computes them.
+without loading the compiler; `measures` computes the values.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import NamedTuple
 from tcs.errors import UnknownNameError
 
 ISOTROPY, INVERSE_CONDITION = 0, 1
-"""What is measured of the Jacobian."""
+"""Function of the Jacobian."""
 UNLIMITED, NORMALISED, THESIS = 0, 1, 2
-"""Whether nearness to joint limits lowers it, and by which of the two penalties."""
+"""Joint-limit penalty: none, normalised, or as in the ITCM thesis."""
 
 
 class Dexterity(NamedTuple):
-    """One measure, as codes for the compiled code."""
+    """A dexterity measure, as the codes that the compiled functions use."""
 
     of: int
     """ISOTROPY or INVERSE_CONDITION."""
@@ -41,7 +41,7 @@ def dexterity(measure: str) -> Dexterity:
     """Return the measure of that name.
 
     Raises:
-        UnknownNameError: If there is none.
+        UnknownNameError: If there is no measure of that name.
     """
     if measure not in MEASURES:
         raise UnknownNameError("measure", measure, MEASURES)

@@ -1,4 +1,4 @@
-"""The dexterity measures at given joint angles, from the Jacobian itself."""
+"""Dexterity measures at given joint angles."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from tcs.kernel.problem import Problem
 THESIS_SCALE = 1e6
 """k of the ITCM thesis, eq. (21), chosen there for seven limited joints."""
 MIDDLE = 0.25
-"""Greatest factor of a joint in eq. (21): in the middle of its limits."""
+"""Greatest factor of a joint in eq. (21), attained in the middle of its limits."""
 JOINTS = 7
 NEWTON_STEPS = 200
-"""More than any eigenvalue takes: some 4 to 8, and where all six coincide each step leaves 5/6."""
+"""Greatest number of Newton steps to an eigenvalue. It takes 4 to 8; where all six eigenvalues
+coincide, a step reduces the error to 5/6 only."""
 CLOSE_ENOUGH = 1e-13
-"""Relative step of an eigenvalue that ends the search; the next would be far below rounding."""
+"""Relative step at which Newton's method has converged; the next would be far below rounding."""
 
 
 @inner
@@ -54,7 +55,7 @@ def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> floa
     J, G = np.empty((6, 7)), np.empty((6, 6))
     jacobian(chain_R, chain_p, q, J)
     trace = gram(J, G)
-    # det of a Gram matrix by its Cholesky factor, in place.
+    # The determinant of the Gram matrix by Cholesky factorisation, in place.
     det = 1.0
     for j in range(6):
         pivot = G[j, j]
@@ -158,10 +159,16 @@ def tridiagonalise(G: FloatArray, diagonal: FloatArray, square: FloatArray) -> N
 
 @jit
 def eigenvalue_from(diagonal: FloatArray, square: FloatArray, start: float) -> float:
-    """Return the eigenvalue of a tridiagonal matrix next to `start`, beyond all of them.
+    """Return the eigenvalue nearest to `start` of a symmetric, tridiagonal matrix T.
 
-    Newton's method on the characteristic polynomial p comes in from outside without ever passing
-    the eigenvalue. p'/p is added up over the pivots of T - x I.
+    Newton's method on the characteristic polynomial p converges monotonically from outside the
+    spectrum. p'/p is summed over the pivots of T - x I.
+
+    Args:
+        diagonal: Diagonal of T, shape (6,).
+        square: Squared off-diagonal as from `tridiagonalise`, shape (6,).
+        start: A bound of the spectrum: 0 for the least eigenvalue, else an upper bound for the
+            greatest.
     """
     x = start
     for _ in range(NEWTON_STEPS):
@@ -174,7 +181,7 @@ def eigenvalue_from(diagonal: FloatArray, square: FloatArray, start: float) -> f
             pivot = diagonal[i] - x - share
             ratio += slope / pivot
         step = -1.0 / ratio
-        # Of the wrong sign, or not a number, once rounding decides: x is the eigenvalue.
+        # A step of the wrong sign, or nan, is due to rounding: x is the eigenvalue.
         if not (step > 0.0 if start == 0.0 else step < 0.0):
             return x
         x += step
@@ -185,7 +192,7 @@ def eigenvalue_from(diagonal: FloatArray, square: FloatArray, start: float) -> f
 
 @jit
 def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: int) -> float:
-    """Return how far joint angles q are from the joint limits: 0 at a limit, 1 well away.
+    """Return the joint-limit penalty at joint angles q: 0 at a limit, 1 far from all limits.
 
     Args:
         q: Joint angles [rad], shape (7,).
@@ -198,9 +205,9 @@ def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: 
 
     Source:
         ITCM thesis eq. (21), P = 1 - exp(-k prod (q - lower)(upper - q) / (upper - lower)^2), with
-        k = 1e6. A continuous joint has no factor. THESIS leaves it out and k as it is; NORMALISED
-        gives it 1/4, what a joint has in the middle of its limits, and the limit of the factor
-        as limits grow wide. With seven limited joints the two are the same.
+        k = 1e6. For a continuous joint the factor is undefined. THESIS omits it and leaves k
+        unchanged; NORMALISED replaces it by 1/4, the factor in the middle of the limits and its
+        limit for ever wider limits. With seven limited joints the two are equal.
     """
     if penalty == UNLIMITED:
         return 1.0
@@ -219,7 +226,7 @@ def measure_at(problem: Problem, q: FloatArray) -> float:
     """Return the problem's dexterity measure at joint angles q [rad], shape (7,).
 
     Source:
-        TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in its eq. (22).
+        TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in thesis eq. (22).
     """
     if problem.measure.of == INVERSE_CONDITION:
         value = inverse_condition_at(problem.chain_R, problem.chain_p, q)
@@ -231,13 +238,13 @@ def measure_at(problem: Problem, q: FloatArray) -> float:
 
 @jit
 def rounded_inward(q: FloatArray, lower: FloatArray, upper: FloatArray, out: FloatArray) -> None:
-    """Fill `out` with q as float32 values that never pass a limit.
+    """Fill `out` with q rounded to float32 values that do not exceed the limits.
 
     Args:
         q: Joint angles [rad], shape (7,).
         lower: Lower limits [rad], shape (7,).
         upper: Upper limits [rad], shape (7,).
-        out: Filled with the float32 values, as float64, shape (7,).
+        out: Filled with the float32 values, as float64 [rad], shape (7,).
     """
     for i in range(q.size):
         near = np.float32(q[i])

@@ -1,10 +1,11 @@
-"""Constants of an arm for numeric inverse kinematics: bounds of its reach and a table of starts.
+"""Constants of an arm for numeric inverse kinematics: bounds of its reach and start postures.
 
-A seven-joint arm that no closed form solves. Axis 1 and axis 7 still are simple. Joint 1 turns the
-whole arm about axis 1, and joint 7 moves no point of axis 7; so joints 2 to 6 alone decide how far
-axis 7 is from axis 1, how high, and at what angles. A table of random postures of these five, by
-these four figures, gives postures that nearly hold the tool at a goal: joints 1 and 7
-follow in closed form, and Newton's method does the rest.
+In a seven-joint arm without a closed form, the first and the last joint are still simple. Joint 1
+rotates the whole arm about axis 1, and joint 7 leaves every point of axis 7 in place. So joints 2
+to 6 alone determine four figures: the distance of a point on axis 7 from axis 1, its height along
+axis 1, and the tilt and the azimuth of axis 7. A table of quasi-random postures of these five
+joints, indexed by the four figures, supplies postures near a goal: joints 1 and 7 follow in closed
+form, and Newton's method removes the remaining error.
 """
 
 from __future__ import annotations
@@ -22,48 +23,48 @@ from tcs.kernel.lines import axis_distance
 from tcs.kernel.problem import Problem
 
 SAMPLES = 1 << 18
-"""Postures in the table."""
+"""Number of postures in the table."""
 ACROSS, UP, TILTS, TURNS = 14, 28, 8, 12
-"""Cells of the table: distance from axis 1, height along it, and tilt and turn of axis 7."""
+"""Number of cells per figure: distance from axis 1, height along it, tilt and azimuth of axis 7."""
 WIDER = 0.25
-"""How far beyond the limits the table goes [rad]: few postures are in a corner of the limits, and
-goals that need one would find no start near."""
+"""Extension of the table beyond the joint limits [rad]: few postures lie near a corner of the
+limits, and goals that need such a posture would have no start nearby."""
 ROUNDING = 1e-9
-"""Taken off bounds of what is within reach [m], far above the rounding of a sum of lengths."""
+"""Margin of the reach bounds [m], far above the rounding of a sum of lengths."""
 CONTINUOUS_HALF_RANGE = 1e3
-"""Half range [rad] of a continuous joint: none of its angles is beyond it."""
+"""Half range [rad] assigned to a continuous joint; no joint angle exceeds it."""
 
 
 class NumericArm(NamedTuple):
-    """One arm's constants. L1..L7 as in `Chain`; F is the frame that joint 1 turns against."""
+    """Constants of one arm. L1..L7 as in `Chain`; F is L1 at a joint angle of zero."""
 
     R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     p: FloatArray
     """Translations of the chain [m], shape (8, 3)."""
     R_F: FloatArray
-    """Rotations of the chain from F on: as R, but the first is the identity."""
+    """Rotations of the chain from F on: as R, but the first is the identity, shape (8, 3, 3)."""
     middle: FloatArray
     """Middle of the joint limits [rad], 0 where continuous, shape (7,)."""
     half: FloatArray
-    """Half their width [rad], CONTINUOUS_HALF_RANGE for a continuous joint, shape (7,)."""
+    """Half range of the joints [rad], CONTINUOUS_HALF_RANGE where continuous, shape (7,)."""
     ends: FloatArray
-    """Where on axis 1, from the origin of F, and on axis 7, from that of L7, points lie that both
-    stay at a distance within `span` [m], shape (2,)."""
+    """Positions of the two end points [m], shape (2,): on axis 1 from the origin of F, and on axis
+    7 from the origin of L7."""
     span: FloatArray
-    """Least and greatest distance of the two [m], shape (2,)."""
+    """Least and greatest distance between the two end points [m], shape (2,)."""
     cell: FloatArray
-    """Least value and size of a cell for each of the four figures, shape (4, 2)."""
+    """Least value and cell size of each of the four figures, shape (4, 2)."""
     first: IntArray
-    """Where each cell's postures begin, and where the last one's end, shape (cells + 1,)."""
+    """First posture of each cell, and the number of postures, shape (cells + 1,)."""
     postures: FloatArray
     """Joints 2 to 6 [rad], up to WIDER beyond their limits, sorted by cell, shape (SAMPLES, 5)."""
     azimuth: FloatArray
-    """Direction of the point on axis 7 about axis 1, joint 1 at zero [rad], shape (SAMPLES,)."""
+    """Azimuth about axis 1 of the end point on axis 7, joint 1 at zero [rad], shape (SAMPLES,)."""
 
 
 def numeric_arm(chain: Chain) -> NumericArm:
-    """Return the constants of an arm; the table is made once for each arm.
+    """Return the constants of an arm; they are computed once for each arm.
 
     Args:
         chain: Any arm of seven revolute joints.
@@ -114,15 +115,16 @@ def _numeric_arm(R_bytes: bytes, p_bytes: bytes, low_bytes: bytes, high_bytes: b
 
 
 def joint_ranges(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the limits [rad], one full turn where a joint may turn all the way round."""
+    """Return the limits [rad], -pi and pi for a joint whose range is a full turn or more."""
     limited = upper - lower < 2.0 * np.pi
     return np.where(limited, lower, -np.pi), np.where(limited, upper, np.pi)
 
 
 def spread(count: int, dimensions: int) -> FloatArray:
-    """Return points spread evenly over the unit cube, the same in every run.
+    """Return a low-discrepancy sequence in the unit cube, shape (count, dimensions).
 
-    Multiples of powers of the root of x^(d+1) = x + 1, modulo 1: Roberts' generalised golden ratio.
+    The sequence is deterministic: multiples, modulo 1, of powers of the root of x^(d+1) = x + 1,
+    Roberts' generalised golden ratio.
     """
     root = 2.0
     for _ in range(64):
@@ -132,10 +134,10 @@ def spread(count: int, dimensions: int) -> FloatArray:
 
 
 def _slides(R: FloatArray, p: FloatArray) -> FloatArray:
-    """Return a point on each axis, from the origin of L1..L7 [m], for bounds of how far they reach.
+    """Return a point on each axis for the reach bounds, from the origin of L1..L7 [m], shape (7,).
 
-    Any points would do. On axes 3 and 5, which joint 4 moves about, and at the ends those next to
-    the neighbour on the other side make the bounds sharp: at a shoulder or wrist, if there is one.
+    Any points give valid bounds. The bounds are sharp with points where an axis passes closest to
+    its neighbour, such as the centre of a spherical shoulder or wrist.
     """
     slides = np.zeros(7)
     for i in (0, 5, 1, 4):
@@ -148,11 +150,11 @@ def _slides(R: FloatArray, p: FloatArray) -> FloatArray:
 def _span(
     R: FloatArray, p: FloatArray, slides: FloatArray, lower: float, upper: float
 ) -> FloatArray:
-    """Return bounds of the distance of the two end points [m], shape (2,).
+    """Return the least and greatest distance between the two end points [m], shape (2,).
 
-    A point on an axis is fixed to the links on both its sides, so each step from axis to axis has
-    one length. Joint 4 sets the distance of the points on axes 3 and 5, a cosine within its limits;
-    the other steps add up at most.
+    A point on an axis is fixed to the links on both sides, so the distance between points on
+    neighbouring axes is constant. The distance between the points on axes 3 and 5 depends on joint
+    4 alone and is bounded by its limits; the others add at most their sum.
     """
     rest = 0.0
     for i in (0, 1, 4, 5):
@@ -179,7 +181,7 @@ def _figures_of(
     figures: FloatArray,
     azimuth: FloatArray,
 ) -> None:
-    """Fill the four figures of each posture of joints 2 to 6, and the azimuth, in F.
+    """Fill the four figures and the azimuth in F of each posture of joints 2 to 6.
 
     R and p are the chain from F on: the first rotation is the identity, the first translation 0.
     """
@@ -197,7 +199,11 @@ def _figures_of(
 def figures_at(
     x: float, y: float, z: float, ax: float, ay: float, az: float, figures: FloatArray
 ) -> float:
-    """Fill the four figures of a point and the direction of axis 7 in F; return the azimuth."""
+    """Fill the four figures of a point on axis 7 and the direction of that axis, both in F.
+
+    Returns:
+        The azimuth of the point about axis 1 [rad].
+    """
     turn = np.arctan2(y, x)
     c, s = np.cos(turn), np.sin(turn)
     figures[0], figures[1], figures[2] = np.hypot(x, y), z, az

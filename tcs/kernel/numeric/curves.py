@@ -1,7 +1,7 @@
-"""All solutions of one goal: the curves of self-motion, on which the tool does not move.
+"""Self-motion curves of one goal: the sets of solutions along which the tool does not move.
 
-With seven joints the solutions of a goal form curves. One solution on a curve leads to all of it:
-a step along the tangent, a correction back to the goal, and so on. Cubics interpolate the points.
+With seven joints the solutions of a goal form curves. From one solution the whole curve is traced:
+a stride along the tangent, a correction back to the goal, and so on. Cubics interpolate the points.
 """
 
 from __future__ import annotations
@@ -27,50 +27,54 @@ from tcs.kernel.numeric.newton import (
 
 FULL_TURN = 6.283185307179586
 LEAST_STRIDE = 1e-3
-"""Shortest stride along a curve [rad, as a norm of the joints]: where it would have to be shorter,
-next to a singularity, the curve is given up."""
+"""Shortest stride along a curve [rad, norm of the joints]. Tracing ends where the stride would have
+to be shorter, next to a singularity."""
 EASY_ANGLE = 0.2
-"""How far the direction may turn from point to point [rad] before strides become shorter."""
+"""Angle between successive tangents [rad] above which strides become shorter."""
 HARD_ANGLE = 0.5
-"""Beyond this [rad] the stride is taken back."""
+"""Angle between successive tangents [rad] above which a stride is rejected."""
 LONG_CORRECTION = 3e-3
-"""Longest step [rad, as a norm] after which the tool is at the goal within 1e-5."""
+"""Length of a Newton step [rad, norm of the joints] up to which the tool is then within 1e-5 of the
+goal; a longer step is followed by a second one."""
 MAX_CORRECTED_ERROR = 3e-4
-"""Greatest error [rad and m] that may be left after one step."""
+"""Error after the first Newton step [rad and m] above which a stride is rejected."""
 MAX_PREDICTED_ERROR = 3e-2
-"""Error after a stride [rad and m] with which the stride is taken back."""
+"""Error of the predicted point [rad and m] above which a stride is rejected."""
 CORRECTIONS = int_constant(4)
-"""Most Newton iterations from a place on a cubic to the goal; it takes 2."""
+"""Greatest number of Newton iterations from a point on a cubic to the goal; 2 are typical."""
 SAME_CURVE = 0.04
-"""How far beside a known curve [rad, as a norm] a solution may lie and count as on it: points are
-up to a stride apart, and the curve departs from their chord."""
+"""Greatest distance from a known curve [rad, norm of the joints] of a solution that counts as on
+it: points are up to a stride apart, and the curve deviates from their chord."""
 
 
 class Curves(NamedTuple):
-    """Curves of one goal, point by point; reused from pair to pair."""
+    """Points of the curves of one goal; reused from pair to pair."""
 
     q: FloatArray
-    """Joint angles [rad], not turned into limits: neighbours are near, shape (points, 7)."""
+    """Joint angles [rad], continuous along a curve, not shifted into limits, shape (points, 7)."""
     tangent: FloatArray
     """Unit directions along the curve, shape (points, 7)."""
     length: FloatArray
-    """From each point to the next one of its curve [rad, as a norm], shape (points,)."""
+    """Distance from each point to the next one of its curve [rad, norm], shape (points,)."""
     value: FloatArray
     """Isotropy or inverse condition at each point, shape (points,)."""
     slack: FloatArray
-    """How far the worst joint is from its limits [rad], negative beyond, shape (points,)."""
+    """Least distance of a joint from its limits [rad], negative beyond them, shape (points,)."""
     first: IntArray
-    """Where each curve begins, and where the last one ends, shape (curves + 1,)."""
+    """First point of each curve, and the number of points, shape (curves + 1,)."""
     newton: NewtonWorkspace
+    """Scratch of Newton's method."""
     q_now: FloatArray
     """Current joint angles [rad], shape (7,)."""
     tangent_now: FloatArray
+    """Current unit tangent, shape (7,)."""
     trial: FloatArray
+    """Vector to project onto the null space, shape (7,)."""
 
 
 @jit
 def new_curves(points: int, curves: int) -> Curves:
-    """Return memory for so many points and curves."""
+    """Return memory for at most `points` points and `curves` curves."""
     return Curves(
         np.empty((points, 7)),
         np.empty((points, 7)),
@@ -87,9 +91,9 @@ def new_curves(points: int, curves: int) -> Curves:
 
 @jit
 def slack_of(arm: NumericArm, q: FloatArray) -> float:
-    """Return how far the worst joint is from its limits [rad], negative beyond.
+    """Return the least distance of a joint from its limits [rad], negative beyond them.
 
-    Joints are turned by full turns to where they are nearest to the middle of their limits.
+    Each joint is shifted by full turns to the angle nearest to the middle of its limits.
     """
     worst = np.inf
     for i in range(7):
@@ -105,14 +109,14 @@ def is_known(curves: Curves, count: int, q: FloatArray, beside: float) -> bool:
 
     Args:
         curves: The curves.
-        count: How many there are.
+        count: Number of curves.
         q: Joint angles [rad], shape (7,).
-        beside: How far beside a curve they may lie [rad, as a norm].
+        beside: Greatest distance from a curve [rad, norm of the joints].
     """
     for k in range(count):
         start, stop = curves.first[k], curves.first[k + 1]
         for n in range(start, stop):
-            # To the middle of the strides on both sides.
+            # Each point covers a little more than half of the strides on either side.
             reach = curves.length[n]
             if n > start:
                 reach = max(reach, curves.length[n - 1])
@@ -141,20 +145,22 @@ def trace(
     stride: float,
     of: int,
 ) -> int:
-    """Append the curve through the solution in `curves.q_now`, both ways from there.
+    """Append the curve through the solution in `curves.q_now`, traced in both directions.
+
+    A closed curve is one entry; an open one is two, one for each direction.
 
     Args:
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
         curves: Filled.
-        count: How many curves there are.
+        count: Number of curves.
         beyond: How far beyond its limits a joint is followed [rad].
-        stride: Longest stride [rad, as a norm].
-        of: ISOTROPY or INVERSE_CONDITION, what to evaluate at each point.
+        stride: Longest stride [rad, norm of the joints].
+        of: Function to evaluate at each point, ISOTROPY or INVERSE_CONDITION.
 
     Returns:
-        How many curves there are now.
+        Updated number of curves.
     """
     most = len(curves.first) - 1
     for side in range(2):
@@ -175,7 +181,7 @@ def trace(
 def _append_point(
     arm: NumericArm, curves: Curves, n: int, start: int, det: float, of: int
 ) -> float:
-    """Write the current joints and tangent as point n of a curve; return its slack."""
+    """Store the current joints and tangent as point n of a curve; return its slack [rad]."""
     J = curves.newton.J
     if of == ISOTROPY:
         total = 0.0
@@ -211,17 +217,17 @@ def _trace_side(
     stride: float,
     of: int,
 ) -> tuple[int, bool]:
-    """Trace a curve to one side of the solution in `q_now`, which is restored in the end.
+    """Trace a curve in one direction from the solution in `q_now`, which is restored at the end.
 
     Returns:
-        One after the last point, and whether the walk has come back to its start.
+        Index after the last point, and whether the curve is closed.
     """
     q, tangent, newton = curves.q_now, curves.tangent_now, curves.newton
     if start >= len(curves.slack):
         return start, False
     evaluate(arm, R_AG, p_AG, q, newton)
     det = factorise(newton, 0.0)
-    # The joint that takes part in the motion most gives the walk its sense.
+    # The joint with the largest part in the self-motion defines the direction of travel.
     best = 0.0
     for i in range(7):
         curves.trial[:] = 0.0
@@ -236,7 +242,7 @@ def _trace_side(
     travelled = 0.0
     while n < len(curves.slack):
         last = n - 1
-        # Predict to second order by how the direction has turned.
+        # Predict to second order, the curvature taken from the last two tangents.
         curvature = 0.0
         if last > start:
             curvature = 0.5 * h * h / curves.length[last - 1]
@@ -280,7 +286,7 @@ def _trace_side(
 
 @inner
 def _has_closed(curves: Curves, start: int, n: int) -> bool:
-    """Return whether the start lies between points n - 1 and n."""
+    """Return whether the curve has returned to its start, between points n - 1 and n."""
     before = after = apart = 0.0
     for i in range(7):
         off = curves.q[start, i] - curves.q[n, i]
@@ -296,12 +302,12 @@ def _has_closed(curves: Curves, start: int, n: int) -> bool:
 
 @jit
 def point_between(curves: Curves, n: int, fraction: float, q: FloatArray) -> None:
-    """Fill joint angles between points n and n + 1, as a cubic has them.
+    """Fill joint angles between points n and n + 1 by cubic Hermite interpolation.
 
     Args:
         curves: The curves.
-        n: A point that is not the last of its curve.
-        fraction: Fraction of the stretch from point n to n + 1, 0 to 1.
+        n: Index of a point that is not the last of its curve.
+        fraction: Fraction of the stride from point n to n + 1, in [0, 1].
         q: Filled [rad], shape (7,).
     """
     length = curves.length[n]
@@ -317,5 +323,5 @@ def point_between(curves: Curves, n: int, fraction: float, q: FloatArray) -> Non
 def correct(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, curves: Curves, exact: float
 ) -> bool:
-    """Bring `q_now`, close to the goal already, to it; return whether that succeeded."""
+    """Bring `q_now`, already close to the goal, to the goal; return whether that succeeded."""
     return converge(arm, R_AG, p_AG, curves.q_now, curves.newton, CORRECTIONS, exact)

@@ -1,8 +1,8 @@
 """Newton's method for a tool pose: error, Jacobian, the shortest step to the goal, the null space.
 
 The arm has one joint more than a pose has coordinates. Of all steps that remove the error to first
-order Newton's is the shortest; the null-space direction moves the joints but not the tool. One
-factorisation of J J^T gives both.
+order, the one taken is the shortest; the null-space direction moves the joints but not the tool.
+One factorisation of J J^T gives both.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_er
 from tcs.kernel.numeric.arm import NumericArm
 
 LEAST_PIVOT = 1e-14
-"""Pivots of J J^T are kept above this: next to a singularity a step is long, but never infinite."""
+"""Lower bound of the pivots of J J^T: next to a singularity, steps are long but finite."""
 LONGEST_STEP = 0.6
-"""Greatest change of the joints in one step [rad, as a norm]: beyond, J is another one."""
+"""Greatest length of one step [rad, norm of the joints], within which J changes little."""
 DAMPING = 0.1
-"""Of J J^T, whose entries are about 1, per square of the error."""
+"""Damping of J J^T, whose entries are about 1, per square of the error."""
 
 
 class NewtonWorkspace(NamedTuple):
@@ -49,7 +49,7 @@ class NewtonWorkspace(NamedTuple):
 
 @jit
 def new_newton_workspace() -> NewtonWorkspace:
-    """Return scratch memory."""
+    """Return scratch memory for one worker."""
     return NewtonWorkspace(
         np.empty((8, 3, 3)),
         np.empty((8, 3)),
@@ -67,7 +67,7 @@ def new_newton_workspace() -> NewtonWorkspace:
 def evaluate(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, q: FloatArray, newton: NewtonWorkspace
 ) -> float:
-    """Fill error and Jacobian at joint angles q; return the greatest entry of the error."""
+    """Fill pose error and Jacobian at joint angles q; return the error's largest absolute entry."""
     link_poses(arm.R, arm.p, q, newton.link_R, newton.link_p)
     place_tool(arm.R, arm.p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
     fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
@@ -76,7 +76,7 @@ def evaluate(
 
 @jit
 def factorise(newton: NewtonWorkspace, damping: float) -> float:
-    """Fill the Cholesky factor of J J^T + damping; return its determinant."""
+    """Fill the Cholesky factor of J J^T + damping I; return the determinant of that matrix."""
     J, G = newton.J, newton.G
     det = 1.0
     for i in range(6):
@@ -89,17 +89,16 @@ def factorise(newton: NewtonWorkspace, damping: float) -> float:
             if i == j:
                 total = max(total + damping, LEAST_PIVOT)
                 det *= total
-                # G[i, i] holds the inverse, so that nothing below divides.
+                # The inverse of the diagonal avoids divisions below and in `_solve`.
                 G[i, i] = 1.0 / np.sqrt(total)
             else:
-                # A row's entry is complete once divided by the pivot of its column.
                 G[i, j] = total * G[j, j]
     return det
 
 
 @inner
 def _solve(newton: NewtonWorkspace) -> None:
-    """Replace x by the solution of (J J^T) y = x."""
+    """Replace `newton.x` by (J J^T)^-1 x, with the factor in `newton.G`."""
     G, x = newton.G, newton.x
     for i in range(6):
         total = x[i]
@@ -115,7 +114,11 @@ def _solve(newton: NewtonWorkspace) -> None:
 
 @jit
 def step_to_goal(newton: NewtonWorkspace, q: FloatArray, longest: float) -> float:
-    """Take the shortest step to the goal, cut to length `longest`; return its full length."""
+    """Add the shortest step to the goal to q, limited to length `longest`.
+
+    Returns:
+        Length of the step before it was limited [rad, norm of the joints].
+    """
     J, x, step = newton.J, newton.x, newton.step
     for i in range(6):
         x[i] = newton.error[i]
@@ -136,15 +139,15 @@ def step_to_goal(newton: NewtonWorkspace, q: FloatArray, longest: float) -> floa
 
 @jit
 def null_space_direction(newton: NewtonWorkspace, before: FloatArray, tangent: FloatArray) -> float:
-    """Fill the unit vector of the null space that points to the side of `before`.
+    """Fill the normalised projection of `before` onto the null space.
 
     Args:
-        newton: Factorised.
-        before: A unit vector, shape (7,).
+        newton: Workspace with the undamped factor of J J^T.
+        before: Unit vector, shape (7,).
         tangent: Filled, shape (7,).
 
     Returns:
-        The cosine between the two; 0 where `before` has no part in that direction.
+        Cosine of the angle between the two; 0 where `before` is orthogonal to the null space.
     """
     J, x = newton.J, newton.x
     for i in range(6):
@@ -179,17 +182,17 @@ def converge(
 ) -> bool:
     """Bring the tool to the goal from joint angles q, in place.
 
-    Damping grows with the square of the error (Sugihara 2011): far from the goal steps are short
-    and safe, close to it they are Newton's.
+    Damping grows with the square of the error (Sugihara 2011): far from the goal steps are short,
+    close to it they are Newton steps.
 
     Args:
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        q: Joint angles to start from [rad]; changed, shape (7,).
-        newton: Workspace; holds the last evaluation.
+        q: Joint angles to start from [rad], shape (7,); updated.
+        newton: Workspace; contains the last evaluation.
         iterations: Greatest number of iterations.
-        exact: Greatest error that will do [rad and m].
+        exact: Error below which the iteration has converged [rad and m].
 
     Returns:
         Whether the tool is at the goal.

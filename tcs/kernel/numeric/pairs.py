@@ -1,4 +1,7 @@
-"""One initial configuration against one goal, for an arm that no closed form solves."""
+"""Score of one initial configuration at one goal, for an arm without a closed form.
+
+A position on the curves is the index of a point plus a fraction of the stride to the next point.
+"""
 
 from __future__ import annotations
 
@@ -32,25 +35,29 @@ from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 EXACT = 1e-9
 """Error of a solution [rad and m], far below the 1e-7 that forward kinematics must confirm."""
 FIRST_TRIES = 6
-"""Candidates tried before all are walked."""
+"""Number of candidates checked in the order of their measure before all are checked in sequence."""
 REFINEMENTS, REFINE_SAMPLES = 3, 8
-"""As in `pairs`."""
+"""As in `tcs.kernel.analytic.pairs`."""
 BISECTIONS = 8
 """Bisections of the interval between two contacts, down to SPACING / 256."""
 APPROXIMATE, SOLVED = int_constant(0), int_constant(1)
-"""Joints as the cubic has them; joints of a solution."""
+"""Joint angles interpolated by the cubic; joint angles of a solution."""
 NO_SOLUTION = -2
-"""In place of a contact: there is no solution within the limits."""
+"""Value in place of a contact: there is no solution within the limits."""
 NOWHERE, TRIED = -1.0, -1.0
-"""No place on the curves; no measure."""
+"""Position and measure that stand for none."""
 NEIGHBOURS = 0.75
-"""Farthest that neighbouring candidates are apart, counted in points: a stride has two parts at
-least, and the limits may lie between."""
+"""Greatest distance of neighbouring candidates, in strides. A stride has at least two parts, so a
+greater distance means that the curve leaves the limits in between."""
 
 
 @inner
 def solve_at(arm: NumericArm, work: Workspace, search: CurveSearch, at: float) -> bool:
-    """Fill `q_now` with the solution at a place on the curves; return whether it keeps limits."""
+    """Fill `q_now` with the solution at a position on the curves.
+
+    Returns:
+        Whether Newton's method has converged, to joint angles within the limits.
+    """
     curves = search.curves
     point_between(curves, int(at), at - int(at), curves.q_now)
     arrived = correct(arm, work.R_AG, work.p_AG, curves, EXACT)
@@ -62,19 +69,20 @@ def contact_at(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch,
     at: float, first: int, last: int, least: float,
 ) -> int:  # fmt: skip
-    """Return the contact at a place on the curves, NO_CONTACT or NO_SOLUTION.
+    """Return the contact at a position on the curves, NO_CONTACT or NO_SOLUTION.
 
     Args:
         problem: The scene.
-        arm: Its arm.
-        work: Environment, base, gripper and goal are placed.
+        arm: Constants of the arm.
+        work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A.
-        search: `q_now` gets filled with the joint angles checked last [rad].
-        at: The place.
+        search: `q_now` is filled with the joint angles checked last [rad].
+        at: The position.
         first: First check, APPROXIMATE (joints of the cubic, with an error of 1e-5 rad) or SOLVED
-            (joints of a solution). Where the cubic's joints touch something, none is computed.
+            (joints of a solution). If the joints of the cubic touch something, no solution is
+            computed.
         last: Last check.
-        least: A solution whose measure is not above this counts as none.
+        least: A solution whose measure is not above this counts as none; negative for no bound.
     """
     q, contact = search.curves.q_now, NO_CONTACT
     for newton in range(first, last + 1):
@@ -103,14 +111,15 @@ def choose(
     search: CurveSearch,
     found: int,
 ) -> tuple[float, int]:
-    """Find the best collision-free candidate, or any free place between two of them.
+    """Return the best collision-free candidate; fills `q_now` with its joint angles.
 
-    The few of the highest measure are tried first. If all touch something, all candidates are
-    walked in order, where neighbours touch the same; of those that seem free the best is taken.
+    FIRST_TRIES candidates of the highest measure are checked first. If none is free, all candidates
+    are checked in the order of their positions, as neighbours mostly touch the same pair, and those
+    whose interpolated joints are free are checked in descending order of measure.
 
     Returns:
-        The place or NOWHERE; the contact of the candidate of the highest measure, or NO_SOLUTION
-        where no candidate is a solution within the limits. `q_now` holds the solution.
+        Position of the candidate or NOWHERE; contact of the candidate with the highest measure, or
+        NO_SOLUTION if no candidate is a solution within the limits.
     """
     first_contact, walked, tries = NO_SOLUTION, False, 0
     while True:
@@ -151,13 +160,13 @@ def bisect_contacts(
     search: CurveSearch,
     found: int,
 ) -> float:
-    """Look for a free place between neighbouring candidates that all touch something.
+    """Search for a collision-free position between candidates that are all in contact.
 
-    As `analytic.pairs.bisect_contacts`: where the pair in contact changes from one candidate
-    to the next, bisection finds whether a free interval separates the two.
+    As in `analytic.pairs.bisect_contacts`, where the pair in contact changes from one candidate to
+    the next, bisection searches between the two positions.
 
     Returns:
-        The place or NOWHERE.
+        The position or NOWHERE.
     """
     for n in range(1, found):
         partner, i, j = search.pair[n - 1, 0], search.pair[n - 1, 1], search.pair[n - 1, 2]
@@ -192,9 +201,10 @@ def refine(
     problem: Problem, arm: NumericArm, work: Workspace, body_A: FloatArray, search: CurveSearch,
     count: int, centre: float, spacing: float,
 ) -> None:  # fmt: skip
-    """Climb from a collision-free place to the best one nearby; fills `search.best`.
+    """Improve a collision-free solution by sampling the curve near it; fills `search.best`.
 
-    Its solution is in `q_now`. Each round spreads places over one spacing to either side.
+    The solution is in `q_now`. Each round spreads positions over one spacing to either side of the
+    best one, and reduces the spacing.
     """
     curves = search.curves
     search.best[:] = curves.q_now
@@ -219,11 +229,11 @@ def refine(
 
 @inner
 def out_of_reach(problem: Problem, work: Workspace, solver: NumericSolver) -> int:
-    """Return TOO_FAR if the sum of the lengths from axis to axis rules the goal out, else REACHED.
+    """Return TOO_FAR if the reach bounds of the arm rule the goal out, else REACHED.
 
     Args:
         problem: The scene.
-        work: The goal is placed.
+        work: Workspace with the goal in A.
         solver: The arm's solver.
     """
     return REACHED if is_within_span(solver.arm, work.R_AG, work.p_AG) else TOO_FAR
@@ -233,13 +243,13 @@ def out_of_reach(problem: Problem, work: Workspace, solver: NumericSolver) -> in
 def score_pair(
     problem: Problem, work: Workspace, body_A: FloatArray, solver: NumericSolver
 ) -> tuple[int, int]:
-    """Score one goal within reach; base and gripper are free already.
+    """Score one goal within reach, base and gripper being free of contact.
 
     Args:
         problem: The scene.
-        work: Environment, base, gripper and goal are placed.
+        work: Workspace with environment, base, gripper and goal in place.
         body_A: The robot's other shapes in A at the current torso level.
-        solver: `best` gets filled with joint angles [rad] when reached.
+        solver: `best` is filled with the joint angles [rad] of the solution if the goal is reached.
 
     Returns:
         Reason and contact code.

@@ -1,7 +1,8 @@
-"""All solutions of one goal within the limits, for an arm that no closed form solves.
+"""Solutions of one goal within the limits, for an arm without a closed form.
 
-Postures of the arm's table are brought to the goal; each that arrives on a curve not known yet has
-it traced. Along the curves, candidates for a collision check are spread.
+Newton's method brings postures of the arm's table to the goal. Each solution that is not on a known
+curve starts a new one, which is traced. Candidates for the collision check are spread along the
+curves.
 """
 
 from __future__ import annotations
@@ -31,53 +32,57 @@ from tcs.kernel.problem import Problem
 
 TURN = 2.0 * np.pi
 MOST_POINTS, MOST_CURVES, MOST_CANDIDATES = 4096, 64, 16_384
+"""Capacities of the scratch arrays."""
 STRIDE = 0.2
-"""Longest stride along a curve [rad, as a norm of the joints]."""
+"""Longest stride along a curve [rad, norm of the joints]."""
 BEYOND = 0.6
-"""How far beyond its limits a joint is followed [rad]: curves that leave the limits for a while
-come back, and a start may converge a little beyond."""
+"""How far beyond its limits a joint is followed [rad]: a curve that leaves the limits may return,
+and Newton's method may converge slightly beyond them."""
 STARTS = 96
-"""Postures of the table that are brought to the goal, at most."""
+"""Greatest number of postures of the table to start Newton's method from."""
 ITERATIONS = int_constant(10)
-"""Most Newton iterations of a start; typically 4."""
+"""Greatest number of Newton iterations from a start; 4 are typical."""
 ON_CURVE = 1e-5
-"""Error [rad and m] of a start that has arrived."""
+"""Error [rad and m] below which a start has converged."""
 SPACING = 0.05
-"""Of candidates along a curve [rad, as a norm of the joints]: the free joint of the closed form,
-spaced 0.0125, moves all joints together by a norm 3 or 4 times that."""
+"""Spacing of candidates along a curve [rad, norm of the joints]. It corresponds to the closed form:
+a step of 0.0125 of the free joint moves all joints by a norm 3 or 4 times that."""
 INSIDE = 3e-5
-"""How far inside the limits a candidate next to them lies [rad]: the cubic is good to 1e-5."""
+"""Distance of a candidate next to the limits from them [rad]: the cubic is accurate to 1e-5."""
 HALVINGS = 8
-"""Of the way to the last place within the limits: down to SPACING / 256."""
+"""Number of bisections towards the last position within the limits: down to SPACING / 256."""
 GOLDEN = 0.381966
-"""Share of a bracket at which a golden section cuts it."""
+"""Fraction at which a golden-section search divides its interval."""
 LAST_FRACTION = 1.0 - 1e-12
-"""Greatest share of the way from a point to the next: a whole one would be the next point, which
-the last of a curve has not got."""
+"""Greatest fraction of a stride: 1 would be the next point, and no stride starts at the last point
+of a curve."""
 NEAREST = np.array([0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15])
-"""Neighbours of a cell as sets of the figures in which they differ, those in few first."""
+"""Neighbours of a cell, as bit sets of the figures in which they differ, fewest bits first."""
 
 
 class CurveSearch(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     curves: Curves
+    """The curves of the goal."""
     figures: FloatArray
-    """Where the goal is in the table, shape (4,)."""
+    """The four figures of the goal, as in `tcs.kernel.numeric.arm`, shape (4,)."""
     at: FloatArray
-    """Where each candidate is: number of the point before it, and share of the way to the next,
-    added up; shape (MOST_CANDIDATES,)."""
+    """Position of each candidate: index of the point before it, plus the fraction of the stride to
+    the next point, shape (MOST_CANDIDATES,)."""
     measure: FloatArray
-    """Its measure; TRIED once it was found to collide."""
+    """Interpolated measure of each candidate, TRIED once it is rejected, shape
+    (MOST_CANDIDATES,)."""
     pair: IntArray
-    """What it touches, as `Workspace.last`; -1 for nothing; shape (MOST_CANDIDATES, 3)."""
+    """Pair in contact at each candidate, as `Workspace.last`; -1 for none, shape
+    (MOST_CANDIDATES, 3)."""
     best: FloatArray
     """Joint angles of the best solution so far [rad], shape (7,)."""
 
 
 @jit
 def new_curve_search(points: int, curves: int, candidates: int) -> CurveSearch:
-    """Return scratch memory."""
+    """Return scratch memory for one worker."""
     return CurveSearch(
         new_curves(points, curves),
         np.empty(4),
@@ -89,12 +94,12 @@ def new_curve_search(points: int, curves: int, candidates: int) -> CurveSearch:
 
 
 class NumericSolver(NamedTuple):
-    """Constants of an arm and the search over its curves."""
+    """Constants of an arm, and scratch of the search over its curves."""
 
     arm: NumericArm
     search: CurveSearch
     best: FloatArray
-    """The array `best` of the search."""
+    """The array `search.best`."""
 
 
 def new_numeric_solver(problem: Problem) -> NumericSolver:
@@ -105,7 +110,7 @@ def new_numeric_solver(problem: Problem) -> NumericSolver:
 
 @jit
 def is_within_span(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray) -> bool:
-    """Return whether lengths alone let the arm come to a goal.
+    """Return whether a goal is within the reach bounds of the arm.
 
     Args:
         arm: The arm.
@@ -131,20 +136,20 @@ def is_within_span(arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray) -> bool:
 def find_curves(
     arm: NumericArm, R_AG: FloatArray, p_AG: FloatArray, search: CurveSearch, of: int
 ) -> int:
-    """Trace all curves of solutions that the starts of the table lead to.
+    """Trace the curves of solutions found from the starts in the table.
 
     Args:
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        search: `curves` gets filled.
-        of: ISOTROPY or INVERSE_CONDITION, what to evaluate along them.
+        search: `curves` is filled.
+        of: Function to evaluate along the curves, ISOTROPY or INVERSE_CONDITION.
 
     Returns:
-        How many there are.
+        Number of curves.
     """
     F, f = arm.R[7], arm.p[7]
-    # L7 at the goal but for its own turn, in A and in the frame that joint 1 turns against.
+    # Orientation of L7 and position of the end point on axis 7, from the origin of F, in A and F.
     R_A7, R_F7 = np.empty((3, 3)), np.empty((3, 3))
     p_A, p_F = np.empty(3), np.empty(3)
     for r in range(3):
@@ -171,7 +176,7 @@ def find_curves(
         side[k] = 1 if place - index[k] >= 0.5 else -1
     count = starts = 0
     for near in range(16):
-        # The cell of the goal, then those it lies next to.
+        # The cell of the goal, then the nearest neighbours.
         flat = 0
         inside = True
         for k in range(4):
@@ -196,10 +201,10 @@ def find_curves(
 
 @inner
 def _start(arm: NumericArm, search: CurveSearch, n: int, azimuth: float, R_F7: FloatArray) -> bool:
-    """Fill `q_now` with posture n of the table, joints 1 and 7 turned to the goal.
+    """Fill `q_now` with posture n of the table, joints 1 and 7 set to match the goal.
 
     Returns:
-        Whether these two keep their limits, or nearly so.
+        Whether joints 1 and 7 are at most BEYOND outside their limits.
     """
     q = search.curves.q_now
     for i in range(5):
@@ -239,15 +244,15 @@ def trace_from(
         arm: The arm.
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
-        search: `curves.q_now` is where to start; `curves` gets filled.
-        count: How many curves there are.
+        search: `curves.q_now` is the start; `curves` is filled.
+        count: Number of curves.
         beyond: How far beyond its limits a joint is followed [rad].
-        stride: Longest stride along a curve [rad].
+        stride: Longest stride along a curve [rad, norm of the joints].
         iterations: Greatest number of Newton iterations.
-        of: ISOTROPY or INVERSE_CONDITION.
+        of: Function to evaluate along the curve, ISOTROPY or INVERSE_CONDITION.
 
     Returns:
-        How many curves there are now.
+        Updated number of curves.
     """
     curves = search.curves
     q = curves.q_now
@@ -262,15 +267,23 @@ def trace_from(
 def find_candidates(
     problem: Problem, arm: NumericArm, search: CurveSearch, count: int, spacing: float
 ) -> int:
-    """Spread candidates over what of the curves keeps all limits; return how many there are.
+    """Spread candidates, in the order of their positions, over the curves within the limits.
 
-    They come in the order of their places.
+    Args:
+        problem: The scene.
+        arm: Constants of the arm.
+        search: `curves` is read; the candidates are filled.
+        count: Number of curves.
+        spacing: Greatest spacing of candidates [rad, norm of the joints].
+
+    Returns:
+        Number of candidates.
     """
     curves, found = search.curves, 0
     q = curves.q_now
     for k in range(count):
         for n in range(curves.first[k], curves.first[k + 1] - 1):
-            # No joint moves farther than the curve is long, and that is little more than its chord.
+            # No joint moves by more than the length of the curve, little more than its chord.
             length = 1.1 * curves.length[n]
             either = curves.slack[n] + curves.slack[n + 1]
             if either < -length:
@@ -288,17 +301,17 @@ def find_candidates(
                 point_between(curves, n, fraction, q)
                 slack = slack_of(arm, q)
                 if (slack >= INSIDE) != (before >= INSIDE):
-                    # The last place that keeps the limits.
+                    # The curve crosses a limit.
                     inner, outer = fraction, (j - 1) / parts
                     if slack < INSIDE:
                         inner, outer = outer, inner
                     found = _at_limit(problem, arm, search, n, inner, outer, found)
                 elif early < before < INSIDE and before >= slack and before > -length / parts:
-                    # Nearer to the limits than both neighbours: a short stretch may hide here.
+                    # A peak of the slack: a short interval within the limits may lie here.
                     low = max((j - 2) / parts, 0.0)
                     found = _at_peak(problem, arm, search, n, low, fraction, found)
                 elif j == parts and before < slack < INSIDE and slack > -length / parts:
-                    # Or on the way to the next point, beyond which it falls again.
+                    # The slack rises to the end of the stride: the peak may lie just before it.
                     found = _at_peak(problem, arm, search, n, (j - 1) / parts, fraction, found)
                 if slack >= INSIDE:
                     found = _add(problem, search, n, fraction, found)
@@ -316,7 +329,10 @@ def _at_limit(
     outer: float,
     found: int,
 ) -> int:
-    """Append the outermost place between two that keeps the limits."""
+    """Append the outermost position within the limits, found by bisection of one stride.
+
+    The limits are kept at the fraction `inner` of stride n and violated at `outer`.
+    """
     q = search.curves.q_now
     for _ in range(HALVINGS):
         middle = 0.5 * (inner + outer)
@@ -338,7 +354,7 @@ def _at_peak(
     high: float,
     found: int,
 ) -> int:
-    """Append the place between two that is farthest inside the limits, if it may be inside."""
+    """Append the position of greatest slack between two, if it may be within the limits."""
     q, before, after = search.curves.q_now, -np.inf, -np.inf
     for _ in range(2 * HALVINGS):
         first, second = low + GOLDEN * (high - low), high - GOLDEN * (high - low)
@@ -354,7 +370,7 @@ def _at_peak(
             high = second
         else:
             low = first
-    # The cubic is too coarse to decide; a candidate counts only once its solution keeps limits.
+    # The cubic is too coarse to decide: only the solution of the candidate does.
     if max(before, after) >= -INSIDE:
         found = _add(problem, search, n, 0.5 * (low + high), found)
     return found
@@ -362,7 +378,7 @@ def _at_peak(
 
 @inner
 def _add(problem: Problem, search: CurveSearch, n: int, fraction: float, found: int) -> int:
-    """Append a candidate; its measure is that of the points about it, interpolated."""
+    """Append a candidate with the measure interpolated between points n and n + 1."""
     if found == len(search.at):
         return found
     curves = search.curves
@@ -379,6 +395,6 @@ def _add(problem: Problem, search: CurveSearch, n: int, fraction: float, found: 
 
 @inner
 def turn_into_limits(problem: Problem, q: FloatArray) -> None:
-    """Turn every joint by full turns into its limits."""
+    """Shift every joint by full turns into its limits, in place."""
     for i in range(7):
         q[i] = within(q[i], problem.arm.lower[i], problem.arm.upper[i])

@@ -1,4 +1,4 @@
-"""The solutions of one pose for an arm that no closed form solves, without a scene around it."""
+"""Inverse kinematics of one pose for an arm without a closed form, collisions not considered."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ ARRIVED = 1e-9
 
 
 def numeric_solutions(chain: Chain, R_AG: FloatArray, p_AG: FloatArray) -> FloatArray:
-    """Return arm postures that hold the tool at a pose, one every 0.2 rad or less along each curve.
+    """Return arm postures with the tool at a pose, at most 0.2 rad apart along each curve.
 
-    These are the solutions that scoring looks at; contacts are left out.
+    The curves are those that scoring searches; collisions are not checked.
 
     Args:
         chain: Any arm of seven revolute joints.
-        R_AG: Orientation of the pose in the arm base A, shape (3, 3).
-        p_AG: Its position in A [m], shape (3,).
+        R_AG: Goal orientation in the arm base A, shape (3, 3).
+        p_AG: Goal position in A [m], shape (3,).
 
     Returns:
-        Joint angles within the limits [rad], shape (n, 7); n is 0 where nothing was found.
+        Joint angles within the limits [rad], shape (n, 7); n is 0 if no solution is found.
     """
     arm, search = numeric_arm(chain), new_curve_search(MOST_POINTS, MOST_CURVES, MOST_CANDIDATES)
     R, p = np.array(R_AG, dtype=np.float64, order="C"), np.array(p_AG, dtype=np.float64)
@@ -48,7 +48,7 @@ def numeric_solutions(chain: Chain, R_AG: FloatArray, p_AG: FloatArray) -> Float
             continue
         joints = zip(curves.q_now, chain.lower, chain.upper, strict=True)
         turned = [within(*joint) for joint in joints]
-        # A point next to a limit may have settled beyond it, and `within` would cut that off.
+        # A point next to a limit may converge beyond it, and `within` would clip it.
         off = np.asarray(turned) - curves.q_now
         if np.abs(np.remainder(off + np.pi, 2.0 * np.pi) - np.pi).max() < ARRIVED:
             found.append(turned)

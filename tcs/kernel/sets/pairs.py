@@ -1,8 +1,8 @@
-"""Pairs of configurations: how many are kept between two base cells, and how good they get.
+"""Pairs of configurations: number and best scores of those kept between two base cells.
 
 Every sum runs over the goals in order, as in `tcs.placement.tables.equations`, so that a pair has
 the same score here and online, to the last bit. Rounding is monotone: a score computed from
-greater isotropies is never smaller, so bounds computed by the same sum need no slack.
+greater measures is never smaller, so bounds computed by the same sum need no tolerance.
 """
 
 from __future__ import annotations
@@ -16,75 +16,75 @@ from tcs.kernel.cache import inner, jit
 
 
 class SetArrays(NamedTuple):
-    """The candidates, grouped by base cell; those of cell c are rows start[c] to start[c + 1]."""
+    """Candidates grouped by base cell; those of cell c are rows start[c] to start[c + 1] - 1."""
 
     number: IntArray
     """Number of each candidate in the order that breaks ties, shape (C,)."""
     start: IntArray
     """First row of each cell, shape (N + 1,)."""
     state: IntArray
-    """Members of a set share this number, shape (C,); all 0 where they need not."""
+    """Number that the members of a set must share, shape (C,); all 0 if they need not."""
     xy: FloatArray
-    """Places of the cells [m], shape (N, 2)."""
+    """Positions of the cells [m], shape (N, 2)."""
     dexterity: FloatArray
-    """Isotropy at each goal, 0 where not reached, shape (C, G)."""
+    """Dexterity at each goal, 0 where not reached, shape (C, G)."""
     reached: BoolArray
     """Whether each goal is reached, shape (C, G)."""
     single: FloatArray
-    """P_M of each candidate by itself, shape (C,)."""
+    """P_M of each candidate alone, shape (C,)."""
     peak: FloatArray
-    """Greatest isotropy in each cell at each goal, shape (N, G)."""
+    """Greatest dexterity in each cell at each goal, shape (N, G)."""
     weights: FloatArray
     """Weights of the goals, shape (G,)."""
     least_distance: float
-    """Pairs of cells closer than this are left out [m]."""
+    """Least distance of the cells of a pair [m]."""
     least_reachability: float
-    """Kept pairs have at least this P_R."""
+    """Least P_R of a kept pair."""
     least_manipulability: float
-    """Kept pairs have at least this P_M."""
+    """Least P_M of a kept pair."""
     least_gain: float
-    """The P_M of a kept pair is at least this much of that of either member."""
+    """Least ratio of the P_M of a kept pair to the P_M of either member alone."""
     by_sum: bool
-    """Whether the best pair is that of the greatest P_R + P_M; else P_R counts before P_M."""
+    """Whether pairs are ranked by P_R + P_M; else by P_R, then by P_M."""
 
 
 class CellPairs(NamedTuple):
-    """What is kept between each cell of a slice (rows) and every cell (columns)."""
+    """Kept pairs between each cell of a slice (rows) and every cell (columns)."""
 
     kept: IntArray
-    """How many pairs are kept, shape (rows, N); 0 where the second cell comes before the first."""
+    """Number of kept pairs, shape (rows, N); 0 where the second cell precedes the first."""
     reachability: FloatArray
-    """Their greatest P_R, shape (rows, N)."""
+    """Greatest P_R of the kept pairs, shape (rows, N)."""
     manipulability: FloatArray
-    """Their greatest P_M, shape (rows, N)."""
+    """Greatest P_M of the kept pairs, shape (rows, N)."""
     total: FloatArray
-    """Their greatest P_R + P_M, shape (rows, N)."""
+    """Greatest P_R + P_M of the kept pairs, shape (rows, N)."""
 
 
 class MemberPairs(NamedTuple):
-    """The kept pairs that each candidate is in; 0 where it is in none."""
+    """Best scores of the kept pairs (or triples) of each candidate; 0 for one in no kept pair."""
 
     reachability: FloatArray
-    """Their greatest P_R, shape (C,)."""
+    """Greatest P_R, shape (C,)."""
     manipulability: FloatArray
-    """Their greatest P_M, shape (C,)."""
+    """Greatest P_M, shape (C,)."""
     total: FloatArray
-    """Their greatest P_R + P_M, shape (C,)."""
+    """Greatest P_R + P_M, shape (C,)."""
 
 
 class BestPairs(NamedTuple):
-    """The best pair in each cell of a slice."""
+    """Best kept pair of each cell of a slice."""
 
     keys: FloatArray
-    """What pairs are ordered by: P_R + P_M and 0, or P_R and P_M; -1 where no pair is kept,
-    shape (rows, 2)."""
+    """Sort keys of the pairs: P_R + P_M and 0, or P_R and P_M; -1 where no pair is kept, shape
+    (rows, 2)."""
     members: IntArray
     """Candidate numbers a < b, shape (rows, 2)."""
 
 
 @jit
 def pair_reachability(reached: BoolArray, i: int, j: int, weights: FloatArray) -> float:
-    """Return P_R of the rows i and j together, TCS eq. (1)."""
+    """Return P_R of the pair of rows i and j, TCS eq. (1)."""
     total = 0.0
     for g in range(weights.size):
         if reached[i, g] or reached[j, g]:
@@ -94,7 +94,7 @@ def pair_reachability(reached: BoolArray, i: int, j: int, weights: FloatArray) -
 
 @jit
 def pair_manipulability(a: FloatArray, i: int, b: FloatArray, j: int, weights: FloatArray) -> float:
-    """Return P_M of row i of `a` and row j of `b` together, TCS eq. (4)."""
+    """Return P_M of the pair of row i of `a` and row j of `b`, TCS eq. (4)."""
     total = 0.0
     for g in range(weights.size):
         total += weights[g] * max(a[i, g], b[j, g])
@@ -111,7 +111,10 @@ def keep_best(
     row: int,
     best: BestPairs,
 ) -> None:
-    """Write the pair of the rows i and j to `row` of `best` where it comes before what is there."""
+    """Store the pair of rows i and j in `row` of `best` if it precedes the pair stored there.
+
+    Of pairs with equal keys, the one with the smaller candidate numbers comes first.
+    """
     first, second = reachability, manipulability
     if arrays.by_sum:
         first, second = reachability + manipulability, 0.0
@@ -136,10 +139,10 @@ def bound_cell_pair(
     members: MemberPairs,
     best: BestPairs,
 ) -> None:
-    """Go through the pairs between two cells, and write what is kept to `row` of `out`."""
+    """Enumerate the pairs between two cells and add the kept ones to `row` of `out`."""
     dexterity, peak, weights = arrays.dexterity, arrays.peak, arrays.weights
     least = arrays.least_manipulability
-    # No pair can beat the cells' peaks, at every goal, taken together.
+    # The peaks of the two cells at every goal bound every pair from above.
     if pair_manipulability(peak, first, peak, second, weights) < least:
         return
     for i in range(arrays.start[first], arrays.start[first + 1]):
@@ -177,15 +180,15 @@ def bound_cells(
     members: MemberPairs,
     best: BestPairs,
 ) -> None:
-    """Go through the pairs between cells begin..end-1 and every cell not before them.
+    """Enumerate the pairs between each of the cells begin .. end - 1 and every cell from it on.
 
     Args:
         arrays: The candidates.
         begin: First cell of the slice.
-        end: Cell after the last.
-        out: Filled with zeros, `end - begin` rows.
-        members: Filled with zeros.
-        best: Filled with -1, `end - begin` rows.
+        end: One after the last cell of the slice.
+        out: Initially zeros, `end - begin` rows; updated.
+        members: Initially zeros; updated.
+        best: Initially -1, `end - begin` rows; updated.
     """
     for first in range(begin, end):
         for second in range(first, arrays.start.size - 1):

@@ -1,9 +1,9 @@
-"""Sets of three configurations: all that are kept, found by branch and bound.
+"""Sets of three configurations: all kept triples, found by branch and bound.
 
 TC-manipulability f is monotone and submodular in the set: a member adds no more to a larger set.
-So, for any naming of the members, f(i, j, k) <= f(i, j) + f(i, k) - f(i), and
-f(i, j, k) <= (f(i, j) + f(i, k) + f(j, k)) / 2. From the P_M of all pairs these bounds leave a
-few percent of the triples to be summed goal by goal.
+So, for any order of the members, f(i, j, k) <= f(i, j) + f(i, k) - f(i), and
+f(i, j, k) <= (f(i, j) + f(i, k) + f(j, k)) / 2. With the P_M of all pairs these bounds leave a few
+percent of the triples to be summed goal by goal.
 """
 
 from __future__ import annotations
@@ -18,25 +18,28 @@ from tcs.kernel.cache import inner, jit
 from tcs.kernel.sets.pairs import BestPairs, MemberPairs, SetArrays, pair_manipulability
 
 ROUNDING = 1e-6
-"""Allowance for rounding in the bounds: pairs are held in single precision, good to 6e-8."""
+"""Allowance for rounding in the bounds: P_M of pairs is stored in single precision, 6e-8."""
 
 
 class KeptTriples(NamedTuple):
-    """A buffer for kept triples."""
+    """Buffer for kept triples."""
 
     cells: IntArray
-    """Their base cells, ascending, shape (B, 3)."""
+    """Base cells of each triple, ascending, shape (B, 3)."""
     reachability: FloatArray
-    """P_R, shape (B,)."""
+    """P_R of each triple, shape (B,)."""
     manipulability: FloatArray
-    """P_M, shape (B,)."""
+    """P_M of each triple, shape (B,)."""
 
 
 @jit
 def fill_pairs(
     arrays: SetArrays, cell: IntArray, begin: int, end: int, pairs: NDArray[np.float32]
 ) -> None:
-    """Write P_M of the rows begin..end-1 with every row to `pairs`; -1 for no members of a set."""
+    """Fill rows begin .. end - 1 of `pairs`, shape (C, C), with P_M of each pair of candidates.
+
+    The entry is -1 where two candidates cannot be in one set.
+    """
     xy = arrays.xy
     for i in range(begin, end):
         for j in range(arrays.number.size):
@@ -52,7 +55,7 @@ def fill_pairs(
 
 @inner
 def triple_scores(arrays: SetArrays, i: int, j: int, k: int) -> tuple[float, float]:
-    """Return P_R and P_M of three rows together, TCS eq. (1) and (4)."""
+    """Return P_R and P_M of the triple of rows i, j and k, TCS eq. (1) and (4)."""
     reachability = manipulability = 0.0
     dexterity, reached = arrays.dexterity, arrays.reached
     for g in range(arrays.weights.size):
@@ -84,7 +87,7 @@ def note_triple(
     members: MemberPairs,
     best: BestPairs,
 ) -> None:
-    """Raise what is known of the members' best triples, and of the best of all."""
+    """Update the best scores of the members of a kept triple, and the best triple of all."""
     total = reachability + manipulability
     for row in rows:
         members.reachability[row] = max(members.reachability[row], reachability)
@@ -106,9 +109,10 @@ def note_triple(
 def partners_of(
     arrays: SetArrays, pairs: NDArray[np.float32], i: int, least: float
 ) -> tuple[IntArray, FloatArray]:
-    """Return the rows that may be with row i in a kept triple, and P_M of both, descending.
+    """Return the rows that may form a kept triple with row i, and P_M of each pair, descending.
 
-    Only rows whose own P_M is not greater: each triple is found from the member with the greatest.
+    Rows whose own P_M is greater are left out: each triple is found from its member of greatest
+    P_M.
     """
     count = arrays.number.size
     single = arrays.single
@@ -118,7 +122,7 @@ def partners_of(
     rows = np.empty(count, dtype=np.int64)
     values = np.empty(count)
     found = 0
-    # The other partner of i adds at most what its best partner does.
+    # A third member adds at most what the best partner of row i adds.
     for j in range(count):
         if pairs[i, j] + most - single[i] + ROUNDING < least or pairs[i, j] < 0.0:
             continue
@@ -146,17 +150,17 @@ def find_triples(
 
     Args:
         arrays: The candidates.
-        cell: Cell of each row.
+        cell: Cell of each row, shape (C,).
         pairs: P_M of all pairs of rows, -1 where they cannot be in one set, shape (C, C).
         least: Least P_M of a kept triple.
         i: The row.
-        p: Where to go on among its partners: 0, or what was returned.
-        out: Filled from its start; longer than there are rows.
-        members: Best kept triples of each row, updated.
+        p: First partner to try: 0, or the second return value of the previous call.
+        out: Filled from its start; its capacity is at least the number of rows.
+        members: Best scores of each row, updated.
         best: Best kept triple, one row of three members, updated.
 
     Returns:
-        How many triples were found, and where to go on: -1 when there are no more.
+        Number of triples found, and the partner to continue from, -1 if there are no more.
     """
     rows, values = partners_of(arrays, pairs, i, least)
     single = arrays.single

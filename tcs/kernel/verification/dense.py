@@ -1,4 +1,4 @@
-"""A dense scan of the free joint, to find solutions that the search misses."""
+"""Dense scan of the free joint, to find solutions that the search misses."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def dense_scan(
 ) -> float:
     """Return the dexterity of the best collision-free sample of the free joint, -1 if none is free.
 
-    With a closed form, every sample is solved on every branch, and those within the joint limits
-    are checked for contacts in the order of their measure; the best is not refined. Without one,
-    `numeric_dense_scan` is called. Neither base against environment nor gripper against environment
-    is checked.
+    With a closed form, every sample is solved on every branch, and solutions within the joint
+    limits are checked for contacts in descending order of their measure; the best one is not
+    refined. Without a closed form, `numeric_dense_scan` is used. Contacts of base and gripper with
+    the environment are not checked.
 
     Args:
         problem: The scene, its goals and its grid.
@@ -45,11 +45,11 @@ def dense_scan(
         goal: Index of a goal at which the gripper is free of contact with the environment.
         samples: Number of angles, spread evenly over the limits of the free joint; ignored without
             a closed form.
-        joints: Filled with the solution [rad] when there is one, shape (7,).
+        joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
     """
     if is_outside(problem.arm):
         return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
-    # Allocated here, to outlive the call: the compiled code takes unowned views of them.
+    # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, search = new_workspace(problem), new_search()
     return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))
 

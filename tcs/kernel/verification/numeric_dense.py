@@ -18,36 +18,38 @@ from tcs.kernel.views import unowned
 STARTS = 400
 """Number of starts."""
 ITERATIONS = int_constant(60)
-"""Most Newton iterations of a start, which may be 180 degrees and an arm's length away."""
+"""Greatest number of Newton iterations from a start, which may be 180 degrees and an arm's length
+away from the goal."""
 STRIDE, SPACING = 0.08, 0.0125
-"""As in `tcs.kernel.numeric.search`, but finer [rad]."""
+"""As in `tcs.kernel.numeric.search`, but finer [rad, norm of the joints]."""
 EVERYWHERE = np.inf
-"""How far beyond their limits joints are followed [rad]: to the end of every curve."""
+"""How far beyond its limits a joint is followed [rad]: to the end of every curve."""
 POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
+"""Capacities of the scratch arrays."""
 
 
 def numeric_dense_scan(
     problem: Problem, configuration: int, goal: int, starts: int, joints: FloatArray
 ) -> float:
-    """Return the dexterity of a collision-free solution, -1 if none was found.
+    """Return the dexterity of a collision-free solution, -1 if none is found.
 
     Starts are spread over the joint limits; the table of the sweep is not used. Each curve that a
-    start arrives on is traced once, beyond the joint limits too, until the scratch memory is full.
-    The result is the free candidate with the highest interpolated measure, not refined; or, if all
-    candidates touch something, any free place between two of them. Neither base against
-    environment nor gripper against environment is checked.
+    start converges to is traced once, also beyond the joint limits, until the scratch memory is
+    full. The result is the collision-free candidate with the highest interpolated measure, not
+    refined; or, if all candidates are in contact, any collision-free position between two of them.
+    Contacts of base and gripper with the environment are not checked.
 
     Args:
         problem: The scene, its goals and its grid.
         configuration: Flat index of an initial configuration whose base is free of contact.
         goal: Index of a goal at which the gripper is free of contact with the environment.
         starts: Number of postures to start from.
-        joints: Filled with the solution [rad] when there is one, shape (7,).
+        joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
     """
     arm = numeric_arm_of(problem)
     low, high = joint_ranges(problem.arm.lower, problem.arm.upper)
     postures = low + spread(starts, 7) * (high - low)
-    # Allocated here, to outlive the call: the compiled code takes unowned views of them.
+    # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, search = new_workspace(problem), new_curve_search(POINTS, CURVES, CANDIDATES)
     return float(_scan(problem, arm, work, search, configuration, goal, postures, joints))
 

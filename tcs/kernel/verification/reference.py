@@ -2,8 +2,8 @@
 
 Tests compare the compiled kernel with it, and it with Drake; `tcs verify` recomputes the stored
 dexterity with it, and benchmarks measure speed-ups over it. It shares no code with the kernel, so
-that a mistake cannot cancel out. Where the kernel takes a shortcut (packed rows, samples, a
-determinant by minors, contacts in the order of likelihood), the reference applies the definition.
+that mistakes cannot cancel. Where the kernel takes a shortcut (packed rows, samples, a determinant
+by minors, contacts in the order of likelihood), the reference applies the definition.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
 from tcs.kernel.dexterity import ISOTROPY, NORMALISED, UNLIMITED, dexterity
 
 MEETING_TOLERANCE = 1e-9
-"""Link origins closer than this [m] are one point, up to rounding."""
+"""Link origins closer than this [m] coincide, up to rounding."""
 Pose = tuple[FloatArray, FloatArray]
-"""Rotation (3, 3) and position (3,) [m]."""
+"""Rotation matrix, shape (3, 3), and position [m], shape (3,)."""
 
 
 def compose(X_AB: Pose, X_BC: Pose) -> Pose:
@@ -72,8 +72,8 @@ def inverse_condition(J: FloatArray) -> float:
 def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: int) -> float:
     """Return ITCM thesis eq. (21) over the joints that have limits, k = 1e6.
 
-    Normalised, four times every factor is taken, 1 in the middle of the limits, and k is 1e6 / 4^7:
-    the same with seven limited joints.
+    The normalised penalty multiplies every factor by 4, so that it is 1 in the middle of the
+    limits, and sets k = 1e6 / 4^7: with seven limited joints the value is the same.
     """
     if penalty == UNLIMITED:
         return 1.0
@@ -97,11 +97,11 @@ def measured(
 
 
 def angles_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float, list[float]]:
-    """Return the turns t about z for which R Rz(t) v has the z component `height`.
+    """Return the angles t about z for which R Rz(t) v has the z component `height`.
 
     Returns:
-        How far the height is from impossible (1 in the middle, negative when impossible), and
-        the two turns: first the one with the sign +1, then the one with -1.
+        Feasibility margin (1 at the middle height, negative if no angle exists), and the two angles
+        [rad]: first that of sign +1, then that of sign -1.
     """
     P = R[2, 0] * v[0] + R[2, 1] * v[1]
     Q = R[2, 1] * v[0] - R[2, 0] * v[1]
@@ -117,9 +117,9 @@ class Solution:
     """One branch of the closed form at one value of the free joint."""
 
     q: FloatArray
-    """Joint angles [rad], turned into the limits where they can be, shape (7,)."""
+    """Joint angles [rad], shifted by full turns towards the middle of their limits, shape (7,)."""
     slack: float
-    """>= 0 where the branch exists and every joint keeps its limits."""
+    """>= 0 if the branch exists and every joint is within its limits."""
     sine_squared: float
     """Squared sine of the wrist angle (of the shoulder, in the spherical-shoulder class)."""
 
@@ -130,7 +130,7 @@ def has_spherical_shoulder(chain: Chain) -> bool:
 
 
 def free_joint(chain: Chain) -> int:
-    """Return the index of the joint whose angle is chosen: the first, or the last if mirrored."""
+    """Return the index of the free joint: 0, or 6 for an arm of the spherical-shoulder class."""
     return 6 if has_spherical_shoulder(chain) else 0
 
 
@@ -182,8 +182,8 @@ def spherical_shoulder_solutions(
 ) -> dict[tuple[int, int, int], Solution]:
     """Return the solutions of an arm with a spherical shoulder, from its tool inward.
 
-    The arm is not turned round here: joint 7 fixes the frame L6 and with it the wrist W, where
-    axes 5 and 6 meet; S is where axes 1, 2 and 3 meet, and stands still.
+    Unlike in the kernel, the chain is not reversed: joint 7 determines the frame L6 and with it the
+    wrist W, where axes 5 and 6 meet; the shoulder S, where axes 1, 2 and 3 meet, is fixed.
     """
     X_67 = compose((chain.R[6], chain.p[6]), (rot_z(q7), np.zeros(3)))
     X_A6 = compose(compose(X_AG, inverse((chain.R[7], chain.p[7]))), inverse(X_67))
@@ -192,7 +192,7 @@ def spherical_shoulder_solutions(
     found = {}
     for elbow_sign in (1, -1):
         q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
-        # From W to S as seen by what joint 5 turns against.
+        # From W to S, in the frame about whose z axis joint 5 rotates.
         X_34 = compose((chain.R[3], chain.p[3]), (rot_z(q4), np.zeros(3)))
         X_35 = compose(X_34, (chain.R[4], chain.p[4]))
         k = inverse(X_35)[1]
@@ -205,7 +205,7 @@ def spherical_shoulder_solutions(
             f = chain.R[2][:, 2]
             shoulder_left, shoulders = angles_to_height(chain.R[1], f, M[2, 2])
             for shoulder_sign, q2 in zip((1, -1), shoulders, strict=True):
-                # From the inside out, as the kernel: it matters to the slack where there is none.
+                # In the kernel's order, which affects the slack of infeasible samples.
                 R_13 = chain.R[1] @ rot_z(q2) @ chain.R[2]
                 q3 = math.atan2(R_13[2, 1], R_13[2, 0]) - math.atan2(M[2, 1], M[2, 0])
                 N = M @ (R_13 @ rot_z(q3)).T
@@ -217,7 +217,7 @@ def spherical_shoulder_solutions(
 
 
 def limited(chain: Chain, angles: list[float], left: float, sine_squared: float) -> Solution:
-    """Return a solution turned into its limits, its slack no more than what is `left` anyway."""
+    """Return the solution with joints shifted into their limits; its slack is at most `left`."""
     q = np.array(angles)
     for i in range(7):
         q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
@@ -239,7 +239,10 @@ def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
 
 
 def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]:
-    """Return the angle turned into its limits if it can be, and cos(off middle) - cos(half)."""
+    """Return the angle [rad] shifted by full turns towards the middle of its limits, and its slack.
+
+    The slack is the cosine of its distance from the middle less the cosine of half the range.
+    """
     if not math.isfinite(lower):
         return math.remainder(angle, 2 * math.pi), 1.0
     middle, half = (lower + upper) / 2, (upper - lower) / 2
@@ -270,12 +273,12 @@ class Placed:
 
     @property
     def radius(self) -> float:
-        """What the core is grown by [m]."""
+        """Radius by which the core is grown [m]."""
         return 0.0 if self.type == BOX else float(self.size[0])
 
     @property
     def sphere(self) -> float:
-        """Radius of a ball about the centre that holds the shape [m]."""
+        """Radius of the bounding sphere about the centre [m]."""
         return float(np.linalg.norm(self.half)) + self.radius
 
     @property
@@ -287,7 +290,7 @@ class Placed:
 
 
 def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
-    """Return the shapes in one state, unpacked."""
+    """Return the shapes in one state, one object each."""
     return [
         Placed(
             int(shapes.type[i]),
@@ -302,10 +305,10 @@ def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
 
 
 def distance(a: Placed, b: Placed) -> float:
-    """Return the distance between two shapes [m], 0 when their cores meet, less the radii.
+    """Return the distance between the cores of two shapes, 0 if they overlap, less the radii [m].
 
-    Cores are boxes with some half sizes 0. When no separating axis shows them apart they meet;
-    else the least distance is attained on an edge of one of them.
+    A core is a box, some of whose half sizes may be 0. Cores overlap if no separating axis exists;
+    otherwise the least distance is attained on an edge of one of them.
     """
     if not _apart(a, b):
         return -(a.radius + b.radius)
@@ -314,7 +317,7 @@ def distance(a: Placed, b: Placed) -> float:
 
 
 def _apart(a: Placed, b: Placed) -> bool:
-    """Return whether one of the 15 separating axes keeps the cores apart."""
+    """Return whether one of the 15 candidate axes separates the cores."""
     axes = [a.R[:, i] for i in range(3)] + [b.R[:, i] for i in range(3)]
     axes += [np.cross(a.R[:, i], b.R[:, j]) for i in range(3) for j in range(3)]
     for axis in axes:
@@ -341,7 +344,7 @@ def _edges_to_box(a: Placed, b: Placed) -> float:
 def _segment_to_box(start: FloatArray, way: FloatArray, half: FloatArray) -> float:
     """Return the least distance from start + t way, t in [0, 1], to the box [m].
 
-    The distance is convex in t: halve the bracket of its minimum by the sign of its slope.
+    The distance is convex in t: its minimum is bracketed by bisection on the sign of the slope.
     """
     low, high = 0.0, 1.0
     for _ in range(60):

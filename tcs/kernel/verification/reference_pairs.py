@@ -1,10 +1,9 @@
-"""The plain-loop reference of scoring: one configuration against one goal, built on `reference`.
+"""Reference implementation of the score of one configuration at one goal, built on `reference`.
 
-It looks at the same angles of the free joint as the kernel, so that verdicts can be compared one
-by one; how many of them the kernel needs is another question (see `dense`). One thing it leaves
-out: where every angle touches something, the kernel bisects the interval between two contacts
-(`pairs.bisect_contacts`) and may find a free angle where the reference returns ARM_BLOCKED; then
-`confirms` checks the angle found.
+It samples the same angles of the free joint as the kernel, so that results can be compared one by
+one; `dense` measures whether these samples suffice. It does not bisect: where every sample is in
+contact, the kernel (`pairs.bisect_contacts`) may find a collision-free angle between two samples
+while the reference returns ARM_BLOCKED. `confirms` then checks the kernel's solution.
 """
 
 from __future__ import annotations
@@ -59,19 +58,22 @@ Branch = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What `score` finds."""
+    """Result of `score`."""
 
     reason: int
+    """Code of the reason, REACHED or why not."""
     dexterity: float = 0.0
-    """Dexterity by the requested measure."""
+    """Dexterity by the requested measure, 0 if not reached."""
     q: FloatArray | None = None
+    """Joint angles of the solution [rad], shape (7,), if reached."""
     clearance: float = math.inf
-    """How far the nearest pair that decided is from deciding otherwise [m]; for tests."""
+    """Least distance of a checked pair from its collision threshold [m]; tests leave out results
+    that rounding decides."""
 
 
 @dataclass
 class PlacedScene:
-    """A scene with the robot at one configuration, everything in the arm base A."""
+    """A scene with the robot at one configuration; all poses are in the arm base A."""
 
     scene: SceneArrays
     environment: list[Placed]
@@ -80,7 +82,7 @@ class PlacedScene:
     clearance: float = math.inf
 
     def touches(self, a: Placed, b: Placed) -> bool:
-        """Return whether two shapes are closer than they may be, and note how clear that is."""
+        """Return whether two shapes collide, and update `clearance`."""
         required = max(self.scene.margin, a.pad + b.pad)
         # Bounding spheres well apart make the exact distance unnecessary.
         if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + 0.01:
@@ -90,13 +92,13 @@ class PlacedScene:
         return excess < 0.0
 
     def arm_at(self, q: FloatArray) -> list[Placed]:
-        """Return the arm's shapes at joint angles q."""
+        """Return the arm's shapes in A at joint angles q [rad]."""
         poses = link_poses(self.scene.chain, q)
         shapes = shapes_of(self.scene.arm, 0)
         return [s.moved(poses[f - 1]) for s, f in zip(shapes, self.scene.arm.frame, strict=True)]
 
     def gripper_touches(self, with_body: bool) -> bool:
-        """Return whether the gripper at the goal touches the environment, or the robot's body."""
+        """Return whether the gripper at the goal touches the robot's body, or the environment."""
         X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
         others = self.body if with_body else self.environment
         checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_environment
@@ -110,9 +112,9 @@ class PlacedScene:
         )
 
     def arm_touches(self, q: FloatArray) -> bool:
-        """Return whether the arm at q touches the environment, the body or itself.
+        """Return whether the arm at joint angles q touches the environment, the body or itself.
 
-        The gripper against environment and body is left out: it has been looked at.
+        Contacts of the gripper with environment and body are left to `gripper_touches`.
         """
         arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
         pairs = [
@@ -138,7 +140,7 @@ class PlacedScene:
 def placed_scene(
     scene: SceneArrays, grid: GridArrays, h: int, goal: int
 ) -> tuple[PlacedScene, bool]:
-    """Return the scene with the robot at configuration h, and whether base or body touch."""
+    """Return the scene with the robot at configuration h, and whether its body is in contact."""
     shape = (
         grid.environment_states,
         len(grid.base_x),
@@ -169,7 +171,7 @@ def placed_scene(
 def score(
     scene: SceneArrays, grid: GridArrays, h: int, goal: int, measure: str = DEFAULT_MEASURE
 ) -> Verdict:
-    """Return what the kernel should say about configuration h and one goal, by a measure."""
+    """Return the result that the kernel should give for configuration h and one goal."""
     placed, blocked = placed_scene(scene, grid, h, goal)
 
     def verdict(reason: int, value: float = 0.0, q: FloatArray | None = None) -> Verdict:
@@ -202,23 +204,31 @@ def score(
 
 @dataclass(frozen=True)
 class Candidate:
-    """A solution that keeps all limits."""
+    """A solution within the joint limits."""
 
     q: FloatArray
+    """Joint angles [rad], shape (7,)."""
     branch: Branch
+    """Signs of elbow, aim and wrist."""
     step: float
+    """Spacing of the samples among which it was found [rad]."""
 
 
 def elbow_arcs(chain: Chain, X_AG: Pose) -> tuple[list[tuple[float, float]], bool]:
-    """Return the arcs of the free joint at which the elbow spans the way, and whether any would."""
+    """Return the arcs of the free joint at which the elbow can span the distance |SW|.
+
+    Returns:
+        Arcs (first, last) within the limits of the free joint [rad], and whether any angle, limits
+        of the free joint left aside, would do.
+    """
     near, far = elbow_spans(chain)
     X_A7 = compose(X_AG, inverse((chain.R[7], chain.p[7])))
     if has_spherical_shoulder(chain):
-        # Seen from L7 the shoulder stands still, and joint 7 turns the wrist backwards.
+        # In L7 the shoulder is fixed, and joint 7 rotates the wrist in the negative sense.
         w = inverse((chain.R[6], chain.p[6]))[1]
         s = inverse(X_A7)[0] @ (chain.p[0] - X_A7[1])
     else:
-        # Seen from what joint 1 turns against, the wrist stands still and the shoulder turns.
+        # In the frame about whose z axis joint 1 rotates, the wrist is fixed; the shoulder rotates.
         w, s = compose(inverse((chain.R[0], chain.p[0])), X_A7)[1], chain.p[1]
     steady = float(w @ w + s @ s - 2 * w[2] * s[2])
     swing = 2 * math.hypot(w[0], w[1]) * math.hypot(s[0], s[1])
@@ -254,7 +264,7 @@ def elbow_spans(chain: Chain) -> tuple[float, float]:
 
 
 def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -> list[Candidate]:
-    """Return the feasible angles of the kernel's two looks: over the arcs, inside the windows."""
+    """Return the feasible samples of the kernel's two passes: over the arcs, inside the windows."""
     length = sum(last - first for first, last in arcs)
     found: list[Candidate] = []
     straight: list[tuple[Branch, float, float]] = []
@@ -281,7 +291,7 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
 def refine_straight(
     chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
 ) -> list[Candidate]:
-    """Return the feasible angles about one at which the wrist is nearly straight."""
+    """Return feasible samples near an angle at which the wrist is nearly straight."""
     for _ in range(STRAIGHT_REFINEMENTS):
         low, step = middle - step, 2 * step / (FINE_SAMPLES - 1)
         angles = [low + i * step for i in range(FINE_SAMPLES)]
@@ -293,7 +303,7 @@ def refine_straight(
 
 
 def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
-    """Return the stretches of samples in which feasible angles lie or may hide."""
+    """Return the windows (first, last) of samples that contain, or may contain, feasible angles."""
     last = len(slack) - 1
     inside = [i for i, left in enumerate(slack) if left >= 0]
     windows = []
@@ -306,7 +316,7 @@ def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
 
 
 def peaks_of(slack: list[float], step: float) -> list[int]:
-    """Return the infeasible samples about which a window narrower than the spacing may hide."""
+    """Return the infeasible samples next to which a window narrower than the spacing may lie."""
     last = len(slack) - 1
     peaks = []
     for i, left in enumerate(slack):
@@ -319,7 +329,7 @@ def peaks_of(slack: list[float], step: float) -> list[int]:
 def refine_window(
     chain: Chain, X_AG: Pose, branch: Branch, first: float, last: float
 ) -> list[Candidate]:
-    """Return the feasible angles of one window on one branch."""
+    """Return the feasible samples of one window on one branch."""
     count = max(MIN_SAMPLES, int((last - first) / FINE_STEP) + 1)
     step = (last - first) / (count - 1)
     angles = [first + i * step for i in range(count)]
@@ -338,7 +348,7 @@ def refine_window(
 def refine_peak(
     chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float, ends: tuple[float, float]
 ) -> list[Candidate]:
-    """Return the feasible angles about an infeasible peak, found by ever narrower looks."""
+    """Return feasible samples near an infeasible peak, found by refining the samples about it."""
     for _ in range(PEAK_REFINEMENTS):
         low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
         step = (high - low) / (FINE_SAMPLES - 1)
@@ -354,7 +364,7 @@ def refine_peak(
 def refine_end(
     chain: Chain, X_AG: Pose, branch: Branch, outer: float, inner: float
 ) -> list[Candidate]:
-    """Return the feasible angles between two neighbouring samples, themselves left out."""
+    """Return feasible samples strictly between two neighbouring samples."""
     fine = (inner - outer) / (FINE_SAMPLES - 1)
     near = [outer + k * fine for k in range(1, FINE_SAMPLES - 1)]
     return candidates_at(chain, X_AG, branch, near, abs(fine))
@@ -363,7 +373,7 @@ def refine_end(
 def candidates_at(
     chain: Chain, X_AG: Pose, branch: Branch, angles: list[float], step: float
 ) -> list[Candidate]:
-    """Return the feasible ones of some angles on one branch."""
+    """Return the candidates among angles of the free joint [rad] on one branch."""
     found = []
     for angle in angles:
         solution = solutions(chain, X_AG, angle)[branch]
@@ -376,7 +386,7 @@ def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatAr
     """Return whether the arm at joint angles q reaches the goal from h and touches nothing."""
     placed, blocked = placed_scene(scene, grid, h, goal)
     R, p = link_poses(scene.chain, q)[-1]
-    # Joints are float32: seven roundings of 1.2e-7 rad at up to 1 m from the tool.
+    # Joint angles are float32: seven rounding errors of 1.2e-7 rad, up to 1 m from the tool.
     at_goal = np.allclose(R, placed.X_AG[0], atol=2e-6) and np.allclose(
         p, placed.X_AG[1], atol=2e-6
     )
@@ -386,12 +396,12 @@ def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatAr
 
 
 def climb(placed: PlacedScene, best: Candidate, value: Callable[[Candidate], float]) -> Candidate:
-    """Return the best solution near a collision-free one, as the kernel refines it.
+    """Return the best solution near a collision-free one, refined as in the kernel.
 
     Args:
         placed: The scene.
-        best: Where to start.
-        value: The measure of a solution.
+        best: Solution to start from.
+        value: Function that returns the measure of a solution.
     """
     chain, step = placed.scene.chain, best.step
     for _ in range(REFINEMENTS):
