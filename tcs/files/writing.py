@@ -1,15 +1,29 @@
-"""Write files whole or not at all, and create folders."""
+"""Write files whole or not at all, create folders, and remove what a killed process left.
+
+A temporary file is locked while it is written: the lock ends with the process, however that ends.
+So what is not locked is left over, and the next process to write into its folder removes it.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
+import re
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
 from tcs.errors import OutputError
+
+_TOKEN = r"\d+-[0-9a-f]{8}"
+"""Process and random number in the name of a temporary file or folder."""
+_FILE = re.compile(rf"\..+\.{_TOKEN}\.part")
+_FOLDER = re.compile(rf"tcs-{_TOKEN}")
 
 
 @contextlib.contextmanager
@@ -18,36 +32,126 @@ def whole_file(
     what: str,
     *,
     advice: str = "Name a file in an existing, writable folder with enough space.",
+    flushed: bool = True,
 ) -> Iterator[BinaryIO]:
     """Open a file to write that replaces an existing one only when it is complete.
 
     The content goes to a temporary file beside the target, which is flushed to the disk and then
-    renamed. After any error, Ctrl-C included, the old file is unchanged and no partial one is left.
+    renamed. After any error, Ctrl-C included, the old file is unchanged and no partial one is left;
+    that of a process that was killed is removed by the next one that writes into the folder.
 
     Args:
         path: Path of the file; its folder must exist.
         what: Name of the file in messages, e.g. "Picture".
         advice: Advice to the user if the file cannot be written.
+        flushed: Whether the file must survive a power failure.
 
     Raises:
         OutputError: If the file cannot be written.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    remove_leftovers(path.parent)
     try:
-        with beside.open("xb") as stream:
+        with _temporary_file(path) as (beside, stream):
             yield stream
             stream.flush()
-            os.fsync(stream.fileno())
-        beside.replace(path)
-    except BaseException as error:
-        # There may be no file to remove; the first error is the one to report.
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        if isinstance(error, OSError):
-            raise OutputError(
-                f"{what} '{path}' cannot be written: {error.strerror or error}. {advice}"
-            ) from error
-        raise
+            if flushed:
+                os.fsync(stream.fileno())
+            # Renamed before it is closed: without its lock, another process would remove it.
+            beside.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"{what} '{path}' cannot be written: {error.strerror or error}. {advice}"
+        ) from error
+
+
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Create an empty folder for temporary files; afterwards remove it with all that is in it.
+
+    Raises:
+        OutputError: If it cannot be created.
+    """
+    above = Path(tempfile.gettempdir())
+    remove_leftovers(above)
+    folder = above / f"tcs-{_token()}"
+    try:
+        make_folder(folder, "temporary folder", advice="Set TMPDIR to a folder you may write to.")
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            _lock(handle, fcntl.LOCK_EX)
+            yield folder
+        finally:
+            os.close(handle)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@cache
+def remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files and folders of killed processes from a folder.
+
+    Only what has the name of a temporary file of `tcs`, belongs to this user, and is not locked by
+    a process; nothing where the disk knows no locks. A process looks through a folder once.
+
+    Args:
+        folder: The folder; if it cannot be read, nothing is done.
+    """
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            is_folder = _FOLDER.fullmatch(entry.name) is not None
+            if not (is_folder or _FILE.fullmatch(entry.name)):
+                continue
+            with contextlib.suppress(OSError):
+                _remove_unlocked(Path(entry.path), is_folder=is_folder)
+
+
+def _remove_unlocked(path: Path, *, is_folder: bool) -> None:
+    """Remove a temporary file or folder of this user that no process has locked."""
+    # Some network disks lock only what is open for writing.
+    mode = os.O_RDONLY | os.O_DIRECTORY if is_folder else os.O_RDWR | os.O_NONBLOCK
+    handle = os.open(path, mode | os.O_NOFOLLOW)
+    try:
+        if os.fstat(handle).st_uid != os.geteuid():
+            return
+        if not _lock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            return
+        if is_folder:
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink()
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int, mode: int) -> bool:
+    """Lock an open file or folder for this process; return whether that could be done."""
+    try:
+        fcntl.flock(handle, mode)
+    except OSError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _temporary_file(path: Path) -> Iterator[tuple[Path, BinaryIO]]:
+    """Create a temporary file beside a path, locked; remove it unless it was renamed."""
+    while True:
+        beside = path.with_name(f".{path.name}.{_token()}.part")
+        try:
+            with beside.open("xb") as stream:
+                _lock(stream.fileno(), fcntl.LOCK_EX)
+                # Another process may have removed it as left over before it was locked.
+                if beside.exists():
+                    yield beside, stream
+                    return
+        finally:
+            # There may be no file to remove; the first error is the one to report.
+            with contextlib.suppress(OSError):
+                beside.unlink()
+
+
+def _token() -> str:
+    return f"{os.getpid()}-{secrets.token_hex(4)}"
 
 
 def make_folder(
@@ -80,10 +184,10 @@ def check_writable(path: Path) -> None:
     if path.is_dir():
         raise OutputError(f"'{path}' is a folder. Name a file in it.")
     # Permissions say nothing of read-only disks and quotas; an attempt does.
-    trial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.trial")
+    remove_leftovers(path.parent)
     try:
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        with _temporary_file(path):
+            pass
     except OSError as error:
         raise OutputError(
             f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "

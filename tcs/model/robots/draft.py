@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ import numpy as np
 import yaml
 
 from tcs.errors import OutputError, RobotError, UnknownNameError
-from tcs.files.writing import whole_file
+from tcs.files.writing import scratch_folder, whole_file
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
@@ -94,8 +93,8 @@ def draft_robot(
         f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
     ]
     # The search for disabled pairs reads the primitives from their file.
-    with tempfile.TemporaryDirectory() as folder:
-        shapes = Path(folder) / "primitives.csv"
+    with scratch_folder() as folder:
+        shapes = folder / "primitives.csv"
         write_primitives(shapes, ())
         robot = RobotFile(
             name=name or path.stem,
