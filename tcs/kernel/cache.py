@@ -2,14 +2,13 @@
 
 Numba's cache depends only on the source file of the function: after an edit of a module that this
 file imports, it would load outdated machine code. Kernel functions are therefore cached in a folder
-named by a hash of all kernel sources, the versions of numba and Python, and the processor.
+named by a hash of all kernel sources, the versions of numba and Python, and the processor, in files
+that `tcs.kernel.machine_code` checks before they are loaded.
 """
 
 from __future__ import annotations
 
 import hashlib
-import logging
-import os
 import platform
 from collections.abc import Callable
 from functools import cache
@@ -23,8 +22,8 @@ from numba.core.registry import CPUDispatcher
 
 from tcs.errors import OutputError
 from tcs.files.paths import cache_folder
+from tcs.kernel.machine_code import CodeCache, private_folder, warn_once
 
-_log = logging.getLogger(__name__)
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _WRAPPERS: dict[str, Any] = {"no_cfunc_wrapper": True}
@@ -49,26 +48,24 @@ def kernel_digest(folder: Path) -> str:
 
 @cache
 def jit_folder() -> Path | None:
-    """Return the folder of the current machine code, or None if it is not writable."""
+    """Return the folder of the current machine code, or None if there is none to be trusted."""
     try:
-        folder = cache_folder() / "jit" / kernel_digest(Path(__file__).parent)
-        folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(13, "not writable", str(folder))
-    except (OSError, OutputError) as error:
-        _log.warning("The kernel compiles anew in every run: %s", error)
+        return private_folder(
+            private_folder(cache_folder() / "jit") / kernel_digest(Path(__file__).parent)
+        )
+    except OutputError as error:
+        warn_once("folder", f"The kernel compiles anew in every run: {error}")
         return None
-    return folder
 
 
-def is_compiled(entry: str = "analytic_*/pairs.score_pair") -> bool:
+def is_compiled(entry: str = "analytic.pairs.score_pair") -> bool:
     """Return whether the cache holds machine code of the whole scoring kernel.
 
     Args:
-        entry: Package, module and function into which the rest is compiled, as a glob pattern.
+        entry: Function into which the rest is compiled, with its module below `tcs.kernel`.
     """
     folder = jit_folder()
-    return folder is not None and any(folder.rglob(f"{entry}*.nbc"))
+    return folder is not None and any(folder.glob(f"tcs.kernel.{entry}-*.nbc"))
 
 
 def int_constant(number: int) -> int:
@@ -111,19 +108,13 @@ class _Inner(CPUDispatcher):
 
 def _compiled(function: _Function, **options: Any) -> object:
     """Return `function` decorated with `numba.njit`, cached in `jit_folder()`."""
+    decorate: Callable[[_Function], object] = numba.njit(
+        nogil=True, error_model="numpy", **_WRAPPERS, **options
+    )
+    compiled = decorate(function)
     folder = jit_folder()
-    settings = vars(numba.config)
-    before = settings["CACHE_DIR"]
-    # Numba reads the cache folder from this global, only while it decorates.
-    settings["CACHE_DIR"] = str(folder) if folder else ""
-    try:
-        decorate: Callable[[_Function], object] = numba.njit(
-            nogil=True,
-            cache=folder is not None,
-            error_model="numpy",
-            **_WRAPPERS,
-            **options,
-        )
-        return decorate(function)
-    finally:
-        settings["CACHE_DIR"] = before
+    # With NUMBA_DISABLE_JIT, functions stay as they are.
+    if folder is not None and isinstance(compiled, CPUDispatcher):
+        # As numba's own `enable_caching` does.
+        compiled._cache = CodeCache(function, folder)  # type: ignore[attr-defined]
+    return compiled

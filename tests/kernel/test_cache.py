@@ -14,7 +14,7 @@ import numba
 import pytest
 
 from tcs.errors import OutputError
-from tcs.kernel import cache
+from tcs.kernel import cache, machine_code
 from tcs.kernel.cache import inner, jit, jit_folder, kernel_digest
 
 ROOT = Path(__file__).parents[2]
@@ -80,8 +80,9 @@ def test_versions_and_processor_change_the_digest(copy, monkeypatch):
 
 
 @pytest.fixture
-def fresh():
+def fresh(monkeypatch):
     """Let `jit_folder` forget what it found before and after."""
+    monkeypatch.setattr(machine_code, "_warned", set())
     jit_folder.cache_clear()
     yield
     jit_folder.cache_clear()
@@ -93,7 +94,7 @@ def refuse():
 
 def test_without_a_folder_functions_compile_all_the_same(fresh, monkeypatch, caplog):
     monkeypatch.setattr(cache, "cache_folder", refuse)
-    with caplog.at_level(logging.WARNING, logger="tcs.kernel.cache"):
+    with caplog.at_level(logging.WARNING, logger="tcs.kernel.machine_code"):
         twice = jit(lambda x: 2 * x)
     assert twice(21) == 42
     assert "compiles anew in every run" in caplog.text
@@ -105,7 +106,7 @@ def test_a_file_in_the_way_of_the_folder_is_no_error(fresh, monkeypatch, tmp_pat
     # Permissions do not stop the superuser; a file where a folder should be stops everyone.
     (tmp_path / "jit").write_text("")
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-    with caplog.at_level(logging.WARNING, logger="tcs.kernel.cache"):
+    with caplog.at_level(logging.WARNING, logger="tcs.kernel.machine_code"):
         assert jit_folder() is None
     assert "compiles anew in every run" in caplog.text
 

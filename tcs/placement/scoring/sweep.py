@@ -26,8 +26,8 @@ is visible, with scratch memory that stays in the processor's cache."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
-_ENTRIES = {ANALYTIC: "analytic_*/pairs.score_pair", NUMERIC: "numeric_*/pairs.score_pair"}
-"""Pair scorers, compiled last but for the sweep: package, module and function as patterns."""
+_ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
+"""Pair scorers, compiled last but for the sweep: package, module and function."""
 
 
 @dataclass(frozen=True, eq=False)
