@@ -2,34 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from tcs.errors import TcsError
+from tcs.interrupts import remember_interrupts, report_interrupt, was_interrupted
 from tcs.output.terminal import console
 
 
 class Commands(TyperGroup):
     """A command group that ends a failed command with one line and an exit code.
 
-    Exit codes: 0 done, 1 a `TcsError`, 2 misuse (reported by typer), 130 interrupted. Any other
-    exception is a defect of the program and keeps its traceback.
+    Exit codes: 0 done, 1 a `TcsError`, 2 misuse (reported by typer), 130 interrupted by Ctrl-C, 143
+    terminated by SIGTERM. Any other exception is a defect of the program and keeps its traceback.
     """
+
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        """Parse the command line."""
+        with _ended_in_one_line():
+            return super().make_context(*arguments, **options)
 
     def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]  # typer's own class
         """Run the command."""
-        with console.remember_interrupts():
-            try:
-                return super().invoke(ctx)
-            except TcsError as error:
-                console.note(" ".join(str(error).splitlines()))
-                raise typer.Exit(1) from None
-            except typer.Exit:
+        with _ended_in_one_line():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _ended_in_one_line() -> Iterator[None]:
+    with remember_interrupts():
+        try:
+            yield
+        except TcsError as error:
+            console.note(" ".join(str(error).splitlines()))
+            raise typer.Exit(1) from None
+        except typer.Exit:
+            raise
+        except (Exception, KeyboardInterrupt) as error:
+            if not isinstance(error, KeyboardInterrupt) and not was_interrupted():
                 raise
-            except (Exception, KeyboardInterrupt) as error:
-                if not isinstance(error, KeyboardInterrupt) and not console.was_interrupted():
-                    raise
-                console.note("interrupted; no half-written file is left.")
-                raise typer.Exit(130) from None
+            raise typer.Exit(report_interrupt()) from None

@@ -12,6 +12,8 @@ import sys
 import joblib
 import pytest
 
+from tests.fresh import fresh
+
 
 def test_first_run_reports_that_it_compiles(tcs_command, example, tmp_path, monkeypatch):
     def score(*_arguments, on_compile, on_progress, **_options):
@@ -71,21 +73,101 @@ def test_bar_on_a_terminal(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_interrupt_while_scoring(tmp_path):
-    code = f"import sys\n{SLOW_SCORE.replace('time.sleep', 'print(0, flush=True); time.sleep')}\n"
-    code += "from tcs.cli import main\nmain()"
+SIGNALS = pytest.mark.parametrize(
+    ("number", "code", "line"),
+    [
+        (signal.SIGINT, 130, "tcs: interrupted; no half-written file is left.\n"),
+        (signal.SIGTERM, 143, "tcs: terminated; no half-written file is left.\n"),
+    ],
+    ids=["ctrl-c", "terminated"],
+)
+
+
+@SIGNALS
+def test_interrupt_while_scoring(tmp_path, number, code, line):
+    script = f"import sys\n{SLOW_SCORE.replace('time.sleep', 'print(0, flush=True); time.sleep')}\n"
+    script += "from tcs.cli import main\nmain()"
     with subprocess.Popen(
-        [sys.executable, "-c", code, "score", "shaving", "--out", str(tmp_path / "o.tcs")],
+        [sys.executable, "-c", script, "score", "shaving", "--out", str(tmp_path / "o.tcs")],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     ) as running:
         assert running.stdout.readline() == "0\n"
-        running.send_signal(signal.SIGINT)
+        running.send_signal(number)
         _, message = running.communicate()
-    assert running.returncode == 130
-    assert message == "tcs: interrupted; no half-written file is left.\n"
+    assert running.returncode == code
+    assert message == line
     assert list(tmp_path.iterdir()) == []
+
+
+@SIGNALS
+@pytest.mark.parametrize("module", ["tcs.cli.app", "typer", "tcs.cli.view", "numpy"])
+def test_interrupt_while_modules_are_imported(process, module, number, code, line):
+    before = f"""
+import signal
+class Interrupting:
+    def find_spec(self, name, *_):
+        if name == "{module}":
+            signal.raise_signal({int(number)})
+sys.meta_path.insert(0, Interrupting())
+"""
+    ran = process("list", before=before)
+    assert (ran.code, ran.out, ran.err) == (code, "", line)
+
+
+@SIGNALS
+def test_interrupt_that_an_import_replaces_by_another_error(process, number, code, line):
+    # As compiled modules do: their import ends in an ImportError.
+    before = f"""
+import signal
+class Interrupting:
+    def find_spec(self, name, *_):
+        if name == "tcs.cli.view":
+            try:
+                signal.raise_signal({int(number)})
+            except KeyboardInterrupt:
+                raise ImportError("initialization failed") from None
+sys.meta_path.insert(0, Interrupting())
+"""
+    ran = process("list", before=before)
+    assert (ran.code, ran.out, ran.err) == (code, "", line)
+
+
+@SIGNALS
+def test_interrupt_while_the_command_line_is_parsed(process, number, code, line):
+    before = f"""
+import signal
+import typer.core
+def parse_args(self, ctx, args):
+    signal.raise_signal({int(number)})
+typer.core.TyperGroup.parse_args = parse_args
+"""
+    ran = process("list", before=before)
+    assert (ran.code, ran.out, ran.err) == (code, "", line)
+
+
+def test_interrupt_after_the_end_prints_no_traceback(process):
+    before = """
+import atexit, signal
+atexit.register(lambda: signal.raise_signal(signal.SIGINT))
+"""
+    ran = process("--version", before=before)
+    assert (ran.code, ran.err) == (-signal.SIGINT, "")
+
+
+def test_the_command_can_be_interrupted_before_anything_large_is_imported():
+    loaded = fresh("import sys, tcs.cli; print('typer' in sys.modules, 'numpy' in sys.modules)")
+    assert loaded == "False False"
+
+
+def test_a_handler_of_the_calling_program_stays(tcs_command):
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        assert tcs_command("--version").code == 0
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_interrupt_in_a_callback_of_compiled_code_is_one_line(process, tmp_path):

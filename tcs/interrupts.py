@@ -1,0 +1,84 @@
+"""Ctrl-C and SIGTERM: one line, a clean end, and an exit code.
+
+This module is imported before everything else, so that an interrupt finds its handler however early
+it comes. It imports nothing large.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+_received: list[int] = []
+"""The signals received: compiled libraries may drop the exception, or replace it by another one."""
+
+
+@contextmanager
+def remember_interrupts(*, to_the_end: bool = False) -> Iterator[None]:
+    """Record Ctrl-C and SIGTERM, in addition to raising `KeyboardInterrupt`.
+
+    Inside another `remember_interrupts`, and on other than the main thread, it does nothing.
+
+    Args:
+        to_the_end: Whether the process ends afterwards. A later signal then ends it at once: while
+            Python shuts down, an exception could only print a traceback.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    # A handler that the calling program has set stays in force; so does ours, further out.
+    before = {
+        number: signal.getsignal(number)
+        for number in _ENDINGS
+        if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL)
+    }
+    if not before:
+        yield
+        return
+    _received.clear()
+    report_unraisable = sys.unraisablehook
+
+    def report_other(unraisable: sys.UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            report_unraisable(unraisable)
+
+    # Python cannot raise through a callback of compiled code, such as llvmlite's: it would print
+    # the interrupt and continue. The list records it.
+    sys.unraisablehook = report_other
+    for number in before:
+        signal.signal(number, _remember)
+    try:
+        yield
+    finally:
+        sys.unraisablehook = report_unraisable
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if to_the_end else handler)
+
+
+def _remember(number: int, _frame: FrameType | None) -> None:
+    _received.append(number)
+    raise KeyboardInterrupt
+
+
+def was_interrupted() -> bool:
+    """Return whether Ctrl-C or SIGTERM came inside `remember_interrupts`."""
+    return bool(_received)
+
+
+def raise_if_interrupted() -> None:
+    """Raise the `KeyboardInterrupt` of an earlier Ctrl-C or SIGTERM that compiled code dropped."""
+    if _received:
+        raise KeyboardInterrupt
+
+
+def report_interrupt() -> int:
+    """Print in one line that the work was interrupted; return the exit code, 130 or 143."""
+    number = _received[0] if _received else signal.SIGINT
+    sys.stderr.write(f"tcs: {_ENDINGS[signal.Signals(number)]}; no half-written file is left.\n")
+    sys.stderr.flush()
+    return 128 + number
