@@ -48,7 +48,11 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    "script", ["live.py", "robots.py", "rows.py", "run.py", "selection.py", "teleop.py"]
+    "script",
+    [
+        *("faults.py", "live.py", "numeric_arms.py", "robots.py", "rows.py", "run.py"),
+        *("selection.py", "teleop.py"),
+    ],
 )
 def test_each_script_says_how_it_is_used(script):
     command = [sys.executable, str(FOLDER / script), "--help"]

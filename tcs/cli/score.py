@@ -141,15 +141,43 @@ def verify(
     dense: Annotated[
         int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
     ] = 200,
+    strata: Annotated[
+        bool,
+        typer.Option(
+            "--strata",
+            help="Scan every unreached pair that only a search of the arm can decide, for minutes.",
+        ),
+    ] = False,
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="With --strata: greatest number of random pairs to scan for each reason.",
+            show_default="all",
+        ),
+    ] = None,
+    jobs: options.Jobs = 2,
     seed: options.Seed = 0,
     as_json: options.Json = False,
 ) -> None:
     """Re-check answers with Drake and estimate the recall of the search."""
+    if limit is not None and not strata:
+        raise typer.BadParameter("needs --strata.", param_hint="--limit")
+
     import tcs
 
     loaded = tcs.load(file)
     with terminal.progress_bar("pairs") as on_progress:
-        found = tcs.verify(loaded, pairs=pairs, dense=dense, seed=seed, on_progress=on_progress)
+        found = tcs.verify(
+            loaded,
+            pairs=pairs,
+            dense=dense,
+            strata=strata,
+            limit=limit,
+            jobs=jobs,
+            seed=seed,
+            on_progress=on_progress,
+        )
     terminal.print_result(found.to_json(), tables.report_verification, as_json=as_json)
     if not found.is_sound:
         terminal.note(f"some answers in '{file}' are false; do not use them.")

@@ -77,6 +77,30 @@ def test_verify_gives_no_figure_for_what_it_did_not_scan(tcs_command, corner_fil
     assert "not estimated" not in scanned.out
 
 
+def test_verify_scans_whole_strata(tcs_command, corner_file):
+    words = ("verify", corner_file, "--pairs", 5, "--dense", 2, "--strata", "--jobs", 2)
+    found = tcs_command(*words, "--json").json
+    reasons = tcs.load(corner_file).nominal.scores.reason_counts()
+    assert {s["reason"]: s["scanned"] for s in found["strata"]} == {
+        reason: reasons[reason] for reason in ("joint_limits", "arm_blocked", "too_far")
+    }
+    assert found["dense_checked"] == sum(s["pairs"] for s in found["strata"])
+    assert found["recall"] == 1.0
+    assert found["scan_seconds"] > 0.0
+    printed = " ".join(tcs_command(*words).out.split())
+    n = reasons["too_far"]
+    assert f"stored as too far 0 of {n:,} reachable, recall 100.00%" in printed
+    assert "time of the scan" in printed
+    limited = tcs_command(*words, "--limit", 1).out
+    assert f"0 of 1 reachable, {n:,} in all" in " ".join(limited.split())
+
+
+def test_a_limit_needs_strata(tcs_command, corner_file):
+    ran = tcs_command("verify", corner_file, "--limit", 5)
+    assert ran.code == 2
+    assert "needs --strata" in ran.err
+
+
 def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
     file = tcs.load(corner_file)
     joints = file.nominal.scores.arm_joints.copy()

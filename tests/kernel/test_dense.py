@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
 from tcs.kernel.verification import reference_pairs
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
@@ -41,6 +42,24 @@ def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
         shortfalls.append(value - scores.dexterity[h, g])
     # Refinement makes up for what the finer scan finds, up to another peak here and there.
     assert np.median(shortfalls) < 5e-4
+
+
+@pytest.mark.parametrize("outside", [False, True], ids=["analytic", "numeric"])
+def test_pairs_are_scanned_together_as_alone(lowered, rng, outside):
+    # Scratch memory is shared: what one pair leaves in it must not reach the next.
+    scene, grid = scene_of(3, lowered)
+    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    if outside:
+        problem = problem._replace(arm=outside_solver(scene.chain))
+    chosen = [sample(rng, scores.reason == r, 2) for r in (REACHED, JOINT_LIMITS, ARM_BLOCKED)]
+    pairs = rng.permutation(np.concatenate(chosen))
+    assert len(pairs) > 2
+    joints, alone = np.full((len(pairs), 7), np.nan), np.full((len(pairs), 7), np.nan)
+    values = dense_scans(problem, pairs, DENSE_SAMPLES, joints)
+    for (h, g), value, q in zip(pairs, values, alone, strict=True):
+        assert dense_scan(problem, h, g, DENSE_SAMPLES, q) == value
+    assert np.any(values >= 0.0)
+    np.testing.assert_array_equal(joints[values >= 0.0], alone[values >= 0.0])
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -1,17 +1,18 @@
-"""Dense scan of the free joint, to find solutions that the search misses."""
+"""Dense scans of the free joint, to find solutions that the search misses."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.search import MAX_SAMPLES, Search, fill_samples, new_search
 from tcs.kernel.analytic.solver import is_outside
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
-from tcs.kernel.cache import jit
+from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -22,7 +23,7 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
-from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scan
+from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.views import unowned
 
 DENSE_SAMPLES = 11_520
@@ -32,39 +33,82 @@ DENSE_SAMPLES = 11_520
 def dense_scan(
     problem: Problem, configuration: int, goal: int, samples: int, joints: FloatArray
 ) -> float:
-    """Return the dexterity of the best collision-free sample of the free joint, -1 if none is free.
-
-    With a closed form, every sample is solved on every branch, and solutions within the joint
-    limits are checked for contacts in descending order of their measure; the best one is not
-    refined. Without a closed form, `numeric_dense_scan` is used. Contacts of base and gripper with
-    the environment are not checked.
+    """Return the dexterity of the best collision-free sample of one pair, -1 if none is free.
 
     Args:
         problem: The scene, its goals and its grid.
-        configuration: Flat index of an initial configuration whose base is free of contact.
-        goal: Index of a goal at which the gripper is free of contact with the environment.
-        samples: Number of angles, spread evenly over the limits of the free joint; ignored without
-            a closed form.
+        configuration: As in `dense_scans`.
+        goal: As in `dense_scans`.
+        samples: As in `dense_scans`.
         joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
     """
+    pairs, found = np.array([[configuration, goal]]), np.empty((1, 7))
+    (value,) = dense_scans(problem, pairs, samples, found)
+    if value >= 0.0:
+        joints[:] = found[0]
+    return float(value)
+
+
+def dense_scans(
+    problem: Problem, pairs: IntArray, samples: int, joints: FloatArray
+) -> NDArray[np.float64]:
+    """Return the dexterity of the best collision-free sample of each pair, -1 where none is free.
+
+    With a closed form, every sample of the free joint is solved on every branch, and solutions
+    within the joint limits are checked for contacts in descending order of their measure; the best
+    one is not refined. Without a closed form, `numeric_dense_scans` is used. Contacts of base and
+    gripper with the environment are not checked. The GIL is released.
+
+    Args:
+        problem: The scene, its goals and its grid.
+        pairs: Flat indices of initial configurations whose base is free of contact, and goals at
+            which the gripper is free of contact with the environment, shape (n, 2).
+        samples: Number of angles, spread evenly over the limits of the free joint; ignored without
+            a closed form.
+        joints: Filled with the joint angles of each solution [rad], shape (n, 7).
+    """
     if is_outside(problem.arm):
-        return numeric_dense_scan(problem, configuration, goal, STARTS, joints)
+        return numeric_dense_scans(problem, pairs, STARTS, joints)
+    values = np.empty(len(pairs))
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, search = new_workspace(problem), new_search()
-    return float(_dense_scan(problem, work, search, configuration, goal, samples, joints))
+    _dense_scans(problem, work, search, pairs, samples, values, joints)
+    return values
 
 
 @jit
-def _dense_scan(
+def _dense_scans(
     owned_problem: Problem,
     owned_work: Workspace,
     owned_search: Search,
+    pairs: IntArray,
+    samples: int,
+    values: FloatArray,
+    joints: FloatArray,
+) -> None:
+    problem, work, search = unowned(owned_problem), unowned(owned_work), unowned(owned_search)
+    angles = np.empty(samples * len(problem.arm.branches))
+    measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
+    for n in range(len(pairs)):
+        values[n] = _scan(
+            problem, work, search, pairs[n, 0], pairs[n, 1], samples,
+            angles, measures, branches, joints[n],
+        )  # fmt: skip
+
+
+@inner
+def _scan(
+    problem: Problem,
+    work: Workspace,
+    search: Search,
     configuration: int,
     goal: int,
     samples: int,
+    angles: FloatArray,
+    measures: FloatArray,
+    branches: IntArray,
     joints: FloatArray,
 ) -> float:
-    problem, work, search = unowned(owned_problem), unowned(owned_work), unowned(owned_search)
     arm = problem.arm
     torso = configuration % problem.torso_levels
     state = place_base(problem, work, configuration // problem.torso_levels)
@@ -78,8 +122,6 @@ def _dense_scan(
     if not np.isfinite(first):
         first, last = -np.pi, np.pi
     step = (last - first) / (samples - 1)
-    angles = np.empty(samples * len(arm.branches))
-    measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     found = 0
     for b in range(len(arm.branches)):
         for start in range(0, samples, MAX_SAMPLES):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import int_constant, jit
 from tcs.kernel.contacts import NO_CONTACT, Workspace, gripper_body_contact, new_workspace
@@ -28,10 +29,10 @@ POINTS, CURVES, CANDIDATES = 16_384, 256, 65_536
 """Capacities of the scratch arrays."""
 
 
-def numeric_dense_scan(
-    problem: Problem, configuration: int, goal: int, starts: int, joints: FloatArray
-) -> float:
-    """Return the dexterity of a collision-free solution, -1 if none is found.
+def numeric_dense_scans(
+    problem: Problem, pairs: IntArray, starts: int, joints: FloatArray
+) -> NDArray[np.float64]:
+    """Return the dexterity of a collision-free solution for each pair, -1 where none is found.
 
     Starts are spread over the joint limits; the table of the sweep is not used. Each curve that a
     start converges to is traced once, also beyond the joint limits, until the scratch memory is
@@ -41,17 +42,22 @@ def numeric_dense_scan(
 
     Args:
         problem: The scene, its goals and its grid.
-        configuration: Flat index of an initial configuration whose base is free of contact.
-        goal: Index of a goal at which the gripper is free of contact with the environment.
+        pairs: Flat indices of initial configurations whose base is free of contact, and goals at
+            which the gripper is free of contact with the environment, shape (n, 2).
         starts: Number of postures to start from.
-        joints: Filled with the joint angles of the solution [rad] if there is one, shape (7,).
+        joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
     arm = numeric_arm_of(problem)
     low, high = joint_ranges(problem.arm.lower, problem.arm.upper)
     postures = low + spread(starts, 7) * (high - low)
     # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
     work, search = new_workspace(problem), new_curve_search(POINTS, CURVES, CANDIDATES)
-    return float(_scan(problem, arm, work, search, configuration, goal, postures, joints))
+    return np.array(
+        [
+            _scan(problem, arm, work, search, h, g, postures, q)
+            for (h, g), q in zip(pairs, joints, strict=True)
+        ]
+    )
 
 
 @jit

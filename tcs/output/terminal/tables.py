@@ -142,6 +142,8 @@ def report_verification(found: Mapping[str, Any]) -> None:
     table = new_table("check", ">result")
     for line in check_lines(found):
         table.add_row(f"  {line.text}" if line.is_detail else line.text, line.value)
+    if found["dense_checked"]:
+        table.add_row("time of the scan of unreached pairs", f"{found['scan_seconds']:.1f} s")
     table.add_row("verdict", found["verdict"])
     results_console().print(table)
 

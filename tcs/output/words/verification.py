@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from tcs.output.words.numbers import percentage
+from tcs.output.words.reasons import REASON_NAMES
+from tcs.placement.tables import Reason
 
 _SCANS = {"analytic": "11,520 arm angles each", "numeric": "400 starts each"}
 
@@ -47,9 +49,20 @@ def check_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
         CheckLine(f"unreached pairs scanned densely ({scan})", f"{found['dense_checked']:,}"),
         CheckLine("reachable", f"{found['missed']:,}", is_detail=True),
         CheckLine("solutions that Drake refutes", f"{found['unconfirmed_hits']:,}", is_detail=True),
+        *(_stratum_line(stratum) for stratum in found["strata"]),
         CheckLine("recall", recall_text(found)),
         CheckLine(f"mean shortfall of {measure}", shortfall),
     )
+
+
+def _stratum_line(stratum: Mapping[str, Any]) -> CheckLine:
+    text = f"{stratum['missed']:,} of {stratum['scanned']:,} reachable"
+    if stratum["scanned"] < stratum["pairs"]:
+        text += f", {stratum['pairs']:,} in all"
+    if stratum["recall"] is not None:
+        text += f", recall {percentage(stratum['recall'], 2)}"
+    name = REASON_NAMES[Reason[stratum["reason"].upper()]]
+    return CheckLine(f"stored as {name}", text, is_detail=True)
 
 
 def recall_text(found: Mapping[str, Any]) -> str:

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
+from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.kernel.verification.reference import measured
 from tcs.model.scene import Scene, goal_poses
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.strata import (
+    STRATA,
+    Pairs,
+    Stratum,
+    estimated_recall,
+    random_pairs,
+    scan_counts,
+    stratum_of,
+)
 from tcs.placement.scoring.sweep import ik_of
 from tcs.placement.store import ScoreFile, StateTables
 from tcs.placement.tables import Reason
@@ -27,15 +38,14 @@ the tool by up to 1.2e-7 rad x 1 m for each of seven joints, 4e-7 m in practice.
 ROTATION_BAR = 2e-6
 """Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
 8.4e-7, and the angle of a rotation matrix near the identity loses as much again."""
+SLICE = 16
+"""Pairs that a thread scans at a time: up to half a second of work, so that progress is visible."""
 DEXTERITY_BAR = 1e-6
 """Greatest difference of a stored dexterity from that of Drake's Jacobian. Float32 keeps 6e-8; a
 least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
 CLEARANCE_ROUNDING = 2e-6
 """Tolerance of a clearance measured by Drake [m]: rounding of the joints
 moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is accurate to 1e-6 m."""
-UNREACHED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
-"""Strata of the dense scan: body and gripper are free of contact, the goal within reach."""
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -69,7 +79,12 @@ class Verification:
     recall: float | None
     """Estimated fraction of the reachable pairs that are stored as reached."""
     recall_ci95: tuple[float, float] | None
-    """Interval of the recall: the sum of exact binomial limits of each stratum."""
+    """Interval of the recall: the sum of exact binomial limits of each stratum; of no width where
+    every stratum was scanned as a whole."""
+    strata: tuple[Stratum, ...]
+    """The findings by stratum of the unreached pairs."""
+    scan_seconds: float = field(compare=False)
+    """Time of the dense scan of the unreached pairs [s]."""
     shortfall_checked: int
     """Number of reached pairs scanned densely."""
     mean_shortfall: float | None
@@ -108,9 +123,7 @@ class Verification:
             return None
         if not self.dense_checked:
             return "not estimated: no unreached pair was scanned"
-        if self.recall_ci95 is None:
-            return "not defined: no pair is stored as reached, and none was found reachable"
-        return "not estimated: too few unreached pairs were scanned"
+        return "not defined: no pair is stored as reached, and none was found reachable"
 
     def to_json(self) -> dict[str, Any]:
         """Return the findings as plain containers."""
@@ -118,6 +131,7 @@ class Verification:
         return {
             **asdict(self),
             "recall_ci95": interval,
+            "strata": [stratum.to_json() for stratum in self.strata],
             "recall_note": self.recall_note,
             "verdict": self.verdict,
         }
@@ -128,6 +142,9 @@ def verify(
     *,
     pairs: int = 500,
     dense: int = 200,
+    strata: bool = False,
+    limit: int | None = None,
+    jobs: int = 2,
     seed: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Verification:
@@ -143,23 +160,34 @@ def verify(
     Args:
         file: A score file.
         pairs: Number of reached pairs to re-check.
-        dense: Number of unreached, and of reached, pairs to scan densely.
+        dense: Number of unreached, and of reached, pairs to scan densely; at least one pair of each
+            stratum unless it is 0.
+        strata: Whether to scan every unreached pair of each stratum in place of `dense` random
+            ones, and the stratum of the goals out of reach as well.
+        limit: With `strata`, the greatest number of random pairs to scan in each stratum.
+        jobs: Number of threads of the dense scan; the findings do not depend on it.
         seed: Seed of the random samples.
         on_progress: Called with the number of checked pairs and their total.
 
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
-        TcsError: If a number is negative.
+        TcsError: If a number is negative, `jobs` is not positive, or there is a limit without
+            `strata`.
     """
     if pairs < 0 or dense < 0:
         raise TcsError(f"verify: pairs is {pairs}, dense is {dense}; neither may be negative.")
+    if jobs < 1:
+        raise TcsError(f"verify: jobs is {jobs}; it must be at least 1.")
+    if limit is not None and (limit < 1 or not strata):
+        raise TcsError(f"verify: limit is {limit}; it must be at least 1, and needs strata=True.")
     job, scene, lowered = rebuild_scene(file)
     rng = np.random.default_rng(seed)
     reason = np.concatenate([table.scores.reason for table in file.tables])
-    reached = _sample(rng, reason == Reason.REACHED, pairs)
-    unreached = [_sample(rng, reason == r, n) for r, n in _scan_counts(reason, dense).items()]
-    again = _sample(rng, reason == Reason.REACHED, dense)
-    total = len(reached) + sum(map(len, unreached)) + len(again)
+    reached = random_pairs(rng, reason == Reason.REACHED, pairs)
+    counts = dict.fromkeys(STRATA, limit) if strata else scan_counts(reason, dense)
+    unreached = {r: random_pairs(rng, reason == r, count) for r, count in counts.items()}
+    again = random_pairs(rng, reason == Reason.REACHED, dense)
+    total = len(reached) + sum(map(len, unreached.values())) + len(again)
     count = itertools.count(1)
 
     def step() -> None:
@@ -168,14 +196,20 @@ def verify(
 
     measure = file.metadata["measure"]
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    checker = _FileChecker(file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure))
+    checker = _FileChecker(
+        file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure), jobs
+    )
     findings = checker.stored(reached, step)
-    hits = [checker.hits(part, step) for part in unreached]
+    begun = time.perf_counter()
+    hits = {r: checker.hits(part, step) for r, part in unreached.items()}
+    scan_seconds = time.perf_counter() - begun
     shortfall = checker.shortfall(again, step)
-    scanned, missed = [len(part) for part in unreached], [sum(part) for part in hits]
-    sizes = [int(np.count_nonzero(reason == r)) for r in UNREACHED]
+    stored = int(np.count_nonzero(reason == Reason.REACHED))
+    found = tuple(
+        stratum_of(r, stored, int(np.count_nonzero(reason == r)), part) for r, part in hits.items()
+    )
     recall, interval = estimated_recall(
-        int(np.count_nonzero(reason == Reason.REACHED)), sizes, scanned, missed
+        stored, [s.pairs for s in found], [s.scanned for s in found], [s.missed for s in found]
     )
     return Verification(
         measure=measure,
@@ -186,11 +220,13 @@ def verify(
         max_rotation_error=max((finding.rotation_error for finding in findings), default=None),
         max_isotropy_error=max((finding.dexterity_error for finding in findings), default=None),
         limit_violations=sum(finding.limit_violations for finding in findings),
-        dense_checked=sum(scanned),
-        missed=sum(missed),
-        unconfirmed_hits=sum(not confirmed for part in hits for confirmed in part),
+        dense_checked=sum(s.scanned for s in found),
+        missed=sum(s.missed for s in found),
+        unconfirmed_hits=sum(s.unconfirmed_hits for s in found),
         recall=recall,
         recall_ci95=interval,
+        strata=found,
+        scan_seconds=scan_seconds,
         shortfall_checked=len(shortfall),
         mean_shortfall=float(np.mean(shortfall)) if shortfall else None,
     )
@@ -210,12 +246,10 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     job, scene, lowered = rebuild_scene(file)
     measure = file.metadata["measure"]
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    checker = _FileChecker(file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure))
+    checker = _FileChecker(
+        file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure), jobs=1
+    )
     return checker.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
-
-
-Pairs = list[tuple[int, int]]
-"""Configurations, numbered through all tables, and goals: (h, g)."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +261,8 @@ class _FileChecker:
     """Number of configurations per table."""
     problem: Problem
     drake: _DrakeChecker
+    jobs: int
+    """Number of threads of the dense scans."""
 
     def dexterity(self, h: int, g: int) -> float:
         """Return the stored dexterity."""
@@ -243,90 +279,37 @@ class _FileChecker:
             step()
         return findings
 
-    def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool]:
-        """Return whether Drake confirms each solution of a dense scan at unreached pairs."""
-        found, q = [], np.empty(7)
-        for h, g in pairs:
-            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
-            if value >= 0.0:
-                found.append(self.drake.check(h, g, q, value).is_true)
+    def hits(self, pairs: Pairs, step: Callable[[], None]) -> list[bool | None]:
+        """Return whether Drake confirms the solution of a dense scan at each unreached pair.
+
+        None stands for a pair at which the scan finds no solution.
+        """
+        hits: list[bool | None] = []
+        for (h, g), value, q in self._scans(pairs):
+            hits.append(self.drake.check(h, g, q, value).is_true if value >= 0.0 else None)
             step()
-        return found
+        return hits
 
     def shortfall(self, pairs: Pairs, step: Callable[[], None]) -> list[float]:
         """Return how much greater the dexterity of the dense scan is at reached pairs."""
-        short, q = [], np.empty(7)
-        for h, g in pairs:
-            value = dense_scan(self.problem, h, g, DENSE_SAMPLES, q)
+        short = []
+        for (h, g), value, _ in self._scans(pairs):
             short.append(max(0.0, value - self.dexterity(h, g)))
             step()
         return short
 
+    def _scans(self, pairs: Pairs) -> Iterator[tuple[tuple[int, int], float, NDArray[np.float64]]]:
+        """Yield each pair with the dexterity and the joints of its dense scan, in order."""
 
-def estimated_recall(
-    reached: int, sizes: list[int], scanned: list[int], missed: list[int]
-) -> tuple[float | None, tuple[float, float] | None]:
-    """Return the estimated recall and its 95 % interval.
+        def scan(part: Pairs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            joints = np.empty((len(part), 7))
+            return dense_scans(self.problem, np.array(part), DENSE_SAMPLES, joints), joints
 
-    Args:
-        reached: Number of pairs that are stored as reached, R.
-        sizes: Number of unreached pairs in each stratum, U.
-        scanned: Number of these that were scanned, n.
-        missed: Number of these that are reachable, k.
-
-    Returns:
-        R / (R + sum of U k / n), and the same at the Clopper-Pearson limits of each stratum, which
-        together are conservative. The estimate is None if a stratum has pairs and none was
-        scanned; both are None if no pair is known to be reachable.
-
-    >>> estimated_recall(990, [1000], [100], [1])[0]
-    0.99
-    """
-    # Imported here: importing this package, which drawing does too, is faster without SciPy.
-    from scipy.special import betaincinv
-
-    tail = (1.0 - CONFIDENCE) / 2.0
-    expected = lowest = highest = 0.0
-    is_known = True
-    for size, n, k in zip(sizes, scanned, missed, strict=True):
-        if n == 0:
-            # Without a scan, none or all of the stratum may be reachable.
-            highest += size
-            is_known &= size == 0
-            continue
-        expected += size * k / n
-        if k > 0:
-            lowest += size * float(betaincinv(k, n - k + 1, tail))
-        highest += size * (float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0)
-    if reached == 0:
-        return (0.0, (0.0, 0.0)) if expected > 0.0 else (None, None)
-    return reached / (reached + expected) if is_known else None, (
-        reached / (reached + highest),
-        reached / (reached + lowest),
-    )
-
-
-def _scan_counts(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
-    """Return the number of pairs of each stratum to scan, in proportion and not 0."""
-    sizes = {r: int(np.count_nonzero(reason == r)) for r in UNREACHED}
-    total = sum(sizes.values())
-    if total == 0 or dense == 0:
-        return dict.fromkeys(UNREACHED, 0)
-    first, second = UNREACHED
-    least = min(dense // 2, sizes[first], max(1, dense // 10)) if sizes[first] else 0
-    count = min(max(round(dense * sizes[first] / total), least), dense)
-    rest = min(dense - count, sizes[second])
-    if sizes[second]:
-        rest = max(rest, min(max(1, dense // 10), sizes[second]))
-    return {first: min(dense - rest, sizes[first]), second: rest}
-
-
-def _sample(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int) -> Pairs:
-    """Return up to `count` distinct random (h, g) at which `chosen` is true."""
-    flat = np.flatnonzero(chosen)
-    picked = rng.choice(flat, size=min(count, len(flat)), replace=False)
-    goals = chosen.shape[1]
-    return [(int(i // goals), int(i % goals)) for i in picked]
+        parts = [pairs[start : start + SLICE] for start in range(0, len(pairs), SLICE)]
+        pool = Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")
+        for part, (values, joints) in zip(parts, pool(map(delayed(scan), parts)), strict=True):
+            for pair, value, q in zip(part, values, joints, strict=True):
+                yield pair, float(value), q
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import pytest
 from tcs.errors import StoreMismatchError, TcsError
 from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
-from tcs.placement.scoring.verify import estimated_recall
+from tcs.placement.scoring.strata import SAMPLED, STRATA, estimated_recall, scan_counts
 from tcs.placement.store import StateTables
 from tcs.placement.tables import Reason
 from tests.environments import BESIDE, write_environment
@@ -98,24 +98,77 @@ def test_a_file_of_other_models_is_refused(small_file):
         verify(dataclasses.replace(small_file, metadata=metadata))
 
 
-def test_reached_pairs_taken_away_are_missed(small_file):
-    # Declare every second reached pair blocked: the dense scan must find about all of them.
-    scores = small_file.nominal.scores
-    reason, dexterity = scores.reason.copy(), scores.dexterity.copy()
+def without_every_second(file, reason):
+    """Return the file with every second reached pair stored as unreached, and how many they are."""
+    scores = file.nominal.scores
+    reasons, dexterity = scores.reason.copy(), scores.dexterity.copy()
     taken = np.argwhere(scores.reached)[::2]
-    reason[taken[:, 0], taken[:, 1]] = Reason.ARM_BLOCKED
+    reasons[taken[:, 0], taken[:, 1]] = reason
     dexterity[taken[:, 0], taken[:, 1]] = 0.0
     kept = np.ones(len(scores.arm_joints), dtype=bool)
     kept[::2] = False
     stripped = dataclasses.replace(
-        scores, reason=reason, dexterity=dexterity, arm_joints=scores.arm_joints[kept]
+        scores, reason=reasons, dexterity=dexterity, arm_joints=scores.arm_joints[kept]
     )
-    sets = build_sets(stripped, Grid.from_dict(small_file.grid))
-    forged = dataclasses.replace(small_file, tables=(StateTables.of(stripped, sets),))
+    sets = build_sets(stripped, Grid.from_dict(file.grid))
+    return dataclasses.replace(file, tables=(StateTables.of(stripped, sets),)), len(taken)
+
+
+def test_reached_pairs_taken_away_are_missed(small_file):
+    # Declare every second reached pair blocked: the dense scan must find about all of them.
+    forged, _ = without_every_second(small_file, Reason.ARM_BLOCKED)
     found = verify(forged, pairs=0, dense=60)
     assert found.missed > 0
     assert found.recall < 0.9
     assert found.recall_ci95[0] <= found.recall <= found.recall_ci95[1]
+
+
+@pytest.mark.parametrize("reason", STRATA, ids=lambda reason: reason.name.lower())
+def test_a_whole_scan_finds_what_was_taken_from_its_stratum(small_file, reason):
+    forged, taken = without_every_second(small_file, reason)
+    found = verify(forged, pairs=0, dense=0, strata=True)
+    assert [stratum.reason for stratum in found.strata] == list(STRATA)
+    for stratum in found.strata:
+        count = int(np.sum(forged.nominal.scores.reason == stratum.reason))
+        assert stratum.pairs == stratum.scanned == count
+        # What the search itself may have missed is not what this test is about.
+        assert stratum.missed >= 0.99 * taken if stratum.reason is reason else not stratum.missed
+    stored = int(forged.nominal.scores.reached.sum())
+    assert found.recall == pytest.approx(stored / (stored + found.missed))
+    assert found.recall_ci95 == (found.recall, found.recall)
+    by_reason = {stratum.reason: stratum.recall for stratum in found.strata}
+    assert by_reason[reason] == found.recall
+    assert all(recall == 1.0 for other, recall in by_reason.items() if other is not reason)
+    assert found.unconfirmed_hits == 0
+
+
+def test_a_limit_samples_each_stratum(small_file):
+    found = verify(small_file, pairs=0, dense=0, strata=True, limit=7)
+    assert [s.scanned for s in found.strata] == [min(7, s.pairs) for s in found.strata]
+    assert found.to_json()["strata"][0]["reason"] == "joint_limits"
+
+
+def test_threads_change_nothing_in_the_findings(small_file):
+    first, second = (verify(small_file, pairs=0, dense=40, jobs=n) for n in (1, 3))
+    assert first == second
+    assert first.scan_seconds > 0.0
+
+
+def test_the_smallest_sample_has_a_pair_of_each_stratum(small_file):
+    found = verify(small_file, pairs=0, dense=1)
+    assert all(stratum.pairs for stratum in found.strata)
+    assert [stratum.scanned for stratum in found.strata] == [1, 1]
+    assert found.recall is not None
+
+
+@pytest.mark.parametrize("dense", [1, 2, 3, 10, 999])
+@pytest.mark.parametrize("sizes", [(0, 50), (50, 0), (1, 1), (1, 900), (900, 1), (30, 40), (0, 0)])
+def test_every_stratum_is_scanned_and_no_pair_twice(sizes, dense):
+    reason = np.repeat(np.array(SAMPLED, np.uint8), sizes)[:, None]
+    counts = [scan_counts(reason, dense)[r] for r in SAMPLED]
+    assert all(0 < n <= size if size else n == 0 for n, size in zip(counts, sizes, strict=True))
+    strata = sum(size > 0 for size in sizes)
+    assert sum(counts) == min(max(dense, strata), sum(sizes))
 
 
 def test_the_same_seed_checks_the_same_pairs(small_file):
@@ -127,6 +180,19 @@ def test_the_same_seed_checks_the_same_pairs(small_file):
 @pytest.mark.parametrize("bad", [{"pairs": -1}, {"dense": -1}])
 def test_negative_numbers_are_refused(small_file, bad):
     with pytest.raises(TcsError, match="neither may be negative"):
+        verify(small_file, **bad)
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"jobs": 0}, "jobs is 0"),
+        ({"limit": 5}, "needs strata=True"),
+        ({"strata": True, "limit": 0}, "at least 1"),
+    ],
+)
+def test_odd_options_of_the_scan_are_refused(small_file, bad, message):
+    with pytest.raises(TcsError, match=message):
         verify(small_file, **bad)
 
 
@@ -142,6 +208,12 @@ def test_an_unscanned_stratum_leaves_recall_open():
     recall, (low, high) = estimated_recall(100, [100], [0], [0])
     assert recall is None
     assert (low, high) == (0.5, 1.0)
+
+
+def test_a_stratum_scanned_as_a_whole_leaves_nothing_to_estimate():
+    recall, interval = estimated_recall(900, [50, 100], [50, 100], [4, 0])
+    assert recall == 900 / 904
+    assert interval == (recall, recall)
 
 
 def test_recall_is_undefined_where_nothing_is_known_to_be_reachable():
