@@ -13,7 +13,8 @@ SHARED := --numprocesses=$(PROCESSES) --dist=loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint wheel docs format figures benchmark benchmark-robots benchmark-peers clean
+.PHONY: help demo test test-all lint wheel docs format figures benchmark benchmark-robots benchmark-peers \
+  benchmark-save clean
 
 help:  ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -66,6 +67,10 @@ benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the sam
 	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[benchmarks]' || \
 	  echo "Not every peer could be installed; what is absent is left out with a line." >&2
 	$(BIN)/python benchmarks/peers.py
+
+benchmark-save: $(STAMP)  ## Run every benchmark that a page shows, save and rewrite the pages; continues where it was
+	$(BIN)/python benchmarks/save_all.py
+	$(BIN)/python scripts/figures.py
 
 clean:  ## Remove everything the other targets made
 	rm -rf $(VENV) $(OUT) build dist

@@ -11,16 +11,18 @@ from __future__ import annotations
 
 import time
 
-from table import header, parser, record, row, save
+from table import header, parser, record_table, row, save
 
+from tcs.model.robots import load_robot
 from tcs.output.report.blocks import Table
 from tcs.output.report.teleop_tables import (
     group_table,
+    learning_table,
     motion_blocks,
     signed_rank_table,
     trials_table,
 )
-from tcs.teleop import load_arm
+from tcs.teleop.arm import load_arm, torso_height_of
 from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.within_subject import ExperimentPlan, run_experiment
 
@@ -43,19 +45,31 @@ def main() -> None:
         training=options.training,
         seed=options.seed,
     )
-    arm = load_arm(options.robot)
+    robot = load_robot(options.robot)
+    arm = load_arm(robot, torso_height=torso_height_of(robot))
     course = find_course(arm, options.line_seed)
     begun = time.perf_counter()
     experiment = run_experiment(arm, course, plan, jobs=options.jobs)
     row("experiment", f"{time.perf_counter() - begun:.0f} s on {options.jobs} processes")
     motion = [block for block in motion_blocks(experiment) if isinstance(block, Table)]
-    names = ("groups", "tests", "motion", "pairs", "trials")
-    tables = (group_table(experiment), signed_rank_table(experiment), *motion)
-    for name, table in zip(names, (*tables, trials_table(experiment)), strict=True):
+    tables = dict(
+        zip(
+            ("groups", "tests", "motion", "pairs", "trials", "learning"),
+            (
+                group_table(experiment),
+                signed_rank_table(experiment),
+                *motion,
+                trials_table(experiment),
+                learning_table(experiment),
+            ),
+            strict=True,
+        )
+    )
+    for name, table in tables.items():
         print(f"\n{table.caption}")
         for cells in table.texts():
             print("  ".join(cells))
-        record(name, [column.title for column in table.columns], table.texts())
+        record_table(name, table)
     save(options)
 
 

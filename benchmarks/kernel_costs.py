@@ -9,7 +9,7 @@ import numpy as np
 from peer_drake import WinnersChecker
 from peer_problems import Bench, Pair
 from sample_costs import measure_fractions
-from table import row, spread
+from table import cell, row, spread
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.problem import UNCHECKED, Problem
@@ -46,15 +46,21 @@ def sweep_costs(bench: Bench, repeats: int) -> None:
         taken["overlaps"].append(seconds)
     for jobs in ("1", "2"):
         rate = pairs / float(np.median(taken[jobs]))
-        row(f"whole sweep, jobs {jobs}", f"{spread(taken[jobs])}, {rate:.3g} pairs a second")
-    row("  processor time, jobs 2", spread(taken["cpu"]))
-    row("thread scaling 1 -> 2", _ratio(taken["1"], taken["2"]))
-    row("floor: each winner checked once", f"{spread(taken['floor'])}, {len(winners)} winners")
-    row("  processor time", spread(taken["floor cpu"]))
-    row("  checker's contexts; winners hit", f"{checked.contexts}; {checked.colliding}")
-    row("  overlap or not, processor time", f"{spread(taken['overlaps'])}, {overlapping} hit")
-    row("floor / sweep, both on 2 threads", _ratio(taken["floor"], taken["2"]))
-    row("  by processor time", _ratio(taken["floor cpu"], taken["cpu"]))
+        _measured(f"whole sweep, jobs {jobs}", f"{spread(taken[jobs])}, {rate:.3g} pairs a second")
+    _measured("  whole sweep, jobs 2, processor time", spread(taken["cpu"]))
+    _measured("thread scaling 1 -> 2", _ratio(taken["1"], taken["2"]))
+    _measured(
+        "floor: each winner checked once", f"{spread(taken['floor'])}, {len(winners)} winners"
+    )
+    _measured("  floor, processor time", spread(taken["floor cpu"]))
+    _measured(
+        "  floor: checker's contexts; winners hit", f"{checked.contexts}; {checked.colliding}"
+    )
+    _measured(
+        "  floor: overlap or not, processor time", f"{spread(taken['overlaps'])}, {overlapping} hit"
+    )
+    _measured("floor / sweep, both on 2 threads", _ratio(taken["floor"], taken["2"]))
+    _measured("  floor / sweep, by processor time", _ratio(taken["floor cpu"], taken["cpu"]))
 
 
 def grid_costs(bench: Bench, repeats: int) -> None:
@@ -71,7 +77,7 @@ def grid_costs(bench: Bench, repeats: int) -> None:
             each[part].append(swept.scoring_seconds / count[part])
     for part in GRID_PARTS:
         text = f"{count[part]} configurations, each {spread(each[part], 'us', 1e6)}"
-        row(f"1/{part} of the grid, jobs 1", text)
+        _measured(f"1/{part} of the grid, jobs 1", text)
 
 
 def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
@@ -97,7 +103,7 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
         for name, (stage, grippers) in stages.items():
             taken[name].append(_processor_seconds(stage, grippers, len(bench.scores.reason)))
     base, reach, solved, whole = (np.array(taken[name]) for name in stages)
-    row(f"kernel on 1/{EVERY} of the grid, jobs 1", f"{spread(list(whole))}, of which")
+    _measured(f"kernel on 1/{EVERY} of the grid, jobs 1", f"{spread(list(whole))}, of which")
     _part("base check", base / whole)
     _part("prefilter: too far", (reach - base) / whole)
     shares = np.array(measure_fractions(problem.arm, pairs, repeats))
@@ -137,7 +143,13 @@ def _processor_seconds(problem: Problem, grippers: IntArray, size: int) -> float
 
 
 def _part(name: str, shares: FloatArray) -> None:
-    row(f"  {name}", spread(list(100.0 * shares), "%"))
+    _measured(f"  of it {name}", spread(list(100.0 * shares), "%"))
+
+
+def _measured(name: str, text: str) -> None:
+    """Print one measured value, and record it for the docs."""
+    row(name, text)
+    cell("sweep", name.strip(), "measured", text)
 
 
 def _ratio(first: list[float], second: list[float]) -> str:

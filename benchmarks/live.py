@@ -10,11 +10,10 @@ depend on time.
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import numpy as np
-from table import header, row, spread
+from table import cell, header, parser, row, save, spread
 
 from tcs.placement.scoring import LiveScorer, score, task_environment_pairs
 from tcs.placement.selection import nearest_table
@@ -25,13 +24,15 @@ WHEELCHAIR = "wheelchair"
 
 def main() -> None:
     """Measure and print everything."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=5, help="observations of each task")
-    parser.add_argument("--rows", nargs="*", metavar="TASK/ENVIRONMENT", help="only these rows")
-    parser.add_argument(
+    command_line = parser(__doc__)
+    command_line.add_argument("--repeats", type=int, default=5, help="observations of each task")
+    command_line.add_argument(
+        "--rows", nargs="*", metavar="TASK/ENVIRONMENT", help="only these rows"
+    )
+    command_line.add_argument(
         "--between", type=float, default=0.025, help="distance from a stored shift [m]"
     )
-    options = parser.parse_args()
+    options = command_line.parse_args()
     header()
     rows = [
         one for one in task_environment_pairs() if not options.rows or "/".join(one) in options.rows
@@ -43,6 +44,7 @@ def main() -> None:
     for task, environment in rows:
         if environment != WHEELCHAIR:
             gains(task, environment, options.between)
+    save(options)
 
 
 def times(task: str, repeats: int) -> None:
@@ -64,6 +66,13 @@ def times(task: str, repeats: int) -> None:
     row("  of it scoring the grid", spread(scoring))
     row("  of it building the sets", spread(sets))
     row("  processor time, two threads", spread(cpu))
+    for column, seconds in (
+        ("one observation", wall),
+        ("of it scoring the grid", scoring),
+        ("of it building the sets", sets),
+        ("processor time, two threads", cpu),
+    ):
+        cell("times", task, column, spread(seconds))
 
 
 def gains(task: str, environment: str, between: float) -> None:
@@ -92,6 +101,10 @@ def gains(task: str, environment: str, between: float) -> None:
             f"({sums.min():+.4f} .. {sums.max():+.4f}), better in "
             f"{np.count_nonzero(sums > 1e-9)} of {len(sums)}",
         )
+        where = f"{100 * between:g} cm along y" + (f", {100 * x:g} cm along x" if x else "")
+        line = f"{task.replace('_', ' ')}, {environment}"
+        cell("gains", line, f"{where}: P_R (greatest)", f"{reach.mean():+.3f} ({reach.max():+.3f})")
+        cell("gains", line, f"{where}: P_M", f"{found[:, 1].mean():+.4f}")
 
 
 def scores_of(live: ScoreFile, members: tuple[int, ...]) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from peer_arms import EaikSweep, PinocchioClik, TracIk, UnfitArmError
 from peer_drake import DrakeIk
 from peer_kernel import Kernel
 from peer_problems import ENVIRONMENT, ROBOT, TASK, Answer, Bench, Judge, Pair, Peer, draw
-from table import header, row
+from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import Chain
 
@@ -107,25 +107,28 @@ def main(arguments: list[str] | None = None) -> int:
         grid_costs(bench, options.repeats)
         part_costs(bench, pairs, options.repeats)
     row("load when it ended", ", ".join(f"{load:.2f}" for load in os.getloadavg()))
+    save(options)
     return 0
 
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """Return the command line's options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--problems", type=int, default=100, help="half of them reachable")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--repeats", type=int, default=5, help="of the sweeps; 0 leaves them out")
-    parser.add_argument(
+    command_line = parser(__doc__)
+    command_line.add_argument("--problems", type=int, default=100, help="half of them reachable")
+    command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument(
+        "--repeats", type=int, default=5, help="of the sweeps; 0 leaves them out"
+    )
+    command_line.add_argument(
         "--peers", default=",".join(NAMES), help=f"some of {', '.join(NAMES)}; '' for none"
     )
-    options = parser.parse_args(arguments)
+    options = command_line.parse_args(arguments)
     if options.problems < 2 or options.seed < 0 or options.repeats < 0:
-        parser.error("--problems must be 2 or more, --seed and --repeats not negative")
+        command_line.error("--problems must be 2 or more, --seed and --repeats not negative")
     options.peers = [name for name in options.peers.split(",") if name]
     unknown = sorted(set(options.peers) - set(NAMES))
     if unknown:
-        parser.error(f"--peers: '{unknown[0]}' is unknown; there are {', '.join(NAMES)}")
+        command_line.error(f"--peers: '{unknown[0]}' is unknown; there are {', '.join(NAMES)}")
     return options
 
 
@@ -160,7 +163,11 @@ def show_answers(records: dict[str, Record], reachable: NDArray[np.bool_]) -> No
             for subset in (reachable, ~reachable)
             for kept in (record.at_goal, record.free)
         ]
-        _cells(f"  {label}", *counts, f"{np.mean(record.solutions[reachable]):.1f}")
+        counts.append(f"{np.mean(record.solutions[reachable]):.1f}")
+        _cells(f"  {label}", *counts)
+        headings = ("reachable: at goal", "free", "unreachable: at goal", "free ", "solutions")
+        for heading, text in zip(headings, counts, strict=True):
+            cell("answers", label, heading, text)
 
 
 def show_times(records: dict[str, Record], reachable: NDArray[np.bool_]) -> None:
@@ -169,6 +176,8 @@ def show_times(records: dict[str, Record], reachable: NDArray[np.bool_]) -> None
     for label, record in records.items():
         texts = [_quantiles(1e3 * record.seconds[subset]) for subset in (reachable, ~reachable)]
         _cells(f"  {label}", *texts, width=32)
+        for heading, text in zip(("reachable", "unreachable"), texts, strict=True):
+            cell("times", label, f"{heading} [ms]", text)
 
 
 def show_ratios(
@@ -198,6 +207,8 @@ def show_ratios(
             whole = np.sum(record.seconds[subset]) / np.sum(ours[subset])
             texts.append(f"{whole:.4g}x ({min(ratios):.4g} .. {max(ratios):.4g})")
         _cells(f"  {label}", *texts, width=32)
+        for heading, text in zip(("all", "reachable", "unreachable"), texts, strict=True):
+            cell("ratios", label, f"time / ours, {heading}", text)
     if REFERENCE_PEER in records:
         theirs, own = records[REFERENCE_PEER], next(iter(records.values()))
         times = [

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from table import header, row, spread, verification_text
+from table import cell, check_texts, header, parser, row, save, spread, verification_text
 
 import tcs
 from tcs.placement.scoring import load_job, sweep
@@ -28,19 +28,27 @@ LOADS = 5
 
 def main() -> int:
     """Run every measurement and print it; the exit code is 1 when an answer was false."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--pairs", type=int, default=500)
-    parser.add_argument("--dense", type=int, default=200)
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("--out", type=Path)
+    command_line.add_argument("--pairs", type=int, default=500)
+    command_line.add_argument("--dense", type=int, default=200)
+    command_line.add_argument("--repeats", type=int, default=3)
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
     header()
     bathing(options.repeats)
     with tempfile.TemporaryDirectory() as folder:
         rows = whole_process(options.out or Path(folder))
         loads(rows)
-        return 0 if verification(rows, options) else 1
+        sound = verification(rows, options)
+    save(options)
+    return 0 if sound else 1
+
+
+def measured(name: str, text: str) -> None:
+    """Print one measured value, and record it for the docs."""
+    row(name, text)
+    cell("summary", name, "measured", text)
 
 
 def bathing(repeats: int) -> None:
@@ -48,7 +56,7 @@ def bathing(repeats: int) -> None:
     job = load_job("bathing", "bed", "pr2")
     lowered = job.lowered(job.scene())
     swept = [sweep(lowered, job.task.weights, tables=job.tables) for _ in range(repeats)]
-    row("bathing, bed: scoring_seconds", spread([s.scoring_seconds for s in swept]))
+    measured("bathing, bed: scoring_seconds", spread([s.scoring_seconds for s in swept]))
 
 
 def whole_process(folder: Path) -> list[dict[str, object]]:
@@ -56,10 +64,10 @@ def whole_process(folder: Path) -> list[dict[str, object]]:
     command = [sys.executable, "-m", "tcs", "score", "--all", "--out", str(folder), "--json"]
     begun = time.perf_counter()
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    row("tcs score --all, whole process", f"{time.perf_counter() - begun:.1f} s")
+    measured("tcs score --all, whole process", f"{time.perf_counter() - begun:.1f} s")
     # Linux counts in KiB.
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
-    row("peak memory of that process", f"{peak / 1e9:.2f} GB")
+    measured("peak memory of that process", f"{peak / 1e9:.2f} GB")
     rows: list[dict[str, object]] = json.loads(done.stdout)["rows"]
     for r in rows:
         one, best = r["best_single"], r["best"]
@@ -72,7 +80,23 @@ def whole_process(folder: Path) -> list[dict[str, object]]:
             f"scoring {r['scoring_seconds']:.2f} s, sets {r['sets_seconds']:.2f} s, "
             f"file {r['file_bytes'] / 1e6:.2f} MB",
         )
+        for column, text in (
+            ("configurations x goals", f"{r['configurations']:,} x {r['goals']}"),
+            ("reached", f"{r['reached_pairs']:,}"),
+            ("sets kept", f"{r['sets']:,}"),
+            ("best single: P_R, P_M", scores_text(one)),
+            ("best set: P_R, P_M", scores_text(best)),
+            ("scoring [s]", f"{r['scoring_seconds']:.2f}"),
+            ("sets [s]", f"{r['sets_seconds']:.2f}"),
+            ("file [MB]", f"{r['file_bytes'] / 1e6:.2f}"),
+        ):
+            cell("rows", f"{r['task']}, {r['environment']}", column, text)
     return rows
+
+
+def scores_text(found: dict[str, float]) -> str:
+    """Return P_R and P_M of a set."""
+    return f"{found['reachability']:.3f}, {found['manipulability']:.3f}"
 
 
 def loads(rows: list[dict[str, object]]) -> None:
@@ -87,9 +111,9 @@ def loads(rows: list[dict[str, object]]) -> None:
         for table in file.tables:
             _ = table.scores
         decoding.append(time.perf_counter() - begun)
-    row("largest file", f"{path.name}, {path.stat().st_size / 1e6:.2f} MB")
-    row("loaded, ready for selection", spread(loading))
-    row("all its scores decoded", spread(decoding))
+    measured("largest file", f"{path.name}, {path.stat().st_size / 1e6:.2f} MB")
+    measured("loaded, ready for selection", spread(loading))
+    measured("all its scores decoded", spread(decoding))
 
 
 def verification(rows: list[dict[str, object]], options: argparse.Namespace) -> bool:
@@ -101,7 +125,10 @@ def verification(rows: list[dict[str, object]], options: argparse.Namespace) -> 
             tcs.load(str(r["file"])), pairs=options.pairs, dense=options.dense, seed=options.seed
         )
         text = verification_text(found, time.perf_counter() - begun)
-        row(f"verify {r['task']}, {r['environment']}", text)
+        line = f"{r['task']}, {r['environment']}"
+        row(f"verify {line}", text)
+        for column, checked in check_texts(found).items():
+            cell("checks", line, column, checked)
         sound &= found.is_sound
     return sound
 

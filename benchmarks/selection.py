@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from table import header, row
+from table import cell, header, parser, row, save
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
@@ -32,12 +32,12 @@ CANDIDATES_AT_ONCE = 16
 
 def main() -> int:
     """Run every measurement and print it; the exit code is 1 when an answer was not the best."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE")
-    parser.add_argument("--places", type=int, default=1000)
-    parser.add_argument("--checked", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    command_line = parser(__doc__)
+    command_line.add_argument("files", nargs="*", type=Path, metavar="FILE")
+    command_line.add_argument("--places", type=int, default=1000)
+    command_line.add_argument("--checked", type=int, default=20)
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
     header()
     row("places, checked, seed", f"{options.places}, {options.checked}, {options.seed}")
     wrong = 0
@@ -49,8 +49,9 @@ def main() -> int:
             f"{len(sets.pair_cells)} pairs of cells, {sets.sets} sets",
         )
         for what, travel in travels(tables.grid).items():
-            wrong += measure(tables, what, travel, options)
+            wrong += measure(tables, f"{name}: {what}", travel, options)
     row("answers that were not the best", str(wrong))
+    save(options)
     return 1 if wrong else 0
 
 
@@ -121,6 +122,13 @@ def measure(
         f"(clock {1e3 * clock_p50:.2f}, {1e3 * clock_p99:.2f}, {1e3 * max(clock):.2f}), "
         f"{refused} positions refused, {wrong} wrong",
     )
+    for column, text in (
+        ("median [ms]", f"{1e3 * p50:.2f}"),
+        ("99th percentile [ms]", f"{1e3 * p99:.2f}"),
+        ("greatest [ms]", f"{1e3 * max(processor_time):.2f}"),
+        ("not the best, of those checked", f"{wrong} of {min(options.checked, len(clock))}"),
+    ):
+        cell("selection", what, column, text)
     return wrong
 
 

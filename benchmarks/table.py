@@ -13,6 +13,7 @@ import platform
 import shlex
 import statistics
 import sys
+import tomllib
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -22,14 +23,16 @@ from typing import TYPE_CHECKING
 from tcs.files.writing import make_folder, whole_file
 
 if TYPE_CHECKING:
+    from tcs.output.report.blocks import Table
     from tcs.placement.scoring import Verification
 
-FIGURES = Path(__file__).resolve().parent / "figures"
+CHECKOUT = Path(__file__).resolve().parents[1]
+FIGURES = CHECKOUT / "benchmarks" / "figures"
 PACKAGES = ("tcs", "drake", "numba", "numpy", "scipy", "joblib", "example-robot-data")
 _cells: dict[str, dict[str, dict[str, str]]] = {}
 """Cells by table, row and column, in the order in which they were measured."""
-_tables: dict[str, dict[str, list[str] | list[list[str]]]] = {}
-"""Tables that were recorded as a whole."""
+_tables: dict[str, dict[str, str | list[str] | list[list[str]]]] = {}
+"""Tables that were recorded as a whole, and texts."""
 _began: dict[str, str] = {}
 
 
@@ -84,6 +87,16 @@ def record(table: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) ->
     _tables[table] = {"columns": list(columns), "rows": [list(cells) for cells in rows]}
 
 
+def record_table(name: str, table: Table) -> None:
+    """Record a table of a report for the docs."""
+    record(name, [column.title for column in table.columns], table.texts())
+
+
+def record_text(name: str, text: str) -> None:
+    """Record the output of a command for the docs, where it stands in a fence."""
+    _tables[name] = {"text": text}
+
+
 def save(options: argparse.Namespace) -> None:
     """Write the recorded tables where `--save` was given."""
     if not options.save:
@@ -126,6 +139,10 @@ def processor() -> str:
 
 
 def _version(name: str) -> str:
+    """Return a version; ours is that of the checkout, whatever is installed."""
+    if name == "tcs":
+        project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
+        return str(project["project"]["version"])
     try:
         return version(name)
     except PackageNotFoundError:
@@ -138,6 +155,15 @@ def recall_text(found: Verification, decimals: int = 5) -> str:
         return found.recall_note or ""
     low, high = found.recall_ci95
     return f"{found.recall:.{decimals}f} ({low:.4f} .. {high:.4f})"
+
+
+def check_texts(found: Verification) -> dict[str, str]:
+    """Return the cells of a table of re-checked score files, by the heading of their columns."""
+    return {
+        "false, of those re-checked": f"{found.false_reached:,} of {found.checked:,}",
+        "missed, of those scanned": f"{found.missed:,} of {found.dense_checked:,}",
+        "recall (95 % interval)": recall_text(found, 4),
+    }
 
 
 def verification_text(found: Verification, seconds: float) -> str:

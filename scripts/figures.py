@@ -2,9 +2,14 @@
 
 Usage: python scripts/figures.py [--check]
 
-A block between `<!-- figures: SCRIPT/TABLE -->` and `<!-- end of figures -->` becomes that table of
-`benchmarks/figures/SCRIPT.json`, followed by machine, versions and command. With `--check` nothing
-is written; the exit code is 1 when a page differs from the saved figures.
+- A block between `<!-- figures: SCRIPT/TABLE -->` and `<!-- end of figures -->` becomes that table
+  of `benchmarks/figures/SCRIPT.json`, or the output of a command that is saved there.
+- What stands between `<!-- figure: SCRIPT/TABLE | ROW | COLUMN -->` and `<!-- -->` in a sentence
+  becomes that cell.
+
+Machine, versions and command stand after the last table of a script in a section, and after the
+last output in a page. With `--check` nothing is written; the exit code is 1 when a page differs
+from the saved figures.
 """
 
 from __future__ import annotations
@@ -23,6 +28,14 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 FIGURES = CHECKOUT / "benchmarks" / "figures"
 END = "<!-- end of figures -->"
 BLOCK = re.compile(rf"(<!-- figures: (\w+)/(\w+) -->\n)(.*?)({re.escape(END)})", flags=re.S)
+CELL = re.compile(r"(<!-- figure: (\w+)/(\w+) \| ([^|\n]+) \| ([^|\n]+) -->)(.*?)(<!-- -->)")
+_FENCE = re.compile(r"^ *(```+|~~~+).*?^ *\1 *$", flags=re.S | re.M)
+_CODE = re.compile(r"`[^`\n]+`|\$\$.*?\$\$|<!--.*?-->", flags=re.S)
+MEASURED = re.compile(
+    r"(?<![\w.])\d[\d.,]*(?: |-)?"
+    r"(?:%|(?:ns|us|µs|ms|s|seconds|min|minutes|hours|kB|MB|GB|percent|percentage points|times)\b)"
+)
+"""A number with a unit of time, memory or proportion, as benchmarks measure them."""
 
 
 def main() -> int:
@@ -50,31 +63,89 @@ def pages() -> list[Path]:
 
 
 def rewritten(text: str) -> str:
-    """Return a page with every block made anew from the saved figures.
+    """Return a page with every block and every cell made anew from the saved figures.
 
     Raises:
-        KeyError: If a block names a table that was not saved.
-        OSError: If a block names a script without saved figures.
+        KeyError: If a block or cell names what was not saved.
+        OSError: If it names a script without saved figures.
     """
 
     def block(match: re.Match[str]) -> str:
         opening, script, table, _, end = match.groups()
-        saved = json.loads((FIGURES / f"{script}.json").read_text(encoding="utf-8"))
-        return f"{opening}\n{as_markdown(saved, table)}\n{end}"
+        saved = saved_figures(script)
+        following = text[match.end() :]
+        if "text" not in saved["tables"][table]:
+            following = re.split(r"^#+ ", following, maxsplit=1, flags=re.M)[0]
+        is_last = not re.search(rf"<!-- figures: {script}/", following)
+        return f"{opening}\n{as_markdown(saved, table, source=is_last)}\n{end}"
 
-    return BLOCK.sub(block, text)
+    def cell(match: re.Match[str]) -> str:
+        opening, script, table, row, column, _, end = match.groups()
+        return opening + cell_of(saved_figures(script), table, row, column) + end
+
+    return CELL.sub(cell, BLOCK.sub(block, text))
 
 
-def as_markdown(saved: Mapping[str, Any], table: str) -> str:
-    """Return one saved table and where it was measured, as Markdown."""
-    columns, rows = saved["tables"][table]["columns"], saved["tables"][table]["rows"]
-    lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
-    lines += [f"| {' | '.join(cells)} |" for cells in rows]
-    where = (
-        f"*`{saved['command']}`, {saved['date']}: {saved['machine']}, load {saved['load']}; "
-        f"Python {saved['python']}, {saved['versions']}.*"
-    )
-    return "\n".join([*lines, "", where, ""])
+def saved_figures(script: str) -> dict[str, Any]:
+    """Return what a benchmark saved.
+
+    Raises:
+        OSError: If it saved nothing.
+    """
+    saved: dict[str, Any] = json.loads((FIGURES / f"{script}.json").read_text(encoding="utf-8"))
+    return saved
+
+
+def as_markdown(saved: Mapping[str, Any], table: str, *, source: bool = True) -> str:
+    """Return one saved table or text, and where it was measured, as Markdown.
+
+    Args:
+        saved: Of one script.
+        table: Name of the table.
+        source: Whether machine, versions and command follow.
+    """
+    found = saved["tables"][table]
+    if "text" in found:
+        lines = ["```text", *found["text"].splitlines(), "```"]
+    else:
+        columns, rows = found["columns"], found["rows"]
+        lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
+        lines += [f"| {' | '.join(cells)} |" for cells in rows]
+    if source:
+        where = (
+            f"*`{saved['command']}`, {saved['date']}: {saved['machine']}, load {saved['load']}; "
+            f"Python {saved['python']}, {saved['versions']}.*"
+        )
+        lines += ["", where]
+    return "\n".join([*lines, ""])
+
+
+def cell_of(saved: Mapping[str, Any], table: str, row: str, column: str) -> str:
+    """Return one cell of a saved table.
+
+    Raises:
+        KeyError: If there is no such table, row or column.
+    """
+    found = saved["tables"][table]
+    if column not in found["columns"]:
+        raise KeyError(f"table '{table}' has no column '{column}': {found['columns']}")
+    texts = {cells[0]: cells[found["columns"].index(column)] for cells in found["rows"]}
+    return str(texts[row])
+
+
+def typed_figures(text: str) -> list[tuple[int, str]]:
+    """Return numbers with a unit of time, memory or proportion that are typed into a page.
+
+    Blocks, cells, fences, code and comments do not count.
+
+    Returns:
+        Line number, counted from 1, and the line, for each line with such a number.
+    """
+    for pattern in (BLOCK, CELL, _FENCE, _CODE):
+        # Line numbers stay as they are.
+        text = pattern.sub(lambda match: "\n" * match[0].count("\n"), text)
+    lines = enumerate(text.splitlines(), start=1)
+    return [(number, line.strip()) for number, line in lines if MEASURED.search(line)]
 
 
 if __name__ == "__main__":
