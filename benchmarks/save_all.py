@@ -31,8 +31,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "teleop": (),
     "peers": (),
     "live": (),
-    "robots": (),
-    "numeric": (),
+    "robots": ("--limit", "2000"),
+    "numeric_arms": (),
     "primitives": (),
     "null_space": (),
     "capability": (),
@@ -40,7 +40,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "experiment": (),
     "lines": (),
 }
-"""Arguments of each script; those that hold times and are short come first."""
+"""Arguments of each script; those with times come first."""
 
 
 def main() -> int:

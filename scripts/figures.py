@@ -141,11 +141,16 @@ def typed_figures(text: str) -> list[tuple[int, str]]:
     Returns:
         Line number, counted from 1, and the line, for each line with such a number.
     """
+    prose = text
     for pattern in (BLOCK, CELL, _FENCE, _CODE):
         # Line numbers stay as they are.
-        text = pattern.sub(lambda match: "\n" * match[0].count("\n"), text)
-    lines = enumerate(text.splitlines(), start=1)
-    return [(number, line.strip()) for number, line in lines if MEASURED.search(line)]
+        prose = pattern.sub(lambda match: "\n" * match[0].count("\n"), prose)
+    lines = zip(text.splitlines(), prose.splitlines(), strict=True)
+    return [
+        (number, line.strip())
+        for number, (line, left) in enumerate(lines, start=1)
+        if MEASURED.search(left)
+    ]
 
 
 if __name__ == "__main__":

@@ -31,11 +31,12 @@ def test_no_page_differs_from_the_saved_figures(figures):
     assert differing == [], "run `make figures`"
 
 
-def test_every_block_is_read(figures):
+def test_every_block_and_cell_is_read(figures):
     # A mistyped opening would be a comment that nothing checks.
     for page in figures.pages():
         text = page.read_text(encoding="utf-8")
-        assert len(figures.BLOCK.findall(text)) == len(re.findall(r"<!--\s*figures\b", text)), page
+        found = len(figures.BLOCK.findall(text)) + len(figures.CELL.findall(text))
+        assert found == len(re.findall(r"<!--\s*figures?\b", text)), page
 
 
 def test_an_edited_figure_is_noticed(figures):
@@ -71,3 +72,56 @@ def test_saved_figures_say_where_they_were_measured(path):
     assert {"command", "date", "machine", "load", "python", "versions"} <= set(saved)
     assert (CHECKOUT / saved["command"].split()[1]).is_file()
     assert saved["tables"]
+
+
+PAGE = """# Measured
+It takes <!-- figure: made/times | step | median [ms] -->9<!-- --> ms.
+
+<!-- figures: made/times -->
+<!-- end of figures -->
+
+<!-- figures: made/times -->
+<!-- end of figures -->
+
+## Output
+<!-- figures: made/output -->
+<!-- end of figures -->
+"""
+
+
+@pytest.fixture
+def made(figures, tmp_path, monkeypatch):
+    """Return the script with saved figures of a made-up benchmark."""
+    tables = {
+        "times": {"columns": ["", "median [ms]"], "rows": [["step", "0.4"]]},
+        "output": {"text": "all done"},
+    }
+    where = dict.fromkeys(("date", "machine", "load", "python", "versions"), "x")
+    saved = {"command": "python benchmarks/made.py", **where, "tables": tables}
+    (tmp_path / "made.json").write_text(json.dumps(saved), encoding="utf-8")
+    monkeypatch.setattr(figures, "FIGURES", tmp_path)
+    return figures
+
+
+def test_cells_tables_and_outputs_are_inserted_and_the_source_once(made):
+    text = made.rewritten(PAGE)
+    assert "| step | median [ms] -->0.4<!-- --> ms." in text
+    assert text.count("| step | 0.4 |") == 2
+    assert "```text\nall done\n```" in text
+    first, second, output = text.split(made.END)[:3]
+    assert ["benchmarks/made.py" in part for part in (first, second, output)] == [False, True, True]
+    assert made.rewritten(text) == text
+
+
+@pytest.mark.parametrize("wrong", ["step | mean [ms]", "stop | median [ms]"])
+def test_a_cell_that_was_not_saved_is_an_error(made, wrong):
+    with pytest.raises(KeyError):
+        made.rewritten(PAGE.replace("step | median [ms]", wrong))
+
+
+def test_typed_figures_are_found_outside_blocks_only(made):
+    page = made.rewritten(PAGE) + "\nA step takes 0.4 ms, in `0.5 s`, at 3 m/s with 2 % slip.\n"
+    (found,) = made.typed_figures(page)
+    assert found == (len(page.splitlines()), page.splitlines()[-1])
+    assert made.MEASURED.findall(found[1]) == ["0.4 ms", "2 %"]
+    assert made.typed_figures("It weighs 3 kg and is 5 m long.") == []
