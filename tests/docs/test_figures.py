@@ -120,8 +120,8 @@ def test_a_cell_that_was_not_saved_is_an_error(made, wrong):
 
 
 def test_typed_figures_are_found_outside_blocks_only(made):
-    page = made.rewritten(PAGE) + "\nA step takes 0.4 ms, in `0.5 s`, at 3 m/s with 2 % slip.\n"
+    page = made.rewritten(PAGE) + "\nA step takes 0.4 ms at 3 m/s, with 2 % slip.\n"
     (found,) = made.typed_figures(page)
     assert found == (len(page.splitlines()), page.splitlines()[-1])
     assert made.MEASURED.findall(found[1]) == ["0.4 ms", "2 %"]
-    assert made.typed_figures("It weighs 3 kg and is 5 m long.") == []
+    assert made.typed_figures("It weighs 3 kg, is 5 m long and waits for `0.5 s`.") == []
