@@ -1,7 +1,7 @@
-"""Where should an assistive robot stand? Task-centric selection of initial configurations.
+"""Base placement for assistive robots: task-centric selection of initial configurations (TCS).
 
-Everything in `__all__` is a promise to users. Names are loaded when they are first used:
-`import tcs` costs nothing, and choosing from a score file loads neither Drake nor a compiler.
+The names in `__all__` are the public interface. They are loaded on first use: `import tcs` is
+immediate, and selecting from a score file loads neither Drake nor a compiler.
 
 >>> import tcs
 >>> here = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.14, torso=0.0)
@@ -82,11 +82,11 @@ _HOMES = {
     "select": ("tcs.placement.selection", "select"),
     "verify": ("tcs.placement.scoring", "verify"),
 }
-"""The module and attribute that each public name is loaded from."""
+"""Module and attribute of each public name."""
 
 
 def __getattr__(name: str) -> Any:
-    """Return a name of `__all__`, loading its module."""
+    """Return a public name, importing its module."""
     if name == "__version__":
         from importlib.metadata import version
 

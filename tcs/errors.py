@@ -1,4 +1,4 @@
-"""The errors that `tcs` raises on purpose.
+"""Exceptions of `tcs`.
 
     TcsError
     ├── UnknownNameError      an unknown name of a task, robot, environment, frame or key
@@ -10,12 +10,12 @@
     ├── GridError             a grid of initial configurations that is empty or too large
     ├── StoreError            a score file that cannot be used
     │   ├── StoreFormatError      truncated, of another program, or of an unknown version
-    │   ├── UnsafeStoreError      a pickle that names something outside the allow-list
+    │   ├── UnsafeStoreError      a pickle that refers to a name outside the allow-list
     │   └── StoreMismatchError    made from models that have changed since
     ├── SelectionError        no set to choose from, or a state that is not stored
     └── OutputError           a file or folder that cannot be written
 
-A goal that cannot be reached is a zero score, never an exception.
+A goal that cannot be reached has a score of zero and raises no exception.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from collections.abc import Iterable
 
 
 class TcsError(Exception):
-    """Root of the errors raised on purpose; the text is one line on which a user can act."""
+    """Base class of the exceptions of `tcs`; the message is one line on which a user can act."""
 
 
 class UnknownNameError(TcsError):
-    """A name that is not known where it was used."""
+    """A name that is unknown where it is used."""
 
     def __init__(self, what: str, name: str, known: Iterable[str], *, where: str = "") -> None:
-        """Compose a message with the unknown name, the known ones and the nearest of them.
+        """Compose a message with the unknown name, the known names and the closest of them.
 
         Args:
             what: Type of the name, e.g. "task".
             name: The unknown name.
-            known: The names that would have been accepted.
+            known: The names that are accepted.
             where: Location of the name, e.g. "goal 3 of task 'shaving'".
         """
         self.what = what
@@ -84,11 +84,11 @@ class StoreFormatError(StoreError):
 
 
 class UnsafeStoreError(StoreError):
-    """A file that names something outside the allow-list of the reader."""
+    """A file that refers to a name outside the allow-list of the reader."""
 
 
 class StoreMismatchError(StoreError):
-    """A file made from models that differ from the present ones."""
+    """A file made from models that differ from the current ones."""
 
 
 class SelectionError(TcsError):

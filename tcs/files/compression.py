@@ -1,4 +1,4 @@
-"""Arrays of numbers, each compressed by itself, so that each is decompressed when needed."""
+"""Arrays of numbers, compressed one by one, so that each can be decompressed on demand."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from tcs.errors import StoreFormatError
 
 LEVEL = 3
-"""Arm joints are as good as random: higher levels and lzma take much longer for a few percent,
-and lzma also to decompress."""
+"""Compression level of zlib. Joint angles are nearly incompressible: higher levels and lzma take
+much longer to save a few percent, and lzma is slow to decompress as well."""
 
 MAX_BYTES = 2 * 1024**3
-"""Most bytes an array may decompress to: several times the largest, within a common machine."""
+"""Greatest size of a decompressed array [bytes]: several times that of any array of `tcs`, and less
+than the memory of a common machine."""
 
 _TYPES = ("u1", "u2", "u4", "u8", "f4", "f8")
 
@@ -36,7 +37,7 @@ def compress(array: NDArray[Any]) -> dict[str, Any]:
 
 
 def smallest_unsigned(values: NDArray[np.int64]) -> NDArray[Any]:
-    """Return whole numbers >= 0 in the smallest unsigned type that holds them all."""
+    """Return whole numbers >= 0 in the smallest unsigned type that can represent them."""
     return values.astype(np.min_scalar_type(int(values.max(initial=0))))
 
 
@@ -46,13 +47,13 @@ def decompress(
     """Return the array stored under a name, decompressed and checked.
 
     Args:
-        encoded: The containers it is stored in.
-        name: Its name there.
-        element: Its element type, or "u" for any unsigned one.
-        shape: Shape it must have, None where any length will do.
+        encoded: Containers with the arrays, by name.
+        name: Name of the array.
+        element: Required element type, "u" for any unsigned one.
+        shape: Required shape, None for an arbitrary length.
 
     Raises:
-        StoreFormatError: If it is missing, damaged, or of another type or shape.
+        StoreFormatError: If the array is missing, damaged, or of another type or shape.
     """
     compressed = encoded.get(name)
     if not isinstance(compressed, dict):
@@ -66,7 +67,7 @@ def decompress(
         or data.dtype != np.uint8
         or data.ndim != 1
     ):
-        raise StoreFormatError(f"has an array '{name}' that is none")
+        raise StoreFormatError(f"has an invalid array '{name}'")
     fits = found[0] == "u" if element == "u" else found == element
     if (
         not fits
@@ -85,9 +86,11 @@ def decompress(
 
 
 def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
-    """Return the decompressed bytes, which must be as many as were stated."""
+    """Return the decompressed bytes; raise unless there are exactly `size` of them."""
     if size > MAX_BYTES:
-        raise StoreFormatError(f"has an array '{name}' of {size} bytes; at most {MAX_BYTES}")
+        raise StoreFormatError(
+            f"has an array '{name}' of {size} bytes; at most {MAX_BYTES} are allowed"
+        )
     decompressor = zlib.decompressobj()
     try:
         inflated = decompressor.decompress(data.tobytes(), size + 1)
@@ -99,22 +102,22 @@ def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
 
 
 def differences(ascending: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the differences of ascending numbers >= 0, from 0; they compress well."""
+    """Return the differences of ascending numbers >= 0, the first from 0; they compress well."""
     return np.asarray(np.diff(ascending, prepend=0), dtype=np.int64)
 
 
 def ascending_from(steps: NDArray[Any], end: int, what: str) -> NDArray[np.int64]:
-    """Return the numbers that have these differences.
+    """Return the ascending numbers that have these differences, the inverse of `differences`.
 
     Args:
-        steps: Unsigned differences, from 0.
-        end: The numbers must be less than this.
-        what: Name of the numbers in an error message.
+        steps: Unsigned differences, the first from 0.
+        end: Exclusive upper bound of the numbers.
+        what: Name of the numbers in messages.
 
     Raises:
         StoreFormatError: If a number is not less than `end`.
     """
-    # Summed in floating point first: forged steps must not wrap around to valid ones.
+    # Summed in floating point first: integer overflow must not make forged steps valid.
     if steps.sum(dtype=np.float64) >= float(end):
         raise StoreFormatError(f"has {what} that do not exist")
     return np.cumsum(steps.astype(np.int64))

@@ -1,4 +1,4 @@
-"""YAML documents: read, checked against a model, and refused with one line that names the field."""
+"""YAML documents: reading, validation against a model, and one-line errors that name the field."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Vector = tuple[Number, Number, Number]
 
 
 class Document(BaseModel):
-    """A mapping in a file: unknown keys are refused, and the value is frozen."""
+    """A mapping in a file: unknown keys are rejected, and the value is frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -77,7 +77,7 @@ def read_mapping(
         known: Keys to list in the message when the file is not a mapping.
 
     Raises:
-        DataFileError: As `error`, if the file cannot be read, is not YAML, holds a key twice, or
+        DataFileError: As `error`, if the file cannot be read, is not YAML, contains a key twice, or
             is not a mapping.
     """
     try:
@@ -89,10 +89,10 @@ def read_mapping(
     except yaml.YAMLError as reason:
         raise error(f"{where} is not valid YAML: {_yaml_fault(reason)}.") from reason
     except ValueError as reason:
-        # The YAML grammar accepts them: a month 13, an integer of 5000 digits.
-        raise error(f"{where} holds an impossible value: {reason}.") from reason
+        # The YAML grammar accepts such values: a month 13, an integer of 5000 digits.
+        raise error(f"{where} contains an invalid value: {reason}.") from reason
     if not isinstance(content, dict):
-        raise error(f"{where} must hold keys and values: {', '.join(known)}.")
+        raise error(f"{where} must contain keys and values: {', '.join(known)}.")
     return content
 
 
@@ -129,16 +129,16 @@ def checked(
 
 _KEY_TAGS = ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge")
 
-# Messages of one line quote the value; a long list is shortened.
+# Messages have one line and quote the value, so a long list is abbreviated.
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader, but duplicate keys are refused and 1e-3 is a number."""
+    """PyYAML's safe loader, except that duplicate keys are rejected and 1e-3 is a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Return a mapping; refuse a duplicate key, of which PyYAML would drop the first."""
+        """Return a mapping; raise for a duplicate key, of which PyYAML would drop the first."""
         seen = set()
         for key_node, _ in node.value:
             if key_node.tag not in _KEY_TAGS:
@@ -163,6 +163,7 @@ _Loader.add_implicit_resolver(
 
 
 def _yaml_fault(error: yaml.YAMLError) -> str:
+    """Return the position and the problem of a YAML error, on one line."""
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         mark = error.problem_mark
         return f"line {mark.line + 1}, column {mark.column + 1}: {error.problem}"
@@ -190,7 +191,7 @@ def _first_fault(
     return error(text + (f" ({others} more after this one.)" if others else ""))
 
 
-# Pydantic names Python types; the author of a file wrote YAML.
+# Pydantic's messages name Python types; the author of a file writes YAML.
 _YAML_TERMS = (
     (re.compile(r"^(?:Input|List|Tuple|String|Value|Dictionary) should "), "must "),
     (re.compile(r"valid dictionary(?: or instance of \w+)?"), "mapping of keys to values"),

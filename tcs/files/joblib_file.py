@@ -1,4 +1,4 @@
-"""Joblib files of tcs: how they are written, and the header that names their format."""
+"""Joblib files of tcs: writing, and the header that names format and version."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tcs.files.writing import whole_file
 
 
 def write_joblib(path: Path, content: Mapping[str, Any], what: str) -> None:
-    """Write plain containers and arrays, wholly or not at all; `read_joblib` reads them.
+    """Write plain containers and arrays, completely or not at all; `read_joblib` reads them.
 
     Args:
-        path: Where to write; its folder must exist.
-        content: What to write. Its large arrays should be compressed already.
-        what: Name of the file in an error message, e.g. "Score file".
+        path: File to write; its folder must exist.
+        content: Content of the file; large arrays should be compressed already.
+        what: Name of the file in messages, e.g. "Score file".
 
     Raises:
-        OutputError: If it cannot be written there.
+        OutputError: If the file cannot be written.
     """
     buffer = io.BytesIO()
     joblib.dump(content, buffer)
-    # Level 0 adds a checksum over everything without compressing anything a second time.
+    # Level 0 adds a checksum of the content without compressing it a second time.
     checked = zlib.compress(buffer.getbuffer(), 0)
     with whole_file(path, what) as stream:
         stream.write(checked)
@@ -50,7 +50,7 @@ def check_header(content: object, name: str, version: int) -> dict[str, Any]:
         StoreFormatError: If the file is of another format or version.
     """
     if not isinstance(content, dict) or content.get("format") != name:
-        raise StoreFormatError(f"holds no {name.removeprefix('tcs ')} of tcs")
+        raise StoreFormatError(f"contains no {name.removeprefix('tcs ')} of tcs")
     found = content.get("format_version")
     if type(found) is not int or found < 1:
         raise StoreFormatError("has no format version")
@@ -65,10 +65,10 @@ def check_header(content: object, name: str, version: int) -> dict[str, Any]:
 
 
 def check_types(content: Mapping[str, Any], types: Mapping[str, type]) -> None:
-    """Check that entries exist and have exactly these types.
+    """Check that entries exist and have exactly the given types.
 
     Raises:
-        StoreFormatError: If one is missing or of another type.
+        StoreFormatError: If an entry is missing or of another type.
     """
     for name, expected in types.items():
         if type(content.get(name)) is not expected:

@@ -17,12 +17,12 @@ CACHE_ADVICE = f"Set {_CACHE_VARIABLE} to a folder you may write to."
 
 
 def data_folder() -> Path:
-    """Return the folder that holds `models/` and `tasks/`.
+    """Return the folder that contains `models/` and `tasks/`.
 
     In an installed wheel it is `tcs/_data`; in a checkout, the folder above the package.
 
     Raises:
-        DataFileError: If neither holds both folders.
+        DataFileError: If neither contains both folders.
     """
     return _data_folder_of(_PACKAGE)
 
@@ -33,7 +33,8 @@ class DataFiles:
 
     Attributes:
         noun: Type of the files in messages, e.g. "robot".
-        pattern: Files that ship, relative to the data folder, e.g. "models/robots/*.yaml".
+        pattern: Glob pattern of the files that ship, relative to the data folder, e.g.
+            "models/robots/*.yaml".
     """
 
     noun: str
@@ -58,9 +59,9 @@ class DataFiles:
         """Return the path of a file.
 
         Args:
-            name_or_path: Name of a file that ships with `tcs`, or a path: anything that ends in
-                `.yaml` or holds a path separator. The file of a path need not exist.
-            beside: Folder that a relative path starts from; None is the current one.
+            name_or_path: Name of a file that ships with `tcs`, or a path: a text that ends in
+                `.yaml` or contains a path separator. The file at a path need not exist.
+            beside: Folder that a relative path starts from; None is the current folder.
             where: Location of the name, for messages.
 
         Raises:
@@ -94,15 +95,15 @@ def expanded(path: str, what: str, error: type[TcsError]) -> Path:
     except RuntimeError:
         user = Path(path).parts[0]
         raise error(
-            f"{what} '{path}': the home folder '{user}' is unknown. Write the whole path."
+            f"{what} '{path}': the home folder '{user}' is unknown. Give the full path."
         ) from None
 
 
 def data_reference(given: object, name: str) -> str:
-    """Return the reference by which a data file is loaded again: its name or absolute path.
+    """Return the reference by which a data file can be loaded again: its name or absolute path.
 
     Args:
-        given: The argument it was loaded by: a name, a path, or the loaded object.
+        given: The argument by which it was loaded: a name, a path, or the loaded object.
         name: The name that the file contains.
     """
     if isinstance(given, Path) or (isinstance(given, str) and given != name):
@@ -146,7 +147,7 @@ def _cache_path() -> Path:
     if chosen:
         return expanded(chosen, _CACHE_VARIABLE, OutputError).absolute()
     base = os.environ.get("XDG_CACHE_HOME")
-    # The XDG specification says that a relative path here is to be ignored.
+    # The XDG specification requires that a relative path is ignored.
     if base and Path(base).is_absolute():
         return Path(base) / "tcs"
     try:

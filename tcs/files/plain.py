@@ -1,4 +1,4 @@
-"""Plain containers: all that a stored file may contain beside arrays."""
+"""Plain containers: the only content of a stored file besides arrays."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy as np
 from tcs.errors import StoreError
 
 MAX_DEPTH = 32
-"""Greatest depth allowed; files written by `tcs` have less than ten levels."""
+"""Greatest depth allowed; files written by `tcs` have fewer than ten levels."""
 
 MAX_ITEMS = 100_000
-"""Most values allowed; files written by `tcs` have a few thousand. Lists that contain each other
-twice, thirty levels deep, fit into a hundred bytes and expand to a billion values."""
+"""Greatest number of values allowed; files written by `tcs` have a few thousand. Thirty nested
+lists that each contain the next one twice fit into a hundred bytes and expand to a billion
+values."""
 
 
 def plain(what: str, value: object) -> Any:
@@ -47,7 +48,7 @@ class _Copier:
             )
         if isinstance(value, np.generic):
             value = value.item()
-        # Convert subclasses: they would be stored under their own name and refused on loading.
+        # Convert subclasses: they would be stored under their own name and rejected on loading.
         if value is None or isinstance(value, bool):
             return value
         for scalar in (str, int, float):

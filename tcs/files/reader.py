@@ -2,7 +2,7 @@
 
 A joblib file is a pickle, and a pickle is a program: it may name any function of any module and
 call it. This reader supports the part of the pickle language that plain containers need, and an
-allow-list of three names. They become inert tokens, not the classes, so no content of a file is
+allow-list of three names. The names become inert tokens, not classes, so no content of a file is
 ever called:
 
     joblib.numpy_pickle.NumpyArrayWrapper   an array follows
@@ -31,16 +31,17 @@ from numpy.typing import NDArray
 from tcs.errors import StoreError, StoreFormatError, TcsError, UnsafeStoreError
 
 MAX_BYTES = 2 * 1024**3
-"""Most bytes after decompression: several times the largest score file, and less than the memory of
-a common machine."""
+"""Greatest size after decompression [bytes]: several times that of the largest score file, and less
+than the memory of a common machine."""
 
 ELEMENT_TYPES = ("u1", "u2", "u4", "u8", "i4", "i8", "f4", "f8")
 """Element types of arrays: plain numbers. Arrays of objects ("O") contain further pickles."""
 
 MAX_DIMENSIONS = 4
-"""Most dimensions of an array; those written by `tcs` have one or two."""
+"""Greatest number of dimensions of an array; those written by `tcs` have one or two."""
 
 AGAIN = "Make it again with `tcs score`."
+"""Default advice in messages."""
 
 SCORE_FILE = "Score file"
 """Default name of a file in messages."""
@@ -54,7 +55,7 @@ _PLAIN_OPERATIONS = (
     *(pickle.EMPTY_LIST, pickle.APPEND, pickle.APPENDS),
     *(pickle.EMPTY_DICT, pickle.SETITEM, pickle.SETITEMS),
     *(pickle.MEMOIZE, pickle.BINPUT, pickle.LONG_BINPUT, pickle.BINGET, pickle.LONG_BINGET),
-    # These name a global and call `find_class` below.
+    # These refer to a global by name and call `find_class` below.
     *(pickle.GLOBAL, pickle.STACK_GLOBAL, pickle.INST),
 )
 _REFUSED_OPERATIONS = (
@@ -66,7 +67,7 @@ Value = TypeVar("Value")
 
 
 class _Known(Enum):
-    """The names a file may use, as tokens without behaviour."""
+    """The names that a file may refer to, as tokens without behaviour."""
 
     ARRAY_FOLLOWS = ("joblib.numpy_pickle", "NumpyArrayWrapper")
     ARRAY = ("numpy", "ndarray")
@@ -109,7 +110,7 @@ class _Reader(pickle._Unpickler):
         """Return the value in the file."""
         value = super().load()
         if self._file.tell() != len(self._data):
-            raise StoreFormatError("continues after its end")
+            raise StoreFormatError("has data after its end")
         return value
 
     def find_class(self, module: str, name: str) -> _Known:
@@ -122,7 +123,7 @@ class _Reader(pickle._Unpickler):
             return _Known((module, name))
         except ValueError:
             raise UnsafeStoreError(
-                f"names {_shown(f'{module}.{name}')}, which is not on the allow-list "
+                f"refers to {_shown(f'{module}.{name}')}, which is not on the allow-list "
                 "(numpy arrays and plain containers)"
             ) from None
 
@@ -131,11 +132,11 @@ class _Reader(pickle._Unpickler):
         arguments = self.stack.pop()
         called = self.stack.pop()
         if called is not _Known.ELEMENT_TYPE or not isinstance(arguments, tuple) or not arguments:
-            raise UnsafeStoreError(f"calls {_shown(called)}, but a file may call nothing")
+            raise UnsafeStoreError(f"calls {_shown(called)}, but a file must not call anything")
         self.stack.append(_ElementType(arguments[0]))
 
     def load_newobj(self) -> None:
-        """Announce an array, where pickle would create an object of any class."""
+        """Create the placeholder of an array, where pickle would create an object of any class."""
         arguments = self.stack.pop()
         made = self.stack.pop()
         if made is not _Known.ARRAY_FOLLOWS or arguments != ():
@@ -151,10 +152,12 @@ class _Reader(pickle._Unpickler):
         elif isinstance(built, _ArrayToCome):
             self.stack[-1] = self._array(state)
         else:
-            raise UnsafeStoreError(f"sets attributes of {_shown(built)}; only of arrays is allowed")
+            raise UnsafeStoreError(
+                f"sets attributes of {_shown(built)}, which is allowed for arrays only"
+            )
 
     def refuse(self) -> None:
-        """Refuse an operation that refers to an object outside the file."""
+        """Raise an error for an operation that refers to an object outside the file."""
         raise UnsafeStoreError("refers to objects outside the file (a pickle extension)")
 
     def _array(self, state: object) -> NDArray[Any]:
@@ -170,14 +173,14 @@ class _Reader(pickle._Unpickler):
             or not all(type(n) is int and 0 <= n <= MAX_BYTES for n in shape)
             or order not in ("C", "F")
         ):
-            raise StoreFormatError(f"has an array of impossible shape {_shown(shape)}")
+            raise StoreFormatError(f"has an array of invalid shape {_shown(shape)}")
         if state.get("numpy_array_alignment_bytes") is not None:
             padding = self._file.read(1)
             self._file.seek(padding[0] if padding else 0, io.SEEK_CUR)
         begin, count = self._file.tell(), math.prod(shape)
         end = begin + count * element.dtype.itemsize
         if end > len(self._data):
-            raise StoreFormatError(f"claims an array of shape {shape}, but ends before it does")
+            raise StoreFormatError(f"ends before the end of an array of shape {shape}")
         self._file.seek(end)
         if not count:
             return np.zeros(shape, dtype=element.dtype.newbyteorder("="))
@@ -206,7 +209,7 @@ def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> objec
     Raises:
         StoreError: If the file cannot be read.
         StoreFormatError: If it is truncated, of another program, or decompresses to more than 2 GB.
-        UnsafeStoreError: If it names anything that is not on the allow-list.
+        UnsafeStoreError: If it refers to a name that is not on the allow-list.
     """
     name = f"{what} '{path}'"
     reader = _Reader(_decompress(name, _bytes_of(path, name, again), again))
@@ -216,7 +219,18 @@ def read_joblib(path: Path, what: str = SCORE_FILE, again: str = AGAIN) -> objec
 def explained(
     path: Path, read: Callable[[], Value], what: str = SCORE_FILE, again: str = AGAIN
 ) -> Value:
-    """Return the result of `read`; raise any error of it as one line that names the file."""
+    """Return the result of `read`; raise its errors with one line that names the file.
+
+    Args:
+        path: The file.
+        read: Function that decodes the content of the file.
+        what: Name of the file in messages.
+        again: Advice in messages on how to make such a file.
+
+    Raises:
+        StoreFormatError: If `read` raises any other error than the one below.
+        UnsafeStoreError: If `read` raises one.
+    """
     try:
         return read()
     except UnsafeStoreError as error:
@@ -229,7 +243,7 @@ def explained(
         raise StoreFormatError(f"{what} '{path}': {text}. {again}") from None
     except Exception as error:
         # Bytes that are not a pickle raise errors of many classes, from KeyError (no such
-        # operation) to OverflowError; their texts do not help the user.
+        # operation) to OverflowError; their messages do not help the user.
         raise StoreFormatError(
             f"{what} '{path}' is truncated or was not written by tcs "
             f"({type(error).__name__} while reading). {again}"
@@ -257,7 +271,7 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
     """Return the decompressed bytes, at most MAX_BYTES of them."""
     if data[:1] == pickle.PROTO:
         return data
-    # The low half of the first byte names the method; 8 is the only one in use.
+    # The low half of the first byte of a zlib stream is its method; 8 is the only one in use.
     if not data or data[0] & 0x0F != 8:
         raise StoreFormatError(
             f"{name} is {'empty' if not data else 'not a joblib file of tcs'}. {again}"
@@ -273,13 +287,13 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
             f"fill the memory. {again}"
         )
     if not decompressor.eof or decompressor.unused_data:
-        what = "continues after its end" if decompressor.eof else "is truncated"
+        what = "has data after its end" if decompressor.eof else "is truncated"
         raise StoreFormatError(f"{name} {what}. {again}")
     return content
 
 
 def _shown(value: object) -> str:
-    """Return a value from the file for a message: short, on one line, nothing unprintable."""
+    """Return a value from the file for a message: short, printable, on one line."""
     if isinstance(value, _Known):
         value = ".".join(value.value)
     shown = repr(value) if isinstance(value, str | int) else type(value).__name__

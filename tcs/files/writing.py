@@ -1,7 +1,8 @@
-"""Write files whole or not at all, create folders, and remove what a killed process left.
+"""Write files completely or not at all, create folders, and remove files left by killed processes.
 
-A temporary file is locked while it is written: the lock ends with the process, however that ends.
-So what is not locked is left over, and the next process to write into its folder removes it.
+A temporary file is locked while it is written, and the lock ends with the process, however it ends.
+A temporary file that is not locked is therefore left over, and the next process that writes into
+its folder removes it.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ def whole_file(
     advice: str = "Name a file in an existing, writable folder with enough space.",
     flushed: bool = True,
 ) -> Iterator[BinaryIO]:
-    """Open a file to write that replaces an existing one only when it is complete.
+    """Open a file for writing that replaces an existing one only when it is complete.
 
-    The content goes to a temporary file beside the target, which is flushed to the disk and then
-    renamed. After any error, Ctrl-C included, the old file is unchanged and no partial one is left;
-    that of a process that was killed is removed by the next one that writes into the folder.
+    The content is written to a temporary file beside the target, which is flushed to the disk and
+    then renamed. After any error, Ctrl-C included, the old file is unchanged and no partial file
+    remains; that of a killed process is removed by the next process that writes into the folder.
 
     Args:
         path: Path of the file; its folder must exist.
@@ -66,10 +67,10 @@ def whole_file(
 
 @contextlib.contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Create an empty folder for temporary files; afterwards remove it with all that is in it.
+    """Create an empty folder for temporary files, and remove it with its content at the end.
 
     Raises:
-        OutputError: If it cannot be created.
+        OutputError: If the folder cannot be created.
     """
     above = Path(tempfile.gettempdir())
     remove_leftovers(above)
@@ -90,8 +91,9 @@ def scratch_folder() -> Iterator[Path]:
 def remove_leftovers(folder: Path) -> None:
     """Remove the temporary files and folders of killed processes from a folder.
 
-    Only what has the name of a temporary file of `tcs`, belongs to this user, and is not locked by
-    a process; nothing where the disk knows no locks. A process looks through a folder once.
+    A file or folder is removed only if it has the name of a temporary file of `tcs`, belongs to this
+    user, and is not locked by a process; on a disk without locks nothing is removed. A process
+    searches each folder once.
 
     Args:
         folder: The folder; if it cannot be read, nothing is done.
@@ -107,7 +109,7 @@ def remove_leftovers(folder: Path) -> None:
 
 def _remove_unlocked(path: Path, *, is_folder: bool) -> None:
     """Remove a temporary file or folder of this user that no process has locked."""
-    # Some network disks lock only what is open for writing.
+    # Some network disks only lock files that are open for writing.
     mode = os.O_RDONLY | os.O_DIRECTORY if is_folder else os.O_RDWR | os.O_NONBLOCK
     handle = os.open(path, mode | os.O_NOFOLLOW)
     try:
@@ -124,7 +126,7 @@ def _remove_unlocked(path: Path, *, is_folder: bool) -> None:
 
 
 def _lock(handle: int, mode: int) -> bool:
-    """Lock an open file or folder for this process; return whether that could be done."""
+    """Lock an open file or folder for this process; return whether that succeeded."""
     try:
         fcntl.flock(handle, mode)
     except OSError:
@@ -145,7 +147,7 @@ def _temporary_file(path: Path) -> Iterator[tuple[Path, BinaryIO]]:
                     yield beside, stream
                     return
         finally:
-            # There may be no file to remove; the first error is the one to report.
+            # There may be no file to remove; the original error is the one to report.
             with contextlib.suppress(OSError):
                 beside.unlink()
 
@@ -176,14 +178,14 @@ def make_folder(
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a path that cannot be written, before the work whose result it is for.
+    """Check that a file can be written, before the computation of its content.
 
     Raises:
-        OutputError: If it is a folder, or its folder is missing or not writable.
+        OutputError: If the path is a folder, or its folder is missing or not writable.
     """
     if path.is_dir():
         raise OutputError(f"'{path}' is a folder. Name a file in it.")
-    # Permissions say nothing of read-only disks and quotas; an attempt does.
+    # Permissions do not reveal read-only disks and quotas; an attempt to write does.
     remove_leftovers(path.parent)
     try:
         with _temporary_file(path):
@@ -196,7 +198,7 @@ def check_writable(path: Path) -> None:
 
 
 def check_page(path: Path) -> None:
-    """Refuse the path of a page that is not named `.html`, or that cannot be written.
+    """Check that the path of a page ends in `.html` or `.htm`, and that it can be written.
 
     Raises:
         OutputError: If its name ends otherwise, or as `check_writable`.

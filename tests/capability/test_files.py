@@ -40,7 +40,7 @@ def test_a_truncated_map_is_refused(stored):
 def test_a_score_file_is_not_a_map(tmp_path):
     path = tmp_path / "scores.tcs"
     joblib.dump({"format": "tcs scores", "format_version": 1}, path)
-    with pytest.raises(StoreFormatError, match="holds no capability map"):
+    with pytest.raises(StoreFormatError, match="contains no capability map"):
         load_map(path)
 
 

@@ -50,7 +50,7 @@ def test_a_sound_file_becomes_a_value(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[a]", "table must hold keys and values: name, height, legs, by_name, feet, foldable."),
+        ("[a]", "table must contain keys and values: name, height, legs, by_name, feet, foldable."),
         ("name: a\nheight: 1\nname: b", "line 3, column 1: key 'name' appears twice."),
         ("name: a\nlegs: [{length: 1, length: 2}]", "line 2, column 20: key 'length' appears"),
         ("1: a", "line 1, column 1: a key must be text."),

@@ -96,7 +96,7 @@ def test_the_attacks_are_real(path, mark):
 
 def test_the_message_contains_the_name(path, mark):
     joblib.dump(attacks(mark)["os.system"], path)
-    with pytest.raises(UnsafeStoreError, match=r"attack\.tcs' names '(posix|nt)\.system'"):
+    with pytest.raises(UnsafeStoreError, match=r"attack\.tcs' refers to '(posix|nt)\.system'"):
         load_scores(path)
 
 

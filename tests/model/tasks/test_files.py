@@ -179,7 +179,7 @@ def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, expecte
         ("goals:", "1: 2\ngoals:", "line 5, column 1: a key must be text"),
         ("goals:", "? [a, b]\n: 2\ngoals:", "line 5, column 3: a key must be text"),
         ("Wiping the mouth", f"[{'9' * 999}]", "field 'title' is [9"),
-        ("Wiping the mouth", "2015-13-01", "holds an impossible value: month must be in 1..12."),
+        ("Wiping the mouth", "2015-13-01", "contains an invalid value: month must be in 1..12."),
         ("goals:", "name: other\ngoals:", "line 5, column 1: key 'name' appears twice"),
         ("[wheelchair]", "[wheelchair", "is not valid YAML: line "),
         ("name: wiping", "name: !!python/name:os.system", "is not valid YAML: line 1"),
@@ -199,8 +199,8 @@ def test_goals_are_needed(refused):
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("", "must hold keys and values: name, title"),
-        ("- a\n- b\n", "must hold keys and values"),
+        ("", "must contain keys and values: name, title"),
+        ("- a\n- b\n", "must contain keys and values"),
         (b"\xff\xfe\x00", "is not a text file in UTF-8"),
         ("name: a\x00", "is not valid YAML"),
     ],

@@ -126,7 +126,7 @@ def test_a_file_replaces_the_errors_of_the_environment(chair_trials, tmp_path):
         ("errors: {person_x: {distribution: uniform, std: 1}}", DataFileError, "'half_width'"),
         ("errors: {person_x: {distribution: normal, std: .inf}}", DataFileError, "finite"),
         ("errros: {}", UnknownNameError, "Did you mean 'errors'"),
-        ("- 1", DataFileError, "must hold keys and values"),
+        ("- 1", DataFileError, "must contain keys and values"),
     ],
     ids=lambda value: value if isinstance(value, str) and ":" in value else "",
 )

@@ -229,7 +229,7 @@ def test_another_joblib_file_is_refused(path, content, compress):
 def test_a_longer_file_is_refused(path, file):
     save_scores(path, file)
     path.write_bytes(path.read_bytes() + b"more")
-    with pytest.raises(StoreFormatError, match="continues after its end"):
+    with pytest.raises(StoreFormatError, match="has data after its end"):
         load_scores(path)
 
 
@@ -295,7 +295,7 @@ FORGED = {
     "bound not a number": ("sets", "pair_sum", lambda a: a * np.float32(np.nan)),
     "bound too short": ("sets", "pair_sum", lambda a: a[1:]),
     "code beyond the values": ("sets", "reachability_values", lambda a: a[:1]),
-    "an array that is none": ("sets", "cell", lambda a: "cell"),
+    "an invalid array": ("sets", "cell", lambda a: "cell"),
     "an array missing": ("sets", "pair_sum", lambda a: None),
     "rule unknown": ("sets", "rule", lambda rule: "mine"),
     "rule missing": ("sets", "rule", lambda rule: None),
