@@ -1,7 +1,7 @@
 """The catalogue: names and titles of the tasks, environments and robots included in `tcs`.
 
-It reads headings only: checking a file against the models it names takes seconds, and happens when
-the file is used.
+Only headings are read. Checking a file against the models that it names takes seconds and is left
+to the functions that load it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The check-up of a robot: properties that scoring relies on, and what is wrong with them."""
+"""The check-up of a robot: properties that scoring relies on, and the problems found in them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ MOST_LOST = 0.05
 """Fraction of tool poses without a numeric solution above which scores would be affected."""
 
 SUNK = 0.02
-"""Depth of a surface below the floor [m] above which the root is not on the floor; models of wheels
-reach millimetres below it."""
+"""Greatest depth of a surface below a root that is on the floor [m]; models of wheels reach
+millimetres below the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class RobotCheck:
         bodies: Enclosure of each body with a surface.
         rest: Rest posture of the arm, by joint [rad], in which self-collision was checked.
         margin: Distance below which bodies are in contact [m].
-        lowest: Height of the lowest point of any surface above the root, the arm at rest [m].
+        lowest: Height above the root of the lowest point of any surface, the arm at rest [m].
         contacts: Pairs that scoring checks and that are in contact at rest.
         trip: Result of the IK round trip.
         seed: Seed of the postures of the round trip.
@@ -130,7 +130,7 @@ class RobotCheck:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on properties that are no problem, one sentence each."""
+        """Remarks on properties that are not problems, one sentence each."""
         found = []
         if self.arm.solver is None:
             found.append(f"{self.arm.reason} It is solved numerically, which takes longer.")
@@ -239,7 +239,7 @@ def _limits(robot: RobotFile) -> tuple[JointLimits, ...]:
 
 
 def _lowest(robot: RobotFile, positions: Mapping[str, float]) -> float:
-    """Return the height of the lowest point of any surface above the root [m]."""
+    """Return the height above the root of the lowest point of any surface, at most 0 [m]."""
     model, lows = robot.model(), [0.0]
     for body, triangles in body_triangles(model).items():
         R, p = pose_in_root(model, body, positions)

@@ -1,7 +1,7 @@
 """The grid of initial configurations: its axes, and the configurations they span.
 
-In: axes as environment and task files give them. Out: configurations by flat index, and the index
-of each along the axes.
+In: axes from environment and task files. Out: configurations by flat index, and the index of each
+along the axes.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ UNITS = ("m", "deg")
 class Axis:
     """Equally spaced values of one degree of freedom, identified by integer index.
 
-    Values are never looked up by their floats, because 3 * 0.1 is not 0.3.
+    Values are never looked up as floats, because 3 * 0.1 is not equal to 0.3.
     """
 
     name: str

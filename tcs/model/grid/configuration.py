@@ -64,7 +64,7 @@ class InitialConfiguration:
     def to_json(self) -> dict[str, float]:
         """Return the configuration as plain numbers, angles in degrees under `..._deg` names.
 
-        Rounded to nine decimals, so that 29 steps of 0.05 m print as 1.45.
+        Values are rounded to nine decimals, so that 29 steps of 0.05 m print as 1.45.
 
         >>> InitialConfiguration(
         ...     base_x=1.0, base_y=-0.5, base_yaw=0.0, torso=0.3,

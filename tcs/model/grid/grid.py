@@ -26,8 +26,8 @@ MAX_CONFIGURATIONS = 20_000_000
 class Grid:
     """Every combination of the values of its axes.
 
-    A configuration is identified by its flat index in C order over the axes, so that the last one,
-    the torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`.
+    A configuration is identified by its flat index in C order over the axes: the last axis, the
+    torso, changes fastest. Axes of the environment come first, then `ROBOT_AXES`.
 
     >>> grid = Grid.from_spec({
     ...     "base_x": {"unit": "m", "start": -1.5, "step": 0.05, "count": 61},
@@ -70,7 +70,7 @@ class Grid:
                     f"grid: axis '{name}': unit is '{self.axis(name).unit}', but must be '{unit}'."
                 )
         yaw = self.axis("base_yaw")
-        # A micro-degree short of a full turn is a rounded full turn.
+        # A span within a micro-degree of a full turn is a full turn, rounded.
         if (yaw.count - 1) * yaw.step > 360.0 - 1e-6:
             raise GridError(
                 f"grid: axis 'base_yaw': {yaw.count} values {yaw.step:g} deg apart exceed a full "
@@ -164,7 +164,7 @@ class Grid:
             flat: Flat indices, shape (...).
 
         Returns:
-            For each axis its values there [m or rad], shape (...).
+            Values of each axis, by its name [m or rad], shape (...).
 
         Raises:
             GridError: If an index is not one of this grid.

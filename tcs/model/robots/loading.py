@@ -1,4 +1,4 @@
-"""Load robot files: those that ship, those of the user, and what a file is based on."""
+"""Load robot files, shipped or by the user, each merged over the file that it is based on."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from tcs.model.robots.robot_file import RobotFile
 
 ROBOTS = DataFiles("robot", "models/robots/*.yaml")
 BASED_ON = "based_on"
-"""Key that names another robot file, which gives every field that this one leaves out."""
+"""Key that names another robot file, which supplies the fields that this file lacks."""
 _PATH_FIELDS = ("urdf", "primitives")
-"""Fields that hold a path relative to the robot file."""
+"""Fields with a path relative to the robot file."""
 
 
 def robot_names() -> tuple[str, ...]:
@@ -27,8 +27,8 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     """Return a robot, checked against its URDF; the paths in it are absolute.
 
     Args:
-        name_or_path: One of `robot_names()`, or the path of a file: anything that ends in `.yaml`
-            or holds a path separator.
+        name_or_path: One of `robot_names()`, or the path of a file: a text that ends in `.yaml` or
+            contains a path separator.
 
     Raises:
         UnknownNameError: If no robot has that name, or the file names something unknown.
@@ -42,7 +42,7 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
 
 
 def _content(path: Path, based_on_it: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """Return the fields of a file, with those of the file it is based on.
+    """Return the fields of a file, merged over those of the file that it is based on.
 
     Args:
         path: The file.

@@ -1,4 +1,4 @@
-"""Robot files: the arm, torso, tool, postures and collision shapes that a URDF does not name."""
+"""Robot files: arm, torso, tool, postures and collision shapes, which a URDF does not specify."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class RobotFile(Document):
         return self
 
     def __hash__(self) -> int:
-        """Hash the content; the hash of pydantic fails for mappings."""
+        """Return a hash of the content; pydantic's own hash fails on mappings."""
         return hash(self.model_dump_json())
 
     @property

@@ -11,10 +11,10 @@ def body_frame_positions(scene: Scene, grid: Grid) -> dict[str, list[float]]:
 
     Args:
         scene: The scene; its state is restored.
-        grid: Its environment axes move the joints of the same name.
+        grid: The grid, whose environment axes move the joints of the same name.
 
     Returns:
-        For each name x, y, z [m] of all states, concatenated in C order over the axes.
+        By name of the body frame: x, y, z [m] of all states, concatenated in C order over the axes.
     """
     before = scene.positions()
     positions: dict[str, list[float]] = {name: [] for name in scene.built.body_frames}

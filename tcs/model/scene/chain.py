@@ -41,9 +41,9 @@ class JointAxis:
 def link_frames(axes: tuple[JointAxis, ...]) -> tuple[FloatArray, FloatArray]:
     """Return the poses of link frames L1..L7 in the arm base A, all joints at zero.
 
-    Each L rotates about its own z. Its origin is that of the joint frame, except where moving it
-    along the joint axis gives the arm its closed form: L2 and L3 are at the intersection of axes 2
-    and 3; L5, L6 and L7 at that of axes 5, 6 and 7 (spherical wrist). An arm without these
+    Each link frame rotates about its own z axis. Its origin is that of the joint frame, except
+    where the closed form requires the intersection of axes: L2 and L3 are at the intersection of
+    axes 2 and 3; L5, L6 and L7 at that of axes 5, 6 and 7 (spherical wrist). An arm without these
     intersections may have a spherical shoulder instead: then L1, L2 and L3 are at the intersection
     of axes 1, 2 and 3, and L5 and L6 at that of axes 5 and 6.
 
@@ -83,8 +83,8 @@ def _common_points(
 def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, FloatArray] | None:
     """Return the intersection of two axes, expressed in A [m], or None if they are skew.
 
-    Axes given in rounded figures do not intersect exactly, so there is one point on each: every
-    link origin stays on its own axis, and the chain stays exact.
+    Axes given by rounded numbers do not intersect exactly, so the result is one point on each axis:
+    every link origin remains on its own axis, and the chain remains exact.
 
     >>> z = JointAxis(np.eye(3), np.zeros(3), np.array([0.0, 0.0, 1.0]))
     >>> x = JointAxis(np.eye(3), np.array([5.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]))
@@ -106,10 +106,10 @@ def meeting_points(first: JointAxis, second: JointAxis) -> tuple[FloatArray, Flo
 
 
 def _rotation_to_z(direction: FloatArray) -> FloatArray:
-    """Return the rotation whose z column is `direction`, cyclic where the axis is x or y.
+    """Return a rotation whose z column is `direction`, shape (3, 3).
 
-    For a URDF axis along x, y or z the columns are exact zeros and ones, so the chain has no
-    rounding errors.
+    For an axis along x, y or z it is a cyclic permutation of exact zeros and ones, so the chain has
+    no rounding errors.
     """
     largest = int(np.argmax(np.abs(direction)))
     z = direction / np.linalg.norm(direction)

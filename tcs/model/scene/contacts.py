@@ -24,7 +24,7 @@ from tcs.model.scene.environment import FLOOR
 
 
 class Group(Enum):
-    """What a collision shape belongs to."""
+    """Group to which a collision shape belongs."""
 
     ARM = "arm"
     """The scored arm and what it carries."""
@@ -36,18 +36,18 @@ class Group(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One collision shape of the scene, with the group and the body it belongs to."""
+    """One collision shape of the scene, with its group and its body."""
 
     geometry: GeometryId
     body: BodyIndex
     group: Group
     carrier: int
-    """The arm: 1..7, the link that carries the shape. The rest of the robot: 1 if mounted on the
-    torso, 0 if fixed to the base. The environment: 0."""
+    """Parent of the shape. Arm: number of the link, 1..7. Rest of the robot: 1 if mounted on the
+    torso, 0 if fixed to the base. Environment: 0."""
     name: str
     """Name under which its contacts are reported, e.g. "person::head_center"."""
     pad: float
-    """How far the true surface may protrude from the shape [m]."""
+    """Greatest distance by which the true surface may exceed the shape [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class ContactRule:
         """Return the rule for a robot's disabled pairs and a task's allowed contacts.
 
         Args:
-            parts: Every part of the scene, whose names the contacts may use.
+            parts: Every part of the scene.
             disabled_pairs: Pairs of robot bodies that are never checked.
             allowed_contacts: Pairs (robot body, environment body) that may touch.
             where: The source of the allowed contacts, for the message.

@@ -26,7 +26,7 @@ from tcs.model.scene.posture import Posture
 FLOOR = "floor"
 """Name under which the floor is reported."""
 BASED_ON = "based_on"
-"""Key that names the environment a file inherits all its missing keys from."""
+"""Key that names another environment, which supplies the keys that this file lacks."""
 WORLD = "world"
 """Name of the environment frame W as a parent."""
 
@@ -44,7 +44,7 @@ class ModelEntry(_NamedEntry):
 
     file: str
     parent: str = WORLD
-    """Where its root link is fixed: "world" or "model::link"."""
+    """Parent of its root link: "world" or "model::link"."""
     named_by: Literal["link", "collision"] = "collision"
     """Name under which contacts are reported: the link's, or the single collision shape's."""
 
@@ -67,12 +67,12 @@ E = TypeVar("E", ModelEntry, Obstacle)
 
 
 class EnvironmentFile(Document):
-    """Everything that surrounds the robot, as written in its file."""
+    """Content of an environment file: everything that surrounds the robot."""
 
     name: Name
     title: str
     origin: str
-    """Where the origin of W is and where its axes point, in words."""
+    """Description of the origin and the axes of W."""
     source: str
     models: tuple[ModelEntry, ...] = ()
     person: Name | None = None
@@ -88,15 +88,16 @@ class EnvironmentFile(Document):
     body_frames: Mapping[str, str] = {}
     """Frames that goals may be fixed to, e.g. parts of the person: name and "model::link"."""
     padding: Mapping[str, Length] = {}
-    """How far the true surface may protrude from a link's shapes, by "model::link" [m]."""
+    """Greatest distance by which the true surface may exceed the shapes of a link, by "model::link"
+    [m]."""
     contact_margin: Length = 0.001
-    """Contacts closer than this count as collision [m]."""
+    """Least clearance: shapes closer than this collide [m]."""
     grid: Mapping[str, Mapping[str, Any]]
     """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis other
     than the robot's moves the joint of its name."""
     observed: Mapping[str, Mapping[str, Any]] = {}
-    """Axes that the robot observes and cannot choose, in the same form: the joint of that name is
-    scored at each of the values."""
+    """Axes that the robot observes but cannot choose, in the same form: the task is scored at each
+    value of the joint of that name."""
     errors: Mapping[str, ErrorDistribution] = {}
     """Error distribution of each joint (Table II of the TCS paper)."""
 
@@ -147,9 +148,9 @@ class EnvironmentFile(Document):
 
     @property
     def observable_axes(self) -> tuple[Axis, ...]:
-        """The joints that an observation may give, with their units.
+        """Axes with the name and the unit of each joint that may be observed.
 
-        First those that have an error distribution, then the observed axes.
+        Joints with an error distribution come first, then the observed axes.
         """
         perturbed = [
             Axis(name, "m" if error.std_deg is None else "deg", 0.0, 0.0, 1)
@@ -195,8 +196,8 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
 
     Args:
         name_or_path: One of `environment_names()`, or the path of a file: a text that ends in
-            `.yaml` or contains a path separator. Files named in it are searched beside it, then in
-            the data folder.
+            `.yaml` or contains a path separator. Files that it names are searched for beside it,
+            then in the data folder.
 
     Raises:
         UnknownNameError: If no environment has that name, or a key in the file is unknown.
@@ -214,7 +215,7 @@ def _folder() -> Path:
 
 
 def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
-    """Return the environment of a file; `above` are the files based on it."""
+    """Return the environment of a file; `above` are the files that are based on it."""
     where = f"environment file '{path}'"
     known = (*EnvironmentFile.model_fields, BASED_ON)
     content = read_mapping(path, where, EnvironmentFileError, known=known)
@@ -224,7 +225,7 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     environment = checked(
         content, EnvironmentFile, where, EnvironmentFileError, also_known=(BASED_ON,)
     )
-    # Only to reject an invalid grid here, where the message can name the file.
+    # Only to raise for an invalid grid here, where the message can name the file.
     Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
     _check_observed(environment, where=f"{where}, field 'observed'")
     return _with_files_resolved(environment, path)

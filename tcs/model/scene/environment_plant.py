@@ -24,8 +24,8 @@ from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntr
 from tcs.model.scene.joints import EnvironmentJoints
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
-"""Wider than any environment, so that there is a floor at every base pose; thick enough that
-nothing lies below it [m]."""
+"""Size of the floor [m]: wider than any environment, so that there is a floor at every base pose,
+and so thick that nothing lies below it."""
 _OBSTACLE_COLOUR = np.array([0.70, 0.66, 0.58, 1.0])
 
 
@@ -125,7 +125,7 @@ def _parent_frame(
 def _add_box(
     plant: MultibodyPlant, name: str, size: tuple[float, float, float], X_WO: RigidTransform
 ) -> RigidBody:
-    # A body of its own rather than a shape of the world, so that it is named like other obstacles.
+    # A separate body, not a shape of the world, so that it is named like other obstacles.
     body = plant.AddRigidBody(name, plant.AddModelInstance(name))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WO)
     at_body = RigidTransform()

@@ -1,4 +1,4 @@
-"""Error distributions of joints: how far a joint may be from its assumed position."""
+"""Error distributions of joints: the difference of a joint from its assumed position."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ErrorDistribution(Document):
 
     @property
     def width_key(self) -> tuple[str, str]:
-        """Keys of this distribution's width, for prismatic and for revolute joints."""
+        """Keys of the width of this distribution, for prismatic and for revolute joints."""
         return _WIDTHS[self.distribution]
 
     @property

@@ -35,7 +35,7 @@ class EnvironmentJoints:
         return bool(self.by_name[name].type_name() == "revolute")
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Return the limits of a joint [m or rad]: its model's, and the outer knots it leads.
+        """Return the limits of a joint [m or rad]: those of its model and of its posture's knots.
 
         Raises:
             EnvironmentFileError: If it is neither revolute nor prismatic.
@@ -61,7 +61,7 @@ class EnvironmentJoints:
             name: The joint to move.
             position: Its new position [m or rad].
             where: The source of the position, for the message.
-            error: Type of the error for a joint or position that cannot be set.
+            error: Class of the error to raise for a joint or position that cannot be set.
 
         Raises:
             UnknownNameError: If there is no such joint.
@@ -75,13 +75,14 @@ class EnvironmentJoints:
                 yield self.by_name[follower], at
 
     def check_axis(self, axis: Axis, *, where: str) -> None:
-        """Raise if the joint of an axis cannot take the axis's values.
+        """Check that the joint of an axis can take the values of the axis.
 
         Raises:
             UnknownNameError: If no joint has the axis's name.
-            GridError: If the joint follows another one, or the unit or the limits differ.
+            GridError: If the joint follows another one, the unit differs, or a value exceeds the
+                limits.
         """
-        self._check_free(axis.name, where, GridError, kind="environment axis")
+        self._check_free(axis.name, where, GridError, noun="environment axis")
         unit = "deg" if self.is_revolute(axis.name) else "m"
         if axis.unit != unit:
             raise GridError(
@@ -92,7 +93,7 @@ class EnvironmentJoints:
             self._check_position(axis.name, float(value), f"{where}, axis '{axis.name}'", GridError)
 
     def check_error(self, name: str, error: ErrorDistribution, *, where: str) -> None:
-        """Raise if an error distribution does not fit its joint.
+        """Check that an error distribution fits its joint.
 
         Raises:
             UnknownNameError: If there is no such joint.
@@ -107,11 +108,11 @@ class EnvironmentJoints:
             )
 
     def check_posture(self, *, where: str) -> None:
-        """Raise if a posture does not fit the joints.
+        """Check that every posture fits its joints.
 
         Raises:
-            UnknownNameError: If there is no joint of a name in it.
-            EnvironmentFileError: If the unit or a limit of a joint does not fit.
+            UnknownNameError: If a posture names a joint that does not exist.
+            EnvironmentFileError: If a unit differs, or a position exceeds the limits of its joint.
         """
         for leader, posture in self.posture.items():
             here = f"{where}, field 'posture.{leader}'"
@@ -130,10 +131,10 @@ class EnvironmentJoints:
                     )
 
     def set_defaults(self, positions: Mapping[str, float], *, where: str) -> None:
-        """Set the default positions of all joints: these, and 0 for the others.
+        """Set default positions: the given ones, and 0 for other joints that lead a posture.
 
         Raises:
-            UnknownNameError: If there is no joint of a name.
+            UnknownNameError: If there is no joint of a given name.
             EnvironmentFileError: If a joint follows another one, or a position exceeds its limits.
         """
         leaders = {name: 0.0 for name in self.posture if name not in positions}
@@ -144,7 +145,7 @@ class EnvironmentJoints:
                 joint.set_default_positions([at])
 
     def _check_free(
-        self, name: str, where: str, error: type[TcsError], *, kind: str = "joint"
+        self, name: str, where: str, error: type[TcsError], *, noun: str = "joint"
     ) -> None:
         """Raise for a joint that does not exist or that follows another one."""
         for leader, posture in self.posture.items():
@@ -154,14 +155,14 @@ class EnvironmentJoints:
                     f"be set. Set '{leader}', or remove '{name}' from the posture."
                 )
         if name not in self.by_name:
-            raise UnknownNameError(kind, name, self.by_name, where=where)
+            raise UnknownNameError(noun, name, self.by_name, where=where)
 
     def _check_position(
         self, name: str, position: float, where: str, error: type[TcsError]
     ) -> None:
         """Raise for a position beyond a joint's limits."""
         lower, upper = self.limits(name)
-        # In this form the comparison rejects "not a number" as well.
+        # In this form the comparison is false for nan as well.
         if lower - _ROUNDING <= position <= upper + _ROUNDING:
             return
         unit, scale = ("deg", math.degrees(1.0)) if self.is_revolute(name) else ("m", 1.0)

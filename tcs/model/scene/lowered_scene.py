@@ -1,4 +1,4 @@
-"""A scene as plain arrays, with the names behind their indices and a digest."""
+"""A scene as plain arrays, with the names that the indices refer to, and a digest."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from tcs.kernel.arrays import GridArrays, SceneArrays
 T = TypeVar("T", SceneArrays, GridArrays)
 
 _DIGEST_DECIMALS = 9
-"""Arrays are hashed in multiples of a nanometre (or nanoradian): far below any change of a model,
+"""Decimals of the hashed arrays: a nanometre or nanoradian is far below any change of a model and
 far above the rounding differences between processors."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoweredScene:
-    """A scene, its goals and its grid as plain arrays, and the names behind their indices.
+    """A scene, its goals and its grid as plain arrays, with the names that indices refer to.
 
     Attributes:
-        arrays: The input of the kernel for every configuration.
+        arrays: Scene and goals, as the kernel reads them.
         grid: The configurations to score.
-        robot_bodies: Names that `body` of the arm's and the robot's shapes refers to.
-        environment_bodies: Names that `body` of the environment's shapes refers to.
+        robot_bodies: Names of the bodies of the robot, by the index `body` of its shapes.
+        environment_bodies: Names of the bodies of the environment, by the index `body` of its
+            shapes.
         goals: Names of the goals, in order.
     """
 
@@ -39,7 +40,7 @@ class LoweredScene:
     def digest(self) -> str:
         """Return the SHA-256 of all arrays and names, as hexadecimal digits.
 
-        Two scenes of the same digest give the same scores.
+        Scenes with the same digest have the same scores.
         """
         sha = hashlib.sha256()
         for item in _flat((self.arrays, self.grid)):
@@ -65,7 +66,7 @@ def _flat(item: object) -> Iterator[object]:
 
 
 def read_only(arrays: T) -> T:
-    """Return the same arrays, made read-only."""
+    """Make arrays read-only, in place, and return them."""
     for leaf in _flat(arrays):
         if isinstance(leaf, np.ndarray):
             leaf.flags.writeable = False

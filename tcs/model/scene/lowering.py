@@ -1,4 +1,4 @@
-"""Lowering: from a Drake plant to the arrays of the kernel, every figure read from the plant."""
+"""Lowering: from a Drake plant to the arrays of the kernel, every number read from the plant."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ from tcs.model.tasks import Task
 
 
 def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
-    """Return the arrays of a scene for a task, read off its Drake plant and scene graph.
+    """Return the arrays of a scene for a task, read from its Drake plant and scene graph.
 
     Args:
         scene: The scene; its state is restored.
-        task: The goals and the contacts that the task allows; None for arrays without goals.
-        grid: The configurations; axes besides the robot's move the environment's joints of the
-            same name.
+        task: The task, whose goals and allowed contacts apply; None for arrays without goals.
+        grid: The configurations; its environment axes move the joints of the same name.
 
     Raises:
         UnknownNameError: If the environment lacks the body frame of a goal or the joint of a grid

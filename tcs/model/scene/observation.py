@@ -16,23 +16,23 @@ from tcs.kernel.arrays import FloatArray
 from tcs.model.scene.scene import Scene
 
 MAX_POSITION_ERROR = 0.05
-"""Greatest residual distance of the frames, root mean square [m]: one standard deviation of the
-person in Table II of the TCS paper. Beyond it the person sits or lies in a posture that the model
-cannot take."""
+"""Greatest root mean square distance between observed and fitted frames [m]: one standard deviation
+of the person in Table II of the TCS paper. Beyond it the person is in a posture that the model
+cannot represent."""
 MAX_ROTATION_ERROR = math.radians(10.0)
-"""Greatest residual angle of the frames, root mean square [rad]: two standard deviations of the
-person's yaw in Table II, which is also the error of head trackers."""
+"""Greatest root mean square angle between observed and fitted frames [rad]: two standard deviations
+of the person's yaw in Table II, which is also the error of head trackers."""
 
 _DEFAULT_STD = 0.05
 """Standard deviation of a joint without an error model [m or rad]: that of the person in Table II.
 It matters only where the frames do not determine all joints."""
 _LENGTH_SCALE = 0.2
-"""Metres that a radian weighs in the residuals [m]: the rotated parts, a head or a trunk, have
-about this radius."""
+"""Weight of angles in the residuals [m/rad]: the rotated parts, a head or a trunk, have about this
+radius."""
 _STEP = 1e-6
 """Step of the central differences [m or rad]: their error is then about 1e-10."""
 _MAX_ITERATIONS = 30
-"""Limit of the Gauss-Newton iterations; five are common."""
+"""Greatest number of Gauss-Newton iterations; five are typical."""
 _CONVERGED = 1e-11
 """Change of the joints at which the iteration ends [standard deviations]: below a picometre."""
 _RANK = 1e-6
@@ -79,7 +79,7 @@ def estimate_joints(scene: Scene, observation: Observation, chosen: Iterable[str
     Args:
         scene: The scene; its state is restored.
         observation: Observed joint values and frames.
-        chosen: Joints that are axes of the grid, which the robot sets rather than observes.
+        chosen: Joints that are axes of the grid, which the robot sets and does not observe.
 
     Raises:
         UnknownNameError: If there is no such joint or frame.
@@ -141,7 +141,7 @@ def _fitted(scene: Scene, observation: Observation) -> JointEstimate:
     z = np.zeros(len(deviations))
     for _ in range(_MAX_ITERATIONS if deviations else 0):
         r, J = residuals(z), _jacobian(residuals, z, _STEP / scale)
-        # The solution of least norm among all that fit is the most likely one.
+        # Of all solutions of the least squares, that of least norm is the most likely.
         step = np.linalg.lstsq(J, J @ z - r, rcond=_RANK)[0]
         step = np.clip(step * scale, limits[:, 0] + _STEP, limits[:, 1] - _STEP) / scale
         done = float(np.max(np.abs(step - z), initial=0.0)) < _CONVERGED
@@ -217,7 +217,7 @@ def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | 
     if numbers.size == 3:
         return numbers, None
     length = float(np.linalg.norm(numbers[3:]))
-    # Trackers print four or more digits.
+    # Trackers report four digits or more.
     if abs(length - 1.0) > 1e-3:
         raise SelectionError(
             f"Observed frame '{name}': its quaternion (qw qx qy qz) has length {length:.4f}; "
@@ -229,7 +229,7 @@ def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | 
 def _residual(
     scene: Scene, frame: Frame, p_WH: FloatArray, R_WH: RotationMatrix | None
 ) -> FloatArray:
-    """Return the pose of a frame minus the observed one: metres, then radians as metres."""
+    """Return the difference of a frame from the observed one: position, then weighted angle [m]."""
     X_WH: RigidTransform = frame.CalcPoseInWorld(scene.plant_context)
     position = np.asarray(X_WH.translation() - p_WH)
     if R_WH is None:

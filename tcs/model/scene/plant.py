@@ -54,15 +54,15 @@ class ScenePlant:
         arm_joints: The scored arm's seven joints, in the robot file's order.
         arm_lower: Their lower limits [rad], -inf where continuous.
         arm_upper: Their upper limits [rad], +inf where continuous.
-        torso_joint: The joint that raises the torso, None for a robot without one.
-        torso_limits: Limits of the torso height [m].
+        torso_joint: The prismatic joint of the torso, None for a robot without one.
+        torso_limits: Limits of the torso height [m], zeros without a torso joint.
         base_frame: B, the robot's base.
         arm_base_frame: A, the parent link of joint 1.
         tool_frame: T.
         environment_joints: Joints of the environment.
         body_frames: Frames that goals may be fixed to.
         parts: Every collision shape: arm, body, environment.
-        rule: The pairs of them that are checked.
+        rule: The contact rule, which selects the pairs of parts to check.
     """
 
     diagram: Diagram
@@ -144,9 +144,9 @@ def _add_base(plant: MultibodyPlant, root: RigidBody) -> tuple[Joint, ...]:
     parent = plant.world_body()
     joints = []
     for name, axis in zip(BASE_JOINTS, axes, strict=True):
-        kind = RevoluteJoint if name == "base_yaw" else PrismaticJoint
+        joint = RevoluteJoint if name == "base_yaw" else PrismaticJoint
         child = root if name == "base_yaw" else plant.AddRigidBody(f"{name}_link", instance)
-        joints.append(plant.AddJoint(kind(name, parent.body_frame(), child.body_frame(), axis)))
+        joints.append(plant.AddJoint(joint(name, parent.body_frame(), child.body_frame(), axis)))
         parent = child
     return tuple(joints)
 
@@ -194,7 +194,7 @@ def _robot_parts(
     arm_joints: tuple[Joint, ...],
     torso: Joint | None,
 ) -> tuple[Part, ...]:
-    """Return the robot's shapes with the arm link, or the part of the body, that carries each."""
+    """Return the robot's shapes as parts, with the arm link or the mount of each."""
     above = {joint.child_body().index(): joint for joint in _joints(plant)}
     arm_link = {joint.index(): i + 1 for i, joint in enumerate(arm_joints)}
     parts = []

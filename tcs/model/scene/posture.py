@@ -16,10 +16,10 @@ Knots = Annotated[tuple[Number, ...], Field(min_length=2)]
 
 
 class Posture(Document):
-    """Positions of the joints that follow one leading joint, at some positions of that joint.
+    """Positions of joints that follow a leading joint, at some positions (knots) of that joint.
 
-    They are interpolated linearly between knots. They are undefined beyond the outer knots, so the
-    outer knots limit the leading joint.
+    Positions are interpolated linearly between knots. They are undefined beyond the outer knots,
+    which therefore limit the leading joint.
 
     >>> posture = Posture(knots_deg=(0, 40, 80), joints={"neck": (-0.1, -0.2, -0.55)})
     >>> round(posture.positions(math.radians(60))["neck"], 12)

@@ -1,4 +1,4 @@
-"""A live scene: a robot in an environment with one state, its kinematics and its contacts."""
+"""A live scene: a robot in an environment as a Drake plant with one state."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Scene:
     """One robot in one environment, as a Drake plant with one state.
 
     Initially the base is at the origin, the torso at its lower limit, the arm at zero and the
-    environment in the state of its file. Drake plants do not pickle: pass on the spec, and build
-    another scene from it.
+    environment in the state of its file. Drake plants cannot be pickled: pass the spec to other
+    processes, and build a scene from it there.
     """
 
     def __init__(
@@ -41,8 +41,8 @@ class Scene:
         Args:
             spec: Robot and environment.
             allowed_contacts: Pairs (robot body, environment body) that may touch.
-            meshes: Whether to load the robot's visual meshes, which takes seconds; only views show
-                them.
+            meshes: Whether to load the robot's visual meshes, which takes seconds; only drawing
+                needs them.
 
         Raises:
             RobotError: If the robot's model cannot be used.
@@ -66,7 +66,7 @@ class Scene:
 
     @property
     def plant_context(self) -> Context:
-        """The plant's subcontext."""
+        """Context of the plant within `context`."""
         return self._state
 
     @property
@@ -121,7 +121,7 @@ class Scene:
             self._set(joint.position_start(), position)
 
     def positions(self) -> FloatArray:
-        """Return the positions of all joints, an argument for `restore`, shape (n,)."""
+        """Return the positions of all joints for `restore`, shape (n,)."""
         return np.array(self.built.plant.GetPositions(self._state))
 
     def restore(self, positions: FloatArray) -> None:
@@ -200,10 +200,12 @@ class Scene:
         return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
 
     def required_clearance(self, first: str, second: str) -> float:
-        """Return the distance that two bodies must keep: margin, or their paddings if larger [m].
+        """Return the distance that two bodies must keep [m].
+
+        It is the contact margin, or the sum of the paddings of the two bodies if that is larger.
 
         Raises:
-            UnknownNameError: If a name has no collision shape.
+            UnknownNameError: If there is no collision shape of a name.
         """
         for name in (first, second):
             if name not in self._pads:

@@ -1,4 +1,4 @@
-"""Tasks: goal poses of the tool, fixed to the person's body or another frame of the environment.
+"""Tasks: goal poses of the tool, each fixed to a body frame of the person or the environment.
 
 In: task files. Out: checked goals with weights, allowed contacts, and changes to the grid.
 """

@@ -16,7 +16,7 @@ TASKS = DataFiles("task", "tasks/*/*.yaml")
 
 
 class _Entry(Document):
-    """Part of a task file, with strict types: no text is converted to a number."""
+    """Part of a task file with strict types: text is never converted to a number."""
 
     model_config = ConfigDict(strict=True)
 

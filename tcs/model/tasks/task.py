@@ -14,14 +14,14 @@ UNIT_TOLERANCE = 1e-5
 """Tolerance of a quaternion's length: six printed digits round by less than this."""
 
 MAX_DISTANCE = 2.0
-"""Greatest distance of a goal from its body frame [m]; larger figures are not metres."""
+"""Greatest distance of a goal from its body frame [m]; a larger number is not in metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """A goal pose of the tool, fixed to a body frame H.
+    """A goal pose of the tool frame T, fixed to a body frame H.
 
-    Poses are those of the tool frame T: x forward out of the fingers, y the way they open.
+    In T, x points forward out of the fingers, and y along their opening direction.
     """
 
     body_frame: str
@@ -87,17 +87,17 @@ class Task:
     """Title for readers, a few words."""
     goals: tuple[Goal, ...]
     environments: tuple[str, ...]
-    """Names of the environments it is made for."""
+    """Names of the environments for which the task is made."""
     source: str
-    """Source of its figures."""
+    """Source of the numbers."""
     tool: str = ""
     """Description of the tool frame that the goals refer to."""
     allowed_contacts: tuple[tuple[str, str], ...] = ()
-    """Pairs of bodies that may touch."""
+    """Pairs (robot body, environment body) that may touch."""
     grids: Mapping[str, Mapping[str, Mapping[str, object]]] = field(
         default_factory=dict, hash=False
     )
-    """For an environment, changes to the axes of its grid: new values of start, step or count."""
+    """By environment, changes to the axes of its grid: new values of start, step or count."""
 
     def __post_init__(self) -> None:
         """Check the fields.
@@ -127,7 +127,7 @@ class Task:
         return np.asarray(raw / raw.sum(), dtype=np.float64)
 
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
-        """Return the changes to the axes of an environment's grid; empty where there are none."""
+        """Return the changes to the axes of an environment's grid, empty if there are none."""
         return self.grids.get(environment, {})
 
 

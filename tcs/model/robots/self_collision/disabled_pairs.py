@@ -103,7 +103,7 @@ class _Found:
         """Return the groups that are not empty."""
         apart = (
             "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
-            "only the room that primitives take beyond them touches"
+            "only the volume that primitives add to them touches"
         )
         hard, soft = (
             apart.format(limits, np.floor(min(pairs.values(), default=0.0) * 1e3))
