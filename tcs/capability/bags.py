@@ -20,7 +20,7 @@ def read_bags(
     """Return the recording in ROS 1 bag files or ROS 2 bag folders, in the order given.
 
     Args:
-        paths: `.bag` files, or folders that hold a `metadata.yaml`.
+        paths: `.bag` files, or folders that contain a `metadata.yaml`.
         robot: The robot.
         topic: Topic of the joint states; None takes every topic of that type.
         drop_bad: As in `recording_of`.

@@ -27,13 +27,13 @@ class MapCheck:
 
     queries: int
     reachable: float
-    """Reachable: inverse kinematics at the exact pose finds a collision-free posture."""
+    """Reachable queries: inverse kinematics at the exact pose finds a collision-free posture."""
     accuracy: float
-    """Classified correctly."""
+    """Correctly classified queries."""
     false_positives: float
-    """Unreachable, in the map."""
+    """Unreachable queries in the map."""
     false_negatives: float
-    """Reachable, not in the map."""
+    """Reachable queries that are not in the map."""
     recall: float
     """Fraction of the reachable queries that are in the map."""
     precision: float
@@ -119,7 +119,7 @@ def check_file(
         path: File of a map made by inverse kinematics.
         robot: Name or file of the robot; None is the one stored in the map.
         grasps: "side", "top" or "all"; by default the tilts of the map among the first two.
-        queries: Number of poses for each.
+        queries: Number of poses for each orientation.
         seed: Seed of the poses.
         jobs: Number of threads.
 
@@ -157,7 +157,7 @@ def random_poses(reach: Reach, grasps: str, count: int, seed: int) -> tuple[Floa
 
     Args:
         reach: The robot.
-        grasps: "side" and "top" have random yaw only, "all" random orientation.
+        grasps: "side" or "top" for random yaw only, "all" for random orientation.
         count: Number of poses.
         seed: Seed of the poses.
 

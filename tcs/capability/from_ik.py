@@ -1,4 +1,4 @@
-"""Maps from inverse kinematics of every cell around the tool (ICM and IHCM)."""
+"""Maps computed by inverse kinematics of every cell around the tool (ICM and IHCM)."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ def finished_map(
         reach: The robot.
         grid: The cells' grid.
         map_type: Map type.
-        cells: Each once, shape (n, 5).
+        cells: Cells without repetitions, shape (n, 5).
         p_BT: Tool positions in B at the map's torso height [m], shape (n, 3).
-        manipulability: Shape (n,).
+        manipulability: Manipulability of the postures, shape (n,).
         joints: Arm joints [rad], shape (n, 7).
         view_rule: Visibility rule.
         metadata: Further metadata.
@@ -128,7 +128,7 @@ def finished_map(
 def camera_view(reach: Reach, grid: MapGrid, map_type: str, view_rule: str) -> View | None:
     """Return the view of the head camera, None for an ICM of a robot without a head file.
 
-    Called before the work, it also validates the arguments of a map.
+    The function also validates the arguments of a map, so it is called before any computation.
 
     Raises:
         RobotError: If a head file is needed and there is none.
@@ -148,7 +148,7 @@ def camera_view(reach: Reach, grid: MapGrid, map_type: str, view_rule: str) -> V
 
 
 def manipulability_scale(reach: Reach) -> float:
-    """Return the greatest measure of random postures of the arm, with a fixed seed."""
+    """Return the greatest manipulability of random postures of the arm, with a fixed seed."""
     lower, upper = reach.limits
     first = np.where(np.isfinite(lower), lower, -np.pi)
     last = np.where(np.isfinite(upper), upper, np.pi)

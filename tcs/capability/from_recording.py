@@ -83,7 +83,7 @@ def map_from_recording(
     Source:
         ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). The sample of a cell is
         the one nearest to its centre: the distances in position and in orientation are each
-        stretched to 0 to 1 over all samples, and multiplied.
+        scaled linearly to [0, 1] over all samples, and multiplied.
     """
     camera_view(reach, grid, ITCM, view_rule)
     R_AT, p_AT = reach.tool_poses(recording.joints)
@@ -132,7 +132,7 @@ def _rows(near: NearestCells, rows: Any) -> NearestCells:
 
 
 def _stretched(values: FloatArray) -> FloatArray:
-    """Return values stretched to 0 to 1; all 0 if they are equal."""
+    """Return values scaled linearly to [0, 1]; all 0 if they are equal."""
     low, high = float(values.min()), float(values.max())
     return (values - low) / (high - low) if high > low else np.zeros_like(values)
 

@@ -16,13 +16,14 @@ from tcs.kernel.arrays import FloatArray
 
 ICM, IHCM, ITCM = "ICM", "IHCM", "ITCM"
 MAP_TYPES = (ICM, IHCM, ITCM)
-"""From inverse kinematics; from inverse kinematics, with visibility; from recordings."""
+"""Maps from inverse kinematics, from inverse kinematics with visibility, and from recordings."""
 
 MAX_TORSO_HEIGHTS = 32
 """Greatest number of torso heights: each has a bit of a 32-bit integer."""
 
 FIXED, SPREAD = "fixed", "thesis"
 SCALES = (FIXED, SPREAD)
+"""Scales of `CapabilityMap.score`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +38,11 @@ class CapabilityMap:
     """ "ICM", "IHCM" or "ITCM"."""
     grid: MapGrid
     cells: CellArray
-    """Sorted by `grid.keys`, each once, shape (n, 5)."""
+    """Cells sorted by `grid.keys`, without repetitions, shape (n, 5)."""
     manipulability: NDArray[np.float32]
-    """Shape (n,)."""
+    """Manipulability of each cell, in [0, 1], shape (n,)."""
     visibility: NDArray[np.float32]
-    """Shape (n,)."""
+    """Visibility of the tool from each cell, in [0, 1], shape (n,)."""
     torso_heights: FloatArray
     """Checked torso heights [m], `grid.step` apart, one of them `torso_height`, shape (levels,)."""
     torso_height: float
@@ -51,12 +52,12 @@ class CapabilityMap:
     manipulability_scale: float
     """Greatest manipulability of the arm, which scales the scores of all its maps."""
     metadata: Mapping[str, Any]
-    """Robot, tool, measure and so on; plain containers."""
+    """Origin of the map, such as robot, tool and measure, as plain containers."""
     joints: NDArray[np.float32]
     """Posture of each cell [rad], shape (n, 7), or (0, 7) if unknown."""
 
     def __post_init__(self) -> None:
-        """Check that the parts agree, and make the arrays read-only.
+        """Check that the fields agree, and make the arrays read-only.
 
         Raises:
             UnknownNameError: If there is no such map type.
@@ -100,11 +101,12 @@ class CapabilityMap:
     def score(self, scale: str = FIXED) -> FloatArray:
         """Return the scores of the cells, shape (n,).
 
-        Manipulability for an ICM, the mean of manipulability and visibility for other types.
+        The score is the manipulability for an ICM, and the mean of manipulability and visibility
+        for other types.
 
         Args:
             scale: "fixed": manipulability divided by the greatest of the arm, so that maps are
-                comparable. "thesis": both stretched to 0 to 1 within this map, ITCM thesis
+                comparable. "thesis": both scaled linearly to [0, 1] within this map, ITCM thesis
                 section II.B and eq. (18).
 
         Raises:
@@ -132,7 +134,7 @@ class CapabilityMap:
     def look_up(self, R_BT: FloatArray, p_BT: FloatArray) -> NDArray[np.int64]:
         """Return the rows of the cells nearest to tool poses in the base, -1 where there is none.
 
-        The query of a forward reachability map: how well is this pose reached from here?
+        This is the query of a forward reachability map.
 
         Args:
             R_BT: Tool orientations in B, shape (n, 3, 3).
@@ -146,7 +148,7 @@ class CapabilityMap:
 
 
 def _stretched(values: NDArray[np.float32]) -> FloatArray:
-    """Return values stretched to 0 to 1; all 1 if they are equal."""
+    """Return values scaled linearly to [0, 1]; all 1 if they are equal."""
     if not values.size or values.max() == values.min():
         return np.ones(values.shape)
     low, high = float(values.min()), float(values.max())

@@ -18,7 +18,7 @@ from tcs.errors import SelectionError
 from tcs.kernel.arrays import FloatArray
 
 _SAME = 1e-6
-"""Torso heights this close are equal, in steps."""
+"""Torso heights closer than this are equal [steps]; the same tolerance applies to angles [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +26,15 @@ class BasePose:
     """A base pose, its torso height and its score."""
 
     x: float
+    """x of the base in the task frame F [m]."""
     y: float
+    """y of the base in F [m]."""
     yaw: float
     """Yaw of the base in F [rad], in (-pi, pi]."""
     torso_height: float
-    """[m]."""
+    """Torso height [m]."""
     score: float
+    """Score of the task map."""
 
     def to_json(self) -> dict[str, float]:
         """Return the pose as plain numbers."""
@@ -49,22 +52,23 @@ class TaskMap:
     """The base poses from which a whole task is feasible: TS-ICM, TS-IHCM or TS-ITCM."""
 
     name: str
-    """E.g. "TS-ITCM"."""
+    """Type of the map, e.g. "TS-ITCM"."""
     task: GraspTask
     grid: MapGrid
     box: Box
+    """Base positions of `score`."""
     torso_heights: FloatArray
-    """Torso heights that were considered [m], shape (levels,)."""
+    """Torso heights considered [m], shape (levels,)."""
     score: NDArray[np.float32]
-    """NaN where the task is infeasible, shape (levels, x, y, yaws)."""
+    """Score of each base pose, NaN where the task is infeasible, shape (levels, x, y, yaws)."""
     nearness: Nearness
-    """Distance of the tool poses from their cells: 0 on the grid."""
+    """Greatest distances of the tool poses from their cells, 0 for poses on the grid."""
 
     @cached_property
     def base_poses(self) -> FloatArray:
-        """Every base pose at its best torso height, shape (n, 5).
+        """Feasible base poses, each at its best torso height, shape (n, 5).
 
-        x, y [m], yaw [rad], torso height [m] and score.
+        Columns are x, y [m], yaw [rad], torso height [m] and score.
         """
         score = np.where(np.isnan(self.score), -1.0, self.score)
         level = score.argmax(axis=0)
@@ -75,11 +79,11 @@ class TaskMap:
         return np.column_stack([x, y, yaw, self.torso_heights[level[i, j, k]], best[i, j, k]])
 
     def best(self) -> BasePose:
-        """Return the base pose of the highest score, the first of equal ones."""
+        """Return the base pose of the highest score, the first one if several are equal."""
         return BasePose(*map(float, self.base_poses[np.argmax(self.base_poses[:, 4])]))
 
     def worst(self) -> BasePose:
-        """Return the base pose of the lowest score, each at its best torso height."""
+        """Return the base pose of the lowest score, each base pose at its best torso height."""
         return BasePose(*map(float, self.base_poses[np.argmin(self.base_poses[:, 4])]))
 
 
@@ -98,7 +102,7 @@ def merge(
     `TaskMap.nearness` reports the distance.
 
     Args:
-        capability: The map; a `MapVolume` of it saves time if several tasks are merged.
+        capability: The map; a `MapVolume` of it saves time when merging for several tasks.
         task: The tool poses.
         scale: Scale of the scores, see `CapabilityMap.score`; a `MapVolume` keeps its own.
         torso_height: Consider this torso height only [m], to half a step; None is the whole range.
@@ -117,7 +121,7 @@ def merge(
     parts = [position_scores(volume, position, box, torso_heights) for position in task.positions]
     score = parts[0][0]
     for part, _ in parts[1:]:
-        # NaN, "not reached", wins over every number: the intersection.
+        # The minimum propagates NaN (not reached): the result is the intersection.
         score = np.minimum(score, part)
     if np.isnan(score).all():
         raise SelectionError(_best_subset(volume, task, torso_heights))
@@ -131,8 +135,8 @@ def usable_torso_heights(
 ) -> FloatArray:
     """Return the torso heights that bring the tool to a height with the base on the floor.
 
-    Cells are whole steps apart, and so are these heights; with a movable torso they fit the tool
-    height exactly. A robot without one takes the nearest cell.
+    Cells are whole steps apart, and so are these heights; with a movable torso they match the tool
+    height exactly. Without one, the nearest cell is used.
 
     Args:
         capability: The map.
@@ -179,13 +183,13 @@ def position_scores(
             before, near = volume.scores(R_FT, p_FT - back * R_FT[:, 0], box, torso_heights)
             score = np.minimum(score, before)
             nearness.append(near)
-        # fmax prefers a number to NaN: the union.
+        # fmax ignores NaN: the result is the union.
         best = np.fmax(best, score)
     return best, Nearness.worst(nearness)
 
 
 def _best_subset(volume: MapVolume, task: GraspTask, torso_heights: FloatArray) -> str:
-    """Return a message that names the most positions reached from one base pose."""
+    """Return a message that names the largest set of positions reached from one base pose."""
     count, grid = len(task.positions), volume.capability.grid
     failure = f"task '{task.name}': no base pose reaches all {count} positions"
     if not len(torso_heights):
@@ -213,6 +217,6 @@ def _best_subset(volume: MapVolume, task: GraspTask, torso_heights: FloatArray) 
 
 
 def _wrapped(yaw: FloatArray) -> FloatArray:
-    """Return angles in (-pi, pi]; rounding does not turn pi into -pi."""
+    """Return angles wrapped to (-pi, pi]; rounding does not change pi to -pi."""
     wrapped = (yaw + math.pi - _SAME) % (2.0 * math.pi) - math.pi + _SAME
     return np.where(np.abs(wrapped) < _SAME, 0.0, wrapped)

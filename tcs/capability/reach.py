@@ -1,4 +1,4 @@
-"""A robot on an empty floor: which tool poses its arm reaches, and how well."""
+"""Reachability and manipulability of tool poses for a robot on an empty floor."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Solved:
     """Best posture for each tool pose."""
 
     reached: BoolArray
-    """Shape (n,)."""
+    """Whether each pose is reached, shape (n,)."""
     manipulability: NDArray[np.float32]
     """The measure of the best posture, 0 where not reached, shape (n,)."""
     joints: NDArray[np.float32]
@@ -57,14 +57,14 @@ class Reach:
         self, robot: RobotFile, *, torso_height: float | None = None, step: float = 0.05,
         measure: str = MEASURE, robot_reference: str | None = None, head: str | None = None,
     ) -> None:  # fmt: skip
-        """Lower the robot at `torso_height` and at all heights that are whole steps away from it.
+        """Lower the robot to arrays at `torso_height` and at all heights whole steps away from it.
 
         Args:
             robot: The robot.
             torso_height: Torso height of the maps [m]; None is the middle of the torso's range.
             step: Distance between torso heights [m].
             measure: Name of the dexterity measure, see `tcs.kernel.dexterity`.
-            robot_reference: Name or path that maps store to find the robot again; None is its
+            robot_reference: Name or path that maps store as a reference to the robot; None is its
                 name.
             head: Name or path of the head file; None is the robot's name.
 
@@ -100,9 +100,9 @@ class Reach:
         self.lowered: LoweredScene = lower(self.scene, None, Grid((*fixed, axis)))
         self._problem = build_problem(self.lowered.arrays, self.lowered.grid, measure)
         self.R_BA = self.lowered.arrays.arm_base_R[below]
-        """Orientation of the arm base at `torso_height`, shape (3, 3)."""
+        """Orientation of the arm base A in B at `torso_height`, shape (3, 3)."""
         self.p_BA = self.lowered.arrays.arm_base_p[below]
-        """Its origin [m], shape (3,)."""
+        """Origin of A in B at `torso_height` [m], shape (3,)."""
 
     @classmethod
     def load(
@@ -143,12 +143,12 @@ class Reach:
 
     @property
     def shoulder(self) -> FloatArray:
-        """Origin of the arm's first moving link in B at `torso_height` [m], shape (3,)."""
+        """Origin of link frame L1 in B at `torso_height` [m], shape (3,)."""
         return np.asarray(self.p_BA + self.R_BA @ self.lowered.arrays.chain.p[0])
 
     @property
     def length(self) -> float:
-        """Greatest distance of the tool from the shoulder, the arm stretched out [m]."""
+        """Sum of the link lengths: an upper bound of the distance from shoulder to tool [m]."""
         return float(np.linalg.norm(self.lowered.arrays.chain.p[1:], axis=1).sum())
 
     def solve(
@@ -161,7 +161,7 @@ class Reach:
             R_BT: Tool orientations in B, shape (n, 3, 3).
             p_BT: Tool positions in B [m], shape (n, 3).
             level: Index of the torso height; None is that of `torso_height`.
-            jobs: Number of threads; the answers do not depend on it.
+            jobs: Number of threads; the results do not depend on it.
             on_progress: Called with the number of poses done and of all.
         """
         problem = self._at(self.level if level is None else level)
@@ -190,7 +190,11 @@ class Reach:
         return R, p
 
     def manipulability(self, joints: FloatArray) -> FloatArray:
-        """Return the measure of postures, shape (n,)."""
+        """Return the manipulability of postures, shape (n,).
+
+        Args:
+            joints: Arm joints [rad], shape (n, 7).
+        """
         value = np.empty(len(joints))
         measures(self._problem, _writable(joints), value)
         return value
@@ -211,7 +215,11 @@ class Reach:
         return free
 
     def free_torso_heights(self, joints: FloatArray) -> NDArray[np.uint32]:
-        """Return the torso heights free of contact, bit i for `torso_heights[i]`, shape (n,)."""
+        """Return the torso heights free of contact, bit i for `torso_heights[i]`, shape (n,).
+
+        Args:
+            joints: Arm joints [rad], shape (n, 7).
+        """
         bits = np.zeros(len(joints), np.uint32)
         for level in range(len(self.torso_heights)):
             bits |= self.free(joints, level).astype(np.uint32) << np.uint32(level)
@@ -252,7 +260,7 @@ def _with_goals(problem: Problem, R_BT: FloatArray, p_BT: FloatArray) -> Problem
 
 
 def _writable(array: NDArray[Any]) -> FloatArray:
-    """Return a writable copy: numba would compile once more for read-only arrays."""
+    """Return a writable copy: numba compiles anew for read-only arrays, which are another type."""
     return np.array(array, dtype=np.float64, order="C")
 
 

@@ -26,7 +26,7 @@ class Recording:
     joints: FloatArray
     """Arm joints [rad], within the limits in force, shape (n, 7)."""
     torso_height: FloatArray | None
-    """Torso height [m], shape (n,); None where it was not recorded."""
+    """Torso height [m], shape (n,); None if it was not recorded."""
     dropped: int = 0
     """Number of invalid samples that were left out."""
 
@@ -165,7 +165,7 @@ def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recordi
 
 
 def write_csv(path: Path, robot: RobotFile, recording: Recording) -> None:
-    """Write a recording as `read_csv` reads it.
+    """Write a recording to a CSV file, which `read_csv` reads.
 
     Raises:
         OutputError: If the file cannot be written.

@@ -59,7 +59,7 @@ def split(
             except SelectionError:
                 if first == last:
                     raise
-                # A longer stretch is infeasible too.
+                # A longer part of the task is infeasible as well.
                 break
             stops, cost, before = best[first]
             options.append((stops + 1, max(cost, -base.score), (*before, Stop(first, last, base))))

@@ -1,4 +1,4 @@
-"""Task maps in an environment: which base poses stay feasible among its obstacles."""
+"""Feasibility of the base poses of a task map among the obstacles of an environment."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ MOST_TRIED = 2000
 
 @dataclass(frozen=True, slots=True)
 class Feasibility:
-    """What a base pose reaches in an environment."""
+    """Feasibility of a task from one base pose in an environment."""
 
     body_blocked: bool
     """Whether the body of the robot is in contact."""
     reached: tuple[bool, ...]
-    """For each position whether a grasp and all its pre-grasps are reached without contact."""
+    """For each position, whether a grasp and all its pre-grasps are reached without contact."""
 
     @property
     def feasible(self) -> bool:
@@ -92,7 +92,7 @@ class Surroundings:
         return cls(file, load_environment(environment), task_pose)
 
     def feasibility(self, task: GraspTask, base: BasePose) -> Feasibility:
-        """Return what a base pose reaches, solved by the kernel at the exact tool poses.
+        """Return the feasibility of a task, solved by the kernel at the exact tool poses.
 
         Args:
             task: The tool poses, in F.

@@ -21,19 +21,19 @@ from tcs.errors import TaskError, UnknownNameError
 
 TASK_SHAPES = ("pick-and-place", "linear", "curved")
 _SAME = 1e-9
-"""Angles this close are equal [rad]."""
+"""Angles closer than this are equal [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskShape:
-    """Parameters of a task by the name of its shape.
+    """Parameters of a task of a named shape.
 
     Attributes:
         shape: "pick-and-place", "linear" or "curved".
         height: Height of all positions above the floor [m].
         length: Distance from the first to the last position, or radius of the arc [m].
         samples: Number of positions on a line or an arc.
-        headings: Headings of the grasps [rad]; the arc has its own.
+        headings: Headings of the grasps [rad]; ignored for the arc, whose headings follow from it.
         approach: "side" or "top"; the arc has side grasps only.
         pre_grasps: Distances of pre-grasps [m].
         direction_deg: Direction of the line from the x axis of F [deg], a multiple of 90.
@@ -174,9 +174,9 @@ def curved_task(
 ) -> GraspTask:
     """Return positions along the path of a door handle, the hinge at the origin of F.
 
-    The positions are the points of the grid nearest to the arc. At each, the grasps are those of
-    four sides that keep the gripper off the door: from the side to which the door opens, or from
-    beyond its free edge.
+    The positions are the points of the grid nearest to the arc. At each position the grasps are
+    those of the four headings that keep the gripper clear of the door: from the side to which the
+    door opens, or from beyond its free edge.
 
     Args:
         radius: Distance from the hinge to the handle [m].
@@ -212,7 +212,7 @@ def curved_task(
             f"task '{name}': the grid has {len(near)} points within a step of the arc, fewer than "
             f"{samples} samples. Use fewer samples or a finer grid."
         )
-    # Of points at equal distance the first along the path counts.
+    # Of points at equal distance, take the first along the path.
     chosen = near[np.lexsort((swept[near], np.round(distance[near], 9)))[:samples]]
     positions = []
     for point in chosen[np.argsort(swept[chosen], kind="stable")]:

@@ -21,7 +21,7 @@ FRONT_AND_SIDES = (0.0, math.pi / 2, -math.pi / 2)
 """From the front, the right and the left: headings of the thesis's pick-and-place task."""
 ALL_SIDES = (0.0, math.pi / 2, math.pi, -math.pi / 2)
 FARTHEST = 20.0
-"""Greatest coordinate of a position [m]; larger numbers are not metres."""
+"""Greatest coordinate of a position [m]; a larger number is not in metres."""
 _MOST_POSITIONS = 64
 _APPROACHES = {SIDE: (0.0, 0.0), TOP: (math.pi / 2, 0.0)}
 """Pitch and roll of the tool in E [rad]."""
@@ -36,7 +36,7 @@ class Grasp:
     approach: str | tuple[float, float] = SIDE
     """ "side", "top", or pitch and roll of the tool in E [rad]."""
     pre_grasps: tuple[float, ...] = ()
-    """Distances back along the approach at which the tool must be reachable too [m]."""
+    """Distances back along the approach at which the tool pose must be reachable as well [m]."""
 
     @property
     def R_FT(self) -> FloatArray:
@@ -56,10 +56,13 @@ class GraspPosition:
     """A tool position and its alternative grasps."""
 
     x: float
+    """x of the tool in F [m]."""
     y: float
+    """y of the tool in F [m]."""
     height: float
-    """Above the floor [m]."""
+    """Height of the tool above the floor [m]."""
     grasps: tuple[Grasp, ...]
+    """Alternatives, of which one must be reachable."""
 
 
 @dataclass(frozen=True, slots=True)

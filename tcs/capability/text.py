@@ -1,4 +1,4 @@
-"""Capability maps as text: the form of the ITCM thesis, and tables of base poses."""
+"""Capability maps as text: the file format of the ITCM thesis, and tables of base poses."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tcs.files.writing import whole_file
 from tcs.kernel.arrays import BoolArray, FloatArray
 
 _COLUMNS = 13
-"""score x y z R11 R12 R13 R21 R22 R23 R31 R32 R33."""
+"""Columns of a text file: score x y z R11 R12 R13 R21 R22 R23 R31 R32 R33."""
 _POSITION_TOLERANCE = 1e-3
-"""Greatest distance of a pose in a text file from its cell [m]: files with four decimals pass."""
+"""Greatest distance of a pose in a text file from its cell [m], enough for four decimals."""
 _ROTATION_TOLERANCE = 1e-2
 """Greatest angle of a pose in a text file from its cell [rad]."""
 
@@ -29,7 +29,7 @@ _ROTATION_TOLERANCE = 1e-2
 def export_text(
     path: str | os.PathLike[str], capability: CapabilityMap, score: str = "manipulability"
 ) -> None:
-    """Write a map as text: one base pose in the tool frame a line, score x y z R11 .. R33.
+    """Write a map as text: per line a score and a base pose in T, score x y z R11 .. R33.
 
     Args:
         path: File to write; its folder must exist.
@@ -58,9 +58,10 @@ def import_text(
     map_type: str = ITCM,
     view_rule: str = CORRECTED,
 ) -> CapabilityMap:
-    """Return the map of a text file; its scores are manipulability, visibility is computed.
+    """Return the map in a text file; its scores are manipulability, visibility is computed.
 
-    A text file holds no postures, so all torso heights count as free of contact, as in the thesis.
+    A text file contains no postures, so all torso heights count as free of contact, as in the
+    thesis.
 
     Args:
         path: The file.
@@ -89,7 +90,7 @@ def import_text(
     message = f"is not a pose of a grid of {spacing} with these tilts"
     _check_rows(path, on_grid, message)
     _check_rows(path, (table[:, 0] >= 0) & (table[:, 0] <= 1), "has a score outside 0 to 1")
-    # Of equal poses the best score counts, as in the thesis, Appendix B.1.3.
+    # Of equal poses the one with the best score is kept, as in the thesis, Appendix B.1.3.
     order = np.lexsort((-table[:, 0], grid.keys(near.cells)))
     _, first = np.unique(grid.keys(near.cells)[order], return_index=True)
     rows = order[first]

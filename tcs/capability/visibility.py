@@ -20,7 +20,7 @@ VISIBILITIES = (CORRECTED, THESIS)
 
 
 def visibility(view: View, p_BT: FloatArray, rule: str = CORRECTED) -> FloatArray:
-    """Return the visibility of tools.
+    """Return the visibility score of tool positions.
 
     Args:
         view: The camera.

@@ -14,7 +14,7 @@ from tcs.capability.map import FIXED, CapabilityMap
 from tcs.kernel.arrays import FloatArray, IntArray
 
 _WHOLE = 1e-6
-"""Tolerance of whole cells and levels, in steps."""
+"""Tolerance of whole cells and levels [steps]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class MapVolume:
     def box_about(self, x: float, y: float) -> Box:
         """Return a box of all base positions that may reach a tool at (x, y) [m]."""
         step = self.capability.grid.step
-        # For any heading of the map about the tool; one more for the rounding.
+        # Covers every heading of the map about the tool; one more cell for rounding.
         far = math.ceil(self._far) + 1
         return Box(round(x / step) - far, round(y / step) - far, 2 * far + 1, 2 * far + 1)
 
@@ -136,7 +136,7 @@ class MapVolume:
         shift_bins: int,
         torso_heights: FloatArray,
     ) -> NDArray[np.float32]:
-        """Return cells of one tilt, NaN where there is none.
+        """Return the scores of cells of one tilt, NaN where there is no cell.
 
         Args:
             tilt: The tilt.
@@ -184,5 +184,5 @@ class MapVolume:
 
 
 def _clean(value: float) -> float:
-    """Return 0 for a value within rounding of 0."""
+    """Return the value, or 0 if it is 0 within rounding."""
     return 0.0 if value < _WHOLE else value

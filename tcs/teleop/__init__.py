@@ -1,9 +1,9 @@
 """Teleoperation of a redundant seven-joint arm: tool motion and null-space motion.
 
-In: an arm read off a robot file (`load_arm`) and one `Command` per control period. Out: one `Step`
-per period (joints, tool pose, limits, singularity, reason for a stop), recorded as runs.
-Subpackages: `control` (the control law), `operators` (scripted ones), `runs` (recorded steps and
-their files) and `experiment` (the null-space paper's trials, metrics and statistics).
+In: an arm from a robot file (`load_arm`) and one `Command` per control period. Out: one `Step` per
+period (joints, tool pose, limits, singularity, reason for a stop), recorded as runs. Subpackages:
+`control` (the control law), `operators` (scripted operators), `runs` (recorded steps and their
+files) and `experiment` (trials, metrics and statistics of the null-space paper).
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ class Kinematics(NamedTuple):
     p: FloatArray
     """p_BoTo_B [m], shape (3,)."""
     jacobian: FloatArray
-    """V_BT per joint rate, shape (6, 7), rows angular then linear [rad/rad; m/rad]."""
+    """Jacobian of the spatial velocity V_BT in B, shape (6, 7), rows angular then linear [rad/rad;
+    m/rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ class Arm:
     _parts: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only; split the frames by the factors 1, cos(q) and sin(q)."""
+        """Make the arrays read-only, and split the frames into factors of 1, cos(q) and sin(q)."""
         turning = self.frames[:JOINTS]
         x, y = turning[:, :, 0], turning[:, :, 1]
         still, cosine, sine = np.zeros_like(turning), np.zeros_like(turning), np.zeros_like(turning)
@@ -157,7 +158,7 @@ class Arm:
 
 
 def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm:
-    """Return the scored arm of a robot, read off its Drake plant.
+    """Return the scored arm of a robot, read from its Drake plant.
 
     Args:
         robot: The robot, its name, or the path of a robot file.

@@ -12,7 +12,7 @@ from tcs.kernel.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A straight line that the tool is to follow, in the frame of the arm's poses [m]."""
+    """A straight line for the tool to follow, in the frame of the tool poses [m]."""
 
     start: tuple[float, float, float]
     end: tuple[float, float, float]
@@ -32,12 +32,12 @@ class Line:
 
     @property
     def length(self) -> float:
-        """From start to end [m]."""
+        """Distance from start to end [m]."""
         return float(np.linalg.norm(np.subtract(self.end, self.start)))
 
     @property
     def direction(self) -> FloatArray:
-        """From start to end, of length 1, shape (3,)."""
+        """Unit vector from start to end, shape (3,)."""
         return np.asarray(np.subtract(self.end, self.start) / self.length)
 
     def at(self, fraction: FloatArray | float) -> FloatArray:

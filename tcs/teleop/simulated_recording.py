@@ -1,8 +1,8 @@
-"""Simulated recordings: a random hand at the master drives the teleoperated arm.
+"""Simulated recordings: a simulated hand at the master moves the teleoperated arm.
 
-The joint states become a capability map (ITCM) where no operator is at hand. The hand heads for
-random poses in the box of a master device; the arm follows in end-effector control. It stops before
-it touches the robot or the floor, and goes back along its path.
+A capability map (ITCM) of the joint states can be made without an operator. The hand moves between
+random poses in the box of a master device, and the arm follows in end-effector control. Before the
+arm touches the robot or the floor it stops, and retreats along its path.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from tcs.teleop.control.settings import Command, Mode, Settings
 MASTER_BOX = (0.070, 0.160, 0.120)
 """Depth, width and height of the workspace of a Geomagic Touch [m]: forward, left, up."""
 PERIOD = 0.02
-"""Between samples [s]: joint states come at 50 Hz, ITCM thesis, Appendix C.1."""
+"""Time between samples [s]: joint states are published at 50 Hz, ITCM thesis, Appendix C.1."""
 LONGEST = 86_400.0
-"""Longest recording [s]: a day, 27 times the thesis's recording, fits into memory."""
+"""Longest recording [s]: a day, 27 times as long as that of the thesis, fits into memory."""
 _GAIN = 4.0
 """Commanded tool speed per distance to the hand [1/s]."""
 _FASTEST = (1.5, 0.4)
 """Greatest commanded velocities, angular and linear [rad/s; m/s]."""
 _LEAD = 0.10
-"""Distance by which the hand leads the tool before it waits [m]."""
+"""Distance between hand and tool above which the hand waits [m]."""
 _PATIENCE = 1.0
-"""Time that the hand waits for the tool [s]."""
+"""Longest time that the hand waits for the tool [s]."""
 _RETREAT = 50
-"""Samples that the arm goes back after its first stop: one second."""
+"""Number of samples by which the arm retreats after its first stop: one second."""
 _STRETCH = 25
-"""Samples between two collision checks, which are done at once: half a second."""
+"""Number of samples that are checked for collision together: half a second."""
 _SETTINGS = Settings(period=PERIOD, length=0.3)
 """Where joint limits leave the tool too few joints, `length` divides the error between position and
 orientation; of 0.1 to 0.6 m, this gives recordings with the most cells."""
 _RECOVERY = Mode.ASSISTED
-"""Mode after the arm was stopped or lost the hand: it leads the joints away from their limits."""
+"""Mode after a stop or a lost hand, which moves the joints away from their limits."""
 
 OnProgress = Callable[[int, int], None]
 
@@ -52,12 +52,12 @@ OnProgress = Callable[[int, int], None]
 class HandMotion:
     """Motion of the operator's hand, scaled to the arm.
 
-    The defaults are those of the recording in the ITCM thesis as far as it states them: height,
-    roll and pitch fixed, an hour. It does not state scale, centre, yaw and speed of the hand.
+    The defaults are those of the recording in the ITCM thesis where the thesis states them: fixed
+    height, roll and pitch, and an hour. It does not state scale, centre, yaw and speed of the hand.
 
     Attributes:
         height: Height of the tool above the floor [m].
-        seconds: Length of the recording [s]: 53 min and 17 s, as in Appendix C.1.
+        seconds: Duration of the recording [s]: about 53 min, as in Appendix C.1.
         scale: Metres at the arm per metre at the master: 0.16 m become the 1.2 m of the thesis.
         centre: Centre of the box, x and y in B [m].
         yaw: Lowest and highest yaw of the tool [rad].
@@ -103,7 +103,7 @@ class HandMotion:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRecording:
-    """Joint states of the teleoperated arm, and how well it followed the hand."""
+    """Joint states of the teleoperated arm, and its tracking errors."""
 
     recording: Recording
     position_error: FloatArray
@@ -111,7 +111,7 @@ class SimulatedRecording:
     orientation_error: FloatArray
     """Angle from the commanded to the actual tool orientation [rad], shape (n,)."""
     stopped: BoolArray
-    """Whether the arm, stopped before a contact, went back along its path, shape (n,)."""
+    """Whether the arm retreated along its path after a stop, shape (n,)."""
 
 
 def simulate_recording(
@@ -121,22 +121,22 @@ def simulate_recording(
     seed: int = 0,
     on_progress: OnProgress | None = None,
 ) -> SimulatedRecording:
-    """Return the joint states of an arm that follows a random hand.
+    """Return the joint states of an arm that follows a simulated hand.
 
     Args:
-        reach: The robot, at the torso height to record at.
+        reach: The robot, at the torso height of the recording.
         motion: Motion of the hand; None for the defaults.
-        seed: Seed of the hand's targets.
-        on_progress: Called with samples done and in all.
+        seed: Seed of the random poses of the hand.
+        on_progress: Called with the number of samples done and of all.
 
     Raises:
-        DataFileError: If a number is not finite, the length is out of range, or the arm reaches no
-            pose in the box to start from.
+        DataFileError: If a number is not finite, the duration is out of range, or the arm reaches
+            no pose in the box to start from.
 
     Source:
-        The "complete simulation" that the ITCM thesis names as future work, Appendix C.4: scaling
-        between master and slave, joint limits, self-collision. The controller of its slave is not
-        published; here it is `Mode.END_EFFECTOR` of `tcs.teleop`.
+        The "complete simulation" that the ITCM thesis proposes as future work, Appendix C.4:
+        scaling between master and slave, joint limits, self-collision. The controller of its slave
+        is not published; here it is `Mode.END_EFFECTOR` of `tcs.teleop`.
     """
     motion = motion or HandMotion()
     count = _sample_count(motion)
@@ -160,7 +160,7 @@ def simulate_recording(
         if not blocked.size:
             back = max(_RETREAT, back - _STRETCH)
         else:
-            # Back along the free path, further at each stop, or the arm would stay wedged.
+            # Retreat along the free path, farther at each stop, so that the arm does not get stuck.
             end = min(done + max(1, min(back, len(path) - 1)), count)
             for i in range(done, end):
                 if len(path) > 1:
@@ -185,10 +185,10 @@ def simulate_recording(
 
 
 class _Hand:
-    """Hand that heads for random poses in its box and waits for a tool that lags behind."""
+    """Hand that moves between random poses in its box, and waits for a tool that lags behind."""
 
     def __init__(self, motion: HandMotion, rng: np.random.Generator, step: Step) -> None:
-        """Start where the tool is, at the middle yaw."""
+        """Start at the position of the tool, with the middle yaw."""
         self.pose = np.array([step.p[0], step.p[1], motion.middle[2]])
         """x, y [m] and yaw [rad] in B, shape (3,)."""
         self._motion, self._rng = motion, rng
@@ -211,7 +211,7 @@ class _Hand:
         return Command(angular=twist[:3], linear=twist[3:], mode=self._mode)
 
     def give_up(self, step: Step) -> None:
-        """Return to the tool and head for another pose, with assistance until it is reached."""
+        """Return to the tool and move to another pose, with assistance until it is reached."""
         self.pose[:2] = step.p[:2]
         self._target, self._waited, self._mode = self._draw(), 0.0, _RECOVERY
 
@@ -235,7 +235,7 @@ def _sample_count(motion: HandMotion) -> int:
     """Return the number of samples.
 
     Raises:
-        DataFileError: If a number is not finite, or the length is out of range.
+        DataFileError: If a number is not finite, or the duration is out of range.
     """
     numbers = (motion.seconds, motion.height, motion.scale, *motion.centre)
     if not (np.all(np.isfinite(numbers)) and PERIOD <= motion.seconds <= LONGEST):
@@ -264,6 +264,6 @@ def _start_posture(reach: Reach, motion: HandMotion) -> FloatArray:
             f"at a height of {motion.height:g} m with the torso at {reach.torso_height:g} m. Move "
             "the box."
         )
-    # Joints rounded to single precision may lie past a limit by their last digit.
+    # Joints in single precision may exceed a limit by rounding.
     joints = np.asarray(solved.joints[int(np.argmax(solved.reached))], dtype=np.float64)
     return np.asarray(np.clip(joints, *reach.limits))

@@ -20,11 +20,11 @@ from tcs.teleop.control.state import ControlState, RateCommand, commanded_twist,
 from tcs.teleop.control.status import range_fraction
 
 _ORIENTATION = 0.02
-"""Distance that weighs as much as a rotation of 1 rad [m]: where both are not possible, the tool
-follows the commanded position and gives up as little orientation as possible."""
+"""Distance that has the weight of a rotation of 1 rad [m]: where both are not possible, the tool
+follows the commanded position and loses as little orientation as possible."""
 _POSTURE = 0.01
-"""A joint's rate of 1 rad/s weighs as much as this velocity [m/s]: in a trade-off, the tool
-gives up 1 % of its motion at a singular value of 0.1 m/rad, which the feedback compensates, and
+"""Velocity of the tool that has the weight of a joint rate of 1 rad/s [m/s]: in a trade-off, the
+tool loses 1 % of its motion at a singular value of 0.1 m/rad, which the feedback compensates, and
 half of its rotation at 0.5 rad/rad."""
 _CORRECTION = 0.3
 """Greatest angular velocity that recovers a lost orientation [rad/s]: at its weight, it costs less
@@ -33,19 +33,20 @@ _LIMITS = 0.05
 """Gain of the limit barrier [rad/s]: a joint at 90 % of the distance from the middle of a range of
 5 rad to its limit gets 1 rad/s, more than `assist_rate`; at 50 %, 0.04 rad/s."""
 _ISOTROPY = 0.2
-"""Gain of the isotropy gradient [rad/s] where a radian raises its logarithm by 1."""
+"""Gain of the gradient of the logarithm of isotropy [rad^2/s]: a gradient of 1/rad gives this joint
+rate."""
 _URGENT = 3.0
-"""Factor on `assist_rate` up to which a limit may act where that costs orientation."""
+"""Greatest joint rate of the assistance, relative to `assist_rate`, where it costs orientation."""
 _CENTRING = 0.1
 """Gain of Drake's joint centring [1/s]: a joint 2 rad from its middle moves at 0.2 rad/s."""
 
 
 def assisted(command: Command, state: ControlState) -> RateCommand:
-    """Move the tool while the redundancy keeps the posture off limits and singularities.
+    """Move the tool while the redundancy keeps the posture away from limits and singularities.
 
-    One bounded least squares problem in each step: tool position first, orientation second
+    Each step solves one bounded least squares problem: tool position first, orientation second
     (`_ORIENTATION`), then the posture (`posture_rates`); joint limits and velocities are hard
-    bounds. A joint at its limit thus costs posture first, then orientation, and position last.
+    bounds. A joint at its limit thus degrades posture first, then orientation, and position last.
     """
     settings = state.settings
     twist = commanded_twist(command)
@@ -60,7 +61,7 @@ def assisted(command: Command, state: ControlState) -> RateCommand:
     hessian = J.T @ J
     hessian.flat[:: JOINTS + 1] += _POSTURE**2
     slope = wanted @ J
-    # Without a command the arm does not move by itself.
+    # Without a command the assistance does not move the arm.
     if twist.any():
         slope += _POSTURE**2 * posture_rates(
             state.arm, state.joints, state.jacobian, settings.assist_rate
@@ -70,21 +71,21 @@ def assisted(command: Command, state: ControlState) -> RateCommand:
 
 
 def posture_rates(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: float) -> FloatArray:
-    """Return the joint rates that lead the posture away from limits and singularities.
+    """Return joint rates that move the posture away from limits and singularities.
 
-    The gradient of `_ISOTROPY * log(isotropy) - _LIMITS * sum 1 / (1 - x^2)`, where x in [-1, 1]
-    is the position of a joint in its range: the limit barrier of Zghal, Dubey and Euler (1990),
-    zero in the middle and infinite at the limits.
+    They are the gradient of `_ISOTROPY * log(isotropy) - _LIMITS * sum 1 / (1 - x^2)`, where x in
+    [-1, 1] is the position of a joint in its range: the limit barrier of Zghal, Dubey and Euler
+    (1990), whose gradient is zero in the middle and infinite at the limits.
 
     Args:
         arm: The arm.
         joints: Joint positions [rad], shape (7,).
-        jacobian: Of the tool, shape (6, 7).
-        fastest: Greatest joint rate of the null-space part [rad/s]; the whole stays below
+        jacobian: Jacobian of the tool, shape (6, 7).
+        fastest: Greatest joint rate of the null-space part [rad/s]; all rates are scaled below
             `_URGENT` times that.
 
     Returns:
-        Shape (7,).
+        Joint rates [rad/s], shape (7,).
     """
     x = 2.0 * range_fraction(arm, joints) - 1.0
     half = np.where(arm.bounded, 0.5 * (arm.upper - arm.lower), np.inf)
@@ -102,19 +103,19 @@ def posture_rates(arm: Arm, joints: FloatArray, jacobian: FloatArray, fastest: f
 
 
 def isotropy_gradient(jacobian: FloatArray, inverse: FloatArray | None = None) -> FloatArray:
-    """Return the gradient of the logarithm of kinematic isotropy by the joints [1/rad].
+    """Return the gradient of the logarithm of kinematic isotropy with respect to the joints.
 
-    With isotropy det(J J^T)^(1/6) / (trace(J J^T) / 6) and D_i the change of J with joint i,
-    entry i is tr(J^+ D_i) / 3 - 2 tr(J^T D_i) / tr(J J^T). Joint i rotates every link beyond
-    it: column j changes by axis_i x (both halves) if i comes before j; else only its
-    linear half changes, by axis_j x linear_i.
+    With isotropy det(J J^T)^(1/6) / (trace(J J^T) / 6) and D_i the derivative of J by joint i,
+    entry i is tr(J^+ D_i) / 3 - 2 tr(J^T D_i) / tr(J J^T). Joint i rotates every link beyond it: if
+    i < j, both halves of column j change by their cross products with axis_i; else only the linear
+    half changes, by axis_j x linear_i.
 
     Args:
-        jacobian: Shape (6, 7).
+        jacobian: Jacobian of the tool, shape (6, 7).
         inverse: Inverse of J J^T, shape (6, 6); None to compute it.
 
     Returns:
-        Shape (7,); finite at a singularity, and leads away from it.
+        Gradient [1/rad], shape (7,); finite at a singularity, and directed away from it.
     """
     axes, linear = jacobian[:3], jacobian[3:]
     if inverse is None:
@@ -122,7 +123,7 @@ def isotropy_gradient(jacobian: FloatArray, inverse: FloatArray | None = None) -
     flat = jacobian.ravel()
     weights = inverse @ jacobian / 3.0 - jacobian * (2.0 / float(flat @ flat))
     first, second = weights[:3], weights[3:]
-    # axis_i . (column_j x weight_j), as the triple product allows: the cross products come once.
+    # axis_i . (column_j x weight_j) by the triple product, so that each cross product is used once.
     turned_axes, turned_linear = _cross(axes, first), _cross(linear, second)
     later = np.cumsum((turned_axes + turned_linear)[:, ::-1], axis=1)[:, ::-1]
     # For j < i: linear_i . (weight_j x axis_j).
@@ -151,8 +152,8 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 def drake(command: Command, state: ControlState) -> RateCommand:
     """Move the tool by Drake's differential inverse kinematics: the baseline.
 
-    A quadratic program that scales the tool's velocity down, in its direction, to what position
-    and velocity limits allow, and centres the joints in the null space.
+    Its quadratic program scales the tool's velocity down, keeping its direction, until position and
+    velocity limits hold, and centres the joints in the null space.
     """
     settings = state.settings
     parameters = _drake_parameters(state.arm, settings.period)
@@ -166,7 +167,7 @@ def drake(command: Command, state: ControlState) -> RateCommand:
     )
     if result.status == DifferentialInverseKinematicsStatus.kNoSolutionFound:
         return RateCommand(np.zeros(JOINTS), "Drake finds no joint rates within the limits.")
-    # The solver keeps to the bounds within its own tolerance.
+    # The solver satisfies the bounds within its own tolerance.
     rates = np.clip(np.asarray(result.joint_velocities), state.lower, state.upper)
     stuck = result.status == DifferentialInverseKinematicsStatus.kStuck
     return RateCommand(
@@ -176,7 +177,7 @@ def drake(command: Command, state: ControlState) -> RateCommand:
 
 @lru_cache(maxsize=16)
 def _drake_parameters(arm: Arm, period: float) -> DifferentialInverseKinematicsParameters:
-    """Return the parameters that do not change from step to step."""
+    """Return the parameters that are the same in every step."""
     parameters = DifferentialInverseKinematicsParameters(JOINTS, JOINTS)
     parameters.set_time_step(period)
     parameters.set_joint_position_limits((arm.lower, arm.upper))

@@ -8,17 +8,17 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
 
 _STILL = 1e-9
-"""A joint at this rate [rad/s] stands still: a thousand times the rounding of any motion."""
+"""Rate [rad/s] below which a joint is at rest: a thousand times the rounding of any motion."""
 
 
 def rate_bounds(
     arm: Arm, joints: FloatArray, period: float, acceleration: float | FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the rates with which no joint runs past its limits, now or later.
+    """Return the rates from which every joint can still stop within its limits.
 
-    A joint may approach a limit only so fast that, slowing down by a T in every step of length T
-    from the next one on, it comes to rest at the limit: with v = (n + f) a T, n whole and f < 1,
-    that way is ((n + 1) f + n (n + 1) / 2) a T^2.
+    At its greatest rate v, a joint that slows down by a T in every step of length T from the next
+    step on comes to rest at its limit: with v = (n + f) a T, n whole and 0 <= f < 1, it travels
+    ((n + 1) f + n (n + 1) / 2) a T^2.
 
     Args:
         arm: The arm.
@@ -32,7 +32,7 @@ def rate_bounds(
     distance = np.array([joints - arm.lower, arm.upper - joints])
     np.maximum(distance, 0.0, out=distance)
     steps = distance / (acceleration * period * period)
-    # Continuous joints: a finite number of steps that is never reached.
+    # Continuous joints: a finite bound that is never reached.
     np.minimum(steps, 1e12, out=steps)
     whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0))
     part = (steps - 0.5 * whole * (whole + 1.0)) / (whole + 1.0)
@@ -47,7 +47,7 @@ def stops_in_time(
     period: float,
     acceleration: float | FloatArray,
 ) -> bool:
-    """Return whether rates are certainly within `rate_bounds`, at a third of its cost.
+    """Return True only if rates are within `rate_bounds`, at a third of the computing time.
 
     Args:
         arm: The arm.
@@ -58,25 +58,25 @@ def stops_in_time(
     """
     size = np.abs(rates)
     distance = np.where(rates > 0.0, arm.upper - joints, joints - arm.lower)
-    # Coming to rest takes v^2 / 2a and half a step more, in whole steps at most half of one again.
+    # The stopping distance is v^2 / 2a plus half a step, and at most another half for whole steps.
     return bool((size * (size * (0.5 / acceleration) + period) <= distance).all())
 
 
 def scale_to_bounds(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
     """Return the factor that scales rates into bounds, and the joint that requires it.
 
-    Scaling all joints alike keeps the direction in which the tool moves.
+    Scaling all joints by one factor keeps the direction of the tool's motion.
 
     Args:
         rates: Joint rates [rad/s], shape (7,).
-        lower: Lowest rates, at most 0, shape (7,).
-        upper: Highest rates, at least 0, shape (7,).
+        lower: Lowest rates, at most 0 [rad/s], shape (7,).
+        upper: Highest rates, at least 0 [rad/s], shape (7,).
 
     Returns:
         A factor in [0, 1], and the joint that requires it, -1 at factor 1.
     """
     bound = np.where(rates > 0.0, upper, lower)
-    # A joint at its limit that is not meant to move must not stop the others by its rounding.
+    # A joint at rest at its limit must not stop the others because of rounding.
     too_fast = np.abs(rates) > np.abs(bound) + _STILL
     if not too_fast.any():
         return 1.0, -1
@@ -91,18 +91,18 @@ def limit_rate_change(
     wanted: FloatArray,
     change: float,
 ) -> tuple[FloatArray, bool]:
-    """Return the next rates between the present and the wanted ones.
+    """Return the next joint rates on the straight line from the current to the required rates.
 
-    All joints change by the same fraction of the difference, so a mixture of two motions that
-    hold the tool at one posture holds it as well.
+    All joints change by the same fraction of the difference: if both motions hold the tool at one
+    posture, so does every combination of them.
 
     Args:
-        before: Rates of the step before [rad/s], shape (7,).
-        wanted: Rates to come to [rad/s], shape (7,).
+        before: Rates of the previous step [rad/s], shape (7,).
+        wanted: Required rates [rad/s], shape (7,).
         change: Greatest change of a rate in one step [rad/s].
 
     Returns:
-        The rates, shape (7,), and whether they are those wanted.
+        The rates [rad/s], shape (7,), and whether they equal the required ones.
     """
     step = wanted - before
     largest = float(np.abs(step).max())

@@ -1,4 +1,4 @@
-"""Null-space control: turning a group of joints while the tool stays (paper, eqs. 9-14)."""
+"""Null-space control: motion of a joint group while the tool is held (paper, eqs. 9-14)."""
 
 from __future__ import annotations
 
@@ -11,34 +11,35 @@ from tcs.teleop.arm import JOINTS
 from tcs.teleop.control.least_squares import bounded_minimum
 
 HELD = 1e-9
-"""A group holds the tool alone when it leaves less than this over of a metre [m per rad of the
-lead]: rounding of a Jacobian is a thousand times smaller, and it is as much as the figures of a
-URDF let axes miss each other by."""
+"""Greatest relative residual of the tool velocity with which a group alone holds the tool: a
+thousand times the rounding of a Jacobian, and about the offset between axes of a URDF that should
+intersect."""
 _WEAK = 0.002
-"""Singular value of the followers [m/rad] below which they are eased: to hold a tool that the lead
-joint moves at 0.5 m/rad, they would have to turn 250 times as fast as it does."""
+"""Singular value of the followers (the group's joints except the lead joint) [m/rad] below which
+their rates are weighted: to hold a tool that the lead joint moves at 0.5 m/rad, they would have to
+rotate 250 times as fast as the lead joint."""
 _EASED = 0.3
-"""How much a follower's rate counts against an outside joint's where the followers can do
-nothing."""
+"""Weight of a follower's rate relative to that of a joint outside the group, where the followers
+cannot move the tool."""
 
 _HOLDING = 1e6
-"""What a velocity of the tool of 1 m/s costs against a rate of the lead joint that is 1 rad/s off:
-a lead joint kept from turning at 0.4 rad/s pulls at the tool by less than 0.01 mm/s."""
+"""Cost of a tool velocity of 1 m/s relative to a deviation of the lead joint's rate by 1 rad/s: a
+lead joint that is blocked at a rate of 0.4 rad/s moves the tool by less than 0.01 mm/s."""
 _RESTING = 1e-3
-"""What a rate of 1 rad/s outside the group costs against the same: the lead joint slows down by a
-thousandth where one of them has to turn as fast."""
+"""Cost of a rate of 1 rad/s outside the group relative to the same deviation: the lead joint slows
+down by a thousandth where one such joint has to rotate as fast."""
 _EASED_WITHIN = 1e-3
-"""What a rate of a follower costs against one outside the group."""
+"""Cost of a follower's rate relative to that of a joint outside the group."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupMotion:
-    """Joint rates that turn a group while the tool stays.
+    """Joint rates that move a joint group while the tool is held.
 
     Attributes:
         rates: Joint rates [rad/s], shape (7,).
         exact: Whether only joints of the group move.
-        slip: Velocity of the tool that no joint could make up for [m/s].
+        slip: Velocity error of the tool that no joint can compensate [m/s].
     """
 
     rates: FloatArray
@@ -54,27 +55,27 @@ def group_motion(
 ) -> GroupMotion:
     """Return the motion of a joint group in the null space: N_Jp xi of eq. (11).
 
-    The paper solves 0 = J_p theta' (eq. 10) for a 7 x 4 basis whose columns turn one joint group
-    each (eq. 12), and does not say how that basis is made. Only the column of the commanded group
-    is computed, as xi has one entry that is not zero. Here the lead joint turns at rate k, and of
+    The paper solves 0 = J_p theta' (eq. 10) for a 7 x 4 basis whose columns move one joint group
+    each (eq. 12), and does not specify how to compute it. Only the column of the commanded group is
+    computed here, as xi has one entry that is not zero. The lead joint rotates at rate k, and of
     all motions that hold the tool we take the one in which the joints outside the group move least
-    (least squares; among equals, the smallest rates within the group). With L the lead joint, F
-    the others of its group, O the rest, v the required velocity of the tool,
+    (least squares; of equal ones, the one with the smallest rates within the group). With L the
+    lead joint, F the followers in its group, O the other joints, v the required tool velocity,
 
         w = v - J_L k,  N = 1 - J_F J_F^+,  r_O = (N J_O)^+ N w,  r_F = J_F^+ (w - J_O r_O).
 
     Where the group alone can hold the tool, N w = 0, and r_O is set to exactly zero. Where J_F
-    loses rank, followers would need unbounded rates; there their rates are weighted as well, the
-    more the smaller their singular value, without a jump at the border.
+    loses rank, followers would need unbounded rates; there their rates are weighted as well, with a
+    weight that increases continuously from 0 as their smallest singular value decreases.
 
     Args:
         jacobian: J_p, shape (3, 7) [m/rad].
         group: Joints of the group, counted from 0, its lead joint first.
         rate: Rate of the lead joint: k times the speed of the group [rad/s].
-        velocity: Velocity that the tool is to have, to undo its drift [m/s], shape (3,).
+        velocity: Required velocity of the tool [m/s], shape (3,); None for zero.
 
     Returns:
-        The motion; `slip` says whether the tool is held.
+        The motion; its `slip` is zero if the tool moves as required.
     """
     lead, own = group[0], list(group[1:])
     others = [joint for joint in range(JOINTS) if joint not in group]
@@ -118,12 +119,12 @@ def bounded_group_motion(
     lower: FloatArray,
     upper: FloatArray,
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the motion of a joint group in the null space between bounds of the joint rates.
+    """Return the motion of a joint group in the null space within bounds of the joint rates.
 
-    As `group_motion`, with weights in place of strict order, because bounds want one minimum:
-    holding the tool (`_HOLDING`), then the lead joint's rate (1), then rest outside the group
-    (`_RESTING`), then within it. Where the tool cannot be held at that rate, the lead joint slows
-    down; the minimum changes steadily with posture and bounds.
+    The objectives are those of `group_motion`, with weights in place of strict priorities, so that
+    bounds apply to a single minimisation: holding the tool (`_HOLDING`), the lead joint's rate (1),
+    rest outside the group (`_RESTING`), and rest within it. Where the tool cannot be held at that
+    rate, the lead joint slows down; the minimum is continuous in posture and bounds.
 
     Args:
         jacobian: J_p, shape (3, 7) [m/rad].
@@ -152,18 +153,18 @@ def holding_rates(
     lower: FloatArray,
     upper: FloatArray,
 ) -> FloatArray:
-    """Return the rates closest to given ones that move the tool as required, between bounds.
+    """Return the rates closest to given ones that move the tool as required, within bounds.
 
     Args:
-        jacobian: Rows that are held, shape (3, 7) or (6, 7).
+        jacobian: Rows of the Jacobian to hold, shape (3, 7) or (6, 7).
         rates: Joint rates to stay close to [rad/s], shape (7,).
         velocity: Required velocity of the tool, shape (3,) or (6,).
         lower: Lowest rates [rad/s], shape (7,).
         upper: Highest rates [rad/s], shape (7,).
 
     Returns:
-        Joint rates [rad/s], shape (7,); where the bounds leave no exact solution, the least
-        squares one.
+        Joint rates [rad/s], shape (7,); if the bounds allow no exact solution, the least squares
+        solution.
     """
     hessian = _HOLDING * (jacobian.T @ jacobian)
     hessian.flat[:: JOINTS + 1] += 1.0
@@ -172,16 +173,17 @@ def holding_rates(
 
 
 def elbow_direction(jacobian: FloatArray) -> FloatArray:
-    """Return the joint motion that holds the tool's whole pose, its fastest joint at rate 1.
+    """Return the self-motion: the null-space direction of the tool's pose, fastest joint at rate 1.
 
-    Component i is (-1)^i times the determinant of J without column i: it turns with the posture
-    without ever changing sign by itself, unlike the last vector of a singular value decomposition.
+    Up to a positive factor, component i is (-1)^i times the determinant of J without column i: it
+    is continuous in the posture, unlike the last vector of a singular value decomposition, whose
+    sign is arbitrary.
 
     Args:
-        jacobian: Shape (6, 7).
+        jacobian: Jacobian of the tool, shape (6, 7).
 
     Returns:
-        Shape (7,); zero at a singularity, where more than one motion holds the pose.
+        Direction, shape (7,); zero at a singularity, where the self-motion is not unique.
     """
     *_, Vt = np.linalg.svd(jacobian)
     n = Vt[-1]
@@ -191,7 +193,7 @@ def elbow_direction(jacobian: FloatArray) -> FloatArray:
 
 
 def _weight(singular_value: float) -> float:
-    """Return how much the followers' rates count, from their smallest singular value."""
+    """Return the weight of the followers' rates for their smallest singular value [m/rad]."""
     if singular_value >= _WEAK:
         return 0.0
     return _EASED * float(np.sqrt(1.0 - (singular_value / _WEAK) ** 2))

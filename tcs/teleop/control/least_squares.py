@@ -1,4 +1,4 @@
-"""Least squares between bounds: the joints at a bound stay there, the rest does what it can."""
+"""Least squares with bounds on the variables, by active sets."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray
 
 _GUESSES = 6
-"""Rounds after which guessing has gone in circles: fewer do nearly always."""
+"""Iterations of the primal-dual method after which it is cycling; it nearly always takes fewer."""
 _ROUNDS = 50
-"""Far more changes of the active set than seven joints ever need; each lowers the cost."""
+"""Greatest number of changes of the active set; each lowers the cost, and seven joints need far
+fewer."""
 
 
 def bounded_minimum(
     hessian: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the x between bounds that minimises x^T H x / 2 - g^T x.
+    """Return the x within bounds that minimises x^T H x / 2 - g^T x.
 
-    Which variables are at a bound is guessed and mended all at once first (the primal-dual active
-    set of Hintermüller, Ito and Kunisch, 2003): mostly two or three rounds. Where that goes in
-    circles, an active set that changes by one variable at a time cannot.
+    The primal-dual active set method of Hintermüller, Ito and Kunisch (2003) changes all variables
+    of the active set at once and mostly takes two or three iterations. If it cycles, the method
+    that changes one variable at a time, which cannot cycle, is used instead.
 
     Args:
         hessian: H, positive definite, shape (n, n).
@@ -34,7 +35,7 @@ def bounded_minimum(
     below, above = x < lower, x > upper
     if not (below.any() or above.any()):
         return x, below
-    # A pull weaker than this is rounding, of the size that the cost itself is rounded by.
+    # A multiplier below this is rounding, of the size of the rounding of the cost.
     slack = 1e-12 * (1.0 + float(np.abs(slope).max()))
     for _ in range(_GUESSES):
         held = below | above
@@ -44,7 +45,8 @@ def bounded_minimum(
         x = np.linalg.solve(reduced, np.where(held, bound, slope - hessian @ bound))
         x[held] = bound[held]
         pull = slope - hessian @ x
-        # A free one may have gone past a bound; a held one stays while it is pulled outwards.
+        # A free variable beyond a bound becomes active; an active one stays so while its
+        # multiplier points outwards.
         now_below = np.where(below, pull < slack, ~above & (x < lower))
         now_above = np.where(above, pull > -slack, ~below & (x > upper))
         if (now_below == below).all() and (now_above == above).all():
@@ -56,12 +58,12 @@ def bounded_minimum(
 def _one_by_one(
     hessian: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray, slack: float
 ) -> tuple[FloatArray, BoolArray]:
-    """Return what `bounded_minimum` does, by steps each of which lowers the cost.
+    """Return the result of `bounded_minimum` by an active set method whose steps lower the cost.
 
-    Solve for the free variables; go towards the solution up to the first bound on the way and hold
-    that variable there; once all free ones are inside, let go of the held one that pulls inwards
-    most; stop when none does (Lawson and Hanson, Solving Least Squares Problems, chapter 23, for
-    bounds on both sides).
+    Solve for the free variables; move towards the solution up to the first bound and make that
+    variable active; once all free variables are within bounds, free the active one whose multiplier
+    points inwards most; stop if there is none (Lawson and Hanson, Solving Least Squares Problems,
+    chapter 23, for bounds on both sides).
     """
     side = np.zeros(len(slope), np.int8)
     x = np.clip(np.zeros_like(slope), lower, upper)
@@ -79,7 +81,7 @@ def _one_by_one(
                 side[joint] = 2 * at - 1
                 continue
             x[free] = goal
-        # The cost falls where x moves along this; a held variable is let go if that is inwards.
+        # The negative gradient; an active variable is freed if it points inwards.
         pull = slope - hessian @ x
         inwards = np.where(upper > lower, -side * pull, 0.0)
         i = int(inwards.argmax())
@@ -92,7 +94,12 @@ def _one_by_one(
 def _first_bound(
     x: FloatArray, goal: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[float, int, int]:
-    """Return how far x can go towards goal, which variable stops it, and at which side."""
+    """Return the fraction of the step from x to goal within bounds, and what limits it.
+
+    Returns:
+        The fraction, in [0, 1]; the variable that meets its bound first, -1 if none does; and the
+        bound, 0 for lower and 1 for upper.
+    """
     share, first, side = 1.0, -1, 0
     for i in range(len(x)):
         way = goal[i] - x[i]

@@ -1,4 +1,4 @@
-"""Control modes: each turns a command and the control state into a rate command."""
+"""Control modes: functions from a command and the control state to a rate command."""
 
 from __future__ import annotations
 

@@ -20,22 +20,22 @@ from tcs.teleop.control.state import (
 )
 
 _SLIP = 1e-4
-"""A tool that would slip faster than this [m/s] is not held: against feedback at the default gain
-it would stand 0.01 mm off."""
+"""Greatest slip velocity of a tool that counts as held [m/s]: with feedback at the default gain,
+the position error is then at most 0.005 mm."""
 _FAST_RATIO = 3.0
 """Ratio of a joint's rate to the lead joint's at which the group has slowed down by a third."""
 _AT_LIMIT = 1e-5
-"""A joint this close to its limit counts as at rest there [rad]."""
+"""Distance from a limit within which a joint is at the limit [rad]."""
 _EDGE = 0.01
-"""Fraction of its speed at which a group is at the end of its range: the other joints turn 30
+"""Fraction of its speed at which a group is at the end of its range: the fastest joint rotates 30
 times as fast as the lead joint."""
 
 
 def null_space(command: Command, state: ControlState) -> RateCommand:
     """Move a joint group while the tool's position is held: eqs. (9) to (14).
 
-    At a limit the group comes to rest, all its joints together. `clamped` continues
-    from there with that joint held, if the rest of the arm can hold the tool.
+    At a limit all joints of the group come to rest together. With `clamped` behaviour the motion
+    continues with that joint at its limit, if the other joints can hold the tool.
     """
     settings, jacobian = state.settings, state.jacobian[3:]
     back = _drift_feedback(jacobian, state.error[3:], state)
@@ -57,7 +57,7 @@ def null_space(command: Command, state: ControlState) -> RateCommand:
     share, joint = slow_down_together(speed * full + back, state)
     if joint >= 0:
         return RateCommand(back, f"{limit_message([joint])}: its motion ends there.")
-    # A group that slowed down for a limit reverses from its present speed.
+    # The reduced speed is the new one: a group that slowed down for a limit reverses from it.
     return RateCommand(share * (speed * full + back), "", share * speed, full)
 
 
@@ -83,11 +83,11 @@ def elbow_sign(jacobian: FloatArray) -> float:
 
 
 def _drift_feedback(jacobian: FloatArray, error: FloatArray, state: ControlState) -> FloatArray:
-    """Return the joint rates that undo the tool's drift [rad/s], shape (7,).
+    """Return the joint rates that correct the drift of the tool [rad/s], shape (7,).
 
-    All joints take part: a nearly locked group would need unbounded rates for it. In `clamped`
-    behaviour joints at their limits stay there if the others can do without them; feedback that
-    moved them off would make the group release and hold them in turns.
+    All joints take part, because a group near a singularity would need unbounded rates. With
+    `clamped` behaviour, joints at their limits stay there if the others can correct half of the
+    error or more; otherwise feedback and group would alternately release and clamp them.
     """
     settings = state.settings
     velocity = settings.gain * error
@@ -108,11 +108,11 @@ def _drift_feedback(jacobian: FloatArray, error: FloatArray, state: ControlState
 
 
 def _next_speed(sign: float, full: FloatArray, state: ControlState) -> float:
-    """Return the speed after this step, between the present and the commanded one.
+    """Return the speed after this step, between the current and the commanded speed.
 
-    The speed is limited, not the joint rates: a group that starts or stops stays in the null
-    space, which changes with the posture. Where it changes so fast that the joints could not
-    follow within their acceleration, the group slows down.
+    The change of the speed is limited, not that of single joint rates, so that a group remains in
+    the null space while it starts or stops. The null space changes with the posture; where the
+    joints could not follow within their acceleration limit, the group slows down.
 
     Args:
         sign: The commanded speed, k of eq. (13).
@@ -125,11 +125,11 @@ def _next_speed(sign: float, full: FloatArray, state: ControlState) -> float:
     wanted = float(sign)
     if state.group_rates is not None:
         change_needed = abs(state.speed) * float(np.abs(full - state.group_rates).max())
-        # The change grows with the square of the speed: with distance, and with the rates.
+        # The change of the rates is proportional to the square of the speed.
         if change_needed > change:
             most = abs(state.speed) * math.sqrt(change / change_needed)
             wanted = min(max(wanted, -most), most)
-    # Slowing down may be urgent; speeding up is not.
+    # Slowing down may be urgent, speeding up is not.
     step = change / fastest * (2.0 if abs(wanted) < abs(state.speed) else 1.0)
     return min(max(wanted, state.speed - step), state.speed + step)
 
@@ -158,11 +158,11 @@ def _turning(
 def _ease(rates: FloatArray, lead: int) -> float:
     """Return the factor that stops a group at the end of its lead joint's range.
 
-    Holding the tool leaves the lead joint only part of its range. At the end of that part the
-    others would need unbounded rates; the group's speed is led to zero there instead.
+    While the tool is held, the lead joint has only part of its range. At the end of that part the
+    other joints would need unbounded rates; the group's speed is reduced to zero there instead.
     """
     faster = float(np.abs(rates).max()) / (abs(float(rates[lead])) * _FAST_RATIO)
-    # Smooth, to avoid a jerk; 0.99 where all joints turn as fast as the lead joint.
+    # Smooth, to avoid jerk; 0.99 where no joint rotates faster than the lead joint.
     return float(1.0 / math.sqrt(1.0 + faster**4))
 
 

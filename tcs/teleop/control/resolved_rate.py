@@ -11,17 +11,17 @@ from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.control.least_squares import bounded_minimum
 
 _CUTOFF = 1e-9
-"""Singular values below this share of the largest count as zero, as in any pseudo-inverse."""
+"""Singular values below this fraction of the largest count as zero, as in any pseudo-inverse."""
 _REGULAR = 1e-8
-"""What is added to the squared singular values [m^2/rad^2] where joints are held at limits, so
-that the answer is unique: 1e-5 of the motion at a singular value of 0.03, which the feedback of
-the pose error makes up for."""
+"""Regularisation of the squared singular values [m^2/rad^2] where joints are held at limits, which
+makes the solution unique: it costs 1e-5 of the motion at a singular value of 0.03, which the
+feedback of the pose error compensates."""
 _FLIPPED = -0.999
-"""Cosine of a turn so near to half a turn that its axis cannot be read off the skew part."""
+"""Cosine of a rotation angle so close to 180 degrees that the skew part does not give the axis."""
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
-    """Return axis times angle of a rotation [rad], shape (3,).
+    """Return the rotation vector, axis times angle [rad], shape (3,).
 
     Args:
         R: Rotation, shape (3, 3).
@@ -32,7 +32,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
         vector: FloatArray = Rotation.from_matrix(R).as_rotvec()
         return vector
     sine = 0.5 * math.sqrt(skew @ skew)
-    # sin(a) / a is 1 to rounding below that angle.
+    # Below that angle sin(a) / a equals 1 within rounding.
     factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
     return factor * skew
 
@@ -40,19 +40,19 @@ def rotation_vector(R: FloatArray) -> FloatArray:
 def pose_error(
     R_target: FloatArray, p_target: FloatArray, R: FloatArray, p: FloatArray
 ) -> FloatArray:
-    """Return the motion that takes the tool to its target: Delta x of eq. (7).
+    """Return the displacement from the tool to its target: Delta x of eq. (7).
 
-    The print subtracts quaternions. That difference is no angular velocity: it is half of one,
-    turned into the four dimensions of the quaternion, it depends on which of the two quaternions
-    of the same orientation came out, and a 6 x 7 Jacobian has no fourth row for it. The rotation
-    vector is what the angular rows of J are about: turning about it at unit rate for the length
-    of the vector brings the tool to its target on the shortest way.
+    The paper subtracts quaternions. Their difference is not an angular velocity: it has four
+    components for three angular rows of J, is half as large, and depends on which of the two
+    quaternions of an orientation is used. The rotation vector corresponds to the angular rows: a
+    rotation about it at 1 rad/s for its length in seconds takes the tool to its target along the
+    shortest path.
 
     Args:
-        R_target: Orientation to come to, in the base, shape (3, 3).
-        p_target: Position to come to [m], shape (3,).
-        R: Orientation of the tool, shape (3, 3).
-        p: Position of the tool [m], shape (3,).
+        R_target: Target orientation in the base, shape (3, 3).
+        p_target: Target position in the base [m], shape (3,).
+        R: Orientation of the tool in the base, shape (3, 3).
+        p: Position of the tool in the base [m], shape (3,).
 
     Returns:
         Rotation vector [rad], then translation [m], in the base, shape (6,).
@@ -64,12 +64,12 @@ def pose_error(
 
 
 def rotated(R: FloatArray, twist: FloatArray, time: float) -> FloatArray:
-    """Return an orientation after turning for a time.
+    """Return an orientation after rotation at a constant angular velocity.
 
     Args:
         R: Orientation, shape (3, 3).
-        twist: Angular velocity in the frame that R is in [rad/s], shape (3,).
-        time: How long [s].
+        twist: Angular velocity in the frame in which R is expressed [rad/s], shape (3,).
+        time: Duration [s].
     """
     turn = twist * time
     angle = math.sqrt(turn @ turn)
@@ -83,11 +83,11 @@ def rotated(R: FloatArray, twist: FloatArray, time: float) -> FloatArray:
 
 
 def smallest_singular_value(jacobian: FloatArray, length: float) -> float:
-    """Return how far a task is from being singular [m/rad].
+    """Return the smallest singular value of the Jacobian of a task [m/rad].
 
     Args:
         jacobian: Shape (6, 7), angular rows first, or the three linear rows, (3, 7).
-        length: What a turn of 1 rad counts [m].
+        length: Distance that has the weight of a rotation of 1 rad [m].
     """
     return float(np.linalg.svd(_weighted(jacobian, length), compute_uv=False)[-1])
 
@@ -100,19 +100,20 @@ def resolved_rates(
     damping: float = 0.0,
     singular: float = 0.0,
 ) -> tuple[FloatArray, float]:
-    """Return joint rates that move the tool as command, the smallest there are: eq. (7).
+    """Return the smallest joint rates that move the tool as commanded: eq. (7).
 
-    Without damping, that is the pseudo-inverse of the full Jacobian. With it, close to a
-    singularity, the squared singular values s^2 are raised by `damping^2 (1 - (s_min /
-    singular)^2)`: rates stay bounded, and the tool lags behind in the direction that is lost
-    (Nakamura and Hanafusa 1986; Maciejewski and Klein 1988).
+    Without damping they are given by the pseudo-inverse of the Jacobian. With damping, close to a
+    singularity, the squared singular values s^2 are increased by `damping^2 (1 - (s_min /
+    singular)^2)`: rates remain bounded, and the tool lags in the singular direction (Nakamura and
+    Hanafusa 1986; Maciejewski and Klein 1988).
 
     Args:
         jacobian: Shape (6, 7), rows angular then linear [rad/rad; m/rad], or its last three.
         twist: Velocity of the tool [rad/s; m/s], shape (6,) or (3,).
-        length: What a turn of 1 rad counts [m], for damping and singular value.
+        length: Distance that has the weight of a rotation of 1 rad [m], for damping and singular
+            value.
         damping: Greatest damping [m/rad]; 0 for none.
-        singular: Smallest singular value below which it begins [m/rad].
+        singular: Smallest singular value below which damping begins [m/rad].
 
     Returns:
         Joint rates [rad/s], shape (7,), and the smallest singular value [m/rad].
@@ -137,18 +138,18 @@ def clamped_rates(
     length: float,
     damping: float = 0.0,
 ) -> tuple[FloatArray, BoolArray]:
-    """Return joint rates between bounds that come closest to the required tool velocity.
+    """Return the joint rates within bounds that come closest to the required tool velocity.
 
-    A joint that would run into its limit stays at its bound, and the others take over its part
-    as far as they can: with six joints left the tool still moves as commanded; with fewer, the
-    difference is shared between turning and moving by `length`.
+    A joint that would exceed its limit stays at its bound, and the other joints compensate as far
+    as they can: with six joints the tool still moves as commanded; with fewer, `length` divides the
+    error between rotation and translation.
 
     Args:
         jacobian: Shape (6, 7), rows angular then linear [rad/rad; m/rad], or its last three.
         twist: Velocity of the tool [rad/s; m/s], shape (6,) or (3,).
         lower: Lowest rates [rad/s], shape (7,).
         upper: Highest rates [rad/s], shape (7,).
-        length: What a turn of 1 rad counts [m].
+        length: Distance that has the weight of a rotation of 1 rad [m].
         damping: Damping [m/rad].
 
     Returns:
@@ -161,7 +162,7 @@ def clamped_rates(
 
 
 def _weighted(rows: FloatArray, length: float) -> FloatArray:
-    """Return a Jacobian or a twist with turns counted as ways; one without angular rows as is."""
+    """Return a Jacobian or twist with its angular rows times `length`; unchanged without any."""
     if len(rows) == 3 or length == 1.0:
         return rows
     weighed = rows.copy()

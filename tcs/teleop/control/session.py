@@ -25,20 +25,20 @@ class Step:
     """State of the arm after one control period.
 
     Attributes:
-        time: Time since the session began [s].
+        time: Time since the start of the session [s].
         joints: Joint positions [rad], shape (7,), always within the limits.
         rates: Joint rates during the step [rad/s], shape (7,).
         R: Orientation of the tool in the robot's base, R_BT, shape (3, 3).
         p: Position of the tool in the robot's base [m], shape (3,).
-        target_R: Orientation that is held or followed, shape (3, 3).
-        target_p: Position that is held or followed [m], shape (3,).
+        target_R: Target orientation in the robot's base, shape (3, 3).
+        target_p: Target position in the robot's base [m], shape (3,).
         mode: The control mode.
-        limits: -1 where a joint is at its lower limit, 1 at its upper one, else 0; shape (7,).
+        limits: -1 where a joint is at its lower limit, 1 at its upper limit, else 0; shape (7,).
         singular: Whether the task of this mode is singular.
         singular_value: Smallest singular value of the task's Jacobian [m/rad].
         worst_joint: The joint closest to a limit, as a fraction of its range, counted from 0.
         stopped: Whether the arm does not follow the command.
-        reason: Why, in one line; empty while it follows.
+        reason: Reason of the stop, one line; empty while the arm follows.
     """
 
     time: float
@@ -67,10 +67,10 @@ class Teleoperation:
         settings: Settings | None = None,
         mode: Mode = Mode.END_EFFECTOR,
     ) -> None:
-        """Begin with the arm at rest.
+        """Start with the arm at rest.
 
         A posture beyond the limits is not an error: the arm holds still there, and every step
-        gives the reason, until `place` moves it elsewhere.
+        reports the reason, until `place` sets another posture.
 
         Args:
             arm: The arm.
@@ -90,13 +90,13 @@ class Teleoperation:
         self.place(joints)
 
     def place(self, joints: ArrayLike) -> None:
-        """Put the arm, at rest, into another posture; time continues.
+        """Set the arm to another posture, at rest; time continues.
 
         Args:
             joints: Joint positions [rad], shape (7,).
 
         Raises:
-            TcsError: If they are not seven finite numbers.
+            TcsError: If the joints are not seven finite numbers.
         """
         self._joints = self.arm.checked(joints, "start posture")
         self._rates = np.zeros(JOINTS)
@@ -121,11 +121,11 @@ class Teleoperation:
         return self._mode
 
     def step(self, command: Command | None = None) -> Step:
-        """Move the arm on by one period.
+        """Move the arm for one period.
 
         Args:
-            command: The operator's command; None if none arrived: the last command continues
-                until `settings.timeout` has passed.
+            command: The operator's command; None if no command arrived, in which case the last one
+                continues until `settings.timeout` has passed.
         """
         self._time += self.settings.period
         why = self._refused(command)
@@ -144,8 +144,8 @@ class Teleoperation:
     def _admitted(self, command: Command, held: bool) -> Command:
         """Return the part of a command that is executed now.
 
-        A moving group comes to rest before anything else begins, and so does the tool before a
-        group moves: each mode ends by its own rules, without jumps and slip.
+        A moving group comes to rest before another motion begins, and so does the tool before a
+        group moves: each mode ends by its own rules, without jumps or slip.
         """
         if not self._speed:
             self._group = command.group
@@ -162,24 +162,24 @@ class Teleoperation:
         return Command() if held else command
 
     def _refused(self, command: Command | None) -> str:
-        """Accept a command, or return why the arm holds still instead."""
+        """Accept a command, or return the reason why the arm holds still instead."""
         settings = self.settings
         why = ""
         if command is not None:
             self._last_command_time = self._time
             fault = command.fault(len(settings.groups))
             if fault:
-                why = f"command refused: {fault}. The arm holds still until a valid one arrives."
+                why = f"command rejected: {fault}. The arm holds still until a valid one arrives."
             else:
                 self._command = command
-        # Half a period, so that rounding of the time does not decide.
+        # Half a period is added so that rounding of the time does not decide.
         elif self._time - self._last_command_time > settings.timeout + 0.5 * settings.period:
             why = (
                 f"input lost: no command for more than {settings.timeout:g} s. The arm holds still "
                 "until one arrives."
             )
         if why:
-            # An earlier command must not continue by itself once the reason is gone.
+            # An earlier command must not resume once the reason no longer applies.
             self._command = Command()
         if self._beyond:
             why = f"start posture: {self._beyond}. The arm holds still; place it within them."
@@ -213,7 +213,7 @@ class Teleoperation:
         return rate_command(self._mode, command, state)
 
     def _move(self, wanted: FloatArray) -> bool:
-        """Move on by one period; return whether the rates are those wanted."""
+        """Move the arm for one period; return whether it reaches the required rates."""
         settings, arm = self.settings, self.arm
         if self._beyond:
             return True
@@ -223,14 +223,14 @@ class Teleoperation:
         rates, arrived = limit_rate_change(before, wanted, change)
         in_time = stops_in_time(arm, self._joints, rates, period, acceleration)
         if not (in_time and arrived):
-            # A joint that has to brake for its limit does so even where the others take longer.
+            # A joint that must brake for its limit does so even if the others take longer.
             lower, upper = rate_bounds(arm, self._joints, period, acceleration)
             held = self._held_rows
             if held is None or self._switching:
                 rates = np.clip(rates, lower, upper)
             else:
-                # The null space turns with the arm: rates that keep their direction while they
-                # change would let the tool slip.
+                # The null space changes with the posture: rates that kept their direction would
+                # let the tool slip.
                 rates = holding_rates(
                     held,
                     rates,
@@ -239,7 +239,7 @@ class Teleoperation:
                     np.minimum(upper, before + change),
                 )
         self._rates = rates
-        # The bounds end at the limits; rounding may go past them by a hair.
+        # The bounds end at the limits, which rounding may exceed slightly.
         joints = self._joints + settings.period * self._rates
         self._joints = np.minimum(np.maximum(joints, arm.lower), arm.upper)
         self._now = arm.kinematics(self._joints)
@@ -250,8 +250,8 @@ class Teleoperation:
 
         Args:
             command: The executed part of the command.
-            stays: Whether the target stays with the tool instead: while the tool comes to rest, so
-                that nothing pulls it back, and where its motion ends.
+            stays: Whether the target is set to the tool pose instead: while the tool comes to rest,
+                so that no error moves it back, and where its motion ends.
         """
         settings, now = self.settings, self._now
         if self._mode in NULL_SPACE_MODES and not self._switching:

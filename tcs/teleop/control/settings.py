@@ -17,7 +17,7 @@ LimitBehaviour = Literal["paper", "clamped"]
 
 
 class Mode(StrEnum):
-    """Control mode: the part of the arm that commands move."""
+    """Control mode: what the commands move, and what is held."""
 
     END_EFFECTOR = "end-effector"
     """The tool, in all six directions (eqs. 6-8)."""
@@ -34,7 +34,7 @@ class Mode(StrEnum):
 NULL_SPACE_MODES = (Mode.NULL_SPACE, Mode.POSE)
 """Modes that move the arm in the null space of the tool."""
 FASTEST = 100.0
-"""Commands beyond this [m/s or rad/s] are refused as faults."""
+"""Greatest velocity of a valid command [m/s or rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +45,9 @@ class Command:
         linear: Velocity of the tool in the robot's base B [m/s], shape (3,).
         angular: Angular velocity of the tool in B [rad/s], shape (3,).
         group: The joint group to move, 0 to 3; None for none.
-        sign: Its direction: k of eq. (13). In `Mode.POSE` the direction of the elbow.
-        mode: The control mode; None keeps the present one.
+        sign: Direction of the group, -1, 0 or 1: k of eq. (13). In `Mode.POSE` the direction of the
+            elbow.
+        mode: The control mode; None keeps the current one.
         clutch: Whether the clutch decouples master and slave: the arm comes to rest and holds the
             target, whatever the rest of the command.
     """
@@ -59,7 +60,7 @@ class Command:
     clutch: bool = False
 
     def fault(self, groups: int) -> str:
-        """Return what makes the command unusable, empty if nothing does.
+        """Return a message about what makes the command invalid, empty if it is valid.
 
         Args:
             groups: Number of joint groups.
@@ -71,7 +72,7 @@ class Command:
                 values = np.empty(0)
             if values.shape != (3,):
                 return f"its {name} velocity must be 3 numbers [{unit}]"
-            # Written so that "not a number" is refused as well.
+            # In this form the comparison is false for nan as well.
             if not np.abs(values).max() <= FASTEST:
                 return f"its {name} velocity must be finite, and {FASTEST:g} {unit} at most"
         if self.sign not in (-1, 0, 1):
@@ -91,7 +92,7 @@ class Settings:
         period: Time of one step [s]; the paper samples at 100 Hz.
         limits: Behaviour at an invalid joint configuration: "paper" ends the motion, "clamped"
             leaves that joint at its limit and continues with the others.
-        gain: Feedback gain of the pose error [1/s]: errors fall by 1/e in 1/gain.
+        gain: Feedback gain of the pose error [1/s]; its inverse is the time constant of errors.
         target_lead: Target lead limit: greatest distance from tool to target [m].
         target_lead_angle: Target lead limit of the orientation [rad].
         acceleration: Greatest change of a joint's rate [rad/s^2].
@@ -100,13 +101,13 @@ class Settings:
         damping: Damping of the pseudo-inverse at a singularity [m/rad]; 0 for none.
         singular: Smallest singular value of the task's Jacobian below which the posture counts as
             singular [m/rad].
-        near_limit: A joint this close to a limit counts as at it [rad].
-        length: Distance that weighs as much as a rotation of 1 rad [m] where a command cannot be
+        near_limit: Distance from a limit within which a joint is reported as at the limit [rad].
+        length: Distance that has the weight of a rotation of 1 rad [m] where a command cannot be
             followed completely, and in singular values.
         assist_rate: Greatest joint rate of the assistance in the null space [rad/s].
         assist_lead_angle: Target lead limit of the orientation in assisted mode [rad]: a smaller
             orientation error is recovered.
-        timeout: Without a command for longer than this, the input counts as lost [s].
+        timeout: Time without a command after which the input counts as lost [s].
     """
 
     period: float = 0.01

@@ -13,7 +13,7 @@ from tcs.teleop.control.bounds import rate_bounds, scale_to_bounds, stops_in_tim
 from tcs.teleop.control.settings import Command, Settings
 
 STILL = 1e-3
-"""A motion below this fraction of the command counts as none."""
+"""Fraction of the command below which a motion counts as none."""
 PLANNED = 0.25
 """Fraction of the acceleration limit for each part of a motion: speeding up, following the curved
 null space, braking for a limit. They may coincide, and one joint may compensate for others."""
@@ -27,17 +27,17 @@ class ControlState(NamedTuple):
     joints: FloatArray
     """Joint positions [rad], shape (7,)."""
     jacobian: FloatArray
-    """Of the tool, half way through the step, shape (6, 7)."""
+    """Jacobian of the tool in the middle of the step, shape (6, 7)."""
     error: FloatArray
-    """From the tool to its target: rotation vector, translation, shape (6,)."""
+    """Displacement from tool to target: rotation vector [rad], translation [m], shape (6,)."""
     lower: FloatArray
     """Lowest rates allowed by joint limits and velocities [rad/s], shape (7,)."""
     upper: FloatArray
     """Highest rates allowed by joint limits and velocities [rad/s], shape (7,)."""
     speed: float
-    """Speed of the joint group in the step before: k of eq. (13) on its way, in [-1, 1]."""
+    """Speed of the joint group in the previous step, in [-1, 1]; it approaches k of eq. (13)."""
     group_rates: FloatArray | None
-    """Joint rates of the group at speed 1 in the step before [rad/s], shape (7,), if it moved."""
+    """Joint rates of the group at speed 1 in the previous step [rad/s], shape (7,), if it moved."""
     elbow_sign: float
     """Direction of the elbow at a positive command: 1 along `elbow_direction`, or -1."""
 
@@ -45,9 +45,11 @@ class ControlState(NamedTuple):
 class RateCommand(NamedTuple):
     """Joint rates that a mode commands.
 
-    `rates` are joint rates within limits of position and velocity [rad/s], shape (7,); `reason`
-    says why they stop short, and is empty if they do not; `speed` is the group's new speed k, and
-    `group_rates` its joint rates at speed 1 [rad/s].
+    Attributes:
+        rates: Joint rates within limits of position and velocity [rad/s], shape (7,).
+        reason: Reason why the arm does not follow the command, empty if it does.
+        speed: New speed k of the joint group.
+        group_rates: Joint rates of the group at speed 1 [rad/s], shape (7,); None without a group.
     """
 
     rates: FloatArray
@@ -68,14 +70,14 @@ def slow_down_together(rates: FloatArray, state: ControlState) -> tuple[float, i
     """Return the factor by which all joints slow down, and the joint that stops them, else -1.
 
     Each joint brakes for its limit in proportion to its rate, so that all joints come to rest
-    together: the tool keeps its path, or its position, until it stops.
+    together: the tool remains on its path, or at its position, until it stops.
     """
     size = np.abs(rates)
     fastest = float(size.max())
     if fastest == 0.0:
         return 1.0, -1
     settings, velocity = state.settings, state.arm.velocity
-    # A joint that hardly moves needs no bound of its own; the floor keeps the division sound.
+    # The lower bound avoids a division by zero; a joint that hardly moves needs no bound.
     braking = PLANNED * settings.acceleration * np.maximum(size / fastest, 1e-6)
     in_time = stops_in_time(state.arm, state.joints, rates, settings.period, braking)
     if in_time and (size <= velocity).all():
@@ -101,9 +103,9 @@ def limit_message(joints: ArrayLike) -> str:
 
 
 def stop_reason(command: Command, rates: FloatArray, held: BoolArray, state: ControlState) -> str:
-    """Return why the tool does not follow the command, empty if it does at least partly."""
+    """Return why the tool does not follow the command, empty if it follows at least partly."""
     twist = commanded_twist(command)
-    # Rotations count as distances, so that a command of both is judged as one.
+    # Rotations are weighted as distances, so that both parts of a command count.
     weights = np.repeat((state.settings.length, 1.0), 3) ** 2
     followed = float((state.jacobian @ rates * weights) @ twist)
     if followed > STILL * float((twist * weights) @ twist) or not twist.any():

@@ -1,4 +1,4 @@
-"""Status of a joint configuration: joint limits and singularities, as the operator sees them."""
+"""Status of a joint configuration, as reported to the operator: joint limits and singularities."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ class ConfigurationStatus:
     """Joints at their limits, and distance to a singularity.
 
     Attributes:
-        limits: -1 where a joint is at its lower limit, 1 where at its upper one, else 0; shape
-            (7,).
+        limits: -1 where a joint is at its lower limit, 1 at its upper limit, else 0; shape (7,).
         singular: Whether the task is singular.
         singular_value: Smallest singular value of the task's Jacobian [m/rad].
         worst_joint: The joint closest to a limit as a fraction of its range, counted from 0.
@@ -56,9 +55,9 @@ def configuration_status(
     Args:
         arm: The arm.
         joints: Joint positions [rad], shape (7,).
-        jacobian: Of the tool, shape (6, 7).
-        mode: Decides the task: the tool's position, or its pose.
-        settings: The thresholds.
+        jacobian: Jacobian of the tool, shape (6, 7).
+        mode: The control mode, which determines the task: the tool's position, or its pose.
+        settings: Settings of the controller, with the thresholds.
     """
     below, above = joints - arm.lower, arm.upper - joints
     limits = np.zeros(len(joints), np.int8)

@@ -19,14 +19,16 @@ from tcs.teleop.control.state import (
 )
 
 _EASE = 0.005
-"""Damping where joints are held at limits [m/rad]: rates stay bounded where the others become
-singular; 1 % of the motion at a singular value of 0.05, which the feedback compensates."""
+"""Damping where joints are held at limits [m/rad]: rates remain bounded where the other joints
+become singular. It costs 1 % of the motion at a singular value of 0.05, which the feedback
+compensates."""
 _NEAR = 3.0
-"""At this many times the singular value that ends the motion, joints begin to slow down."""
+"""Multiple of `Settings.singular` at which joints begin to slow down."""
 _NEAR_RATE = 1.0
-"""Greatest joint rate there [rad/s]: it takes a tenth of a second to stop from."""
+"""Greatest joint rate at that singular value [rad/s], from which a joint stops in a tenth of a
+second."""
 _BEYOND = 0.9
-"""Fraction of that singular value at which the rates would be zero: the motion ends before."""
+"""Fraction of `Settings.singular` at which the rates would be zero; the motion ends before."""
 
 
 def end_effector(command: Command, state: ControlState) -> RateCommand:
@@ -42,7 +44,7 @@ def end_effector(command: Command, state: ControlState) -> RateCommand:
     )
     if settings.limits == "paper":
         return _until_invalid(rates, smallest, state)
-    # A command beyond the joint velocities is followed in the same direction, slower.
+    # A command that exceeds the joint velocities is followed in the same direction, but slower.
     share, _ = scale_to_bounds(rates, -state.arm.velocity, state.arm.velocity)
     if ((share * rates >= state.lower) & (share * rates <= state.upper)).all():
         return RateCommand(share * rates)
@@ -58,16 +60,16 @@ def end_effector(command: Command, state: ControlState) -> RateCommand:
 
 
 def _until_invalid(rates: FloatArray, smallest: float, state: ControlState) -> RateCommand:
-    """End the motion where a joint is at its limit, or the arm singular, as the paper does.
+    """End the motion where a joint is at its limit or the arm is singular, as in the paper.
 
-    A motion that leads away from there continues.
+    A motion away from the limit or the singularity continues.
     """
     nearness = smallest / state.settings.singular
     if nearness < _NEAR and rates.any() and _gets_more_singular(rates, state):
         if nearness < 1.0:
             return RateCommand(np.zeros(JOINTS), "the arm is singular: motion ends there.")
-        # Near a singularity a slow tool needs fast joints: they slow down in advance, or they
-        # would pass through it before they could stop.
+        # Near a singularity even a slow tool needs fast joints. They slow down in advance, because
+        # they would otherwise pass through it before they could stop.
         most = _NEAR_RATE * (nearness - _BEYOND) / (_NEAR - _BEYOND)
         rates = rates * min(1.0, most / float(np.abs(rates).max()))
     share, joint = slow_down_together(rates, state)

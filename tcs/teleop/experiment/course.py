@@ -1,8 +1,8 @@
-"""The experiment's line: it cannot be followed to its end without null-space motion.
+"""The experiment's line, which cannot be followed to its end without null-space motion.
 
-A straight line from the front towards the back of the workspace on which joint 4 or 6 meets a limit
-after three quarters of the way. Nothing is typed in: the line is searched for, the first one that
-meets every condition of `find_course` is taken, and the same seed finds the same line.
+It is a straight line from the front towards the back of the workspace on which joint 4 or 6 meets a
+limit after three quarters of the length. The line is found by a random search, and is the first one
+that meets every condition of `find_course`; the same seed gives the same line.
 """
 
 from __future__ import annotations
@@ -22,53 +22,54 @@ from tcs.teleop.control.settings import Settings
 from tcs.teleop.line import Line
 
 BLOCKED_AFTER = 0.75
-"""Share of the line after which a joint is at its limit (paper: three quarters)."""
+"""Fraction of the line after which a joint is at its limit (paper: three quarters)."""
 BLOCKING = (3, 5)
-"""Joints that may block it, counted from 0: 4 and 6."""
+"""Joints that may block the line, counted from 0: 4 and 6."""
 _SHORTEST, _LONGEST = 0.4, 0.9
-"""Way until the limit [m]: shorter ones are no way to speak of, longer ones few arms have."""
+"""Range of the distance to the limit [m]: shorter lines test little, and few arms reach longer
+ones."""
 _OFF_AXIS = 0.2
-"""The line keeps so far from the vertical axis of the arm's base [m]: there its body stands."""
+"""Least distance of the line from the vertical axis of the arm's base [m], where the body is."""
 _AHEAD = 0.45
-"""A start lies at least so far ahead of the arm's base, as a fraction of the arm's reach."""
+"""Least distance of the start ahead of the arm's base, as a fraction of the arm's reach."""
 _HEADING = math.radians(25.0)
-"""The line goes straight back, give or take so much."""
+"""Greatest deviation of the line from the direction straight back [rad]."""
 _TURNS = np.radians(np.arange(10.0, 151.0, 10.0))
-"""Turns of joint 1 that are tried."""
+"""Rotations of joint 1 to try [rad]."""
 _SOLVING = 3
-"""Least number of neighbouring turns that must open the way: no operator is exact to a degree."""
+"""Least number of consecutive rotations that must unblock the line, as operators are inaccurate."""
 _DETOURS = 60
-"""Hand motions that are tried; one of them at least must open the way."""
+"""Number of hand motions to try, of which one at least must unblock the line."""
 _FARTHEST = 0.2
-"""Way of the longest of them [m]."""
+"""Greatest distance of a hand motion [m]."""
 _TURN_PER_METRE = 5.0
-"""How far the hand turns on its way [rad/m]."""
+"""Rotation of the hand per distance in a hand motion [rad/m]."""
 _AIM = 0.1
-"""How far ahead on the line the tool aims once it is off it [m]."""
+"""Distance ahead on the line at which the tool aims when it is beside the line [m]."""
 _STEP = 0.004
-"""Way from one posture to the next [m]: a limit is found to that."""
+"""Distance from one posture to the next [m], the resolution with which a limit is found."""
 _TURN_STEP = 0.02
-"""The same for turns [rad]."""
+"""Rotation of joint 1 from one posture to the next [rad]."""
 _STILL = 1e-9
-"""A joint that moves less than this in a step keeps still [rad]."""
+"""Motion in one step below which a joint is at rest [rad]."""
 _MARGIN = 0.85
-"""Start postures keep within this share of the joints' ranges about their middles."""
+"""Fraction of the joint ranges, about their middles, from which start postures are drawn."""
 _TRIED = 100_000
-"""Start postures after which the search gives up: a minute or two."""
+"""Greatest number of start postures, a minute or two of search."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A line, and how the arm stands at its start."""
+    """A line, and the posture of the arm at its start."""
 
     line: Line
-    """In the robot's base [m]."""
+    """The line in the robot's base [m]."""
     joints: FloatArray
     """Start posture [rad], shape (7,)."""
     blocking: int
-    """The joint that ends the straight way, counted from 0."""
+    """The joint that blocks the line, counted from 0."""
     turns: tuple[float, ...]
-    """Turns of joint 1 after which the way is open [rad]."""
+    """Rotations of joint 1 that unblock the line [rad]."""
 
     def __post_init__(self) -> None:
         """Make the array read-only."""
@@ -76,21 +77,22 @@ class Course:
 
 
 def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Course:
-    """Return the first line that is found to fit.
+    """Return the first line found that meets these conditions.
 
-    - The start lies ahead of the arm's base; the line is level and leads straight back, within
-      25 deg; an arm that stands on a base of its own, without a torso, comes behind it.
-    - Without hand or noise, end-effector control comes three quarters of the way, 0.4 m at least,
-      before joint 4 or 6 is at its limit.
-    - Turning joint group 1 there opens the rest of the way, for three neighbouring turns at least.
+    - The start is ahead of the arm's base; the line is level and leads straight back, within 25
+      deg; for a robot without a torso joint it ends behind the arm's base.
+    - Without hand motion and noise, end-effector control follows three quarters of the line, 0.4 m
+      at least, until joint 4 or 6 is at its limit.
+    - Motion of joint group 1 there unblocks the rest of the line, for three consecutive rotations
+      at least.
     - So does one hand motion at least: the end can be reached with either controller.
-    - Along the straight part, the middle one of those turns and the rest of the way, the arm
-      touches neither the robot nor the floor.
+    - Along the first part, the middle one of those rotations and the rest of the line, the arm is
+      free of contact with the robot and the floor.
 
     Args:
         arm: The arm.
-        seed: Of the start postures.
-        settings: What counts as singular.
+        seed: Seed of the start postures.
+        settings: Settings of the controller; None for the defaults.
 
     Raises:
         TcsError: If no line is found.
@@ -116,15 +118,15 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
             return found
     raise TcsError(
         f"no line for '{arm.name}' on which joint 4 or 6 meets a limit after three quarters of the "
-        f"way and group 1 opens the rest: {_TRIED:,} start postures were tried with seed {seed}. "
-        "Try another seed."
+        f"length and group 1 unblocks the rest: {_TRIED:,} start postures were tried with seed "
+        f"{seed}. Try another seed."
     )
 
 
 def _course(
     walk: _Walk, reach: Reach, joints: FloatArray, way: FloatArray, rng: np.random.Generator
 ) -> Course | None:
-    """Return the line from a start that fits, if there is one."""
+    """Return the line from a start posture in a direction, None if it fails a condition."""
     arm = walk.arm
     start = arm.link_poses(joints)[JOINTS, :3, 3]
     ahead = Line(_triple(start), _triple(start + _LONGEST * way))
@@ -160,22 +162,22 @@ def _triple(point: FloatArray) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """An arm that moves without inertia, hand or noise: where it comes to, and what stops it."""
+    """Kinematic simulation of an arm, without dynamics and noise: its path, and what stops it."""
 
     arm: Arm
     settings: Settings
 
     def follow(self, joints: FloatArray, line: Line) -> tuple[FloatArray, int]:
-        """Go along a line, or back to it, the tool's orientation held.
+        """Move the tool to the line and along it, the tool's orientation held.
 
         Returns:
-            The postures on the way, shape (n, 7), and the joint at whose limit it ends: -1 for
-            none, the end was reached; `JOINTS` where the arm is singular.
+            Postures along the path [rad], shape (n, 7), and the joint at whose limit it ends: -1 if
+            the end is reached, `JOINTS` if the arm is singular.
         """
         R = self.arm.kinematics(joints).R
         end = np.asarray(line.end)
         trail = [joints]
-        # From off the line the way is longer, by twice the way off it at most.
+        # From a start beside the line the path is longer than the line.
         for _ in range(int(2.0 * line.length / _STEP)):
             p = self.arm.link_poses(joints)[JOINTS, :3, 3]
             if np.linalg.norm(end - p) <= _STEP:
@@ -189,10 +191,10 @@ class _Walk:
         return np.array(trail), JOINTS
 
     def turn(self, joints: FloatArray, angle: float) -> FloatArray:
-        """Turn joint group 1, the tool's place held.
+        """Rotate joint 1 by an angle [rad] with its group, the tool's position held.
 
         Returns:
-            The postures on the way, shape (n, 7); none where a limit ends it before.
+            Postures along the path [rad], shape (n, 7); empty if a limit ends the motion.
         """
         p = self.arm.link_poses(joints)[JOINTS, :3, 3]
         steps = math.ceil(abs(angle) / _TURN_STEP)
@@ -208,7 +210,7 @@ class _Walk:
         return np.array(trail)
 
     def opening_turns(self, blocked: FloatArray, line: Line) -> tuple[float, ...]:
-        """Return the turns of joint 1 that open the way: neighbours, the most there are."""
+        """Return the longest sequence of neighbouring rotations that unblock the line [rad]."""
         best: tuple[float, ...] = ()
         for sign in (-1.0, 1.0):
             run: tuple[float, ...] = ()
@@ -224,7 +226,7 @@ class _Walk:
         return best if len(best) >= _SOLVING else ()
 
     def has_detour(self, blocked: FloatArray, line: Line, rng: np.random.Generator) -> bool:
-        """Return whether some motion of the hand opens the way."""
+        """Return whether some hand motion unblocks the line."""
         for _ in range(_DETOURS):
             turn, way = rng.standard_normal((2, 3))
             length = rng.uniform(0.0, _FARTHEST)
@@ -236,7 +238,13 @@ class _Walk:
         return False
 
     def _shift(self, joints: FloatArray, turn: FloatArray, way: FloatArray) -> FloatArray | None:
-        """Move the hand straight; None where a limit ends it."""
+        """Return the posture after a hand motion, None if a limit ends the motion.
+
+        Args:
+            joints: Start posture [rad], shape (7,).
+            turn: Rotation vector of the motion [rad], shape (3,).
+            way: Translation of the motion [m], shape (3,).
+        """
         start = self.arm.kinematics(joints)
         steps = max(1, math.ceil(np.linalg.norm(way) / _STEP))
         for i in range(1, steps + 1):
@@ -247,7 +255,11 @@ class _Walk:
         return joints
 
     def _move(self, joints: FloatArray, R: FloatArray, p: FloatArray) -> tuple[FloatArray, int]:
-        """Bring the tool to a pose close by; where that is not possible, stay and say why."""
+        """Return the posture after one step to a nearby pose, and the joint that blocks it.
+
+        The joint is -1 if none does, and `JOINTS` if the arm is singular; if blocked, the posture
+        is the given one.
+        """
         now = self.arm.kinematics(joints)
         error = pose_error(R, p, now.R, now.p)
         length = self.settings.length
@@ -258,9 +270,9 @@ class _Walk:
         return (joints, joint) if joint >= 0 else (joints + change, -1)
 
     def _ends(self, joints: FloatArray, change: FloatArray) -> int:
-        """Return a joint that would go beyond its limit, -1 if none would."""
+        """Return the first joint that would exceed its limit, -1 if none would."""
         after = joints + change
-        # A joint that keeps still but for rounding does not run into its limit.
+        # A joint that moves only by rounding does not exceed its limit.
         beyond = ((after > self.arm.upper) & (change > _STILL)) | (
             (after < self.arm.lower) & (change < -_STILL)
         )

@@ -1,8 +1,8 @@
 """Capability maps of an experiment, one per controller.
 
-The ITCM thesis records people with one controller and leaves open what another one would change.
-Here all trials of an experiment with one controller form one recording, and its capability map
-gives base poses for operators of that controller.
+The ITCM thesis records people with one controller and leaves open how the map depends on it. Here
+all trials of an experiment with one controller form one recording, and its capability map gives
+base poses for operators of that controller.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ class ControllerMap:
     condition: str
     capability: CapabilityMap
     samples: int
-    """Postures in the recording."""
+    """Number of postures in the recording."""
     shared_fraction: float
-    """Fraction of its cells that the map of the first controller holds as well."""
+    """Fraction of its cells that are also in the map of the first controller."""
     grasp_cells: int
-    """Cells that hold the requested grasp."""
+    """Number of cells with the grasp that the maps are compared by."""
     best: BasePose | None
-    """Best base pose for that grasp, relative to the tool; None where no cell holds it."""
+    """Best base pose for that grasp, relative to the tool; None if no cell has it."""
 
     @property
     def mean_score(self) -> float:
@@ -63,15 +63,15 @@ class ControllerMaps:
 
     maps: tuple[ControllerMap, ...]
     height: float
-    """Of the tool above the floor [m]."""
+    """Height of the tool above the floor [m]."""
     pitch: float
-    """Of the tool in its level frame [rad]."""
+    """Pitch of the tool in its level frame E [rad]."""
     roll: float
-    """The same [rad]."""
+    """Roll of the tool in E [rad]."""
 
 
 def check_map_robot(arm: Arm) -> None:
-    """Refuse an arm whose recordings cannot become a map, before they are made.
+    """Check that recordings of an arm can become a map, before they are made.
 
     Raises:
         RobotError: If the robot has no head file.
@@ -127,7 +127,7 @@ def controller_maps(experiment: Experiment) -> ControllerMaps:
 
 
 def _grasp(maps: Sequence[CapabilityMap]) -> tuple[int, int]:
-    """Return the tilt and level whose smallest count of cells is greatest; the first of equals."""
+    """Return the tilt and level whose smallest number of cells over the maps is greatest."""
     counts: dict[tuple[int, int], list[int]] = {}
     for number, capability in enumerate(maps):
         grasps, count = np.unique(capability.cells[:, [TILT, Z]], axis=0, return_counts=True)

@@ -1,7 +1,7 @@
-"""What people say afterwards: NASA-TLX workload, and van der Laan's usefulness and satisfaction.
+"""Questionnaires: NASA-TLX workload, and van der Laan's usefulness and satisfaction.
 
-These score answers that people gave. The scripted operators have no
-opinion, so the experiment's tables hold none.
+The functions score the answers of people. Scripted operators give no answers, so the tables of the
+experiment contain no such scores.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ LAAN_ITEMS = (
     ("undesirable", "desirable"),
     ("raising alertness", "sleep-inducing"),
 )
-"""What the left and the right end of each scale say."""
+"""Labels of the left and the right end of each scale."""
 LAAN_MIRRORED = (3, 6, 8)
-"""Items, counted from 1, whose right end is the good one."""
+"""Items, counted from 1, whose right end is positive."""
 LAAN_USEFULNESS = (1, 3, 5, 7, 9)
+"""Items of the usefulness score."""
 LAAN_SATISFACTION = (2, 4, 6, 8)
+"""Items of the satisfaction score."""
 TLX_DIMENSIONS = (
     "mental demand",
     "physical demand",
@@ -36,7 +38,7 @@ TLX_DIMENSIONS = (
     "frustration",
 )
 TLX_PAIRS = 15
-"""Pairs of dimensions that are compared; each gives one point of weight."""
+"""Number of pairs of dimensions that are compared; each gives one point of weight."""
 _TLX_STEPS = 20
 
 
@@ -52,15 +54,15 @@ def van_der_laan(ticks: Sequence[int]) -> Acceptance:
     """Return usefulness and satisfaction from the nine items.
 
     Args:
-        ticks: Which box was ticked in each line, 1 for the leftmost to 5 for the rightmost.
+        ticks: Box ticked in each item, from 1 for the leftmost to 5 for the rightmost.
 
     Raises:
-        DataFileError: If there are not nine, or one is no box.
+        DataFileError: If there are not nine ticks, or one is not 1 to 5.
 
     Source:
-        Van der Laan, Heino, De Waard, Transp. Res. C 5 (1997), as the null-space paper uses it: a
-        tick counts +2 at the left to -2 at the right, the other way round for items 3, 6 and 8;
-        usefulness is the mean of the odd items, satisfaction of the even ones.
+        Van der Laan, Heino, De Waard, Transp. Res. C 5 (1997), as in the null-space paper: a tick
+        scores from +2 at the left to -2 at the right, with the opposite sign for items 3, 6 and 8;
+        usefulness is the mean of the odd items, satisfaction that of the even items.
 
     >>> van_der_laan([1, 1, 5, 1, 1, 5, 1, 5, 1])
     Acceptance(usefulness=2.0, satisfaction=2.0)
@@ -84,11 +86,11 @@ def weighted_workload(ratings: Mapping[str, int], weights: Mapping[str, int]) ->
     """Return the weighted workload, 0 to 100.
 
     Args:
-        ratings: Of each of `TLX_DIMENSIONS`, 0 to 20 as on the form's scale.
-        weights: How often each was picked of a pair, 0 to 5; 15 in all.
+        ratings: Rating of each of `TLX_DIMENSIONS`, 0 to 20 as on the scale of the form.
+        weights: Number of pairs in which each dimension was chosen, 0 to 5; 15 in total.
 
     Raises:
-        DataFileError: If a dimension is missing or unknown, or a number out of its range.
+        DataFileError: If a dimension is missing or unknown, or a number is out of range.
 
     Source:
         NASA-TLX; ITCM thesis, eq. (27).
@@ -103,11 +105,11 @@ def weighted_workload(ratings: Mapping[str, int], weights: Mapping[str, int]) ->
                 f"of: {', '.join(TLX_DIMENSIONS)}."
             )
         for name, value in given.items():
-            # Written so that what is no number is refused, too.
+            # In this form the comparison is false for nan as well.
             if not 0 <= value <= most:
                 raise DataFileError(f"NASA-TLX {what} of {name} is {value}; must be 0 to {most}.")
     total = sum(weights.values())
     if total != TLX_PAIRS:
-        raise DataFileError(f"NASA-TLX weights add up to {total}; each of 15 pairs gives one.")
+        raise DataFileError(f"NASA-TLX weights add up to {total}; must be {TLX_PAIRS}.")
     scale = 100 // _TLX_STEPS
     return sum(ratings[name] * scale * weights[name] for name in TLX_DIMENSIONS) / TLX_PAIRS

@@ -1,4 +1,4 @@
-"""Tests of the experiment: normality, equal variance, signed ranks, repeated measures."""
+"""Statistical tests: normality, equal variance, signed ranks, repeated measures."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ Tail = Literal["greater", "less", "two-sided"]
 
 @dataclass(frozen=True, slots=True)
 class GroupStatistics:
-    """One condition's sample: a row of the paper's Table II, and its test of normality."""
+    """Statistics of the sample of one condition: a row of the paper's Table II, and normality."""
 
     count: int
     median: float
     mean: float
     std: float
-    """Of n - 1 degrees of freedom."""
+    """Standard deviation with n - 1 degrees of freedom."""
     shapiro_w: float
+    """Statistic of the Shapiro-Wilk test of normality."""
     shapiro_p: float
-    """That a normal population gives such a sample; 1 where all values are equal."""
+    """Its p value; 1 if all values are equal."""
 
 
 def group_statistics(sample: FloatArray) -> GroupStatistics:
-    """Return what a sample is like.
+    """Return the statistics of a sample.
 
     Args:
-        sample: Shape (n,), n >= 3.
+        sample: The values, shape (n,), n >= 3.
 
     Raises:
         DataFileError: If there are fewer than three values, or one is not finite.
@@ -43,7 +44,7 @@ def group_statistics(sample: FloatArray) -> GroupStatistics:
     from scipy import stats
 
     values = _checked(sample)
-    # The statistic is not defined where nothing varies.
+    # The statistic is undefined for equal values.
     w, p = (1.0, 1.0) if np.ptp(values) == 0.0 else stats.shapiro(values)
     return GroupStatistics(
         len(values),
@@ -57,34 +58,39 @@ def group_statistics(sample: FloatArray) -> GroupStatistics:
 
 @dataclass(frozen=True, slots=True)
 class SignedRankTest:
-    """Two conditions on the same operators: a row of the paper's Table III."""
+    """Comparison of two conditions over the same operators: a row of the paper's Table III."""
 
     count: int
+    """Number of operators."""
     tail: Tail
     levene_f: float
+    """Statistic of Levene's test of equal variances."""
     levene_p: float
+    """Its p value."""
     statistic: float
     """Sum T of the ranks of positive differences, first less second."""
     z: float
+    """Normal approximation of T."""
     p: float
+    """p value of the signed-rank test."""
     effect: float
-    """r = z / sqrt(2 N)."""
+    """Effect size r = z / sqrt(2 N)."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the test as plain containers."""
         return asdict(self)
 
 
 def signed_rank_test(first: FloatArray, second: FloatArray, *, tail: Tail) -> SignedRankTest:
-    """Return how two conditions differ on the same operators.
+    """Return the comparison of two conditions over the same operators.
 
     Args:
-        first: Shape (n,), n >= 3.
-        second: Of the same operators in the same order, shape (n,).
+        first: Values of the first condition, shape (n,), n >= 3.
+        second: Values of the second condition for the same operators, shape (n,).
         tail: Alternative hypothesis about the first against the second.
 
     Raises:
-        DataFileError: If they do not match, or a value is not finite.
+        DataFileError: If the sizes differ, or a value is not finite.
 
     Source:
         Null-space paper, section II.C.7 and Table III: Levene's test, about the mean; Wilcoxon's
@@ -96,7 +102,9 @@ def signed_rank_test(first: FloatArray, second: FloatArray, *, tail: Tail) -> Si
 
     one, other = _checked(first), _checked(second)
     if len(one) != len(other):
-        raise DataFileError(f"{len(one)} values against {len(other)}: no pairs.")
+        raise DataFileError(
+            f"{len(one)} values against {len(other)}: the test needs pairs of values."
+        )
     levene_f, levene_p = 0.0, 1.0
     if np.ptp(one) > 0.0 or np.ptp(other) > 0.0:
         levene_f, levene_p = (float(x) for x in stats.levene(one, other, center="mean"))
@@ -134,43 +142,49 @@ def effect_size(z: float, pairs: int) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PostHoc:
-    """Two conditions after an analysis of variance."""
+    """Comparison of two conditions after an analysis of variance."""
 
     first: str
     second: str
     difference: float
-    """Mean of the first less that of the second."""
+    """Mean of the first condition less that of the second."""
     t: float
+    """Statistic of the paired t test."""
     p: float
-    """Two-sided, of a paired t test, times the number of pairs (Bonferroni), at most 1."""
+    """Two-sided p value of that test, times the number of pairs (Bonferroni), at most 1."""
     effect: float
-    """r = sqrt(t^2 / (t^2 + degrees of freedom))."""
+    """Effect size r = sqrt(t^2 / (t^2 + degrees of freedom))."""
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatedMeasures:
-    """A one-way analysis of variance with repeated measures."""
+    """One-way analysis of variance with repeated measures."""
 
     f: float
+    """F statistic."""
     df_between: float
+    """Degrees of freedom of the numerator."""
     df_error: float
+    """Degrees of freedom of the denominator."""
     p: float
+    """p value."""
     post_hoc: tuple[PostHoc, ...]
+    """Comparison of each pair of conditions."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain containers."""
+        """Return the analysis as plain containers."""
         return asdict(self)
 
 
 def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
-    """Return whether conditions differ on the same operators, and which of them.
+    """Return the analysis of variance of conditions over the same operators.
 
     Args:
-        samples: Values of each condition by operator, shapes (n,), n >= 3.
+        samples: By condition, the values of all operators, shape (n,), n >= 3.
 
     Raises:
-        DataFileError: If there are fewer than two conditions, they do not match, or nothing varies
-            within the operators.
+        DataFileError: If there are fewer than two conditions, their sizes differ, or the error sum
+            of squares is zero.
 
     Source:
         ITCM thesis, section III.C.5: one-way repeated-measures analysis of variance, then paired t
@@ -185,15 +199,18 @@ def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
     sizes = {len(sample) for sample in values.values()}
     if len(values) < 2 or len(sizes) != 1:
         raise DataFileError(
-            f"repeated measures of {len(values)} conditions with {sorted(sizes)} values; it takes "
-            "two conditions or more, and a value of each operator in each."
+            f"repeated measures of {len(values)} conditions with {sorted(sizes)} values; must be "
+            "two conditions or more, with a value of each operator in each."
         )
     table = np.stack(list(values.values()))
     n = table.shape[1]
     left = table - table.mean(axis=0) - table.mean(axis=1, keepdims=True) + table.mean()
-    # Sums of some hundred squares are good to 1e-13; beneath, nothing is left to divide by.
+    # Sums of some hundred squares are accurate to 1e-13; an error sum below that is zero.
     if (left**2).sum() <= 1e-13 * (table**2).sum():
-        raise DataFileError("the conditions differ alike for each operator: no error to test with.")
+        raise DataFileError(
+            "repeated measures: conditions differ equally for every operator, so the test is "
+            "undefined. Compare more operators."
+        )
     frame = pd.DataFrame(
         {
             "operator": np.tile(np.arange(n), len(values)),

@@ -1,4 +1,4 @@
-"""One trial: a scripted operator follows the line with one controller, and all is recorded."""
+"""One trial: a scripted operator follows the line with one controller; a run records it."""
 
 from __future__ import annotations
 
@@ -30,22 +30,26 @@ from tcs.teleop.runs.recorder import last_attempt, run_from_steps
 from tcs.teleop.runs.run import Run
 
 GOAL_RADIUS = 0.02
-"""Of the sphere at the end of the line [m]; the paper draws one and does not say how large."""
+"""Radius of the sphere at the end of the line [m]; the paper shows one without its size."""
 SCRIPTED_TYPE = "scripted"
 """Metadata `operator_type` of a run with a scripted operator."""
 TIME_LIMIT = 120.0
-"""Of a trial [s] (paper, experiment information, part 3)."""
+"""Time limit of a trial [s] (paper, experiment information, part 3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A controller, and what an operator can do with it when the arm stops."""
+    """A controller, and the recovery of an operator when the arm stops."""
 
     name: str
     title: str
+    """Title for readers."""
     mode: Mode
+    """Mode in which the hand moves the tool."""
     approach: Recovery
+    """Recovery when the arm stops."""
     settings: Settings
+    """Settings of the controller."""
 
 
 END_EFFECTOR = Condition(
@@ -63,30 +67,30 @@ CONDITIONS = (END_EFFECTOR, NOVEL, ASSISTED)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialMeasures:
-    """Measures of a trial, or means of several."""
+    """Measures of a trial, or their means over several trials."""
 
     accuracy: float
     """Greatest distance between barycentre and line [m]."""
     time: float
-    """Until the end was reached; the time limit where it was not [s]."""
+    """Completion time, or the time limit if the end was not reached [s]."""
     effort: float
     """Mean absolute work on the device from sample to sample [J]."""
     work: float
-    """The sum of it over the trial [J]: what rests of the hand do not dilute."""
+    """Sum of that work over the trial [J], which is independent of the hand's time at rest."""
     steering_angle: float
-    """[rad]."""
+    """Total rotation of the hand [rad]."""
     steering_translation: float
-    """[m]."""
+    """Total translation of the hand [m]."""
     arc_length: float
     """Spectral arc length of the hand's speed."""
     stops: float
-    """How often the arm came to a stop."""
+    """Number of stops of the arm."""
     turned: float
-    """How far joint 1 was turned through its group [rad]."""
+    """Total rotation of joint 1 by motion of joint group 1 [rad]."""
     finished: float
-    """1 where the end was reached in time, else 0."""
+    """1 if the end was reached in time, else 0."""
     planes_met: float
-    """Of the 30."""
+    """Number of planes with samples, of 30."""
 
 
 MEASURES = tuple(TrialMeasures.__dataclass_fields__)
@@ -103,7 +107,7 @@ def run_trial(
     time_limit: float = TIME_LIMIT,
     metadata: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Return what an operator and an arm do until the end is reached or the time is over.
+    """Return the run of an operator until the end of the line is reached or the time is over.
 
     Args:
         arm: The arm.
@@ -112,12 +116,12 @@ def run_trial(
         traits: Traits of the operator.
         habits: Successful recoveries with this controller; updated in place.
         rng: Random generator.
-        time_limit: End of the trial [s].
+        time_limit: Time limit of the trial [s].
         metadata: Further metadata of the run.
 
     Raises:
-        TcsError: If the start posture is beyond a limit, is not at the line's start, or the line's
-            end is out of reach.
+        TcsError: If the start posture is beyond a limit, the tool is not at the start of the line,
+            or an end of the line is out of reach.
     """
     check_course(arm, course)
     session = Teleoperation(arm, course.joints, condition.settings, condition.mode)
@@ -145,10 +149,11 @@ def run_trial(
 
 
 def check_course(arm: Arm, course: Course) -> None:
-    """Refuse a line that the arm cannot start on, or whose end is farther than it is long.
+    """Check that an arm can start on a line, and that both ends are within its length.
 
     Raises:
-        TcsError: If the start posture or an end of the line is out of reach.
+        TcsError: If the start posture is beyond a limit, the tool is not at the start of the line,
+            or an end of the line is out of reach.
     """
     outside = arm.limit_violation(course.joints)
     if outside:
@@ -173,15 +178,15 @@ def check_course(arm: Arm, course: Course) -> None:
 
 
 def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> TrialMeasures:
-    """Return what a trial comes to.
+    """Return the measures of a trial.
 
-    Steering is filtered and resampled as the ITCM thesis does; effort is not, as the null-space
-    paper reads it off the device.
+    Steering is filtered and resampled as in the ITCM thesis; effort is not, as in the null-space
+    paper.
 
     Args:
         run: The trial.
-        course: What was to be followed.
-        time_limit: What counts as its time where the end was not reached [s].
+        course: The line and the start posture.
+        time_limit: Completion time to report if the end was not reached [s].
     """
     line = course.line
     path = trajectory_accuracy(run.position, line)
@@ -217,28 +222,28 @@ def mean_measures(trials: list[TrialMeasures]) -> TrialMeasures:
 
 
 def sampled_path(run: Run, count: int = 200) -> FloatArray:
-    """Return some points of the tool's path at even times, for a picture [m], shape (count, 3)."""
+    """Return at most `count` points of the tool's path, evenly spaced in time [m], shape (k, 3)."""
     rows = np.linspace(0, len(run) - 1, min(count, len(run))).astype(int)
     return np.asarray(run.position[rows])
 
 
 @dataclass(frozen=True, slots=True)
 class LineResult:
-    """How well the last attempt of a run followed a line, as the paper measures it."""
+    """The paper's metrics of the last attempt of a run at a line."""
 
     time: float | None
-    """Completion time [s]; None where the end was not reached."""
+    """Completion time [s]; None if the end was not reached."""
     distance_left: float
     """Distance from the last tool position to the end [m]."""
     accuracy: Accuracy | None
-    """Trajectory accuracy up to the completion; None where the end was not reached."""
+    """Trajectory accuracy until completion; None if the end was not reached."""
 
 
 def line_result(run: Run, line: Line) -> LineResult:
-    """Return how well the last attempt of a run followed a line.
+    """Return the metrics of the last attempt of a run at a line.
 
     Args:
-        run: The run; attempts begin with the first command after the arm was put back.
+        run: The run; an attempt begins with the first command after the arm was put back.
         line: The line.
     """
     first = last_attempt(run)

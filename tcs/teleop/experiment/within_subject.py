@@ -1,7 +1,7 @@
 """The trajectory-following experiment of the null-space paper, with scripted operators.
 
-Every operator drives with every controller: four training trials, then three that count. The means
-of these three are the samples that the tests compare (paper, section II.C).
+Every operator uses every controller, for four training trials and three counted trials. The means
+over the counted trials are the samples that the tests compare (paper, section II.C).
 """
 
 from __future__ import annotations
@@ -45,13 +45,16 @@ from tcs.teleop.runs.files import FORMATS, save_run
 from tcs.teleop.runs.run import Run
 
 OPERATORS = 26
-"""As many as the paper had participants."""
+"""Number of participants in the paper."""
 TRAINING = 4
+"""Number of training trials of an operator with a controller."""
 TRIALS = 3
+"""Number of counted trials of an operator with a controller."""
 SCRIPTED = "scripted operators, not people"
 """Note of every table."""
 HYPOTHESES: dict[str, Tail] = {"accuracy": "greater", "time": "two-sided", "effort": "greater"}
-"""Tails of end-effector control against the novel controller (paper, section II.C.6)."""
+"""Alternative hypothesis on end-effector control against the novel controller, by measure (paper,
+section II.C.6)."""
 ANOVA_MEASURES = ("time", "steering_angle", "steering_translation", "arc_length")
 """Measures of the ITCM thesis, compared over all conditions."""
 
@@ -64,11 +67,11 @@ class ExperimentPlan:
 
     Attributes:
         operators: Number of operators.
-        training: Trials that do not count, before those that do.
-        trials: Trials that count.
+        training: Number of training trials of an operator with a controller.
+        trials: Number of counted trials of an operator with a controller.
         seed: Seed of the operators and their noise.
-        conditions: Controllers that are compared.
-        time_limit: Of a trial [s].
+        conditions: Controllers to compare.
+        time_limit: Time limit of a trial [s].
     """
 
     operators: int = OPERATORS
@@ -79,26 +82,27 @@ class ExperimentPlan:
     time_limit: float = TIME_LIMIT
 
     def __post_init__(self) -> None:
-        """Refuse a plan that compares nothing.
+        """Check the plan.
 
         Raises:
-            TcsError: If there are fewer than three operators, no trial, or a condition twice.
+            TcsError: If there are fewer than three operators, no counted trial, fewer than two
+                conditions or one of them twice, or the time limit is below 1 s.
         """
         if self.operators < 3 or self.trials < 1 or self.training < 0:
             raise TcsError(
                 f"experiment with {self.operators} operators, {self.training} training trials and "
-                f"{self.trials} trials: it takes 3 operators and 1 trial at least."
+                f"{self.trials} trials: at least 3 operators and 1 trial are needed."
             )
         if not (math.isfinite(self.time_limit) and self.time_limit >= 1.0):
-            raise TcsError(f"experiment: a time limit of {self.time_limit:g} s; 1 s at least.")
+            raise TcsError(f"experiment: time limit {self.time_limit:g} s; must be at least 1 s.")
         names = [condition.name for condition in self.conditions]
         if len({*names}) != len(names) or len(names) < 2:
             raise TcsError(f"experiment: conditions {names} must be two or more, each once.")
 
     def order(self, operator: int) -> tuple[Condition, ...]:
-        """Return the order in which an operator, counted from 0, meets the conditions.
+        """Return the order of the conditions for an operator, counted from 0.
 
-        All orders take turns; of two conditions that is the paper's Table I.
+        Operators take all orders in turn; with two conditions this is the paper's Table I.
         """
         orders = list(itertools.permutations(self.conditions))
         return orders[operator % len(orders)]
@@ -113,13 +117,13 @@ class ControllerTrials:
     training: tuple[TrialMeasures, ...]
     trials: tuple[TrialMeasures, ...]
     paths: tuple[FloatArray, ...]
-    """Of the tool in each trial that counts [m], shapes (k, 3)."""
+    """Path of the tool in each counted trial [m], shapes (k, 3)."""
     postures: tuple[FloatArray, ...]
-    """Of the arm in each trial that counts, ten a second [rad], shapes (k, 7)."""
+    """Postures of the arm in each counted trial, ten per second [rad], shapes (k, 7)."""
 
     @property
     def mean(self) -> TrialMeasures:
-        """Mean of each measure over the trials that count."""
+        """Mean of each measure over the counted trials."""
         return mean_measures(list(self.trials))
 
 
@@ -132,18 +136,18 @@ class Experiment:
     plan: ExperimentPlan
     traits: tuple[OperatorTraits, ...]
     drives: dict[str, tuple[ControllerTrials, ...]]
-    """By condition, in the order of operators."""
+    """Trials by condition, in the order of operators."""
 
     def sample(self, condition: str, measure: str) -> FloatArray:
-        """Return the means of a measure by operator, shape (operators,)."""
+        """Return the mean of a measure over the counted trials of each operator, shape (n,)."""
         return np.array([getattr(drive.mean, measure) for drive in self.drives[condition]])
 
     def described(self, condition: str, measure: str) -> GroupStatistics:
-        """Return what a sample is like: a row of the paper's Table II."""
+        """Return the statistics of a sample: a row of the paper's Table II."""
         return group_statistics(self.sample(condition, measure))
 
     def compared(self, measure: str, first: str, second: str, tail: Tail) -> SignedRankTest:
-        """Return how two conditions differ: a row of the paper's Table III."""
+        """Return the comparison of two conditions: a row of the paper's Table III."""
         return signed_rank_test(
             self.sample(first, measure), self.sample(second, measure), tail=tail
         )
@@ -173,16 +177,16 @@ def run_experiment(
     jobs: int = 1,
     on_progress: OnProgress | None = None,
 ) -> Experiment:
-    """Return what all operators did with all controllers.
+    """Return the trials of all operators with all controllers.
 
     Args:
         arm: The arm.
         course: The line and the start posture.
-        plan: How much is run; None for the paper's.
-        runs: Folder to save each trial that counts to, as `runs_as`; it must be there.
-        runs_as: ".csv" or ".parquet".
-        jobs: Number of processes; the answers do not depend on it.
-        on_progress: Called with operators times conditions done, and in all.
+        plan: Size and seed of the experiment; None for those of the paper.
+        runs: Existing folder to save each counted trial to; None saves none.
+        runs_as: Format of these files, ".csv" or ".parquet".
+        jobs: Number of processes; the results do not depend on it.
+        on_progress: Called with the number of pairs (operator, condition) done and of all.
 
     Raises:
         TcsError: If the course does not fit the arm.
@@ -226,7 +230,7 @@ def _drive(
     runs: Path | None,
     runs_as: str,
 ) -> ControllerTrials:
-    """Return what one operator does with one controller."""
+    """Return the trials of one operator with one controller."""
     habits = Experience()
     measured, paths, postures = [], [], []
     number = plan.conditions.index(condition)
@@ -267,8 +271,8 @@ def run_name(run: Run, runs_as: str = ".csv") -> str:
 
 
 def _rng(seed: int, *place: int) -> np.random.Generator:
-    """Return the random generator of one place in the experiment, whatever the order of calls."""
-    # A path of its own for each length: operator 1 is not trial 1.
+    """Return the random generator of one operator or trial, independent of the order of calls."""
+    # The length is part of the key, so that keys of operators and trials differ.
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(len(place), *place)))
 
 
@@ -279,7 +283,11 @@ def median_ratio(experiment: Experiment, measure: str) -> float:
 
 
 def trial_rows(experiment: Experiment, names: Sequence[str]) -> list[list[object]]:
-    """Return every trial as rows: operator, condition, place in the order, trial, measures."""
+    """Return every trial as a row.
+
+    Columns are operator, condition, its position in the operator's order, whether the trial is for
+    training, number of the trial, and the measures in `names`.
+    """
     rows: list[list[object]] = []
     for condition, drives in experiment.drives.items():
         for drive in drives:

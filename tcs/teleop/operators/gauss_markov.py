@@ -1,4 +1,4 @@
-"""A smooth Gauss-Markov process: the tremor of a hand and the misjudgement of a position."""
+"""A smooth Gauss-Markov process, which models tremor of a hand and misjudgement of a position."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tcs.kernel.arrays import FloatArray
 class GaussMarkovProcess:
     """A stationary second-order Gauss-Markov process of three independent coordinates.
 
-    Each is a critically damped second-order system driven by white noise, in the steady state from
-    the first sample on: its variance does not depend on time or sampling period.
+    Each coordinate is a critically damped second-order system driven by white noise, in the steady
+    state from the first sample on: its variance depends neither on time nor on the sampling period.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class GaussMarkovProcess:
 
     @property
     def value(self) -> FloatArray:
-        """Present value, shape (3,)."""
+        """Current value, shape (3,)."""
         return np.array(self._state[0])
 
     @property
     def rate(self) -> FloatArray:
-        """Present rate of change [1/s], shape (3,)."""
+        """Current rate of change [1/s], shape (3,)."""
         return np.array(self._state[1])
 
     def advance(self) -> None:

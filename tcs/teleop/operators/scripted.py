@@ -1,14 +1,14 @@
-"""Scripted operators: stand-ins for people in the trajectory-following experiment.
+"""Scripted operators: models of people in the trajectory-following experiment.
 
-They are not people, and their results prove nothing about people. They make the experiment
-repeatable and show the effect of a controller on one and the same behaviour.
+Their results prove nothing about people. They make the experiment repeatable and show the effect of
+a controller on identical behaviour.
 
-An operator behaves alike with every controller: pursue the line with a reaction delay and tremor;
-when the arm stops, think and try a recovery; if that does not help, try another, larger one. The
-controller decides only the type of recovery (`Recovery`):
+An operator behaves in the same way with every controller: it pursues the line with a reaction delay
+and tremor; when the arm stops, it thinks and tries a recovery; if that does not help, it tries
+another, larger one. The controller determines only the type of recovery (`Recovery`):
 
-- end-effector control: hand motions, a random direction with a random turn;
-- the novel controller: joint group 1, one way or the other.
+- end-effector control: hand motions in random directions with random rotations;
+- the novel controller: motion of joint group 1 in either direction.
 
 A successful recovery is remembered and tried first the next time. Nothing else is learnt, and
 operators begin without experience.
@@ -35,9 +35,9 @@ class Recovery(StrEnum):
     """Recovery of an operator when the arm stops."""
 
     HAND = "hand"
-    """Moves and turns the hand."""
+    """Translation and rotation of the hand."""
     GROUP = "group"
-    """Moves joint group 1, counted from 1, while the tool is held."""
+    """Motion of joint group 1, counted from 1, while the tool is held."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,23 +45,25 @@ class OperatorTraits:
     """Behaviour of one operator, the same with every controller.
 
     The values were set before the first run, to those usual for adults at slow and careful work,
-    and never fitted to an outcome. `drawn` varies them over operators.
+    and never fitted to results. `drawn` varies them over operators.
 
     Attributes:
         speed: Speed of the hand [m/s]: 1 m in 17 s, for "as accurately as possible".
-        reaction: From an event to the hand's answer [s]; simple reactions take 0.2 to 0.3 s.
-        thinking: From noticing that the arm has stopped to the next try [s].
-        pointing: To take the other device, point at the joint on the interface and press [s].
-        regrip: To take the first device again [s].
+        reaction: Time from an event to the reaction of the hand [s]; simple reactions take 0.2 to
+            0.3 s.
+        thinking: Time from the perceived stop of the arm to the next recovery [s].
+        pointing: Time to take the other device, point at the joint on the interface and press [s].
+        regrip: Time to take the first device again [s].
         muscle: Time constant of the hand's speed [s].
-        lookahead: How far ahead on the line the operator aims [m].
+        lookahead: Distance ahead on the line at which the operator aims [m].
         misjudging: Standard deviation of the perceived tool position, each coordinate [m].
         misjudging_memory: Time constant of the misjudgement [s].
         tremor: Standard deviation of the hand's speed as a fraction of the speed:
             signal-dependent noise (Harris and Wolpert, Nature 394, 1998).
-        tremor_rest: Speed added to the hand's before that fraction is taken [m/s]: tremor at rest.
+        tremor_rest: Speed added to the speed of the hand before that fraction is taken, for tremor
+            at rest [m/s].
         tremor_memory: Time constant of the tremor [s].
-        first_try: Distance of the hand's first recovery motion [m].
+        first_try: Distance of the first recovery motion of the hand [m].
         turn_per_metre: Rotation of the hand per distance in a recovery [rad/m].
         first_turn: Rotation of group 1 in the first recovery [rad].
         growth: Growth factor from one recovery to the next.
@@ -86,7 +88,7 @@ class OperatorTraits:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> OperatorTraits:
-        """Return an operator whose traits vary log-normally by a fifth."""
+        """Return random traits, log-normal with a standard deviation of 0.2 of the logarithm."""
         usual = cls()
         varied = (
             "speed", "reaction", "thinking", "pointing", "regrip", "misjudging", "tremor",
@@ -105,7 +107,7 @@ class Experience:
     """Successful recoveries with one controller, by the number of the obstacle on the line."""
 
     motions: dict[int, FloatArray] = field(default_factory=dict)
-    """Rotation and translation of the tool from where the arm stopped [rad; m], shape (6,)."""
+    """Rotation and translation of the tool from its pose at the stop [rad; m], shape (6,)."""
     turns: dict[int, float] = field(default_factory=dict)
     """Rotation of group 1 [rad]."""
 
@@ -121,7 +123,7 @@ class _Phase(StrEnum):
 
 
 _PAST = 0.05
-"""An obstacle is passed when the tool is this fraction of the line beyond it."""
+"""Fraction of the line beyond an obstacle at which the obstacle is passed."""
 _FARTHEST_TRY = 0.3
 """Greatest distance of a recovery [m]: a third of the arm's reach."""
 _FARTHEST_TURN = 1.6
@@ -129,7 +131,7 @@ _FARTHEST_TURN = 1.6
 
 
 class ScriptedOperator:
-    """One operator in one trial: steps in, commands out."""
+    """One operator in one trial: returns a command for each step of the arm."""
 
     def __init__(
         self,
@@ -170,7 +172,7 @@ class ScriptedOperator:
         self._begin(_Phase.READY, traits.reaction)
         self._obstacle, self._tries, self._farthest = -1, 0, -np.inf
         self._where: Step | None = None
-        """The arm where it stopped at this obstacle."""
+        """Step at which the arm stopped at the current obstacle."""
         self._motion, self._moved = np.zeros(6), np.zeros(6)
         self._turn, self._turned = 0.0, 0.0
 
@@ -226,11 +228,11 @@ class ScriptedOperator:
         traits, line = self._traits, self._line
         ahead = line.at(min(1.0, max(0.0, share) + traits.lookahead / line.length)) - place
         distance = float(np.linalg.norm(ahead))
-        # The hand slows down where the end is less than a second away at distance per second.
+        # Within `speed` x 1 s of the aim, the speed decreases in proportion to the distance.
         return np.asarray(ahead * (min(traits.speed, distance) / max(distance, 1e-9)))
 
     def _stop(self, seen: Step, share: float) -> None:
-        """Note that the arm has stopped: at the same obstacle as before, or beyond."""
+        """Record a stop of the arm, at the same obstacle as before or at the next one."""
         if share > self._farthest + _PAST:
             self._obstacle += 1
             self._tries = 0
@@ -249,7 +251,7 @@ class ScriptedOperator:
             self._tries = 0
 
     def _go_on(self) -> None:
-        """Begin the phase after one whose time is over."""
+        """Begin the phase that follows one whose time is over."""
         if self._phase is _Phase.THINK:
             self._tries += 1
             if self._approach is Recovery.GROUP:
@@ -260,7 +262,7 @@ class ScriptedOperator:
                 turn, way = (float(np.linalg.norm(part)) for part in np.split(self._motion, 2))
                 pace = self._traits.speed
                 lasts = max(way / pace, turn / (pace * self._traits.turn_per_metre))
-                # A remembered motion may be tiny; it still takes a moment.
+                # A remembered motion may be tiny, but takes some time.
                 self._begin(_Phase.TRY, max(lasts, self._traits.muscle))
         elif self._phase is _Phase.TO_GROUP:
             self._begin(_Phase.TURN, abs(self._turn) / self._settings.group_rate)
@@ -285,12 +287,12 @@ class ScriptedOperator:
         more = min(_FARTHEST_TURN, traits.first_turn * traits.growth ** (self._tries - 1))
         if self._turn and abs(self._turned) + more <= math.pi:
             return math.copysign(more, self._turn)
-        # First try, or that direction is blocked, or half a rotation has not helped: reverse.
+        # Reverse at the first try, if the direction is blocked, or if half a turn does not help.
         way = -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
         return float(way * (abs(self._turned) + more))
 
     def _end_try(self, now: Step, *, stopped: bool) -> None:
-        """Resume the line from here; think again where the recovery itself was stopped."""
+        """Resume the line after a recovery; think again if the arm stopped during it."""
         assert self._where is not None
         self._moved = pose_error(now.R, now.p, self._where.R, self._where.p)
         if stopped:
@@ -299,7 +301,7 @@ class ScriptedOperator:
             self._begin(_Phase.FOLLOW)
 
     def _end_turn(self, *, stopped: bool) -> None:
-        """Return to the tool; a blocked direction is not tried again."""
+        """Return to the tool after a group motion; a blocked direction is not tried again."""
         turned = (self._time - self._began) * self._settings.group_rate
         self._turned += math.copysign(turned, self._turn)
         if stopped:

@@ -1,6 +1,6 @@
 """Run files: CSV or Parquet, one row per sample.
 
-The columns of the arm's joints bear the joints' names and hold radians, so that
+The columns of joint positions have the names of the joints, in radians, so that
 `tcs capability record RUN.csv` makes a capability map of a run file.
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FORMATS = (".csv", ".parquet")
 VERSION = 2
-"""Version of the columns and of the metadata's keys."""
+"""Version of the columns and of the keys of the metadata."""
 _VERSION_KEY = "run_format"
 _XYZ = ("x", "y", "z")
 _WXYZ = ("qw", "qx", "qy", "qz")
@@ -34,9 +34,9 @@ _BOOLEANS = ("clutch", "singular", "stopped")
 
 
 def save_run(path: Path, run: Run) -> None:
-    """Write a run as CSV or Parquet, by the suffix of the path; whole or not at all.
+    """Write a run as CSV or Parquet, by the suffix of the path; completely or not at all.
 
-    CSV keeps ten digits, Parquet all of them.
+    CSV stores ten digits, Parquet all of them.
 
     Raises:
         OutputError: If the file cannot be written, its suffix is unknown, or the library for
@@ -56,10 +56,10 @@ def save_run(path: Path, run: Run) -> None:
 
 
 def check_format(path: Path) -> None:
-    """Refuse a path that no run can be written to.
+    """Check the suffix of a path to write a run to.
 
     Raises:
-        OutputError: If its suffix is unknown, or the library for Parquet is not installed.
+        OutputError: If the suffix is unknown, or the library for Parquet is not installed.
     """
     if path.suffix not in FORMATS:
         raise OutputError(f"'{path}' ends in '{path.suffix}'; a run is {' or '.join(FORMATS)}.")
@@ -74,15 +74,15 @@ def load_run(path: Path) -> Run:
     """Return the run in a file that `save_run` wrote.
 
     Raises:
-        DataFileError: If the file cannot be read, has another format version, is cut short, or
-            holds an invalid sample.
+        DataFileError: If the file cannot be read, has another format version, is truncated, or
+            contains an invalid sample.
     """
     where = f"run '{path}'"
     frame = _read(path, where)
     try:
         return _from_frame(frame)
     except DataFileError as error:
-        # These messages begin with "run": name the file there. A damaged file may hold line breaks.
+        # The messages start with "run": name the file there, on one line.
         text = " ".join(str(error).split())
         raise DataFileError(f"{where}{text.removeprefix('run')}") from None
 
@@ -91,7 +91,7 @@ def _read(path: Path, where: str) -> pd.DataFrame:
     """Return the table in a file.
 
     Raises:
-        DataFileError: If there is none.
+        DataFileError: If the file cannot be read, or is not a table.
     """
     import pandas as pd
 
@@ -113,7 +113,7 @@ def _read(path: Path, where: str) -> pd.DataFrame:
     except Exception as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise DataFileError(f"{where} is not a table: {reason}.") from None
-    # pandas fills up a row that ends early.
+    # pandas pads a truncated row.
     last = content.rstrip(b"\r\n").rsplit(b"\n", 1)[-1]
     if len(frame) > 1 and last.count(b",") < len(frame.columns) - 1:
         raise DataFileError(
@@ -142,7 +142,7 @@ def _to_frame(run: Run) -> pd.DataFrame:
     columns |= {"mode": run.mode.astype(object)}
     columns |= _split([f"{name}_limit" for name in run.joint_names], run.limits)
     columns |= {"singular": run.singular.astype(int), "stopped": run.stopped.astype(int)}
-    # One cell: no other place in a table is passed over by every reader of CSV.
+    # One cell, as readers of CSV have no common notation for comments.
     metadata = json.dumps({**run.metadata, _VERSION_KEY: VERSION}, sort_keys=True)
     columns[_METADATA] = [metadata] + [""] * (len(run) - 1)
     return pd.DataFrame(columns)
@@ -206,7 +206,7 @@ def _metadata(frame: pd.DataFrame) -> dict[str, Any]:
 
 
 def _values(frame: pd.DataFrame, name: str, columns: list[str]) -> Any:
-    """Return the array of some columns, shape (n, columns).
+    """Return columns as an array, shape (n, columns).
 
     Raises:
         DataFileError: If a value does not fit the column.
@@ -218,7 +218,7 @@ def _values(frame: pd.DataFrame, name: str, columns: list[str]) -> Any:
     values = np.column_stack(
         [pd.to_numeric(frame[column], errors="coerce").to_numpy(np.float64) for column in columns]
     )
-    # Infinite and too large values are left to the run's own checks.
+    # `Run` checks for infinite and too large values.
     valid = ~np.isnan(values)
     required = "a number"
     if name in _INTEGERS:

@@ -1,4 +1,4 @@
-"""Recorder of a session: commands and steps become a run, an hour at 100 Hz in 120 MB."""
+"""Recorder of a session: collects commands and steps as a run, an hour at 100 Hz in 120 MB."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from tcs.teleop import Arm, Command, Step
 from tcs.teleop.runs.run import NO_GROUP, Run
 
 _BLOCK = 6000
-"""Steps after which objects become arrays: a minute."""
+"""Number of steps after which objects are converted to arrays: a minute at 100 Hz."""
 _LEAST = 2
 """Least number of samples of a run."""
 _PUT_BACK = 1e-4
-"""Joints farther than this from the integral of their rates [rad] were placed there."""
+"""Difference of joints from the integral of their rates [rad] above which they were set."""
 
 
 class Recorder:
     """Collector of commands and steps."""
 
     def __init__(self, arm: Arm) -> None:
-        """Begin empty.
+        """Create an empty recorder.
 
         Args:
             arm: The arm.
@@ -43,7 +43,7 @@ class Recorder:
             self._rows = self._rows[_BLOCK:]
 
     def run(self, metadata: Mapping[str, Any]) -> Run | None:
-        """Return the recorded run; None if it is too short for one.
+        """Return the recorded run; None if there are fewer than two samples.
 
         Args:
             metadata: Metadata of the run.
@@ -60,13 +60,13 @@ class Recorder:
 
 
 def last_attempt(run: Run) -> int:
-    """Return the first sample of the operator's last attempt at a line.
+    """Return the index of the first sample of the operator's last attempt at a line.
 
-    An attempt begins with the first command after the arm was put back to its start; without a
-    command it is the last sample.
+    An attempt begins with the first command after the arm was put back to its start posture;
+    without a command the result is the last sample.
     """
     steps = np.diff(run.joints, axis=0) - run.rates[1:] * np.diff(run.time)[:, None]
-    # Steps integrate the rates, up to the digits of a file, except where the arm was put back.
+    # Joints are the integral of the rates, within the digits of a file, unless they were set.
     put_back = np.flatnonzero(np.abs(steps).max(axis=1) > _PUT_BACK)
     first = int(put_back[-1]) + 1 if len(put_back) else 0
     commanded = run.linear.any(axis=1) | run.angular.any(axis=1) | (run.sign != 0)
@@ -79,7 +79,7 @@ def run_from_steps(arm: Arm, rows: list[tuple[Command, Step]], metadata: Mapping
 
     Args:
         arm: The arm.
-        rows: Each command with the step after it; two at least.
+        rows: At least two pairs of a command and the step after it.
         metadata: Metadata of the run.
     """
     from scipy.spatial.transform import Rotation

@@ -17,7 +17,7 @@ IntArray = NDArray[np.int64]
 NO_GROUP = -1
 """Value of `Run.group` where no joint group was commanded."""
 _UNIT_SLACK = 1e-6
-"""Tolerance of a quaternion's length: files hold ten digits."""
+"""Tolerance of the length of a quaternion: files store ten digits."""
 _FARTHEST = {
     "time": (1e7, "s"),
     "joints": (1e3, "rad"),
@@ -26,30 +26,31 @@ _FARTHEST = {
     "linear": (1e3, "m/s"),
     "angular": (1e3, "rad/s"),
 }
-"""Greatest magnitude and unit of plausible values: beyond it the file is broken."""
+"""Greatest magnitude and unit of plausible values; a file with greater ones is damaged."""
 _MOST_GROUPS = 100
-"""Joint groups that settings may define; the paper has four."""
+"""Greatest number of joint groups that settings may define; the paper has four."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run of n samples; poses are those of the tool in the arm's frame of reference."""
+    """A run of n samples."""
 
     joint_names: tuple[str, ...]
+    """Names of the joints, from the base outward."""
     time: FloatArray
-    """From the start of the run [s], shape (n,), rising."""
+    """Time since the start of the session [s], ascending, shape (n,)."""
     joints: FloatArray
-    """[rad], shape (n, 7)."""
+    """Joint positions [rad], shape (n, 7)."""
     rates: FloatArray
-    """[rad/s], shape (n, 7)."""
+    """Joint rates [rad/s], shape (n, 7)."""
     position: FloatArray
-    """[m], shape (n, 3)."""
+    """Position of the tool in the robot's base [m], shape (n, 3)."""
     quaternion: FloatArray
-    """Of length 1, wxyz, shape (n, 4)."""
+    """Orientation of the tool in the robot's base, unit quaternion wxyz, shape (n, 4)."""
     linear: FloatArray
-    """Commanded velocity of the tool [m/s], shape (n, 3)."""
+    """Commanded velocity of the tool in the robot's base [m/s], shape (n, 3)."""
     angular: FloatArray
-    """Commanded angular velocity of the tool [rad/s], shape (n, 3)."""
+    """Commanded angular velocity of the tool in the robot's base [rad/s], shape (n, 3)."""
     group: IntArray
     """Commanded joint group, counted from 0, shape (n,); `NO_GROUP` for none."""
     sign: IntArray
@@ -59,20 +60,20 @@ class Run:
     mode: NDArray[np.str_]
     """Name of the control mode, shape (n,)."""
     limits: IntArray
-    """-1 where a joint was at its lower limit, 1 at its upper one, else 0, shape (n, 7)."""
+    """-1 where a joint was at its lower limit, 1 at its upper limit, else 0, shape (n, 7)."""
     singular: BoolArray
     """Whether the task was singular, shape (n,)."""
     stopped: BoolArray
     """Whether the arm did not follow the command, shape (n,)."""
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    """Origin of the run, such as robot, condition and seed: values that JSON can hold."""
+    """Origin of the run, such as robot, condition and seed, as values of JSON."""
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only.
 
         Raises:
-            DataFileError: If shapes do not match, a number is not finite or out of its range, a
-                mode is unknown, the time does not rise, or a quaternion is not of length 1.
+            DataFileError: If shapes do not match, a number is not finite or out of range, a mode is
+                unknown, times are not ascending, or a quaternion does not have length 1.
         """
         n, m = len(self.time), len(self.joint_names)
         wide = {"joints": m, "rates": m, "limits": m, "quaternion": 4}
@@ -108,11 +109,11 @@ class Run:
         self._check(np.abs(length - 1.0) <= _UNIT_SLACK, "'quaternion' must have length 1")
 
     def _check(self, valid: BoolArray, requirement: str) -> None:
-        """Refuse the first sample that is not valid.
+        """Raise an error for the first sample that is not valid.
 
         Args:
-            valid: Shape (n,) or (n, k).
-            requirement: What is required, for the message.
+            valid: Whether each value is valid, shape (n,) or (n, k).
+            requirement: The requirement, for the message.
 
         Raises:
             DataFileError: If a sample is not valid.
@@ -132,12 +133,12 @@ class Run:
     def hand(self) -> tuple[FloatArray, FloatArray]:
         """Return the path of the operator's hand while it was coupled to the tool.
 
-        The path is the sum of the commanded velocities, from the origin. A decoupled hand counts
-        as at rest, as the paper computes effort from the controlled path only.
+        The path is the integral of the commanded velocities, from the origin. A decoupled hand
+        counts as at rest, as the paper computes effort from the controlled path only.
 
         Returns:
-            Positions [m], shape (n, 3), and roll, pitch, yaw [rad], shape (n, 3), in the frame of
-            the tool's poses.
+            Positions [m], shape (n, 3), and roll, pitch, yaw [rad], shape (n, 3), in the robot's
+            base.
         """
         from scipy.spatial.transform import Rotation
 
@@ -154,3 +155,4 @@ class Run:
 
 
 ARRAYS = tuple(one.name for one in fields(Run) if one.name not in ("joint_names", "metadata"))
+"""Names of the arrays of a run."""

@@ -122,7 +122,7 @@ class TestBadInput:
         drive(session, Command(linear=(0.1, 0, 0), group=0, sign=1), 1.0)
         steps = drive(session, command, 1.0)
         assert all(step.stopped for step in steps)
-        assert steps[0].reason.startswith(f"command refused: {said}")
+        assert steps[0].reason.startswith(f"command rejected: {said}")
         assert "\n" not in steps[0].reason
         assert not steps[-1].rates.any()
         rates = np.array([step.rates for step in steps])
