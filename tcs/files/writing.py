@@ -91,8 +91,8 @@ def scratch_folder() -> Iterator[Path]:
 def remove_leftovers(folder: Path) -> None:
     """Remove the temporary files and folders of killed processes from a folder.
 
-    A file or folder is removed only if it has the name of a temporary file of `tcs`, belongs to this
-    user, and is not locked by a process; on a disk without locks nothing is removed. A process
+    A file or folder is removed only if it has the name of a temporary file of `tcs`, belongs to
+    this user, and is not locked by a process; on a disk without locks nothing is removed. A process
     searches each folder once.
 
     Args:
