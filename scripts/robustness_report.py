@@ -95,7 +95,8 @@ def estimate(path: Path, row: tuple[str, str], options: argparse.Namespace) -> N
     file = tcs.load(path)
     check_row(path, file, *row, ROBOT)
     settings = file.metadata.get("robustness", [None] * len(file.tables))[file.nominal_index]
-    if settings is not None and settings["environment_errors"] and not settings["check_base"]:
+    is_default = settings is not None and settings["environment_errors"]
+    if is_default and settings["body_collisions"] == "paper":
         # Estimates with more samples are kept.
         if settings["samples"] >= SAMPLES and settings["sets"] >= SETS:
             return

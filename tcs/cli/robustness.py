@@ -14,7 +14,7 @@ from tcs.cli.values import observed_settings
 from tcs.output import terminal
 from tcs.output.terminal import tables
 from tcs.output.words import member_text, settings_text
-from tcs.output.words.robustness import error_width
+from tcs.output.words.robustness import BODY_COLLISIONS, error_width
 
 _Errors = Annotated[
     Path | None,
@@ -30,12 +30,16 @@ Delta = Annotated[
         "`tcs robustify` can be selected."
     ),
 ]
-_CheckBase = Annotated[
-    bool,
+_BodyCollisions = Annotated[
+    str,
     typer.Option(
-        "--check-base",
-        help="Check the base for collisions in every sample, which the paper does not.",
+        metavar="paper|all|none",
+        help="Collisions of base, torso, head and other arm with the environment that count in a "
+        "sample: all but those of the base with the furniture, as in the paper; all; or none.",
     ),
+]
+_CheckBase = Annotated[
+    bool, typer.Option("--check-base", help="The same as --body-collisions all.")
 ]
 
 
@@ -60,6 +64,7 @@ def evaluate(
         ),
     ] = None,
     observed: options.Observed = None,
+    body_collisions: _BodyCollisions = "paper",
     check_base: _CheckBase = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
@@ -80,7 +85,7 @@ def evaluate(
             select=select,
             members=members or 2,
             table=table,
-            check_base=check_base,
+            body_collisions="all" if check_base else body_collisions,
             jobs=jobs,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
@@ -102,6 +107,7 @@ def robustify(
     seed: options.Seed = 0,
     errors: _Errors = None,
     observed: options.Observed = None,
+    body_collisions: _BodyCollisions = "paper",
     check_base: _CheckBase = False,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
@@ -125,7 +131,7 @@ def robustify(
             samples=samples,
             seed=seed,
             errors=errors,
-            check_base=check_base,
+            body_collisions="all" if check_base else body_collisions,
             tables=None if table is None else [table],
             jobs=jobs,
             on_progress=on_progress,
@@ -190,8 +196,8 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
     goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"]))
     out.print(f"by goal  {goals}")
     widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
-    base = "" if result["check_base"] else "; the base is not checked, as in the paper"
-    out.print(f"errors  {widths}{base}")
+    out.print(f"errors  {widths}")
+    out.print(f"collisions  {BODY_COLLISIONS[result['body_collisions']]}")
     if result["clipped"]:
         out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")

@@ -42,7 +42,8 @@ def stored(tmp_path_factory):
         ((), {}),
         (("--select", "single", "--seed", 3, "--jobs", 1), {"select": "single", "seed": 3}),
         (("--select", "uniform", "--members", 1), {"select": "uniform", "members": 1}),
-        (("--check-base",), {"check_base": True}),
+        (("--check-base",), {"body_collisions": "all"}),
+        (("--body-collisions", "none"), {"body_collisions": "none"}),
     ],
     ids=str,
 )

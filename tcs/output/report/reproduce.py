@@ -65,8 +65,8 @@ def robustify_command(report: ScoreReport) -> str:
     words = ["tcs", "robustify", str(report.path)]
     words += ["--sets", str(record["sets"]), "--samples", str(record["samples"])]
     words += ["--seed", str(record["seed"])]
-    if record["check_base"]:
-        words.append("--check-base")
+    if record["body_collisions"] != "paper":
+        words += ["--body-collisions", record["body_collisions"]]
     if not record["environment_errors"]:
         words += ["--errors", "ERRORS.yaml"]
     records = report.file.metadata["robustness"]

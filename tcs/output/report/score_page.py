@@ -14,7 +14,7 @@ from tcs.output.report.reproduce import commands, success_record
 from tcs.output.report.score_report import ScoreReport
 from tcs.output.report.score_summary import summary_blocks, unreached_everywhere
 from tcs.output.words import assigned_goals, frame_name, goals_text
-from tcs.output.words.robustness import error_width
+from tcs.output.words.robustness import BODY_COLLISIONS, error_width
 from tcs.placement.tables import SetTable
 
 
@@ -139,12 +139,12 @@ def _success(report: ScoreReport) -> list[Block]:
     widths = "; ".join(
         f"{frame_name(joint)} ({error_width(error)})" for joint, error in record["errors"].items()
     )
-    base = "the base must stay free" if record["check_base"] else "the base is not checked again"
+    collisions = BODY_COLLISIONS[record["body_collisions"]]
     blocks: list[Block] = [
         Text(
             f"Estimated by tcs {record['program_version']} from up to {record['samples']:,} "
-            f"samples, seed {record['seed']}, with errors of {widths}; {base}. In each sample the "
-            "configurations stay as they are, and the arm postures are computed anew."
+            f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. "
+            "In each sample the configurations stay as they are; arm postures are computed anew."
         ),
         table,
     ]

@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from tcs.placement.robustness import Evaluation, Loss
 
 
+BODY_COLLISIONS = {
+    "paper": "of the robot's body count, except those of the base with the furniture",
+    "all": "of the robot's body count",
+    "none": "of the robot's body are ignored",
+}
+"""What the collisions of base, torso, head and other arm mean for a sample."""
+
+
 def mean_and_std(evaluation: Evaluation) -> str:
     """Return mean and standard deviation in percent, as the paper prints them."""
     return f"{percent(evaluation.summary.mean)} ({percent(evaluation.summary.std)})"

@@ -43,7 +43,7 @@ def robustify(
     samples: int = 1024,
     seed: int = 0,
     errors: Errors = None,
-    check_base: bool = False,
+    body_collisions: str = "paper",
     tables: Sequence[int] | None = None,
     jobs: int = 2,
     on_progress: Progress = None,
@@ -62,7 +62,7 @@ def robustify(
         samples: Number of samples of the sets that remain to the end.
         seed: Seed of the samples; results are the same for any number of jobs.
         errors: Path of an error file, or errors by joint, in place of those of the environment.
-        check_base: Whether the base must be collision-free in every sample.
+        body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`.
         tables: Numbers of the tables; all by default. The others keep their estimates.
         jobs: Number of threads.
         on_progress: Called with the number of rounds done and of all rounds.
@@ -71,14 +71,14 @@ def robustify(
     Raises:
         StoreMismatchError: If the file was made from other models.
         DataFileError: If the error file cannot be used.
-        UnknownNameError: If a joint has no such name.
+        UnknownNameError: If a joint or a choice of collisions has no such name.
         SelectionError: If there is no such table.
         TcsError: If a number is out of range.
     """
     check_draws(samples, seed)
     if not 1 <= sets <= 100_000:
         raise TcsError(f"sets is {sets}; must be 1 to 100,000.")
-    trials = Trials.of(file, errors=errors, check_base=check_base, on_compile=on_compile)
+    trials = Trials.of(file, errors=errors, body_collisions=body_collisions, on_compile=on_compile)
     chosen = range(len(file.tables)) if tables is None else tables
     rounds = 1 + len(round_sizes(samples))
     done, total = 0, 2 * rounds * len(chosen)
@@ -101,7 +101,7 @@ def robustify(
         "sets": sets,
         "errors": trials.errors.to_json(),
         "environment_errors": errors is None,
-        "check_base": check_base,
+        "body_collisions": body_collisions,
     }
     # One record for each table, because tables may be estimated at different times.
     records = list(file.metadata.get("robustness", [None] * len(scored)))

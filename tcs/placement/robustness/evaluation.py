@@ -50,8 +50,8 @@ class Evaluation:
     """Number of samples in which an error is limited at a joint limit."""
     errors: ErrorModel
     """Error model of the joints."""
-    check_base: bool
-    """Whether the base had to be collision-free in every sample."""
+    body_collisions: str
+    """Collisions of the robot's body that counted, one of `BODY_COLLISIONS`."""
     seed: int
     """Seed of the samples."""
     seconds: float
@@ -108,7 +108,7 @@ class Evaluation:
             "seed": self.seed,
             "errors": self.errors.to_json(),
             "clipped": self.clipped,
-            "check_base": self.check_base,
+            "body_collisions": self.body_collisions,
             "seconds": self.seconds,
         }
 
@@ -122,7 +122,7 @@ def evaluate(
     select: str | Sequence[int] = "best",
     members: int = 2,
     table: int | None = None,
-    check_base: bool = False,
+    body_collisions: str | None = None,
     stream: str = "",
     jobs: int = 2,
     on_progress: Progress = None,
@@ -143,8 +143,8 @@ def evaluate(
         select: One of `SELECTIONS`, or flat configuration indices of the members of a set.
         members: Number of members of the sets of "uniform", 1 or 2.
         table: Number of the file's table; by default the nominal one. Not for trials.
-        check_base: Whether the base must be collision-free in every sample, which the paper does
-            not check. Not for trials.
+        body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`; by
+            default `paper`. Not for trials.
         stream: Name of the draw; another name gives independent samples.
         jobs: Number of threads.
         on_progress: Called with the number of evaluated pairs of configuration and sample, and of
@@ -156,7 +156,7 @@ def evaluate(
 
     Raises:
         StoreMismatchError: If the file was made from other models.
-        UnknownNameError: If a joint or a selection has no such name.
+        UnknownNameError: If a joint, a selection or a choice of collisions has no such name.
         DataFileError: If the error file cannot be used.
         SelectionError: If there is no set to evaluate.
         TcsError: If a number is out of range.
@@ -170,13 +170,17 @@ def evaluate(
     compiling = 0.0
     if isinstance(file, Trials):
         trials = file
-        if errors is not None or table is not None or check_base:
+        if errors is not None or table is not None or body_collisions is not None:
             raise TcsError(
-                "Trials already include errors, table and base check. Set them in Trials.of."
+                "Trials already include errors, table and body collisions. Set them in Trials.of."
             )
     else:
         trials = Trials.of(
-            file, errors=errors, table=table, check_base=check_base, on_compile=on_compile
+            file,
+            errors=errors,
+            table=table,
+            body_collisions=body_collisions or "paper",
+            on_compile=on_compile,
         )
         compiling = trials.compile_seconds
     offsets = trials.errors.draw(samples, seed, stream=stream)
@@ -204,7 +208,7 @@ def evaluate(
         choices=choices,
         clipped=trials.clipped(sets, offsets),
         errors=trials.errors,
-        check_base=trials.checks_base,
+        body_collisions=trials.body_collisions,
         seed=seed,
         seconds=time.perf_counter() - begun - compiling,
         observed=state_to_json(trials.file.observed_axes, trials.observed),

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import SelectionError, TcsError
-from tcs.kernel.arrays import FloatArray, GridArrays, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
+from tcs.placement.robustness.body_collisions import check_body_collisions, counted_pairs
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, PerturbedScenes, Run
 from tcs.placement.scoring.job import Job
@@ -48,8 +49,10 @@ class Trials:
     """Number of its table, which was scored for one observed state."""
     errors: ErrorModel
     """Error model of the environment."""
-    checks_base: bool
-    """Whether base and body of the robot must be collision-free in every sample."""
+    body_collisions: str
+    """Collisions of the robot's body that count, one of `BODY_COLLISIONS`."""
+    body_pairs: BoolArray
+    """The pairs of body and environment shapes that this means, shape (n_body, n_environment)."""
     job: Job
     """The scored task, robot, environment and grid."""
     scene: Scene
@@ -66,7 +69,7 @@ class Trials:
         *,
         errors: Errors = None,
         table: int | None = None,
-        check_base: bool = False,
+        body_collisions: str = "paper",
         on_compile: Callable[[], None] | None = None,
     ) -> Trials:
         """Return the trials of a score file.
@@ -75,15 +78,16 @@ class Trials:
             file: A score file.
             errors: Path of an error file, or errors by joint, in place of those of the environment.
             table: Number of one of its tables; by default the nominal one.
-            check_base: Whether the base must be collision-free, which the paper does not check.
+            body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`.
             on_compile: Called first if the kernel has to be compiled.
 
         Raises:
             StoreMismatchError: If the file was made from other models.
             DataFileError: If a file cannot be used.
-            UnknownNameError: If a named model or joint does not exist.
+            UnknownNameError: If a named model, joint or choice of collisions does not exist.
             SelectionError: If there is no such table.
         """
+        check_body_collisions(body_collisions)
         job, scene, lowered = rebuild_scene(file)
         chosen = file.nominal_index if table is None else table
         if not 0 <= chosen < len(file.tables):
@@ -94,7 +98,8 @@ class Trials:
         measure = str(file.metadata["measure"])
         problem = build_problem(lowered.arrays, lowered.grid, measure)
         seconds = warm_up(problem, on_compile)
-        return cls(file, chosen, model, check_base, job, scene, lowered, seconds)
+        pairs = counted_pairs(scene, lowered, body_collisions)
+        return cls(file, chosen, model, body_collisions, pairs, job, scene, lowered, seconds)
 
     def at_table(self, table: int) -> Trials:
         """Return the trials of another table of the same file."""
@@ -287,8 +292,7 @@ class Trials:
             for i in range(columns.size)
         )
         arrays = environment_at(self.lowered, self.scene, self.job.task, states)
-        if not self.checks_base:
-            arrays = arrays._replace(body_vs_environment=np.zeros_like(arrays.body_vs_environment))
+        arrays = arrays._replace(body_vs_environment=self.body_pairs)
         torso_levels = len(arrays.arm_base_p)
         origin = np.zeros(1)
         grid = GridArrays(columns.size, origin, origin, origin, torso_levels)

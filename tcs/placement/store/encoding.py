@@ -25,7 +25,7 @@ from tcs.placement.tables import Reason, ScoreTable, SetTable
 FORMAT = "tcs scores"
 """Name of the format."""
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 """Version of the format; files of other versions are refused."""
 
 

@@ -32,6 +32,6 @@ def test_without_error_every_row_gives_its_offline_score(task, environment, rng)
     assert np.array_equal(reached, sets.reached[np.searchsorted(sets.candidates, members)])
     # Configurations with a blocked base reach nothing offline, nor here if the base is checked.
     everywhere = rng.choice(trials.job.grid.size, 2000, replace=False)
-    checked = Trials.of(file, errors=trials.errors.errors, check_base=True)
+    checked = Trials.of(file, errors=trials.errors.errors, body_collisions="all")
     again = checked.reached(everywhere, trials.errors.draw(1, 0))[:, 0]
     assert np.array_equal(again, file.nominal.scores.reached[everywhere])

@@ -10,9 +10,11 @@ import pytest
 
 from tcs.errors import GridError, SelectionError, StoreMismatchError, TcsError
 from tcs.kernel.arrays import GridArrays
-from tcs.model.scene import ErrorDistribution, environment_at, goal_poses
+from tcs.model.scene import ErrorDistribution, Scene, SceneSpec, environment_at, goal_poses
+from tcs.model.scene.contacts import Group
 from tcs.placement.robustness import Trials, perturbed_scenes
 from tcs.placement.robustness import trials as trials_module
+from tcs.placement.robustness.body_collisions import base_bodies
 from tcs.placement.scoring.verify import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
 from tcs.placement.tables import Reason
 from tests.kernel.judge import is_true
@@ -45,14 +47,30 @@ def test_without_error_the_joints_are_the_stored_ones(bed_trials, rng):
             assert np.array_equal(joints[0, g], scores.joints_of(int(h), int(g)))
 
 
-def test_a_blocked_base_counts_only_where_it_is_checked(chair_file, chair_trials):
-    # Configurations whose base touches the chair: all goals blocked, offline.
+def test_only_contacts_of_the_base_with_furniture_are_ignored(chair_file, chair_trials):
+    # Configurations whose body touches something: all goals blocked, offline.
     scores = chair_trials.scored.scores
     blocked = np.flatnonzero(np.all(scores.reason == Reason.BODY_BLOCKED, axis=1))
     nothing = no_error(chair_trials, 1)
-    checked = Trials.of(chair_file, check_base=True)
+    checked = Trials.of(chair_file, body_collisions="all")
+    ignored = Trials.of(chair_file, body_collisions="none").reached(blocked, nothing)
     assert not checked.reached(blocked, nothing).any()
-    assert chair_trials.reached(blocked, nothing).any()
+    here = chair_trials.reached(blocked, nothing)
+    assert here.any()
+    assert np.all(ignored[here])
+    assert ignored.sum() > here.sum()
+    # Drake's contacts of the configurations that reach a goal: those of the base with the chair.
+    scene, base = chair_trials.scene, base_bodies(chair_trials.scene)
+    body = {part.name for part in scene.built.parts if part.group is Group.BODY}
+    before, contacts = scene.positions(), set()
+    for h in blocked[here.any(axis=(1, 2))]:
+        at = chair_trials.job.grid.configuration(int(h))
+        scene.place_base(at.base_x, at.base_y, at.base_yaw)
+        scene.set_torso(at.torso)
+        touching = [c for c in scene.clearances(0.0) if c[0] in body and c[2] < 0.0]
+        contacts |= {(first in base, second.split("::")[0]) for first, second, _ in touching}
+    scene.restore(before)
+    assert contacts == {(True, "wheelchair")}
     everything = np.arange(chair_trials.job.grid.size)
     assert np.array_equal(checked.reached(everything, nothing)[:, 0], scores.reached)
 
@@ -61,7 +79,7 @@ def test_checking_the_base_never_adds_a_goal(chair_file, chair_trials, rng):
     # The chair moves sideways into the robot, so a free base may become blocked.
     members, offsets = some(rng, chair_trials, 30), {"wheelchair_y": np.linspace(-0.4, 0.4, 20)}
     free = chair_trials.reached(members, offsets)
-    checked = Trials.of(chair_file, check_base=True).reached(members, offsets)
+    checked = Trials.of(chair_file, body_collisions="all").reached(members, offsets)
     assert not np.any(checked & ~free)
     assert np.count_nonzero(checked) < np.count_nonzero(free)
 
@@ -228,3 +246,17 @@ def test_a_file_of_other_models_is_refused(bed_file):
     other = dataclasses.replace(bed_file, metadata={**bed_file.metadata, "scene_digest": "5f" * 32})
     with pytest.raises(StoreMismatchError, match="from other models"):
         Trials.of(other)
+
+
+@pytest.mark.parametrize(
+    ("robot", "inside", "outside"),
+    [
+        ("pr2", {"base_link", "fl_caster_rotation_link", "fl_caster_l_wheel_link"}, "torso"),
+        ("tiago", {"base_link", "wheel_left_link"}, "torso_lift_link"),
+        ("baxter", {"base", "torso", "pedestal"}, "head"),
+    ],
+)
+def test_base_bodies_end_at_the_first_joint_with_limits(robot, inside, outside):
+    found = base_bodies(Scene(SceneSpec.load(robot, "wheelchair")))
+    assert inside <= found, sorted(found)
+    assert not any(name.startswith(outside) and name not in inside for name in found)

@@ -235,7 +235,7 @@ def test_a_longer_file_is_refused(path, file):
 
 def test_a_newer_file_is_refused(path, file):
     joblib.dump(encode(file) | {"format_version": FORMAT_VERSION + 1}, path)
-    message = "written by a newer tcs, and this program reads version 3: update tcs"
+    message = "written by a newer tcs, and this program reads version 4: update tcs"
     with pytest.raises(StoreFormatError, match=message):
         load_scores(path)
 
@@ -246,7 +246,7 @@ def test_an_older_file_gets_one_line_that_says_what_to_do(path, file):
         load_scores(path)
     assert str(refused.value) == (
         f"Score file '{path}': has format version 2, written by an older tcs, and this program "
-        "reads version 3. Make it again with `tcs score`."
+        "reads version 4. Make it again with `tcs score`."
     )
 
 

@@ -1,0 +1,82 @@
+"""Which collisions of the robot's body count when the environment is perturbed."""
+
+from __future__ import annotations
+
+from pydrake.multibody.tree import RevoluteJoint, WeldJoint
+
+from tcs.errors import UnknownNameError
+from tcs.kernel.arrays import BoolArray
+from tcs.model.scene import LoweredScene, Scene
+
+BODY_COLLISIONS = ("paper", "all", "none")
+"""Collisions of the robot's body, i.e. of everything but the scored arm, with the environment:
+
+- `paper`: all but those of the base with the furniture, which the evaluation of the TCS paper
+  ignores: the base may touch a wheelchair that stands elsewhere than assumed.
+- `all`: all of them.
+- `none`: none of them, as in hrl_base_selection in gt-ros-pkg/hrl-assistive (BSD), 30 April 2015.
+"""
+
+
+def check_body_collisions(name: str) -> None:
+    """Refuse a name that is not one of `BODY_COLLISIONS`.
+
+    Raises:
+        UnknownNameError: If it is not.
+    """
+    if name not in BODY_COLLISIONS:
+        raise UnknownNameError("body collisions", name, BODY_COLLISIONS, where="evaluate")
+
+
+def counted_pairs(scene: Scene, lowered: LoweredScene, body_collisions: str) -> BoolArray:
+    """Return which pairs of a body shape and an environment shape are checked under error.
+
+    Args:
+        scene: The scene, for the bodies that belong to the base and to the person.
+        lowered: The same scene as arrays.
+        body_collisions: One of `BODY_COLLISIONS`.
+
+    Returns:
+        Shape (body shapes, environment shapes); never more pairs than in the offline score.
+
+    Source:
+        TCS section IV: "We ignore collisions between the robot base and the wheelchair".
+    """
+    arrays = lowered.arrays
+    pairs = arrays.body_vs_environment.copy()
+    if body_collisions == "none":
+        pairs[:] = False
+    if body_collisions == "paper":
+        base, spec = base_bodies(scene), scene.spec.environment
+        of_base = [lowered.robot_bodies[i] in base for i in arrays.body.body]
+        models = [lowered.environment_bodies[i].split("::")[0] for i in arrays.environment.body]
+        for column, model in enumerate(models):
+            if not spec.is_person(model):
+                pairs[of_base, column] = False
+    return pairs
+
+
+def base_bodies(scene: Scene) -> frozenset[str]:
+    """Return the names of the robot bodies that form its base.
+
+    They are the root body and what is fixed to it or turns on it without limits: wheels and
+    casters. Whatever hangs on a joint with limits belongs to torso, head or arms.
+    """
+    plant = scene.built.plant
+    root = scene.built.base_frame.body()
+    found = {root.index()}
+    joints = [plant.get_joint(i) for i in plant.GetJointIndices(root.model_instance())]
+    # A body's joint may be listed before that of its parent: repeat until nothing is added.
+    size = 0
+    while len(found) > size:
+        size = len(found)
+        for joint in joints:
+            is_wheel = isinstance(joint, RevoluteJoint) and not _is_limited(joint)
+            if isinstance(joint, WeldJoint) or is_wheel:
+                if joint.parent_body().index() in found:
+                    found.add(joint.child_body().index())
+    return frozenset(plant.get_body(index).name() for index in found)
+
+
+def _is_limited(joint: RevoluteJoint) -> bool:
+    return bool(joint.position_lower_limits()[0] > -float("inf"))
