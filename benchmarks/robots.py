@@ -141,9 +141,9 @@ def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
         "recall_text": recall_text(verification),
     }
     if options.finished is not None:
-        # One write of one line: an interrupted run leaves no half of it but the last.
         with options.finished.open("a") as stream:
-            stream.write(json.dumps({"key": key, "text": text, "found": found}) + "\n")
+            # The line before may have been cut off by the end of an earlier run.
+            stream.write("\n" + json.dumps({"key": key, "text": text, "found": found}))
     return found
 
 
@@ -152,7 +152,7 @@ def finished(path: Path | None) -> list[dict[str, Any]]:
     if path is None or not path.exists():
         return []
     lines = []
-    for line in path.read_text().splitlines():
+    for line in filter(None, path.read_text().splitlines()):
         try:
             lines.append(json.loads(line))
         except ValueError:

@@ -156,3 +156,103 @@ def test_the_base_poses_of_the_thesis_are_as_far_apart_as_published(module):
     assert np.degrees(high[2] - expert[2]) == pytest.approx(2.8, abs=0.15)
     # A task to the right of the robot has the robot on its left, along its y axis.
     assert script.base_of(script.LOW) == pytest.approx((-0.45, -0.55, np.pi / 2))
+
+
+class StandIn:
+    """A job, a score file and its verification, without Drake."""
+
+    def __init__(self, robot: str, recall: float = 1.0) -> None:
+        self.robot, self.is_sound, self.scan_seconds = robot, True, 12.0
+        self.checked, self.false_reached, self.unconfirmed_hits = 500, 0, 0
+        self.dense_checked, self.missed = 30, 4
+        self.recall, self.recall_ci95, self.recall_note = recall, (recall, recall), None
+        self.measure, self.mean_shortfall = "isotropy", None
+        self.max_position_error = self.max_rotation_error = self.max_isotropy_error = 0.0
+        self.tables = ()
+
+    def scene(self):
+        return None
+
+    def lowered(self, _scene):
+        return self
+
+    def digest(self):
+        return "d"
+
+    def to_json(self):
+        strata = [
+            {"reason": "joint_limits", "pairs": 10, "scanned": 10, "missed": 4},
+            {"reason": "arm_blocked", "pairs": 2000, "scanned": 20, "missed": 0},
+            {"reason": "too_far", "pairs": 0, "scanned": 0, "missed": 0},
+        ]
+        counts = {key: getattr(self, key) for key in ("checked", "false_reached", "recall")}
+        return {
+            **counts,
+            "strata": strata,
+            "ik": "analytic",
+            "unconfirmed_hits": 0,
+            "scan_seconds": 12.0,
+            "reached": 996,
+        }
+
+
+def test_an_interrupted_run_of_the_robots_is_continued(module, monkeypatch, tmp_path, capsys):
+    robots = module("robots")
+    verified = []
+
+    def verify(file, **_options):
+        verified.append(file.robot)
+        if len(verified) == 2:
+            raise KeyboardInterrupt
+        return file
+
+    monkeypatch.setattr(robots, "load_job", lambda _task, _environment, robot: StandIn(robot))
+    monkeypatch.setattr(robots, "score", lambda _task, _environment, robot, **_: StandIn(robot))
+    monkeypatch.setattr(robots, "verify", verify)
+    path = tmp_path / "rows.jsonl"
+    words = ["--tasks", "shaving", "--robots", "pr2,panda", "--repeats", "0"]
+    monkeypatch.setattr(sys, "argv", ["robots.py", *words, "--finished", str(path)])
+    with pytest.raises(KeyboardInterrupt):
+        robots.main()
+    with path.open("a") as stream:
+        stream.write('\n{"key": {"task"')
+    assert robots.main() == 0
+    assert verified == ["pr2", "panda", "panda"]
+    printed = capsys.readouterr().out
+    assert "pr2, shaving" in printed
+    assert "(measured before)" in printed
+    assert robots.main() == 0
+    assert len(verified) == 3
+    # A changed kernel makes every row anew.
+    monkeypatch.setattr(robots, "kernel_digest", lambda _folder: "another")
+    assert robots.main() == 0
+    assert verified[3:] == ["pr2", "panda"]
+
+
+def test_the_recall_of_a_robot_is_that_of_all_its_rows(module, capsys):
+    robots = module("robots")
+    works = [robots.Work("shaving", "wheelchair", "pr2"), robots.Work("shaving", "bed", "pr2")]
+    found = [{**StandIn("pr2").to_json(), "reached": 496}, StandIn("pr2").to_json()]
+    robots.by_robot(works, found)
+    printed = capsys.readouterr().out
+    # 1492 are reached, and 4 of each row's 10 pairs were missed.
+    assert f"joint limits 8 of 20, recall {1492 / 1500:.5f}" in printed
+    assert "arm blocked 0 of 40 (of 4,000), recall 1.00000" in printed
+    assert works[1].line == "pr2, shaving, bed"
+
+
+@pytest.mark.parametrize(
+    ("found", "fault"),
+    [
+        (([1.0], 2, ["a line"]), None),
+        (([1.5], 2, ["a line"]), "false results"),
+        (([1.0], 3, ["a line"]), "false results"),
+        (([1.0], 2, []), "not one warning"),
+        (([1.0], 2, ["one", "two"]), "not one warning"),
+        ("dead processes", "dead processes"),
+    ],
+)
+def test_faults_are_told_apart(module, found, fault):
+    faults = module("faults")
+    counted = {name for name, count in faults.judged(found, [1.0], 2).items() if count}
+    assert counted == ({fault} if fault else set())
