@@ -30,7 +30,8 @@ def main() -> None:
     choice = tcs.select(file, here, frames={"head": (0.294, -0.09, 0.682)})
     match = choice.match
     assert match is not None
-    print(f"the head is {match.frame_error:.3f} m from its position at the shift {match.state}")
+    error = match.frame_position_error
+    print(f"the head is {error:.3f} m from its position at the shift {match.state}")
 
 
 if __name__ == "__main__":

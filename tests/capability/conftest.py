@@ -1,4 +1,4 @@
-"""TIAGo on an empty floor, and a coarse map of it: both take a second, so once a session."""
+"""TIAGo on an empty floor, and a coarse map of it, made once per session."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def test_joint_states_of_both_generations(generation, tiago, tmp_path):
     np.testing.assert_array_equal(found.torso_height, [LISTING[8]] * 2)
 
 
-def test_several_bags_follow_one_another(tiago, tmp_path):
+def test_several_bags_are_concatenated(tiago, tmp_path):
     other = [0.5, *LISTING[1:]]
     first = write_bag(tmp_path / "a.bag", [(NAMES, LISTING)])
     second = write_bag(tmp_path / "b.bag", [(NAMES, other)])

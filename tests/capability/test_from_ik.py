@@ -23,7 +23,7 @@ def test_a_reached_cell_is_confirmed_by_drake(ihcm, reach, rng):
             scene.set_arm(q)
             assert np.all((q >= lower) & (q <= upper))
             X_BT = scene.tool_pose()
-            # Joints are kept in single precision: 1e-7 rad at a metre.
+            # Joints are stored in single precision: 1e-7 rad at a distance of 1 m.
             np.testing.assert_allclose(X_BT.translation(), p, atol=1e-6)
             np.testing.assert_allclose(X_BT.rotation().matrix(), R, atol=1e-6)
             assert scene.violations() == ()
@@ -87,7 +87,7 @@ def test_no_posture_is_longer_than_the_arm(reach, rng):
     assert 0.9 * reach.length < away.max() <= reach.length
 
 
-def test_a_smaller_radius_leaves_out_what_is_farther(tiago):
+def test_a_smaller_radius_leaves_out_farther_cells(tiago):
     at = Reach(tiago, torso_height=0.15, step=0.1)
     grid = MapGrid.of(0.1, 4, "side")
     whole, near = map_from_ik(at, grid), map_from_ik(at, grid, radius=0.7)
@@ -129,7 +129,7 @@ def test_a_torso_height_out_of_range_is_refused(tiago, torso_height, words):
         Reach(tiago, torso_height=torso_height)
 
 
-def test_invalid_arguments_are_refused_before_the_work(tiago, monkeypatch):
+def test_invalid_arguments_are_refused_before_any_computation(tiago, monkeypatch):
     def solve(*_arguments, **_options):
         raise AssertionError
 

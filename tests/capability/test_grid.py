@@ -79,7 +79,7 @@ def test_the_nearest_tilt_is_the_nearest_of_all(rng):
 @given(
     st.lists(st.tuples(st.integers(0, 113), *[st.integers(-4000, 4000)] * 3, st.integers(0, 15)))
 )
-def test_keys_sort_as_cells_do_and_come_back(rows):
+def test_keys_sort_as_cells_do_and_convert_back(rows):
     grid = MapGrid.of(0.05, 16, "all")
     cells = np.array(sorted(rows), dtype=np.int32).reshape(-1, 5)
     keys = grid.keys(cells)
@@ -97,7 +97,7 @@ def test_keys_sort_as_cells_do_and_come_back(rows):
         (0.05, 1024, "from 4 to 1020"),
     ],
 )
-def test_impossible_grids_are_refused(step, yaw_bins, words):
+def test_invalid_grids_are_refused(step, yaw_bins, words):
     with pytest.raises(GridError, match=words):
         MapGrid.of(step, yaw_bins)
 
@@ -107,6 +107,6 @@ def test_unknown_grasps_are_refused():
         MapGrid.of(grasps="sides")
 
 
-def test_a_cell_beyond_the_numbers_is_refused():
+def test_a_cell_beyond_the_range_of_keys_is_refused():
     with pytest.raises(GridError, match="beyond"):
         MapGrid.of().keys(np.array([[0, 5000, 0, 0, 0]]))

@@ -31,18 +31,18 @@ def small_map(cells, manipulability, visibility, map_type="IHCM", grid=None, **c
 CELLS = [[0, 0, 0, 0, 0], [0, 1, 0, 0, 0], [1, 0, 0, 0, 3]]
 
 
-def test_fixed_scores_count_manipulability_by_the_arms_best():
+def test_fixed_scores_divide_manipulability_by_the_greatest_of_the_arm():
     found = small_map(CELLS, [0.05, 0.1, 0.2], [1.0, 0.5, 0.0])
     np.testing.assert_allclose(found.score(), [0.75, 0.75, 0.5], rtol=1e-6)
     np.testing.assert_allclose(found.of_type("ICM").score(), [0.5, 1.0, 1.0], rtol=1e-6)
 
 
-def test_the_thesis_stretches_both_within_the_map():
+def test_thesis_scores_scale_both_linearly_within_the_map():
     found = small_map(CELLS, [0.05, 0.1, 0.15], [1.0, 0.5, 0.5])
     np.testing.assert_allclose(found.score("thesis"), [0.5, 0.25, 0.5], rtol=1e-5)
 
 
-def test_a_map_of_equal_scores_can_be_stretched():
+def test_a_map_of_equal_scores_can_be_scaled():
     found = small_map(CELLS, [0.1] * 3, [0.5] * 3)
     np.testing.assert_array_equal(found.score("thesis"), [1.0, 1.0, 1.0])
 

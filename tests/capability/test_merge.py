@@ -118,7 +118,7 @@ def test_merging_agrees_with_plain_loops(task, seed, torso_height):
     assert fast.keys() == slow.keys()
     assert len(fast) > 20
     for key, score in slow.items():
-        # Scores are kept in single precision.
+        # Scores are stored in single precision.
         assert fast[key] == pytest.approx(score, rel=1e-6)
 
 
@@ -247,7 +247,7 @@ def test_the_best_and_the_worst(ihcm):
     assert np.all((found.base_poses[:, 2] > -math.pi) & (found.base_poses[:, 2] <= math.pi))
 
 
-def test_a_volume_answers_as_its_map_does(ihcm):
+def test_a_volume_gives_the_same_results_as_its_map(ihcm):
     task = linear_task(0.2, 2, 0.65, step=0.1)
     np.testing.assert_array_equal(merge(MapVolume(ihcm), task).score, merge(ihcm, task).score)
 
@@ -262,7 +262,7 @@ def test_a_long_line_is_split_into_the_fewest_stops(ihcm):
         part = GraspTask("part", task.positions[stop.first : stop.last + 1])
         assert merge(ihcm, part).best() == stop.base
 
-    # By trying every way to cut the line, no fewer stops do.
+    # Exhaustive search over all divisions of the line finds no fewer stops.
     def reachable(first, last):
         try:
             merge(ihcm, GraspTask("part", task.positions[first : last + 1]))
@@ -278,12 +278,12 @@ def test_a_long_line_is_split_into_the_fewest_stops(ihcm):
 
 
 def test_the_split_maximises_the_lowest_score():
-    """By trying every way to cut a line on maps of random scores."""
+    """Exhaustive search over all divisions of a line, on maps of random scores."""
     distinguished = 0
     for seed in range(6):
         rng = np.random.default_rng(seed)
         capability = random_map(rng)
-        # Places unevenly spaced: else every stretch of two is as good as any other.
+        # Unevenly spaced positions: otherwise all parts of two positions are equal.
         places = np.cumsum(rng.integers(2, 9, 5)) * 0.05
         task = GraspTask("t", tuple(GraspPosition(x, 0, 0.41, (Grasp(0.0),)) for x in places))
         n = len(task.positions)

@@ -62,7 +62,7 @@ def test_an_encoder_value_just_beyond_a_limit_is_clipped(tiago):
     assert found.joints[0, 0] == upper
 
 
-def test_a_csv_comes_back(tiago, tmp_path):
+def test_a_csv_round_trip(tiago, tmp_path):
     path = tmp_path / "arm.csv"
     write_csv(path, tiago, recording_of(NAMES, [LISTING] * 3, tiago))
     back = read_csv(path, tiago)
@@ -141,7 +141,7 @@ def test_the_height_is_measured_above_the_floor(ihcm, reach, tiago):
 
 
 def test_the_sample_of_a_cell_is_the_nearest(ihcm, reach, tiago):
-    """By the product of the two distances, each stretched over all samples: Appendix C.3."""
+    """By the product of both distances, each scaled linearly over all samples: Appendix C.3."""
     rng = np.random.default_rng(3)
     row = int(np.argmax(ihcm.manipulability))
     near = ihcm.joints[row] + rng.normal(0.0, 0.02, (40, 7))

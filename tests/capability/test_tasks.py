@@ -53,7 +53,7 @@ def test_an_arc_stays_near_its_radius_and_on_the_grid(radius):
     xy = np.array(places(task))
     assert np.abs(np.hypot(*xy.T) - radius).max() <= 0.05
     np.testing.assert_allclose(xy / 0.05, np.round(xy / 0.05), atol=1e-9)
-    # Nearest first: no other place of the quarter is nearer than the farthest one taken.
+    # No other point of the quarter is nearer to the arc than the farthest one chosen.
     line = np.arange(0, 13) * 0.05
     other = np.abs(np.hypot(*np.meshgrid(line, line)) - radius).ravel()
     assert np.sort(other)[3] == pytest.approx(np.abs(np.hypot(*xy.T) - radius).max(), abs=1e-9)
@@ -61,12 +61,12 @@ def test_an_arc_stays_near_its_radius_and_on_the_grid(radius):
     assert np.all(np.diff(np.arctan2(xy[:, 1], xy[:, 0])) >= 0.0)
 
 
-def test_the_gripper_keeps_off_the_door():
+def test_the_gripper_is_clear_of_the_door():
     # Closed along x and opening towards +y: the hand is on the +y side (heading -90) or beyond the
-    # free edge at +x (heading 180), never behind the door nor on its way to the hinge.
+    # free edge at +x (heading 180), never behind the door nor on the side of the hinge.
     task = curved_task(0.4, 0.0, math.pi / 2, 2, 1.0)
     assert headings(task.positions[0]) == [-90, 180]
-    # Open along y: what was before is now left of it, at -x.
+    # Open along y: the side in front of the door is now at -x.
     assert headings(task.positions[-1]) == [-90, 0]
 
 

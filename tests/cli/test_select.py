@@ -191,7 +191,7 @@ def test_the_observed_shift_is_reported(tcs_command, tmp_path):
     for option in ("--frames", "--seen"):
         words = (*HERE, option, "head=0.1,0.1,0.12", "--json")
         result = tcs_command("select", path, *words).json
-        assert result["frame_error"] == pytest.approx(0.02)
+        assert result["frame_position_error"] == pytest.approx(0.02)
     message = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
     assert "scored for person y 0.05 m; observed person y differs by -0.01 m" in message.out
     # A zero that comes out negative has no sign.

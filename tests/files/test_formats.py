@@ -1,4 +1,4 @@
-"""The suite for files that `tcs` saves and loads: every format runs through all that applies to it.
+"""The suite for files that `tcs` saves and loads: every format runs through all tests that apply.
 
 A new format is one more entry of `FORMATS`.
 """

@@ -59,7 +59,7 @@ def test_cache_follows_xdg(home, monkeypatch):
     assert cache_folder() == home / "xdg" / "tcs"
 
 
-def test_relative_xdg_folder_is_ignored_as_its_specification_says(home, monkeypatch):
+def test_relative_xdg_folder_is_ignored_as_specified(home, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", "xdg")
     assert cache_folder() == home / ".cache" / "tcs"
 

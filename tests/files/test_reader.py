@@ -1,4 +1,4 @@
-"""Files that try to do something when they are read. None may get as far as leaving a mark."""
+"""Files that try to execute code when they are read; none may succeed, which would leave a mark."""
 
 import os
 import pickle
@@ -86,7 +86,7 @@ def test_nothing_is_executed_in_any_protocol(path, mark, name, protocol):
 
 
 def test_the_attacks_are_real(path, mark):
-    """joblib's own reader falls for them, so the tests above could fail."""
+    """joblib's own reader executes them, so the tests above can fail."""
     for name in ("os.system", "in a list", "array of objects"):
         joblib.dump(attacks(mark)[name], path)
         joblib.load(path)
@@ -198,7 +198,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("content", BROKEN.values(), ids=BROKEN.keys())
-def test_a_hand_written_wreck_is_refused(path, content):
+def test_a_hand_written_damaged_file_is_refused(path, content):
     path.write_bytes(zlib.compress(content))
     with pytest.raises(StoreFormatError) as caught:
         load_scores(path)

@@ -30,7 +30,7 @@ def test_the_old_file_stays_until_the_new_one_is_complete(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_what_is_written_reaches_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):
+def test_content_is_flushed_to_the_disk_before_the_file_is_renamed(tmp_path, monkeypatch):
     path = tmp_path / "a.txt"
     sizes = []
     monkeypatch.setattr(os, "fsync", lambda handle: sizes.append(os.fstat(handle).st_size))
@@ -41,7 +41,7 @@ def test_what_is_written_reaches_the_disk_before_it_takes_the_name(tmp_path, mon
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_whatever_goes_wrong_inside_goes_on_and_leaves_nothing(tmp_path, error):
+def test_an_exception_inside_propagates_and_leaves_no_file(tmp_path, error):
     def write():
         with whole_file(tmp_path / "a.txt", "Text") as stream:
             stream.write(b"half")
@@ -52,7 +52,7 @@ def test_whatever_goes_wrong_inside_goes_on_and_leaves_nothing(tmp_path, error):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_told_with_what_to_do(tmp_path):
+def test_a_full_disk_is_reported_with_advice(tmp_path):
     path = tmp_path / "a.txt"
     with (
         pytest.raises(OutputError, match=r"^Text '.*a\.txt' cannot be written: full\. Buy one\.$"),

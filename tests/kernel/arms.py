@@ -1,4 +1,4 @@
-"""Chains of real arms, read off Drake's plant of their own URDF."""
+"""Chains of real arms, read from Drake's plant of their own URDF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plain-loop reference as the judge of the kernel's answers."""
+"""Comparison of the kernel's results with the plain-loop reference."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def chain_of(seed, lowered, *, spherical_shoulder=False):
 
 
 def is_true(scene, grid, h, g, q):
-    """Return whether the reference finds joints q at the goal, in their limits and free."""
+    """Return whether joints q are at the goal, within limits and free by the reference."""
     eased = scene._replace(
         margin=scene.margin - ROUNDING,
         environment=scene.environment._replace(
@@ -38,16 +38,16 @@ def is_true(scene, grid, h, g, q):
 
 
 def compare(scene, grid, scores, pairs, measure="isotropy"):
-    """Hold the kernel's answers against the reference's, away from contact."""
+    """Compare the kernel's results with the reference's, away from contact thresholds."""
     for h, g in pairs:
         expected = reference_pairs.score(scene, grid, int(h), int(g), measure)
         reason = int(scores.reason[h, g])
         if reason == REACHED and expected.reason == ARM_BLOCKED:
-            # The kernel looks between two contacts as well; the reference can judge what it found.
+            # The kernel also searches between two contacts; the reference checks its solution.
             assert is_true(scene, grid, h, g, scores.joints[h, g])
         elif expected.clearance > 1e-6:  # at contact, rounding decides
             assert reason == expected.reason, (h, g)
-            # Both look at the same angles; what is stored is that of joints rounded to float32.
+            # Both sample the same angles; the stored measure is that of joints rounded to float32.
             assert abs(scores.dexterity[h, g] - expected.dexterity) < 1e-6, (h, g)
 
 

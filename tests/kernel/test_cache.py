@@ -1,4 +1,4 @@
-"""The machine code on disk must be that of the sources, whatever is edited."""
+"""The machine code on disk must be that of the current sources."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ print(value, len(isotropy_at.stats.cache_hits), jit_folder())
 """
 
 
-def test_an_edit_in_an_imported_file_is_not_answered_with_old_machine_code(tmp_path):
+def test_an_edit_in_an_imported_file_recompiles_the_code(tmp_path):
     # `measures.isotropy_at` calls `kinematics.link_poses`: numba's own cache looks at measures.py
     # alone and would go on with the old placement.
     shutil.copytree(ROOT / "tcs", tmp_path / "tcs", ignore=shutil.ignore_patterns("__pycache__"))

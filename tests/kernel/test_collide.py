@@ -42,7 +42,7 @@ def row(shape):
 
 
 def gap_between(a, b):
-    """Return the gap at which the kernel changes its mind: its distance, 0 where cores meet."""
+    """Return the gap at which the kernel's result changes: its distance, 0 where cores overlap."""
     low, high = 0.0, FAR
     A, B = row(a), row(b)
     for _ in range(64):
@@ -52,7 +52,7 @@ def gap_between(a, b):
 
 
 def least_squares_distance(a, b):
-    """Return the distance by bounded least squares over points of both cores: a third judge."""
+    """Return the distance by bounded least squares over points of both cores."""
     matrix = np.hstack([a.R * a.half, -b.R * b.half])
     with np.errstate(all="ignore"):
         # Tolerances below what doubles can show: the active-set method stops when it is exact.
@@ -118,7 +118,7 @@ def near_pair(rng, first, second):
 
 
 def tolerance(a, b):
-    """Return how far the kernel's distance may be off [m].
+    """Return the greatest error of the kernel's distance [m].
 
     All is exact up to rounding, but for two capsules less than 1e-6 rad from parallel: the kernel
     takes them as parallel, which moves a closest point by up to 1e-6 of a length.
@@ -143,7 +143,7 @@ def test_the_reference_agrees_with_bounded_least_squares(first, second, rng):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_drake_never_sees_a_contact_that_the_kernel_does_not(first, second, rng):
+def test_every_contact_of_drake_is_a_contact_of_the_kernel(first, second, rng):
     # Drake is exact for a sphere with anything. For the rest it iterates, and stops too far out:
     # measured by up to 3e-4 m for capsules, 1e-3 m for a capsule and a box, centimetres for some
     # boxes with parallel edges (then least squares is on the kernel's side, see above). So its
@@ -174,8 +174,8 @@ def test_order_and_common_motion_do_not_matter(first, second, rng):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_balls_hold_their_shapes(first, second, rng):
-    # The quick test must never spare a pair that the exact one would catch.
+def test_bounding_spheres_contain_their_shapes(first, second, rng):
+    # The bounding spheres must never rule out a pair that is in contact.
     for _ in range(100):
         a, b = near_pair(rng, first, second)
         A, B = row(a), row(b)
@@ -241,7 +241,7 @@ def test_one_inside_the_other_touches(first, second, rng):
                      id="capsule of no length"),
     ],
 )  # fmt: skip
-def test_distances_that_can_be_worked_out_by_hand(a, b, exact):
+def test_distances_computed_by_hand(a, b, exact):
     # Rounding of numbers of the order of 1.
     assert gap_between(a, b) == pytest.approx(exact, abs=1e-14)
     assert distance(a, b) == pytest.approx(exact, abs=1e-14)

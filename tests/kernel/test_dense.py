@@ -1,4 +1,4 @@
-"""The dense scan, and the search held against it."""
+"""The dense scan, and comparison of the search with it."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
     for h, g in sample(rng, scores.reason == REACHED, 12):
         q = np.full(7, np.nan)
         value = dense_scan(problem, h, g, DENSE_SAMPLES, q)
-        # Free stretches narrower than the scan's 1/32 degree are the search's own.
+        # Only the search finds free intervals narrower than the scan's 1/32 degree.
         assert value >= 0.0
         # 1/32 degree is 5e-4 rad, and the isotropy of these arms changes by up to 2 per radian.
         assert value >= scores.dexterity[h, g] - 2e-3
         shortfalls.append(value - scores.dexterity[h, g])
-    # Refinement makes up for what the finer scan finds, up to another peak here and there.
+    # Refinement compensates the finer scan, except where the scan finds another peak.
     assert np.median(shortfalls) < 5e-4
 
 
@@ -70,7 +70,7 @@ def test_what_the_scan_finds_is_true(lowered, seed, rng):
         q = np.full(7, np.nan)
         value = dense_scan(problem, h, g, 2000, q)
         if value >= 0.0:
-            # The reference's chain of rotations rounds otherwise, to 1e-15.
+            # The reference's chain of rotations rounds differently, by 1e-15.
             eased = scene._replace(margin=scene.margin - 1e-9)
             assert reference_pairs.confirms(eased, grid, int(h), int(g), q)
             exact = isotropy(jacobian(scene.chain, q))
@@ -104,7 +104,7 @@ def test_nothing_is_found_too_far_away(lowered):
     "spherical_shoulder", [False, True], ids=["spherical-wrist", "spherical-shoulder"]
 )
 @pytest.mark.parametrize("samples", [2, 511, 512, 513, 514, 1025])
-def test_every_number_of_samples_is_walked_to_its_end(lowered, samples, spherical_shoulder):
+def test_every_number_of_samples_is_scanned_to_its_end(lowered, samples, spherical_shoulder):
     # Samples come in blocks of 512; a goal reached only at the last angle shows a lost block.
     chain = chain_of(4, lowered, spherical_shoulder=spherical_shoulder)
     free = free_joint(chain)

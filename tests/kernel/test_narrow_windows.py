@@ -21,7 +21,7 @@ NEXT_TO_A_LIMIT = [
     (86787, 3), (64777, 1), (64071, 5), (73541, 5), (80859, 5), (58945, 2), (61873, 1), (63310, 2),
     (79465, 5),
 ]  # fmt: skip
-# Of shaving, with TIAGo. The wrist is all but straight, and joints 5 and 7 swing by half a turn.
+# Of shaving, with TIAGo. The wrist is nearly straight, and joints 5 and 7 rotate by half a turn.
 STRAIGHT_WRIST = [(50114, 6), (51599, 6), (64780, 5), (69101, 5), (81542, 4)]
 
 
@@ -62,7 +62,7 @@ def test_a_window_at_a_straight_wrist_is_found(shaving_with_tiago, h, g):
 
 
 def check(problem, h, g):
-    """Score one pair, and hold it to the dense scan."""
+    """Score one pair, and compare it with the dense scan."""
     goals = problem.goal_p.shape[1]
     scores = Scores(
         reason=np.empty((1, goals), np.uint8),

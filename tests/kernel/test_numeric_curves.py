@@ -82,7 +82,7 @@ def test_every_start_of_the_table_is_in_its_cell(chain, rng):
         )
         index = np.clip(index.astype(int), 0, [13, 27, 7, 11])
         flat = np.ravel_multi_index(index, (14, 28, 8, 12))
-        # A figure on the face between two cells may round to either side.
+        # A value on the face between two cells may round to either side.
         inside = arm.first[flat] <= n < arm.first[flat + 1]
         place = (figures - arm.cell[:, 0]) / arm.cell[:, 1]
         assert inside or np.any(np.abs(place - np.round(place)) < 1e-8)
@@ -136,7 +136,7 @@ def test_factor_step_and_tangent_are_those_of_linear_algebra(chain, rng):
             assert tangent @ before > 0.0
 
 
-def test_newton_comes_back_to_the_goal(chain, rng):
+def test_newton_converges_to_the_goal(chain, rng):
     arm, newton, arrived = numeric_arm(chain), new_newton_workspace(), 0
     for _ in range(50):
         q = random_joints(rng, chain)
@@ -168,13 +168,13 @@ def test_a_curve_holds_the_tool_still_from_point_to_point(chain, rng, of):
             for n in range(curves.first[k], curves.first[k + 1]):
                 at = curves.q[n].copy()
                 assert evaluate(arm, *to, at, newton) < 1e-5
-                # Of the posture before the last step, 3e-4 off.
+                # Error of the posture before the last step, 3e-4.
                 assert curves.value[n] == pytest.approx(
                     exact(reference.jacobian(chain, at)), abs=2e-3
                 )
                 if n + 1 == curves.first[k + 1]:
                     continue
-                # Where nothing bends much, a cubic over 0.2 rad is good to about 1e-5.
+                # Where curvature is small, a cubic over 0.2 rad is accurate to about 1e-5.
                 point_between(curves, n, 0.5, at)
                 assert evaluate(arm, *to, at, newton) < 2e-4
                 assert curves.length[n] <= 0.25
@@ -201,7 +201,7 @@ def test_without_limits_a_curve_closes(rng):
     assert closed >= 9
 
 
-def test_solutions_hold_the_tool_in_drake_and_lie_near_the_posture_asked_for(rng):
+def test_solutions_hold_the_tool_in_drake_and_lie_near_the_given_posture(rng):
     arm = drake_arm("baxter")
     found = 0
     for _ in range(20):
@@ -221,7 +221,7 @@ def test_solutions_hold_the_tool_in_drake_and_lie_near_the_posture_asked_for(rng
 
 
 def test_postures_are_found_again_on_their_own_curves(rng):
-    # Each pose is reachable by construction, so what is not found is missed, whoever judges.
+    # Each pose is reachable by construction, so a posture that is not found is missed.
     any_found = own_found = drawn = 0
     for seed in range(8):
         chain = offset_arm(np.random.default_rng(100 + seed))
@@ -230,7 +230,7 @@ def test_postures_are_found_again_on_their_own_curves(rng):
             solutions = numeric_solutions(chain, *pose(chain, q))
             drawn += 1
             any_found += len(solutions) > 0
-            # A stride is up to 0.2 rad, and at the ends of a stretch one side may be beyond limits.
+            # A stride is up to 0.2 rad, and at the ends of a curve one side may be beyond limits.
             off = np.linalg.norm(around(solutions - q), axis=1)
             own_found += bool(np.any(off < 0.21))
     # Measured over 4,800 postures of twelve arms: all but one, and all but seven.

@@ -47,12 +47,12 @@ def test_numeric_ik_reaches_what_the_closed_form_reaches(lowered, seed):
     blocked = np.isin(
         closed.reason, (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT)
     )
-    # Which comes first, too far or the gripper on the robot, is a matter of how sharp the bound is.
+    # Whether TOO_FAR or the gripper's contact is reported first depends on the reach bound.
     assert np.mean(numeric.reason[blocked] == closed.reason[blocked]) > 0.9
     reached = closed.reason == REACHED
     assert reached.sum() > 5
     both = reached & (numeric.reason == REACHED)
-    # Measured: all of them on these scenes; a narrow stretch here and there may differ.
+    # Measured: all of them on these scenes; a narrow interval may differ.
     assert both.sum() >= 0.99 * reached.sum()
     for h, g in np.argwhere((numeric.reason == REACHED) & ~reached):
         assert is_true(scene, grid, h, g, numeric.joints[h, g])
@@ -128,7 +128,7 @@ def test_the_dense_scan_finds_what_is_reached_and_no_less_dexterous(seed, rng):
         assert value >= 0.0
         assert is_true(scene, grid, h, g, q)
         found.append(value - scores.dexterity[h, g])
-    # Nothing is refined there: what it finds lies up to half a spacing beside the best.
+    # The scan does not refine: its result is up to half a spacing from the best.
     assert np.median(np.abs(found)) < 1e-3
 
 
@@ -141,7 +141,7 @@ def test_nothing_too_far_is_found_by_many_starts(seed, rng):
         assert dense_scan(problem, h, g, 0, np.empty(7)) == -1.0
 
 
-def test_without_obstacles_only_the_robot_is_in_the_way():
+def test_without_obstacles_only_the_robot_blocks():
     _, _, scores = offset_scene(0, obstacles=0)
     assert set(np.unique(scores.reason)) <= {
         REACHED, TOO_FAR, JOINT_LIMITS, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED,

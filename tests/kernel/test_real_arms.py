@@ -70,7 +70,7 @@ def test_every_solution_reaches_the_goal_in_drake_within_the_limits(arm, rng):
 
 
 def test_every_posture_is_among_the_solutions(arm, rng):
-    # Completeness: at the free joint's own value, one branch gives the other six back.
+    # Completeness: at the value of the free joint, one branch gives the other six joints.
     chain, free = arm.chain, free_joint(arm.chain)
     worst = []
     for _ in range(500):

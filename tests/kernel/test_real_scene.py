@@ -15,7 +15,7 @@ from tests.kernel.judge import compare, is_true, stratified
 
 @pytest.fixture(scope="module")
 def real(lowered):
-    """Every third place and every heading of the wheelchair grid, scored by the public sweep."""
+    """Every third base position and every heading of the wheelchair grid, scored by the sweep."""
     grid = lowered.grid._replace(
         base_x=lowered.grid.base_x[::3],
         base_y=lowered.grid.base_y[1::3],
@@ -34,7 +34,7 @@ def test_two_jobs_give_what_one_gives(real):
     assert one.pair_names == two.pair_names
 
 
-def test_pairs_are_named_exactly_where_something_blocks(real):
+def test_contacts_are_reported_exactly_where_something_blocks(real):
     _, _, scores = real
     blocked = np.isin(
         scores.reason,
@@ -72,7 +72,7 @@ def test_the_kernel_agrees_with_the_reference_on_real_pairs(real, number):
 def test_reached_pairs_are_true_for_the_reference(real, rng):
     small, _, scores = real
     reached = np.argwhere(scores.reason == REACHED)
-    # The reference takes a second a pair here; `tcs verify` has Drake judge thousands.
+    # The reference takes a second per pair; `tcs verify` checks thousands by Drake.
     for h, g in reached[rng.choice(len(reached), 4, replace=False)]:
         q = np.asarray(scores.joints_of(int(h), int(g)))
         assert is_true(small.arrays, small.grid, h, g, q)

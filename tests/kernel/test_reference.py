@@ -47,7 +47,7 @@ def test_tool_pose_and_jacobian_are_drakes(scene, lowered, full_grid, seed):
     J = reference.jacobian(chain, q)
     J_W = np.vstack([X_WA[0] @ J[:3], X_WA[0] @ J[3:]])
     np.testing.assert_allclose(J_W, scene.tool_jacobian(), atol=EXACT)
-    # Turning the frame changes no isotropy.
+    # A rotation of the frame does not change isotropy.
     drakes = reference.isotropy(scene.tool_jacobian())
     assert reference.isotropy(J) == pytest.approx(drakes, abs=1e-9)
 
@@ -79,7 +79,7 @@ def test_distances_of_the_real_shapes_are_drakes_or_less(scene, lowered, full_gr
         ).distance
         if exact <= 0 and drakes <= 1e-6:
             continue
-        # Drake's iterations stop too far out where edges are parallel (see test_collide).
+        # Drake's iterations end too far out where edges are parallel (see test_collide).
         assert drakes > exact - 1e-6
         close += abs(drakes - exact) < 1e-5
     assert close > 60

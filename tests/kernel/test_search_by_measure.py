@@ -50,8 +50,8 @@ def test_what_is_reached_does_not_depend_on_the_measure(lowered, measure):
 
 
 @pytest.mark.parametrize("measure", OTHERS)
-def test_each_measure_wins_by_its_own_count(lowered, measure):
-    # Of the two sets of winners, each is the better one by the measure it was looked for with.
+def test_each_search_is_best_by_its_own_measure(lowered, measure):
+    # Of two sets of solutions, each is better by the measure that its search maximised.
     gains = []
     for scene, grid in scenes(lowered, range(4)):
         usual, other = scores_of(scene, grid), scores_of(scene, grid, measure=measure)

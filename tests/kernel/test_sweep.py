@@ -1,4 +1,4 @@
-"""The compiled sweep against the plain-loop reference, and laws that any sweep must keep."""
+"""The compiled sweep against the plain-loop reference, and invariants of any sweep."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_the_kernel_agrees_with_the_reference_in_random_scenes(
     "spherical_shoulder", [False, True], ids=["spherical-wrist", "spherical-shoulder"]
 )
 def test_random_scenes_show_every_reason(lowered, spherical_shoulder):
-    # The tests above look at what occurs; so everything must occur.
+    # The tests above cover only reasons that occur, so every reason must occur.
     counts = np.zeros(len(Reason), int)
     for seed in range(8):
         chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
@@ -127,7 +127,7 @@ def test_moving_environment_goals_and_robot_together_changes_nothing(lowered, se
         values = values.reshape(*shape, *values.shape[1:])
         return values.swapaxes(1, 2).reshape(size_of(grid), *values.shape[5:])
 
-    # Rounding of 1e-16 in other frames: it may turn a tie, or a sample at the edge of an arc.
+    # Rounding of 1e-16 in other frames may decide a tie, or a sample at the end of an arc.
     different = turned(after.reason) != before.reason
     assert np.mean(different) < 0.002
     both = (turned(after.reason) == REACHED) & (before.reason == REACHED)
@@ -139,7 +139,7 @@ def test_moving_environment_goals_and_robot_together_changes_nothing(lowered, se
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_obstacle_more_reaches_nothing_more(lowered, seed):
+def test_another_obstacle_never_adds_a_reached_goal(lowered, seed):
     # Of the verdict alone: with several convex obstacles the best measure that a search with
     # finite steps finds may even rise when an obstacle sends its refinement elsewhere.
     rng = np.random.default_rng(seed)
@@ -150,11 +150,11 @@ def test_an_obstacle_more_reaches_nothing_more(lowered, seed):
     p = scene.goal_p[0, 0] + rng.normal(scale=0.2, size=3)
     fuller = with_obstacle(scene, placed(shape_type, [0.15, 0.1, 0.2], rotation(rng), p, body=20))
     before, after = scores_of(scene, grid), scores_of(fuller, grid)
-    # Looking between two contacts depends on which contacts there are: what is new must be true.
+    # The search between two contacts depends on the contacts: a new solution must be true.
     for h, g in np.argwhere((after.reason == REACHED) & (before.reason != REACHED)):
         assert is_true(scene, grid, h, g, after.joints[h, g])
     assert np.sum(after.reason == REACHED) <= np.sum(before.reason == REACHED)
-    # Base and gripper are exact questions: for them the law holds without exception.
+    # Contacts of base and gripper are exact: for them the invariant holds without exception.
     for reason, later in (
         (BODY_BLOCKED, (BODY_BLOCKED,)),
         (GRIPPER_BLOCKED_BY_ENVIRONMENT, (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT)),
@@ -167,14 +167,14 @@ def test_an_obstacle_more_reaches_nothing_more(lowered, seed):
         assert np.all(np.isin(after.reason[blocked], later))
 
 
-def test_an_obstacle_on_the_gripper_blocks_it_wherever_the_robot_stands(lowered):
+def test_an_obstacle_on_the_gripper_blocks_it_at_every_base_pose(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=0, states=1), toy_grid(states=1)
     fuller = with_obstacle(scene, placed(SPHERE, [0.02, 0, 0], p=scene.goal_p[0, 1], body=9))
     scores = scores_of(fuller, grid)
     assert np.all(np.isin(scores.reason[:, 1], (BODY_BLOCKED, GRIPPER_BLOCKED_BY_ENVIRONMENT)))
 
 
-def test_states_of_the_environment_are_scored_each_for_itself(lowered):
+def test_states_of_the_environment_are_scored_independently(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 4, states=2), toy_grid(states=2)
     both = scores_of(scene, grid)
     half = size_of(grid) // 2
@@ -291,7 +291,7 @@ def test_goals_at_singularities_are_reached_truly_or_not_at_all(offset, rng):
 
 
 def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
-    # Straight up, this arm needs every centimetre that `arm_radius` grants.
+    # Straight up, this arm reaches as far as `arm_radius` allows.
     chain = straight_arm(np.full(7, 3.0), 0.0)
     scene, grid = toy_scene(chain, 0), toy_grid()
     radius = build_problem(scene, grid).arm_radius
@@ -304,7 +304,7 @@ def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
     assert 0.9 * radius < max(extents) <= radius - scene.margin
 
 
-def test_a_margin_of_zero_still_sees_shapes_inside_each_other(lowered):
+def test_a_margin_of_zero_still_detects_overlapping_shapes(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=8), toy_grid()
     tight, loose = scores_of(scene._replace(margin=1e-9), grid), scores_of(scene, grid)
     none = scores_of(scene._replace(margin=0.0), grid)
@@ -336,7 +336,7 @@ with open(sys.argv[2], "wb") as file:
 """
 
 
-def test_without_the_compiler_the_answers_are_the_same(lowered, tmp_path):
+def test_without_the_compiler_the_results_are_the_same(lowered, tmp_path):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=3, goals=3), toy_grid()
     whole = scores_of(scene, grid)
     # Two rows that reach something: a reached pair takes seconds without the compiler.

@@ -1,4 +1,4 @@
-"""Small random scenes around one arm: everything the kernel distinguishes, in few shapes."""
+"""Small random scenes around one arm, with every type of shape and contact of the kernel."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def environment_shapes(rng, number, states):
 
 
 def toy_grid(*, states=2):
-    """Return 3 x 3 places, four headings, two torso levels."""
+    """Return a grid of 3 x 3 base positions, four headings and two torso levels."""
     return GridArrays(
         environment_states=states,
         base_x=np.array([-0.4, 0.0, 0.45]),
@@ -84,7 +84,7 @@ def toy_grid(*, states=2):
 
 
 def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
-    """Return a random scene, its goals placed such that some place of `toy_grid` may reach them."""
+    """Return a random scene with goals that some base pose of `toy_grid` may reach."""
     rng = np.random.default_rng(seed)
     arm, body, environment = (
         arm_shapes(chain),
@@ -142,7 +142,7 @@ def with_obstacle(scene, shape):
 
 
 def size_of(grid):
-    """Return how many configurations there are."""
+    """Return the number of configurations."""
     places = len(grid.base_x) * len(grid.base_y) * len(grid.base_yaw)
     return grid.environment_states * places * grid.torso_levels
 
@@ -162,7 +162,7 @@ def scores_of(scene, grid, cuts=None, measure="isotropy", numeric=False):
         problem = problem._replace(arm=outside_solver(scene.chain))
     size, goals = size_of(grid), scene.goal_p.shape[1]
     scores = Scores(
-        # Values that no score has: whatever is left unfilled shows.
+        # Values that no score has, so that unfilled entries are detected.
         reason=np.full((size, goals), 99, np.uint8),
         contact=np.full((size, goals), -9, np.int32),
         dexterity=np.zeros((size, goals), np.float32),

@@ -1,4 +1,4 @@
-"""Arms that several tests drive."""
+"""Arms that several tests use."""
 
 from __future__ import annotations
 
@@ -23,5 +23,5 @@ def ready():
 
 @pytest.fixture(scope="session")
 def course(iiwa):
-    """The line of the experiment with the iiwa; to find it takes seconds."""
+    """The line of the experiment with the iiwa; finding it takes seconds."""
     return find_course(iiwa)

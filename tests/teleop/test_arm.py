@@ -28,7 +28,7 @@ def test_tool_and_jacobian_are_those_of_drake(name, lift, rng):
 
 
 @pytest.mark.parametrize("name", ["iiwa7", "tiago"])
-def test_jacobian_is_how_the_tool_moves(name, rng):
+def test_jacobian_is_the_derivative_of_the_tool_pose(name, rng):
     arm, step = load_arm(name), 1e-6
     for joints in arm.random_joints(rng, 5):
         now = arm.kinematics(joints)
@@ -84,7 +84,7 @@ def test_arrays_cannot_be_written_to():
     [[0.0] * 6, [0.0] * 8, [0.0] * 6 + [np.nan], [0.0] * 6 + [np.inf], "seven", None, [[0.0] * 7]],
     ids=["six", "eight", "nan", "inf", "text", "nothing", "nested"],
 )
-def test_joints_that_are_no_seven_numbers_are_refused(joints):
+def test_joints_that_are_not_seven_numbers_are_refused(joints):
     with pytest.raises(TcsError, match="must be 7 finite numbers"):
         load_arm("iiwa7").checked(joints)
 
@@ -109,13 +109,13 @@ def test_an_unknown_robot_is_named():
         load_arm("iwa7")
 
 
-def test_an_arm_knows_its_robot():
+def test_an_arm_has_its_robot():
     arm = load_arm("iiwa7")
     assert isinstance(arm, Arm)
     assert arm.name == "iiwa7"
 
 
 @pytest.mark.parametrize("lift", [np.nan, np.inf])
-def test_a_lift_that_is_no_number_is_refused(lift):
+def test_a_torso_height_that_is_not_finite_is_refused(lift):
     with pytest.raises(TcsError, match="torso height: must be a finite number"):
         load_arm("tiago", torso_height=lift)

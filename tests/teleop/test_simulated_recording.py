@@ -64,7 +64,7 @@ def test_drake_finds_no_contact(reach, minute):
 def test_a_stopped_arm_goes_back_along_its_path(minute):
     stopped, joints = minute.stopped, minute.recording.joints
     assert stopped.any()
-    # The rest of the time it follows the hand: it is never wedged for good.
+    # The rest of the time it follows the hand: it never gets stuck.
     assert stopped.mean() < 0.6
     assert not stopped[-500:].all()
     for i in np.flatnonzero(stopped)[::50]:
@@ -74,7 +74,7 @@ def test_a_stopped_arm_goes_back_along_its_path(minute):
 
 
 def test_the_arm_follows_the_hand_where_nothing_is_in_the_way(minute):
-    # It lags by speed over gain, 4 cm; much more means that it has lost the hand.
+    # It lags by speed over gain, 4 cm; much more means that it no longer follows the hand.
     assert np.median(minute.position_error[~minute.stopped]) < 0.08
 
 
@@ -145,6 +145,6 @@ def test_progress_ends_with_all_samples(reach):
         (HandMotion(scale=math.inf), "finite"),
     ],
 )
-def test_recordings_that_cannot_be(reach, motion, words):
+def test_invalid_recordings_are_refused(reach, motion, words):
     with pytest.raises(DataFileError, match=words):
         simulate_recording(reach, motion)

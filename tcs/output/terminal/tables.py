@@ -129,8 +129,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
         )
     if "observed" in result:
         errors = [deviation_text(name, value) for name, value in result["observed_error"].items()]
-        if result["frame_error"] is not None:
-            errors.append(f"observed frames differ by {result['frame_error']:.3f} m")
+        if result["frame_position_error"] is not None:
+            errors.append(f"observed frames differ by {result['frame_position_error']:.3f} m")
         state = settings_text(result["observed"])
         out.print(
             f"scored for {state}" + (f"; {', '.join(errors)}" if errors else ", not observed")

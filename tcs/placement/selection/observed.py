@@ -37,7 +37,7 @@ class Match:
     """Values of the observed axes the table was scored for [m or rad]."""
     observed_error: dict[str, float]
     """Observed minus scored value of each axis that was given [m or rad]."""
-    frame_error: float | None
+    frame_position_error: float | None
     """Root mean square distance of the observed frames from their scored positions [m]; None
     without frames."""
     axes: tuple[Axis, ...]
@@ -48,7 +48,7 @@ class Match:
         return {
             "observed": state_to_json(self.axes, self.state),
             "observed_error": state_to_json(self.axes, self.observed_error),
-            "frame_error": self.frame_error,
+            "frame_position_error": self.frame_position_error,
         }
 
 

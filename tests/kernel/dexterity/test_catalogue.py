@@ -1,4 +1,4 @@
-"""The measures of dexterity: their names, closed forms, and numpy's word on Drake's Jacobian."""
+"""Dexterity measures: names, closed forms, and comparison with numpy on Drake's Jacobian."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_inverse_condition_of_a_two_link_arm_is_the_closed_form(elbow, rng):
     J[0, 0] = -l2 * s
     root = math.sqrt(total * total - 4 * det * det)
     exact = math.sqrt((total - root) / (total + root))
-    # Four more singular values in between change nothing; turned about, none is on an axis.
+    # Four more singular values in between change nothing; after a rotation none is along an axis.
     J[2:, 2:6] = math.sqrt(det) * np.eye(4)
     turned = orthogonal(rng, 6) @ J @ orthogonal(rng, 7)
     assert inverse_condition(np.ascontiguousarray(turned)) == pytest.approx(exact, abs=1e-12)
@@ -166,7 +166,7 @@ def test_inverse_condition_does_not_depend_on_the_frame(lowered, rng):
 
 @pytest.mark.parametrize("penalty", [NORMALISED, THESIS])
 @pytest.mark.parametrize("which", range(7))
-def test_a_joint_at_its_limit_is_worth_nothing(penalty, which):
+def test_a_joint_at_its_limit_has_measure_zero(penalty, which):
     for limit in (LOWER, UPPER):
         q = (LOWER + UPPER) / 2
         q[which] = limit[which]
@@ -174,7 +174,7 @@ def test_a_joint_at_its_limit_is_worth_nothing(penalty, which):
 
 
 @pytest.mark.parametrize("limited", range(8))
-def test_in_the_middle_of_all_limits_the_normalised_penalty_takes_nothing(limited):
+def test_in_the_middle_of_all_limits_the_normalised_penalty_is_one(limited):
     lower, upper = LOWER.copy(), UPPER.copy()
     lower[limited:], upper[limited:] = -np.inf, np.inf
     q = np.where(np.isfinite(lower), (LOWER + UPPER) / 2, 2.0)
@@ -197,7 +197,7 @@ def test_the_penalty_is_the_printed_one_where_seven_joints_have_limits(rng):
         assert limit_penalty(q, LOWER, UPPER, UNLIMITED) == 1.0
 
 
-def test_wide_limits_are_as_none_to_the_normalised_penalty(rng):
+def test_the_normalised_penalty_of_wide_limits_is_that_of_none(rng):
     q = rng.uniform(LOWER, UPPER)
     q[2] = LOWER[2] + 1e-4
     continuous, wide = (LOWER.copy(), UPPER.copy()), (LOWER.copy(), UPPER.copy())
@@ -212,7 +212,7 @@ def test_wide_limits_are_as_none_to_the_normalised_penalty(rng):
     ("name", "meant"),
     [("isotropi", "isotropy"), ("inverse_condition", "inverse-condition")],
 )
-def test_an_unknown_measure_is_told_with_the_nearest_name(name, meant):
+def test_an_unknown_measure_is_reported_with_the_nearest_name(name, meant):
     with pytest.raises(UnknownNameError) as caught:
         dexterity(name)
     said = str(caught.value)

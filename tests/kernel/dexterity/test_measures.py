@@ -1,4 +1,4 @@
-"""Jacobian and isotropy at given joints, and rounding that keeps the limits."""
+"""Jacobian and isotropy at given joints, and rounding within the limits."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_isotropy_is_the_equation(chain, rng):
 
 
 def test_isotropy_does_not_depend_on_the_first_joint(chain, rng):
-    # Turning the whole arm about its first axis turns the Jacobian, no more.
+    # A rotation of the whole arm about its first axis only rotates the Jacobian.
     q = random_joints(rng, chain)
     values = []
     for first in rng.uniform(-3, 3, 10):

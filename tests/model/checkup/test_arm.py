@@ -24,7 +24,7 @@ def made_up(offsets):
     return Chain(R=R, p=p, lower=np.full(7, -2.0), upper=np.full(7, 2.0))
 
 
-def test_axes_that_miss_are_measured():
+def test_axes_that_do_not_meet_are_measured():
     # Along x, square to both axes: the offset is the distance.
     found = arm_class(made_up({2: [0.07, 0.0, 0.3], 6: [0.02, 0.0, 0.0], 1: [0.01, 0.0, 0.0]}))
     assert found.name is None
@@ -47,7 +47,7 @@ def test_parallel_axes_have_no_distance():
     assert arm_class(chain).distances["5-6"] is None
 
 
-def test_a_wrong_solver_is_found_out(pr2):
+def test_a_wrong_solver_is_detected(pr2):
     """The round trip judges by Drake: a solver of an arm 1 mm longer recovers nothing."""
     scene = Scene(SceneSpec(pr2, EMPTY_ENVIRONMENT))
     chain, _ = arm_chain(scene)
@@ -73,11 +73,11 @@ def test_a_numeric_solver_that_finds_too_little_is_a_problem(pr2):
 
 
 def test_a_closed_arm_is_solved_numerically_too(pr2):
-    """Without its closed form, Drake still has to confirm what comes back."""
+    """Without the closed form, Drake still has to confirm the solutions."""
     scene = Scene(SceneSpec(pr2, EMPTY_ENVIRONMENT))
     trip = round_trip(scene, None, 20, seed=0)
     assert (trip.method, trip.joint_error) == ("numeric", None)
-    # Of 200 poses it found 200; one of 20 may be lost to chance.
+    # It found solutions for 200 of 200 poses; one of 20 may be missed by chance.
     assert trip.recovered >= 19
     assert trip.solutions > trip.recovered
     assert trip.position_error < 1e-8

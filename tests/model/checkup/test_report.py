@@ -1,4 +1,4 @@
-"""The check-up: what a sound robot gets, and that each thing that may be wrong is found."""
+"""The check-up: results for a sound robot, and that every type of problem is found."""
 
 import json
 
@@ -20,7 +20,7 @@ def test_shipped_robots_are_sound(found):
     assert found.is_sound
 
 
-def test_json_holds_what_is_promised(found):
+def test_json_has_the_documented_keys(found):
     plain = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert {
         "arm_class", "limits", "enclosed", "excess_volume", "self_collision", "ik_round_trip",
@@ -30,11 +30,11 @@ def test_json_holds_what_is_promised(found):
     assert plain["ik_round_trip"]["success_rate"] == 1.0
 
 
-def test_every_posture_comes_back(found):
+def test_every_posture_is_recovered(found):
     assert found.trip.recovered == found.trip.samples == 200
     if found.robot.name == "baxter":
         assert found.trip.method == "numeric"
-        # Points on curves: many to a pose, and none has to be the very posture.
+        # Points on curves: many for a pose, and none has to be the given posture.
         assert found.trip.solutions > 200
         assert found.trip.joint_error is None
         # Newton steps end below 1e-9 along each axis.
@@ -88,7 +88,7 @@ def test_contact_at_rest_is_found(pr2):
     assert any("'l_wrist_roll_link'" in problem for problem in found.problems)
 
 
-def test_bulky_shapes_are_worth_a_note(pr2, tmp_path):
+def test_bulky_shapes_give_a_note(pr2, tmp_path):
     shapes = [
         shape.shrunk(-0.05) if shape.body == "l_wrist_roll_link" else shape
         for shape in pr2.load_primitives()

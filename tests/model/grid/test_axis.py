@@ -19,7 +19,7 @@ def axes(draw):
 
 
 @given(axes())
-def test_plain_form_goes_there_and_back(axis):
+def test_plain_form_round_trip(axis):
     assert Axis.from_dict(axis.to_dict()) == axis
 
 
@@ -65,7 +65,7 @@ def test_a_single_value_needs_no_step():
     ],
     ids=str,
 )
-def test_what_is_no_axis_is_refused(changes, expected):
+def test_an_invalid_axis_is_refused(changes, expected):
     spec = {"name": "base_x", "unit": "m", "start": 0, "step": 0.1, "count": 3}
     with pytest.raises(GridError) as caught:
         Axis.from_dict({**spec, **changes}, where="own.yaml")

@@ -62,7 +62,7 @@ def test_grids_of_the_paper_have_their_size(spec, size, environment_shape):
 
 
 @given(grids(), st.data())
-def test_index_goes_there_and_back(grid, data):
+def test_index_round_trip(grid, data):
     flat = data.draw(st.lists(st.integers(0, grid.size - 1), max_size=20))
     along = grid.indices(np.array(flat, dtype=np.int64))
     assert along.shape == (len(flat), len(grid.axes))
@@ -70,7 +70,7 @@ def test_index_goes_there_and_back(grid, data):
 
 
 @given(grids())
-def test_plain_form_goes_there_and_back(grid):
+def test_plain_form_round_trip(grid):
     assert Grid.from_dict(grid.to_dict()) == grid
     assert pickle.loads(pickle.dumps(grid)) == grid
 
@@ -91,7 +91,7 @@ def test_torso_changes_fastest_and_the_bed_slowest():
     assert grid.indices(grid.size // 4).tolist() == [1, 0, 0, 0, 0, 0]
 
 
-def test_indices_keep_the_shape_asked_for():
+def test_indices_have_the_shape_of_their_argument():
     grid = Grid.from_spec(WHEELCHAIR)
     assert grid.indices(5).shape == (4,)
     assert grid.indices([[0, 1], [2, 3]]).shape == (2, 2, 4)
@@ -100,12 +100,12 @@ def test_indices_keep_the_shape_asked_for():
     assert grid.flat([[[0, 0, 0, 1]]]).tolist() == [[1]]
 
 
-def test_robot_axes_of_a_spec_may_stand_in_any_order():
+def test_robot_axes_of_a_spec_may_be_in_any_order():
     shuffled = {name: WHEELCHAIR[name] for name in ("torso", "base_y", "base_yaw", "base_x")}
     assert Grid.from_spec(shuffled) == Grid.from_spec(WHEELCHAIR)
 
 
-def test_configuration_holds_metres_and_radians():
+def test_configuration_is_in_metres_and_radians():
     grid = Grid.from_spec(BED)
     configuration = grid.configuration(int(grid.flat([2, 1, 20, 25, 3, 2])))
     assert configuration.base_x == pytest.approx(0.0, abs=1e-15)  # -2 + 20 * 0.1 rounds
@@ -140,7 +140,7 @@ def test_axis_by_name():
     ],
     ids=["empty", "enormous", "unit", "full-turn-twice", "missing", "nothing", "no-axis"],
 )
-def test_what_is_no_grid_is_refused(spec, expected):
+def test_an_invalid_grid_is_refused(spec, expected):
     with pytest.raises(GridError) as caught:
         Grid.from_spec(spec, where="file 'own.yaml'")
     assert expected in str(caught.value)
@@ -148,7 +148,7 @@ def test_what_is_no_grid_is_refused(spec, expected):
     assert "\n" not in str(caught.value)
 
 
-def test_a_whole_turn_of_any_step_is_no_turn_too_many():
+def test_a_full_turn_of_any_step_is_allowed():
     # 360 / 7 is rounded, so seven of them are not exactly a turn.
     for count in (7, 8, 360):
         assert Grid.from_spec(changed("base_yaw", start=10, step=360 / count, count=count))
@@ -163,7 +163,7 @@ def test_the_largest_grid_is_allowed_and_one_more_is_not():
         Grid.from_spec(full)
 
 
-def test_axes_may_not_repeat_or_stand_elsewhere():
+def test_axes_may_not_repeat_or_be_out_of_order():
     axes = Grid.from_spec(WHEELCHAIR).axes
     with pytest.raises(GridError, match="axis 'base_x' is repeated"):
         Grid((axes[0], *axes))
@@ -199,7 +199,7 @@ def test_task_changes_some_axes_only():
     assert grid.overridden({}) == grid
 
 
-def test_changes_that_make_no_grid_say_where_they_stand():
+def test_changes_that_make_an_invalid_grid_are_reported_with_their_source():
     grid = Grid.from_spec(WHEELCHAIR)
     with pytest.raises(
         UnknownNameError, match=r"task 'a': unknown axis 'base_z'.*Did you mean 'base_"
@@ -210,7 +210,7 @@ def test_changes_that_make_no_grid_say_where_they_stand():
 
 
 @pytest.mark.parametrize("plain", [{}, {"axes": 3}, {"axes": ["base_x"]}], ids=str)
-def test_what_is_no_plain_form_is_refused(plain):
+def test_an_invalid_plain_form_is_refused(plain):
     with pytest.raises(GridError, match="needs 'axes', a list of axes"):
         Grid.from_dict(plain)
 

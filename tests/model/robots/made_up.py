@@ -1,4 +1,4 @@
-"""A small URDF of boxes for tests: a base on the floor, a lift, seven turning joints, a gripper."""
+"""A small URDF of boxes for tests: base on the floor, torso, seven revolute joints, gripper."""
 
 # Where each arm joint sits in its parent, and about which axis it turns: a roll-pitch-roll arm with
 # a wrist whose last three axes meet.

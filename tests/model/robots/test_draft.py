@@ -1,4 +1,4 @@
-"""Drafting robot files: what is found in a URDF, and one clear line when it cannot be used."""
+"""Drafting robot files: what is found in a URDF, and one-line errors if it cannot be used."""
 
 import pytest
 
@@ -36,14 +36,14 @@ def test_arm_and_torso_are_found(drafted):
     assert any("a1, a2, a3, a4, a5, a6, a7" in remark for remark in drafted[0].remarks)
 
 
-def test_other_joints_stand_at_zero_or_mid_range(drafted):
+def test_other_joints_are_at_zero_or_mid_range(drafted):
     robot = drafted[0].robot
     assert robot.postures == {"drafted": {"pan": 0.0, "nod": 0.5}}
     assert robot.grippers == {"drafted": {"grip": 0.02}}
 
 
-def test_a_posture_of_rest_is_found_where_zero_will_not_do(tmp_path):
-    """A wall in front of the mast, in which the arm would stand at zero."""
+def test_a_rest_posture_is_found_where_zero_collides(tmp_path):
+    """A wall in front of the mast touches the arm at zero."""
     wall = (
         '<link name="wall"><visual><geometry><box size="0.2 0.4 0.4"/></geometry></visual></link>'
     )
@@ -65,7 +65,7 @@ def test_a_posture_of_rest_is_found_where_zero_will_not_do(tmp_path):
     assert not any("wall" in pair for pair in met[1])
 
 
-def test_written_file_says_the_same(drafted):
+def test_the_written_file_has_the_same_content(drafted):
     draft, file = drafted
     robot = load_robot(file)
     assert robot.model() == draft.robot.model()

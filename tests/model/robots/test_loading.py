@@ -13,7 +13,7 @@ def write(folder, stem, /, **content):
     return path
 
 
-def test_a_file_takes_over_what_it_does_not_say(tmp_path, pr2):
+def test_a_file_inherits_missing_fields(tmp_path, pr2):
     mine = load_robot(write(tmp_path, "mine", based_on="pr2", name="mine", gripper="closed"))
     assert (mine.name, mine.gripper) == ("mine", "closed")
     taken = {"name", "gripper"}
@@ -23,7 +23,7 @@ def test_a_file_takes_over_what_it_does_not_say(tmp_path, pr2):
     assert load_robot(tmp_path / "again.yaml").load_primitives() == pr2.load_primitives()
 
 
-def test_bases_that_do_not_exist_or_run_in_circles_are_refused(tmp_path):
+def test_missing_or_circular_bases_are_refused(tmp_path):
     with pytest.raises(UnknownNameError, match=r"based_on.*Did you mean 'pr2'"):
         load_robot(write(tmp_path, "mine", based_on="pr3", name="mine"))
     write(tmp_path, "one", based_on="./two.yaml")

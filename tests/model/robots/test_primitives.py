@@ -74,7 +74,7 @@ def test_triangle_needs_all_corners():
     assert shape().shrunk(-0.2).contains_triangles(triangle)[0]
 
 
-def test_file_holds_what_was_written(tmp_path):
+def test_file_round_trip(tmp_path):
     path = tmp_path / "p.csv"
     shapes = (
         shape(size=(0.1, 0.2, 0.3), xyz=(-0.123456, 0.0, 1.0)),

@@ -104,7 +104,7 @@ def test_iiwa_has_the_published_joints():
             assert joint.hard == numbers(row, "lower", "upper")
 
 
-def test_iiwa_is_as_long_as_its_data_sheet_says():
+def test_iiwa_is_as_long_as_in_its_data_sheet():
     """340, 400, 400 and 126 mm from the foot to the flange, the arm straight up."""
     robot = load_robot("iiwa7")
     model = model_with_extras(robot)
@@ -184,7 +184,7 @@ def test_right_arm_is_the_left_one_in_a_mirror(pr2):
         assert isinstance(joints[name], Joint)
         sides = [joints[swapped(name)], joints[name]]
         assert sides[1].xyz == pytest.approx([sides[0].xyz[0], -sides[0].xyz[1], sides[0].xyz[2]])
-    # Pan and roll turn the other way round in a mirror.
+    # Pan and roll have the opposite sense in a mirror.
     turns = {"shoulder_pan", "upper_arm_roll", "forearm_roll", "wrist_roll"}
     for posture, positions in pr2.postures.items():
         mirrored = {
@@ -194,7 +194,7 @@ def test_right_arm_is_the_left_one_in_a_mirror(pr2):
         assert right.postures[posture] == mirrored
 
 
-def test_both_arms_have_the_same_pairs_off(pr2):
+def test_both_arms_have_the_same_disabled_pairs(pr2):
     right = load_robot("pr2_right")
     left = {frozenset(map(swapped, pair)) for pair in pr2.disabled_pairs}
     assert {frozenset(pair) for pair in right.disabled_pairs} == left

@@ -1,4 +1,4 @@
-"""Robot files: what the PR2's says, and what a wrong one gets."""
+"""Robot files: content of that of the PR2, and errors of invalid ones."""
 
 import pickle
 import re
@@ -58,7 +58,7 @@ def test_hard_limits_on_request(pr2):
     assert limits["torso_lift_joint"] == (0.0, 0.31)
 
 
-def test_positions_hold_everything_but_arm_and_torso(pr2):
+def test_positions_include_all_joints_except_arm_and_torso(pr2):
     positions = pr2.joint_positions()
     movable = {joint.name for joint in pr2.model().joints.values() if joint.is_movable}
     assert set(positions) == movable - {*pr2.arm_joints, pr2.torso_joint}
@@ -240,7 +240,7 @@ def test_wrong_files_get_one_clear_line(case, content, tmp_path):
 
 
 @pytest.mark.parametrize("text", ["- a\n- b\n", "a: [", "", "\tx"])
-def test_what_is_no_robot_file_is_refused(text, tmp_path):
+def test_a_file_that_is_not_a_robot_file_is_refused(text, tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(RobotError, match=r"mine\.yaml"):

@@ -99,7 +99,7 @@ def test_rest_is_free_of_self_collision(robot, model):
     assert touching == set()
 
 
-def test_tool_looks_out_of_the_hand_along_its_x(robot, model):
+def test_the_x_axis_of_the_tool_points_out_of_the_hand(robot, model):
     """Goals have x forward: from the last joint the tool lies straight ahead."""
     last = model.joints[robot.arm_joints[-1]].child
     R_T, p_T = pose_in_root(model, robot.tool_frame, {})

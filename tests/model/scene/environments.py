@@ -94,7 +94,7 @@ class EnvironmentAlone:
             point = X_WL @ numbers(row, "x", "y", "z")
             normal = X_WL.rotation() @ numbers(row, "nx", "ny", "nz")
             # The meshes reach into one another with slots and sockets that nothing ever meets.
-            # What lies inside another part is such a place, and so is what a ball cannot touch
+            # Points inside another part are such places, and so are points a sphere cannot touch
             # because another part is in its way.
             others = self.distances_to_links(point + PROBE_RADIUS * normal)
             others.pop(link)

@@ -15,7 +15,7 @@ from tests.model.scene.environments import EnvironmentAlone, numbers, rows
 HEAD_RESTS = (0, 35, 70)
 HINGE = np.array([0.755, 0.0, 0.541])
 OUR_NAME = {"head_link": "head_center"}
-"""The head's shapes ride on a link of their own, so that the head can tilt alone."""
+"""The head's shapes are on a link of their own, so that the head can tilt alone."""
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def bed():
 
 @pytest.fixture
 def environment(bed):
-    """The bed environment as its file says, before and after each test."""
+    """The bed environment in the state of its file, before and after each test."""
     bed.set()
     yield bed
     bed.set()
@@ -140,7 +140,7 @@ FURNITURE = [row for row in rows("furniture_bed.csv") if row["kind"] == "primiti
 
 
 @pytest.mark.parametrize("row", FURNITURE, ids=lambda row: row["item"])
-def test_furniture_stands_where_the_mesh_has_it(environment, row):
+def test_furniture_is_where_the_mesh_is(environment, row):
     lowest, highest = environment.reach(our_name(row["item"]))
     if row["shape"] == "cylinder":
         centre, radius = numbers(row, "cx", "cy", "cz"), float(row["dim_a"])
@@ -264,7 +264,7 @@ def test_joints_go_as_far_as_the_bed_does(environment):
         environment.set(head_rest=np.radians(105))
 
 
-def test_models_load_without_a_word_from_drake(caplog):
+def test_models_load_without_a_warning_from_drake(caplog):
     EnvironmentAlone("bed")
     assert caplog.records == []
 

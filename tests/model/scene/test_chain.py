@@ -10,7 +10,7 @@ from tcs.model.scene.chain import AXES_MEET, JointAxis, link_frames, meeting_poi
 
 
 def axis_through(point, direction, slide=0.0, turn=0.0):
-    """An axis whose joint frame sits `slide` along it and is turned arbitrarily."""
+    """An axis whose joint frame is at `slide` along it and rotated arbitrarily."""
     direction = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     R_AJ = Rotation.from_euler("xyz", [turn, 2 * turn, -turn]).as_matrix()
     return JointAxis(R_AJ, np.asarray(point) + slide * direction, R_AJ.T @ direction)
@@ -34,7 +34,7 @@ def arm(wrist_miss=0.0, shoulder_miss=0.0):
     )
 
 
-def test_origins_slide_to_where_the_axes_meet():
+def test_origins_are_moved_to_where_the_axes_meet():
     axes, S, W = arm()
     R_AL, p_AL = link_frames(axes)
     # A few roundings of numbers below 1.
@@ -60,7 +60,7 @@ def test_axes_that_nearly_meet_keep_their_origins_on_themselves():
     _, p_AL = link_frames(axes)
     for i in (1, 2):
         offset = p_AL[i] - axes[i].p_AJ
-        # An origin off its axis would bend the chain by as much.
+        # An origin beside its axis would change the chain by as much.
         np.testing.assert_allclose(np.cross(offset, axes[i].direction_A), 0.0, atol=1e-15)
         assert np.linalg.norm(p_AL[i] - S) <= AXES_MEET
 
@@ -89,7 +89,7 @@ def spherical_shoulder_arm(shoulder_miss=0.0, wrist_miss=0.0):
     )
 
 
-def test_origins_of_the_mirror_image_slide_to_where_its_axes_meet():
+def test_origins_of_a_spherical_shoulder_arm_are_moved_to_where_its_axes_meet():
     axes, S, W = spherical_shoulder_arm()
     _, p_AL = link_frames(axes)
     # A few roundings of numbers below 1.
@@ -99,7 +99,7 @@ def test_origins_of_the_mirror_image_slide_to_where_its_axes_meet():
 
 
 @pytest.mark.parametrize("miss", [{"shoulder_miss": 0.01}, {"wrist_miss": 0.01}], ids=str)
-def test_half_a_mirror_image_leaves_axis_1_and_the_wrist_alone(miss):
+def test_a_spherical_shoulder_alone_leaves_axis_1_and_the_wrist_alone(miss):
     # Axes 2 and 3 meet here or not; nothing else may move for it.
     axes, _, _ = spherical_shoulder_arm(**miss)
     _, p_AL = link_frames(axes)
@@ -108,7 +108,7 @@ def test_half_a_mirror_image_leaves_axis_1_and_the_wrist_alone(miss):
 
 
 def test_an_arm_of_both_classes_keeps_its_first_joint_frame():
-    # With a spherical wrist the arm is solved as it stands, so axis 1 needs no frame of its own.
+    # With a spherical wrist the chain is not reversed, so axis 1 needs no special frame.
     axes, S, W = spherical_shoulder_arm()
     axes = (*axes[:6], axis_through(W, [0, 0, 1], slide=-0.3, turn=0.7))
     _, p_AL = link_frames(axes)

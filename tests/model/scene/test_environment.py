@@ -1,4 +1,4 @@
-"""Environment files: what they say, and what a bad one gets."""
+"""Environment files: their content, and the errors of invalid ones."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_observed_axes_are_axes_in_the_order_of_the_file(tmp_path):
     assert load_environment(written(tmp_path)).observed_axes == ()
 
 
-def test_posture_and_observed_are_taken_over_from_the_base(tmp_path):
+def test_posture_and_observed_are_inherited_from_the_base(tmp_path):
     own = tmp_path / "own.yaml"
     own.write_text("{name: own, based_on: bed}")
     ours, bed = load_environment(own), load_environment("bed")
@@ -211,7 +211,7 @@ def test_posture_and_observed_are_taken_over_from_the_base(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["[1, 2]", "a: [", "\x00"], ids=["list", "torn", "binary"])
-def test_what_is_no_mapping_is_refused(tmp_path, text):
+def test_a_file_that_is_not_a_mapping_is_refused(tmp_path, text):
     path = tmp_path / "own.yaml"
     path.write_text(text)
     with pytest.raises(EnvironmentFileError, match=r"own\.yaml"):
@@ -237,7 +237,7 @@ def test_a_missing_file_is_refused(tmp_path):
         load_environment(tmp_path / "none.yaml")
 
 
-def test_a_file_says_only_what_differs_from_the_one_it_is_based_on(tmp_path):
+def test_a_file_needs_only_what_differs_from_its_base(tmp_path):
     own = tmp_path / "own.yaml"
     own.write_text("{name: own, title: t, based_on: wheelchair, contact_margin: 0.004}")
     corner = tmp_path / "corner.yaml"
@@ -250,7 +250,7 @@ def test_a_file_says_only_what_differs_from_the_one_it_is_based_on(tmp_path):
     assert environment.model_dump(exclude=changed) == base.model_dump(exclude=changed)
 
 
-def test_a_base_that_is_none_is_refused(tmp_path):
+def test_an_invalid_base_is_refused(tmp_path):
     path = tmp_path / "own.yaml"
     path.write_text("{name: own, based_on: wheelchir}")
     with pytest.raises(UnknownNameError, match=r"own\.yaml', field 'based_on'.*'wheelchair'"):

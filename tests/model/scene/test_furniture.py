@@ -1,4 +1,4 @@
-"""The furniture's boxes enclose its meshes, as far as the padding says."""
+"""The furniture's boxes enclose its meshes, within the padding."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class Comparison:
 
     @property
     def rows(self):
-        """Row by row: task, goal, scene, what the meshes say, what is here."""
+        """Row by row: task, goal, scene, result by the meshes, result here."""
         for row in ROWS[self.environment]:
             if row["finger"] == self.finger:
                 scene = "" if self.environment == "wheelchair" else row["scene"]
@@ -144,7 +144,7 @@ def test_the_verdict_is_that_of_the_meshes(compared):
     assert wrong == []
 
 
-def test_what_cannot_be_met_is_blocked_and_never_freed(compared):
+def test_goals_blocked_in_the_meshes_are_blocked_here(compared):
     for (task, goal, _), row, least in compared.rows:
         if (task, goal, row["finger"]) in NOT_MET:
             assert row["colliding"] == "no"

@@ -1,4 +1,4 @@
-"""Joints of an environment: how far they go, and what follows them."""
+"""Joints of an environment: their limits, and the joints that follow them."""
 
 from __future__ import annotations
 
@@ -68,21 +68,21 @@ def angle(X):
     return np.arctan2(R[0, 2], R[0, 0])
 
 
-def test_followers_stand_right_from_the_start(lift):
+def test_followers_have_their_positions_from_the_start(lift):
     environment = lift(posture=FLAP_FOLLOWS)
     assert angle(environment.pose("lift::flap_link")) == pytest.approx(0.2, abs=1e-12)
     environment = lift(posture=FLAP_FOLLOWS, joints={"height": 0.5})
     assert angle(environment.pose("lift::flap_link")) == pytest.approx(0.7, abs=1e-12)
 
 
-def test_a_leader_goes_no_farther_than_its_knots(lift):
+def test_a_leader_is_limited_to_its_knots(lift):
     assert lift().added.joints.limits("height") == (-1.0, 2.0)
     environment = lift(posture=FLAP_FOLLOWS)
     assert environment.added.joints.limits("height") == (0.0, 1.0)
     for beyond in (-0.01, 1.01, np.nan):
         with pytest.raises(TcsError, match=r"joint 'height': .* m is beyond .* 0 to 1 m"):
             environment.set(height=beyond)
-    # A hair of rounding is no excess.
+    # Rounding is tolerated.
     environment.set(height=0.1 * 3 + 0.7 + 1e-12)
 
 
@@ -141,7 +141,7 @@ def test_a_leader_goes_no_farther_than_its_knots(lift):
         ),
     ],
 )
-def test_what_a_joint_cannot_do_is_refused_with_its_place(lift, changes, error, expected):
+def test_an_invalid_position_is_refused_with_its_source(lift, changes, error, expected):
     with pytest.raises(error, match=expected) as caught:
         lift(**changes)
     assert "\n" not in str(caught.value)

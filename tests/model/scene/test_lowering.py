@@ -1,4 +1,4 @@
-"""The lowered arrays against the Drake plant they were read off."""
+"""The lowered arrays against the Drake plant that they were read from."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def test_arrays_put_every_shape_and_the_tool_where_drake_does(scene, lowered, fu
         assert_same_pose(arrays.environment.R[0, i], arrays.environment.p[0, i], X_WG)
 
 
-def test_each_joint_turns_the_link_that_drake_turns(scene, lowered):
-    # Turning joint i alone must move what hangs on it and leave what comes before.
+def test_each_joint_rotates_the_link_that_drake_rotates(scene, lowered):
+    # Rotation of joint i alone must move the links beyond it and no others.
     for i in range(7):
         q = np.zeros(7)
         q[i] = 0.5
@@ -175,7 +175,7 @@ def test_the_pairs_are_those_that_drake_checks(scene, lowered):
     np.testing.assert_array_equal(arrays.arm_vs_arm, arrays.arm_vs_arm.T)
 
 
-def test_goals_ride_on_the_body(scene, lowered, shaving):
+def test_goals_move_with_the_body(scene, lowered, shaving):
     X_WH = scene.body_frame_pose("head")
     for i, (goal, X_WG) in enumerate(zip(shaving.goals, goal_poses(scene, shaving), strict=True)):
         assert_same_pose(lowered.arrays.goal_R[0, i], lowered.arrays.goal_p[0, i], X_WG)

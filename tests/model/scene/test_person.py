@@ -60,7 +60,7 @@ def test_every_body_part_can_be_named_by_a_goal(environment):
         ("foot plate left", (1.04076, 0.02995, 0.03976), (1.28824, 0.27745, 0.28724)),
     ],
 )
-def test_furniture_stands_where_the_mesh_has_it(environment, item, lower, upper):
+def test_furniture_is_where_the_mesh_is(environment, item, lower, upper):
     lowest, highest = environment.reach(f"wheelchair::{item}")
     # The figures have five digits.
     np.testing.assert_allclose(lowest, lower, atol=1e-5)
@@ -76,7 +76,7 @@ def test_the_chair_is_as_large_as_its_mesh(environment):
     np.testing.assert_allclose(highest, [1.2884, 0.3325, 0.89], atol=0.003)
 
 
-def test_the_chair_turns_and_shifts_about_its_own_origin(environment):
+def test_the_chair_rotates_and_shifts_about_its_own_origin(environment):
     X_WC = environment.pose(
         "wheelchair::base_link", wheelchair_x=0.1, wheelchair_y=-0.2, wheelchair_yaw=1
     )
@@ -93,7 +93,7 @@ def test_the_chair_turns_and_shifts_about_its_own_origin(environment):
     )
 
 
-def test_the_person_shifts_along_their_own_axes_after_the_turn(environment):
+def test_the_person_shifts_along_their_own_axes_after_the_rotation(environment):
     seat = np.array([0.403, 0.0, 0.47])
     offset = environment.pose("person::head_center").translation() - seat
     for joints, shift in (
@@ -103,7 +103,7 @@ def test_the_person_shifts_along_their_own_axes_after_the_turn(environment):
         ({"person_x": 0.03, "person_y": -0.02}, [-0.03, 0.02, 0]),
     ):
         for turn in (0.0, 0.4):
-            # Positive yaw turns to the person's right.
+            # Positive yaw rotates to the person's right.
             R = Rotation.from_euler("z", -turn).as_matrix()
             got = environment.pose("person::head_center", person_yaw=turn, **joints).translation()
             np.testing.assert_allclose(got, seat + R @ (offset + shift), atol=1e-12)
@@ -152,7 +152,7 @@ def test_padded_shapes_enclose_the_exposed_skin(environment, skin):
     assert outside == []
 
 
-def test_models_load_without_a_word_from_drake(caplog):
+def test_models_load_without_a_warning_from_drake(caplog):
     EnvironmentAlone("wheelchair")
     assert caplog.records == []
 

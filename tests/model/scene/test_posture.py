@@ -1,4 +1,4 @@
-"""What follows a joint, as numbers."""
+"""Positions of the joints that follow a joint."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def test_joints_move_in_proportion_between_the_knots(deg, a, b):
     assert positions == pytest.approx({"a": a, "b": b}, abs=1e-12)
 
 
-def test_a_sliding_leader_has_knots_in_metres():
+def test_a_prismatic_leader_has_knots_in_metres():
     posture = Posture(knots=(0.0, 0.5), joints={"a": (0.0, 1.0)})
     assert not posture.is_revolute
     assert posture.leading == (0.0, 0.5)
     assert posture.positions(0.2) == pytest.approx({"a": 0.4}, abs=1e-15)
 
 
-def test_a_turning_leader_has_knots_in_degrees():
+def test_a_revolute_leader_has_knots_in_degrees():
     assert TURNING.is_revolute
     assert TURNING.leading == pytest.approx(np.radians([0, 40, 80]), abs=1e-15)

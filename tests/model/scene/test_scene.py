@@ -1,4 +1,4 @@
-"""The live scene: where things are, what touches what, and obstacles of the user's own."""
+"""The live scene: poses, contacts, and obstacles of the user's own."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_the_base_carries_the_tool(scene):
     X_WB = scene.base_pose()
     np.testing.assert_allclose(X_WB.translation(), [0.7, -0.4, 0.0], atol=1e-15)
     np.testing.assert_allclose(X_WB.rotation().matrix()[:2, 0], [np.cos(0.9), np.sin(0.9)])
-    # Two ways of multiplying the same transforms.
+    # Two orders of multiplying the same transforms.
     np.testing.assert_allclose(
         scene.tool_pose().GetAsMatrix34(), (X_WB @ X_BT).GetAsMatrix34(), atol=1e-14
     )
@@ -61,7 +61,7 @@ def test_arm_limits_are_the_soft_ones_in_the_order_of_the_arm(scene):
 
 
 @pytest.mark.parametrize("bad", [[0.0] * 6, [0.0] * 6 + [np.nan], [[0.0] * 7]])
-def test_arm_positions_that_are_none_are_refused(scene, bad):
+def test_invalid_arm_positions_are_refused(scene, bad):
     with pytest.raises(TcsError, match="7 finite numbers"):
         scene.set_arm(bad)
 
@@ -143,7 +143,7 @@ def test_the_parts_of_the_robot_are_distinguished(scene):
     assert carriers["l_gripper_l_finger_tip_link"] == (Group.ARM, 7)
 
 
-def test_standing_in_the_chair_is_a_violation_and_standing_clear_is_none(scene):
+def test_a_base_in_the_chair_is_a_violation_and_a_clear_base_is_none(scene):
     scene.set_arm(REACHING)
     scene.set_torso(0.15)
     scene.place_base(0.4, 0.0, 0.0)
@@ -162,7 +162,7 @@ def test_required_clearance_is_margin_or_padding(scene):
 
 
 def test_violations_start_at_the_required_clearance(scene):
-    # Drive the base toward the chair from the front, and look where it is first refused.
+    # Move the base towards the chair from the front, up to the first violation.
     scene.set_arm(REACHING)
     closest = []
     for x in np.linspace(2.2, 1.5, 141):
@@ -171,7 +171,7 @@ def test_violations_start_at_the_required_clearance(scene):
         for a, b, distance in scene.clearances(0.05):
             assert (distance < scene.required_clearance(a, b)) == ((a, b) in hits)
             closest.append(distance)
-    # The drive crossed from clear to blocked, or it would have shown nothing.
+    # The path must go from clear to blocked, or the test would show nothing.
     assert min(closest) < 0 < max(closest)
 
 
@@ -242,7 +242,7 @@ def test_a_box_of_the_users_own_blocks_the_arm(spec, scene):
     assert any(b == "table" for _, b, _ in other.violations())
     pose = shape_poses(other)["table"]
     np.testing.assert_allclose(pose.translation(), where, atol=1e-12)
-    # Its long side turned from y to -x.
+    # Its long side is rotated from y to -x.
     np.testing.assert_allclose(pose.rotation().matrix()[:, 1], [-1, 0, 0], atol=1e-12)
 
 
@@ -251,9 +251,7 @@ def test_a_box_of_the_users_own_blocks_the_arm(spec, scene):
     [("", FIXED), (STATIC, ""), (STATIC, FIXED)],
     ids=["jointed", "static", "static and jointed"],
 )
-def test_a_model_of_the_users_own_stands_where_the_environment_file_says(
-    spec, tmp_path, static, joint
-):
+def test_a_model_of_the_users_own_is_placed_by_the_environment_file(spec, tmp_path, static, joint):
     path = tmp_path / "shelf.sdf"
     path.write_text(SHELF.format(static=static, z=0.2, shape=BOARD, joint=joint))
     turned = Obstacle(name="left shelf", file=str(path), xyz=(1, 2, 0.1), rpy_deg=(0, 0, 90))
@@ -348,12 +346,12 @@ def test_the_floor_stops_the_arm_but_not_what_stands_on_it(scene):
     assert met == arm
 
 
-def test_drake_has_nothing_to_say(spec, caplog):
+def test_drake_prints_no_warning(spec, caplog):
     Scene(spec)
     assert caplog.records == []
 
 
-def test_meshes_are_for_show_only(spec, scene):
+def test_meshes_are_for_drawing_only(spec, scene):
     with_meshes = Scene(spec, meshes=True)
     inspector = with_meshes.built.scene_graph.model_inspector()
     plain = scene.built.scene_graph.model_inspector()

@@ -32,7 +32,7 @@ def written(task: str) -> list[dict[str, str]]:
 
 @pytest.fixture
 def refused(tmp_path):
-    """Return the one line that a file with this content is refused with."""
+    """Return the one-line error of a file with this content."""
 
     def message(content: str | bytes, error: type[TcsError] = TaskError) -> str:
         path = tmp_path / "wiping.yaml"
@@ -61,7 +61,7 @@ TABLE_1 = {
     "scratching_thigh_right": ("bed",),
     "scratching_chest": ("bed",),
 }
-"""The tasks of the TCS paper and where they are done: 13 rows of its Table I."""
+"""The tasks of the TCS paper and their environments: 13 rows of its Table I."""
 
 
 def test_the_rows_of_the_paper_ship():
@@ -185,7 +185,7 @@ def test_unknown_keys_are_refused_with_the_known_ones(refused, old, new, expecte
         ("name: wiping", "name: !!python/name:os.system", "is not valid YAML: line 1"),
     ],
 )
-def test_impossible_values_are_refused_with_their_place(refused, old, new, expected):
+def test_invalid_values_are_refused_with_their_location(refused, old, new, expected):
     assert old in GOOD
     assert expected in refused(GOOD.replace(old, new, 1))
 
@@ -220,7 +220,7 @@ def test_a_file_that_is_not_there(tmp_path):
         load_task(tmp_path / "wiping.yaml")
 
 
-def test_a_folder_is_no_file(tmp_path):
+def test_a_folder_is_refused(tmp_path):
     with pytest.raises(TaskError, match="cannot be read"):
         load_task(tmp_path)
 

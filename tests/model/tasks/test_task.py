@@ -32,7 +32,7 @@ def task(**changes: object) -> Task:
 
 
 def test_quaternion_is_normalised():
-    # 7e-6 off unit length: what figures of six digits may be off.
+    # An error of 7e-6 of the length, as from numbers of six digits.
     written = np.array([0.5, 0.5, 0.5, 0.5]) * (1 + 7e-6)
     length = np.linalg.norm(goal(quaternion=written).quaternion)
     assert length == pytest.approx(1.0, abs=4e-16)  # rounding of one division
@@ -59,7 +59,7 @@ def test_weights_sum_to_one_in_proportion():
     assert weights.tolist() == [0.25, 0.75]
 
 
-def test_tasks_go_to_other_processes():
+def test_tasks_can_be_pickled():
     sent = task(grids={"wheelchair": {"torso": {"count": 1}}})
     assert pickle.loads(pickle.dumps(sent)) == sent
     assert hash(sent) == hash(pickle.loads(pickle.dumps(sent)))
@@ -84,7 +84,7 @@ def test_tasks_go_to_other_processes():
     ],
     ids=str,
 )
-def test_what_is_no_goal_is_refused(changes, expected):
+def test_an_invalid_goal_is_refused(changes, expected):
     with pytest.raises(TaskError) as caught:
         goal(**changes)
     assert expected in str(caught.value)
@@ -100,7 +100,7 @@ def test_what_is_no_goal_is_refused(changes, expected):
     ],
     ids=["name", "goals", "environments", "twice"],
 )
-def test_what_is_no_task_is_refused(changes, expected):
+def test_an_invalid_task_is_refused(changes, expected):
     with pytest.raises(TaskError, match=expected):
         task(**changes)
 

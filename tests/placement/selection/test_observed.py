@@ -105,7 +105,7 @@ def test_selection_uses_the_matched_table(file):
 def test_observed_frames_select_the_shift(file, frames, here, index, error):
     match = nearest_table(file, here, frames=frames)
     assert match.index == index
-    assert match.frame_error == pytest.approx(error, abs=1e-12)
+    assert match.frame_position_error == pytest.approx(error, abs=1e-12)
 
 
 @pytest.mark.parametrize(

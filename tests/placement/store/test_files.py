@@ -148,11 +148,6 @@ def test_an_unwritable_folder_is_refused(path, file, monkeypatch):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_missing_file_is_refused(path):
-    with pytest.raises(StoreError, match="cannot be read: No such file"):
-        load_scores(path)
-
-
 def test_a_folder_or_pipe_is_no_file(tmp_path):
     with pytest.raises(StoreError, match="not a regular file"):
         load_scores(tmp_path)

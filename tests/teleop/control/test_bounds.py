@@ -16,7 +16,7 @@ CHANGE = PERIOD * ACCELERATION
 @given(
     start=st.floats(-2.0, 2.0), before=st.floats(-3.0, 3.0), period=st.sampled_from([0.01, 0.02])
 )
-def test_a_joint_that_races_for_its_limit_stops_there_in_time(iiwa, start, before, period):
+def test_a_joint_at_the_greatest_rate_stops_at_its_limit(iiwa, start, before, period):
     change = ACCELERATION * period
     joints, rates = np.full(7, start), np.full(7, before)
     lower, upper = rate_bounds(iiwa, joints, period, ACCELERATION)
@@ -36,7 +36,7 @@ def test_a_joint_that_races_for_its_limit_stops_there_in_time(iiwa, start, befor
     np.testing.assert_allclose(rates, 0.0, atol=1e-9)
 
 
-def test_the_way_to_rest_is_just_the_room_there_is(iiwa):
+def test_the_stopping_distance_is_the_distance_to_the_limit(iiwa):
     for n in range(1, 5):
         for part in (0.0, 0.3, 0.9):
             speeds = (np.arange(n, -1, -1) + part) * CHANGE
@@ -46,7 +46,7 @@ def test_the_way_to_rest_is_just_the_room_there_is(iiwa):
             np.testing.assert_allclose(upper, speeds[0], rtol=1e-9)
 
 
-def test_each_joint_may_brake_in_its_own_way(iiwa, ready):
+def test_each_joint_may_have_its_own_acceleration(iiwa, ready):
     each = np.linspace(0.5, 5.0, 7)
     lower, upper = rate_bounds(iiwa, ready, PERIOD, each)
     for i, one in enumerate(each):
@@ -61,7 +61,7 @@ def test_a_joint_without_limits_is_not_held():
     assert (lower[~arm.bounded] < -100.0).all()
 
 
-def test_all_joints_slow_down_alike():
+def test_all_joints_slow_down_by_one_factor():
     rates = np.array([1.0, -2.0, 0.0, 0.5, 0.0, 0.0, 0.0])
     bound = np.full(7, 1.0)
     assert scale_to_bounds(rates, -bound, bound) == (0.5, 1)
@@ -70,7 +70,7 @@ def test_all_joints_slow_down_alike():
     assert scale_to_bounds(rates, -bound, bound) == (0.0, 3)
 
 
-def test_rates_go_straight_from_one_motion_to_the_next():
+def test_rates_change_along_a_straight_line():
     before, wanted = np.zeros(7), np.array([1.0, -0.5, 0, 0, 0, 0, 0])
     after, arrived = limit_rate_change(before, wanted, 0.05)
     assert not arrived
@@ -87,7 +87,7 @@ def test_a_joint_at_its_limit_stays(iiwa, rate):
 
 
 @given(seed=st.integers(0, 10**6))
-def test_whoever_is_said_to_stop_in_time_is_within_the_bounds(iiwa, seed):
+def test_rates_that_stop_in_time_are_within_the_bounds(iiwa, seed):
     rng = np.random.default_rng(seed)
     joints = iiwa.upper - rng.exponential(0.1, 7)
     rates, acceleration = rng.normal(size=7), rng.uniform(0.1, 10.0, 7)

@@ -22,7 +22,7 @@ def outside(group):
 
 
 @given(seed=st.integers(0, 10**6), group=st.sampled_from(GROUPS))
-def test_a_group_turns_and_the_tool_stays(iiwa, seed, group):
+def test_a_group_moves_while_the_tool_is_held(iiwa, seed, group):
     joints = iiwa.random_joints(np.random.default_rng(seed), 1)[0]
     J = iiwa.kinematics(joints).jacobian[3:]
     motion = group_motion(J, group, 0.4)
@@ -40,7 +40,7 @@ def test_no_motion_that_holds_the_tool_moves_less_outside_the_group(iiwa, group,
         J = iiwa.kinematics(joints).jacobian[3:]
         followers = np.linalg.svd(J[:, group[1:]], compute_uv=False)
         if followers.min(initial=1.0) < 0.002:
-            # There, and only there, their own rates count too.
+            # There, and only there, their own rates are weighted as well.
             continue
         motion = group_motion(J, group, 1.0)
         free = np.delete(np.arange(7), group[0])
@@ -81,7 +81,7 @@ class TestWhichPosturesAreExact:
             group_motion(arm.kinematics(joints).jacobian[3:], GROUPS[0], 1.0).exact
             for joints in arm.random_joints(rng, 300)
         ]
-        # But for the postures in which joints 2 and 3 have all but lost a direction: 0.7 % seen.
+        # Except in postures in which joints 2 and 3 are nearly singular: 0.7 % were measured.
         assert np.mean(exact) > 0.97
 
     def test_group_1_never_on_a_shoulder_with_an_offset(self, rng):
@@ -108,9 +108,9 @@ class TestWhichPosturesAreExact:
             np.testing.assert_array_equal(motion.rates, np.eye(7)[6])
 
 
-def test_a_group_that_cannot_hold_the_tool_says_by_how_much_it_slips(iiwa, ready):
+def test_a_group_that_cannot_hold_the_tool_reports_the_slip(iiwa, ready):
     J = iiwa.kinematics(ready).jacobian[3:].copy()
-    # As if joints 3 to 7 were locked.
+    # As with joints 3 to 7 locked.
     J[:, 2:] = 0.0
     motion = group_motion(J, GROUPS[0], 1.0)
     assert motion.slip == pytest.approx(np.linalg.norm(J @ motion.rates))
@@ -132,7 +132,7 @@ class TestBounded:
         np.testing.assert_allclose(rates, plain, atol=0.1 * np.abs(plain).max())
         assert np.linalg.norm(J @ rates) < 1e-6
 
-    def test_the_tool_stays_whatever_the_bounds_are(self, iiwa, rng):
+    def test_the_tool_is_held_within_any_bounds(self, iiwa, rng):
         slowed = 0
         for joints in iiwa.random_joints(rng, 200):
             J = iiwa.kinematics(joints).jacobian[3:]
@@ -149,15 +149,15 @@ class TestBounded:
         assert 20 < slowed < 180
 
 
-def test_drift_is_undone_on_the_way(iiwa, ready):
+def test_drift_is_corrected_during_the_motion(iiwa, ready):
     J = iiwa.kinematics(ready + 0.2).jacobian[3:]
     velocity = np.array([0.01, -0.02, 0.005])
     motion = group_motion(J, GROUPS[0], 0.3, velocity)
     np.testing.assert_allclose(J @ motion.rates, velocity, atol=1e-13)
 
 
-def test_the_border_of_the_eased_postures_is_no_step(iiwa):
-    # Nearly stretched, joints 2 and 3 lose their grip on the tool; the rates change steadily.
+def test_rates_are_continuous_where_the_weights_begin(iiwa):
+    # In nearly stretched postures joints 2 and 3 hardly move the tool; rates change continuously.
     rates = []
     for bend in np.linspace(0.004, 0.02, 400):
         joints = np.array([0.3, 0.5, 0.2, -bend, 0.0, 0.0, 0.0])
@@ -201,7 +201,7 @@ class TestElbow:
             np.testing.assert_allclose(J @ direction, 0.0, atol=1e-10)
             assert np.abs(direction).max() == pytest.approx(1.0)
 
-    def test_it_never_turns_round_by_itself(self, iiwa, ready):
+    def test_it_never_changes_sign(self, iiwa, ready):
         joints, before = ready + 0.1, None
         # More than a whole turn of the elbow, no limits: back where it was.
         for _ in range(3000):

@@ -22,7 +22,7 @@ def problem(seed, rows):
 
 @pytest.mark.parametrize("guesses", [6, 0], ids=["all at once", "one by one"])
 @given(seed=st.integers(0, 10**6), rows=st.integers(3, 12))
-def test_the_least_of_all_sums_between_the_bounds_is_found(seed, rows, guesses):
+def test_the_minimum_within_bounds_is_found(seed, rows, guesses):
     A, b, lower, upper = problem(seed, rows)
     ease = 1e-3
     with pytest.MonkeyPatch.context() as patch:
@@ -30,7 +30,7 @@ def test_the_least_of_all_sums_between_the_bounds_is_found(seed, rows, guesses):
         x, held = bounded_minimum(A.T @ A + ease * np.eye(7), A.T @ b, lower, upper)
     assert ((x >= lower) & (x <= upper)).all()
     assert ((x == lower) | (x == upper))[held].all()
-    # What decides that it is the least: free ones lie in a hollow, held ones are pulled outwards.
+    # Optimality: zero gradient of free variables, multipliers of active ones point outwards.
     pull = A.T @ (b - A @ x) - ease * x
     # The slope is of size 10 to 100 and rounded to 1e-13 of that, through a condition of 1e5.
     assert np.abs(pull[~held]).max(initial=0.0) < 1e-8
@@ -42,7 +42,7 @@ def test_the_least_of_all_sums_between_the_bounds_is_found(seed, rows, guesses):
 def test_scipy_finds_the_same():
     for seed in range(20):
         A, b, lower, upper = problem(seed, 9)
-        # scipy wants some room between the bounds.
+        # scipy needs bounds that differ.
         lower, upper = lower - 1e-3, upper + 1e-3
         ours, _ = bounded_minimum(A.T @ A, A.T @ b, lower, upper)
         theirs = lsq_linear(A, b, (lower, upper), method="bvls", tol=1e-14).x

@@ -35,12 +35,12 @@ def test_half_a_turn_has_a_rotation_vector_too():
     np.testing.assert_allclose(np.abs(rotation_vector(R)), [0.0, np.pi, 0.0], atol=1e-7)
 
 
-def test_no_turn_has_none():
+def test_the_identity_has_a_zero_rotation_vector():
     assert not rotation_vector(np.eye(3)).any()
 
 
 @given(seed=st.integers(0, 10**6), time=st.floats(0.0, 2.0))
-def test_an_orientation_turns_as_scipy_turns_it(seed, time):
+def test_rotation_agrees_with_scipy(seed, time):
     rng = np.random.default_rng(seed)
     R = Rotation.random(rng=rng).as_matrix()
     twist = rng.normal(size=3)
@@ -49,7 +49,7 @@ def test_an_orientation_turns_as_scipy_turns_it(seed, time):
 
 
 @given(seed=st.integers(0, 10**6))
-def test_turning_by_the_error_for_a_second_takes_the_tool_to_its_target(seed):
+def test_rotation_by_the_error_takes_the_tool_to_its_target(seed):
     rng = np.random.default_rng(seed)
     R, R_target = (Rotation.random(rng=rng).as_matrix() for _ in range(2))
     p, p_target = rng.normal(size=(2, 3))
@@ -60,7 +60,7 @@ def test_turning_by_the_error_for_a_second_takes_the_tool_to_its_target(seed):
 
 
 def test_a_difference_of_quaternions_would_lead_elsewhere():
-    # Why the print is not followed: the same target, about another axis and half as fast.
+    # Why the printed equation is not used: it rotates about another axis, half as fast.
     R, R_target = np.eye(3), Rotation.from_rotvec([1.0, 0.5, 0.0]).as_matrix()
     here, there = (Rotation.from_matrix(M).as_quat(scalar_first=True) for M in (R, R_target))
     start = Rotation.from_rotvec([0.0, 0.0, 1.0]).as_matrix()
@@ -70,7 +70,7 @@ def test_a_difference_of_quaternions_would_lead_elsewhere():
     difference, turned = (there - here)[1:], (turned_there - turned_here)[1:]
     exact = pose_error(R_target, np.zeros(3), R, np.zeros(3))[:3]
     assert np.linalg.norm(difference) < 0.55 * np.linalg.norm(exact)
-    # The same turn of the tool, from another orientation: the error is the same, the
+    # The same rotation of the tool, from another orientation: the error is the same, the
     # difference of quaternions is not.
     again = pose_error(R_target @ start, np.zeros(3), R @ start, np.zeros(3))[:3]
     np.testing.assert_allclose(again, exact, atol=1e-12)
@@ -101,7 +101,7 @@ def test_damping_bounds_the_rates_at_a_singularity_and_does_nothing_elsewhere(ii
     plain, _ = resolved_rates(J, twist)
     damped, _ = resolved_rates(J, twist, **settings)
     np.testing.assert_allclose(damped, plain, atol=1e-12)
-    # Stretched out, elbow and wrist straight but for a hair: outwards is lost.
+    # Stretched out, elbow and wrist nearly straight: the outward direction is singular.
     straight = ready.copy()
     straight[3], straight[5] = 1e-6, 1e-6
     J = iiwa.kinematics(straight).jacobian
@@ -114,7 +114,7 @@ def test_damping_bounds_the_rates_at_a_singularity_and_does_nothing_elsewhere(ii
     assert np.linalg.norm(calm) <= 0.1 / (2 * 0.02)
 
 
-def test_a_singular_value_says_how_singular(iiwa, ready):
+def test_the_smallest_singular_value(iiwa, ready):
     straight = np.zeros(7)
     J = iiwa.kinematics(straight).jacobian
     assert smallest_singular_value(J, LENGTH) < 1e-12
@@ -124,7 +124,7 @@ def test_a_singular_value_says_how_singular(iiwa, ready):
 
 
 class TestClamped:
-    def test_with_one_joint_at_its_limit_the_tool_goes_where_it_is_asked_to(self, iiwa, rng):
+    def test_with_one_joint_at_its_limit_the_tool_moves_as_commanded(self, iiwa, rng):
         # Joint 4 alone stretches the arm, so any other may be held without losing a direction.
         for joints in iiwa.random_joints(rng, 200):
             held = int(rng.choice([0, 1, 2, 4, 5, 6]))
@@ -159,5 +159,5 @@ class TestClamped:
             ours, _ = clamped_rates(J, twist, lower, upper, length=LENGTH)
             theirs = lsq_linear(weights[:, None] * J, weights * twist, (lower, upper)).x
             off = [np.linalg.norm(weights * (J @ rates - twist)) for rates in (ours, theirs)]
-            # 1e-8 |rates|^2 is what the ease may cost.
+            # The regularisation may cost 1e-8 |rates|^2.
             assert off[0] <= off[1] + 1e-6

@@ -19,7 +19,7 @@ BOTH = ["paper", "clamped"]
 class TestSwitching:
     @settings(max_examples=15, deadline=None)
     @given(seed=st.integers(0, 10**6), limits=st.sampled_from(BOTH))
-    def test_no_rate_jumps_whatever_is_asked(self, iiwa, seed, limits):
+    def test_no_rate_jumps_for_any_command(self, iiwa, seed, limits):
         rng = np.random.default_rng(seed)
         joints = 0.8 * iiwa.random_joints(rng, 1)[0]
         session = Teleoperation(iiwa, joints, Settings(limits=limits))
@@ -45,19 +45,19 @@ class TestSwitching:
         session = Teleoperation(iiwa, ready)
         drive(session, Command(linear=(0.1, 0.1, 0.0)), 1.0)
         steps = drive(session, Command(group=0, sign=1, mode=mode), 3.0)
-        # It rolls on while its joints slow down, for less than 0.1 s at 0.14 m/s.
+        # It moves on while its joints slow down, for less than 0.1 s at 0.14 m/s.
         assert off(steps, steps[0].p) < 0.01
         rest = next(i for i, step in enumerate(steps) if step.time > 1.2)
         assert off(steps[rest:], steps[rest].p) < 1e-5
         assert steps[0].mode == mode
 
     @pytest.mark.parametrize("mode", [Mode.NULL_SPACE, Mode.POSE])
-    def test_nothing_pulls_the_tool_on_to_where_the_target_had_run_ahead(self, iiwa, ready, mode):
+    def test_the_tool_does_not_move_on_to_a_target_ahead_of_it(self, iiwa, ready, mode):
         session = Teleoperation(iiwa, ready)
         last = session.step(Command(linear=(3.0, 0.0, 0.0)))
         # The tool has hardly begun to move; its target waits at the end of its target_lead.
         assert np.linalg.norm(last.target_p - last.p) == pytest.approx(0.005)
-        # What takes one step to begin takes one to end; a pull to the target takes 1 mm.
+        # A motion that starts within one step ends within one; a motion to the target takes 1 mm.
         assert off(drive(session, Command(mode=mode), 1.0), last.p) < 1e-5
 
     def test_a_group_comes_to_rest_before_the_tool_moves(self, iiwa, ready):
@@ -79,7 +79,7 @@ class TestSwitching:
         assert off(steps, start.p) < 1e-5
         assert steps[-1].rates[1] < -0.05
 
-    def test_the_clutch_parts_person_and_arm(self, iiwa, ready):
+    def test_the_clutch_decouples_master_and_slave(self, iiwa, ready):
         session = Teleoperation(iiwa, ready)
         drive(session, Command(linear=(0.1, 0, 0)), 1.0)
         steps = drive(session, Command(linear=(0.1, 0, 0), clutch=True), 1.0)
@@ -117,7 +117,7 @@ class TestBadInput:
         ids=["nan", "inf", "huge", "short", "text", "mode", "group", "sign", "nan sign"],
     )
     @pytest.mark.parametrize("mode", [Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.ASSISTED])
-    def test_the_arm_holds_still_and_says_why(self, iiwa, ready, mode, command, said):
+    def test_the_arm_holds_still_and_reports_the_reason(self, iiwa, ready, mode, command, said):
         session = Teleoperation(iiwa, ready, mode=mode)
         drive(session, Command(linear=(0.1, 0, 0), group=0, sign=1), 1.0)
         steps = drive(session, command, 1.0)
@@ -127,7 +127,7 @@ class TestBadInput:
         assert not steps[-1].rates.any()
         rates = np.array([step.rates for step in steps])
         assert np.abs(np.diff(rates, axis=0)).max() <= STEP + ROUNDING
-        # What was asked before does not come back by itself.
+        # The earlier command does not resume.
         # Where the tool is held, a drift of less than a micrometre is being undone.
         assert np.abs(drive(session, None, 0.1)[-1].rates).max() < 1e-5
         fine = session.step(Command(linear=(0.1, 0, 0), group=0, sign=1))
@@ -137,13 +137,13 @@ class TestBadInput:
         session = Teleoperation(iiwa, ready)
         drive(session, Command(linear=(0.1, 0, 0)), 1.0)
         silent = drive(session, None, 1.0)
-        # 0.25 s, of which the step that was last heard is none.
+        # 0.25 s, not counting the step of the last command.
         assert [step.stopped for step in silent] == [False] * 25 + [True] * 75
         assert silent[-1].reason.startswith("input lost: no command for more than 0.25 s.")
         assert not silent[-1].rates.any()
         assert not session.step(Command()).stopped
 
-    def test_a_session_that_hears_nothing_says_so(self, iiwa, ready):
+    def test_a_session_without_commands_reports_it(self, iiwa, ready):
         assert drive(Teleoperation(iiwa, ready), None, 0.3)[-1].reason.startswith("input lost")
 
     @pytest.mark.parametrize("mode", list(Mode))
@@ -159,7 +159,7 @@ class TestBadInput:
         session.place(ready)
         assert not session.step(Command()).stopped
 
-    def test_a_start_that_is_no_posture_is_refused(self, iiwa):
+    def test_an_invalid_start_posture_is_refused(self, iiwa):
         with pytest.raises(TcsError, match="start posture: must be 7 finite numbers"):
             Teleoperation(iiwa, [0.0] * 6)
 
@@ -186,7 +186,7 @@ class TestFlags:
         assert Teleoperation(iiwa, joints).step(Command()).singular
         assert not Teleoperation(iiwa, joints, mode=Mode.NULL_SPACE).step(Command()).singular
 
-    def test_paper_ends_the_motion_at_a_singularity_and_the_way_back_is_open(self, iiwa, ready):
+    def test_paper_ends_the_motion_at_a_singularity_and_allows_the_way_back(self, iiwa, ready):
         session = Teleoperation(iiwa, ready, Settings(limits="paper"))
         last = drive(session, Command(linear=(0.2, 0, 0.1)), 5.0)[-1]
         assert last.reason == "the arm is singular: motion ends there."

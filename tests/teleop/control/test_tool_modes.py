@@ -18,7 +18,7 @@ class TestEndEffector:
         start = session.step(Command())
         steps = drive(session, Command(linear=(0.05, 0.03, -0.02), angular=(0, 0.1, 0.2)), 2.0)
         moved = steps[-1].p - start.p
-        # It runs behind while it gathers speed, in 0.05 s, and makes up for that.
+        # It lags while it accelerates, for 0.05 s, and compensates afterwards.
         np.testing.assert_allclose(moved, [0.1, 0.06, -0.04], atol=1e-4)
         turned = rotation_vector(steps[-1].R @ start.R.T)
         np.testing.assert_allclose(turned, [0.0, 0.2, 0.4], atol=2e-3)
@@ -39,7 +39,7 @@ class TestEndEffector:
         # The target gives way to the tool on its target_lead, so what the first steps leave stays.
         assert np.hypot(moved[0], moved[2]) < 0.03 * moved[1]
 
-    def test_paper_ends_the_motion_at_a_limit_and_the_way_back_is_open(self, iiwa, ready):
+    def test_paper_ends_the_motion_at_a_limit_and_allows_the_way_back(self, iiwa, ready):
         session = Teleoperation(iiwa, ready, Settings(limits="paper"))
         steps = drive(session, Command(linear=(-0.1, 0.0, 0.0)), 6.0)
         last = steps[-1]
@@ -50,7 +50,7 @@ class TestEndEffector:
         assert np.abs(last.rates).max() < 1e-9
         back = drive(session, Command(linear=(0.1, 0.0, 0.0)), 0.5)
         assert not back[0].stopped
-        # It gathers speed in 0.05 s.
+        # It accelerates for 0.05 s.
         assert back[-1].p[0] - last.p[0] > 0.045
 
     @pytest.mark.parametrize("limits", BOTH)
@@ -63,7 +63,7 @@ class TestEndEffector:
             assert not any(step.stopped for step in steps)
             assert np.abs(steps[-1].joints - joints)[:6].max() > 0.02
 
-    def test_clamped_leaves_the_joint_at_its_limit_and_goes_on(self, iiwa):
+    def test_clamped_leaves_the_joint_at_its_limit_and_continues(self, iiwa):
         # Elbow nearly at its limit, the rest bent so that six joints can do it all.
         joints = np.array([0.3, 0.4, 0.6, -2.05, -0.7, 0.8, 0.0])
         session = Teleoperation(iiwa, joints)
@@ -72,7 +72,7 @@ class TestEndEffector:
         steps = drive(session, command, 1.0)
         np.testing.assert_allclose(steps[-1].p - start.p, [0, 0.03, 0], atol=2e-3)
 
-    def test_clamped_says_when_nothing_goes_on(self, iiwa):
+    def test_clamped_reports_when_no_motion_is_possible(self, iiwa):
         # Joint 6 and the shoulder are all that could lift a stretched arm any farther.
         session = Teleoperation(iiwa, np.array([0.0, 0.8, 0, -0.4, 0, 0.4, 0]))
         steps = drive(session, Command(linear=(0.5, 0.0, -0.5)), 3.0)
@@ -97,7 +97,7 @@ class TestAssisted:
 
 
 def follow(session, way, length):
-    """Return the steps of somebody who drives along a line without noise, and how far off."""
+    """Return the steps along a line without noise, and the greatest distance from the line."""
     start, steps = session.step(Command()), []
     for _ in range(1000):
         gone = (steps[-1] if steps else start).p - start.p
@@ -109,7 +109,7 @@ def follow(session, way, length):
     return steps, np.linalg.norm(gone - np.outer(gone @ way, way), axis=1).max()
 
 
-def test_the_assistance_goes_on_along_a_line_on_which_a_limit_ends_the_paper_s_motion(iiwa):
+def test_the_assistance_continues_along_a_line_on_which_a_limit_ends_the_paper_s_motion(iiwa):
     joints = np.array([-1.44, 1.74, -0.76, 1.19, 0.11, 1.0, 1.9])
     way = np.array([np.cos(np.radians(-164.3)), np.sin(np.radians(-164.3)), 0.0])
     found = {}
@@ -119,11 +119,11 @@ def test_the_assistance_goes_on_along_a_line_on_which_a_limit_ends_the_paper_s_m
     assert ended[-1].stopped
     steps, beside = found[Mode.ASSISTED]
     assert len(steps) < 1000
-    # 0.3 mm is seen; end-effector control that leaves the joint at its limit goes 24 mm astray.
+    # 0.3 mm is measured; end-effector control with the joint at its limit has an error of 24 mm.
     assert beside < 1e-3
 
 
-def test_an_assisted_arm_that_nobody_drives_does_not_move(iiwa, ready):
+def test_an_assisted_arm_without_a_command_does_not_move(iiwa, ready):
     joints = ready.copy()
     joints[5] = 2.05
     steps = drive(Teleoperation(iiwa, joints, mode=Mode.ASSISTED), Command(), 1.0)

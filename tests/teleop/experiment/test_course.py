@@ -1,4 +1,4 @@
-"""The experiment's line: it does to the arm what it was searched for."""
+"""The experiment's line: it meets the conditions of the search."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SPEED = 0.06
 
 
 def go(session, line, seconds):
-    """Drive along the line by a steady hand until something stops the arm, or it is there."""
+    """Follow the line without noise until the arm stops or the end is reached."""
     step = session.step(Command())
     for _ in range(int(seconds / SETTINGS.period)):
         aim = line.at(min(1.0, float(line.fraction_at(step.p)) + 0.1)) - step.p
@@ -51,7 +51,7 @@ def check(arm, course):
     np.testing.assert_allclose(step.p, line.end, atol=0.011)
 
 
-def test_the_line_is_blocked_after_three_quarters_and_group_1_opens_it(iiwa, course):
+def test_the_line_is_blocked_after_three_quarters_and_group_1_unblocks_it(iiwa, course):
     check(iiwa, course)
 
 
@@ -75,7 +75,7 @@ def test_other_arms_have_such_lines(robot):
     check(arm, find_course(arm))
 
 
-def test_where_there_is_no_line_it_says_so(iiwa, monkeypatch):
+def test_a_failed_search_is_reported(iiwa, monkeypatch):
     monkeypatch.setattr(course_module, "_TRIED", 3)
     with pytest.raises(TcsError, match=r"no line for 'iiwa7'.*Try another seed"):
         find_course(iiwa)

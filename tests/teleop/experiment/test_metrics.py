@@ -1,4 +1,4 @@
-"""The metrics against closed forms, and against paths whose answer is seen at a glance."""
+"""The metrics against closed forms, and on paths with an obvious result."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def along(shares, off=(0.0, 0.0, 0.0)):
 def test_on_the_line_the_error_is_that_of_sampling():
     found = trajectory_accuracy(along(np.linspace(0, 1, 2001)), LINE)
     # Samples 0.5 mm apart: the mean of those within 5 mm is at most a step off; at both ends the
-    # plane has samples on one side only, 2.5 mm off in the mean.
+    # plane has samples on one side only, with a mean offset of 2.5 mm.
     assert found.worst == pytest.approx(0.0025, abs=0.0005)
     assert found.planes_met == 30
 
 
-def test_a_path_beside_the_line_is_as_far_off_as_it_is():
+def test_a_path_beside_the_line_has_its_distance_as_error():
     sideways = np.array([0.6, 0.8, 0.0])
     assert sideways @ LINE.direction == pytest.approx(0.0, abs=1e-12)
     path = along(np.linspace(-0.1, 1.1, 5001), 0.03 * sideways)
@@ -52,7 +52,7 @@ def test_barycentre_is_the_mean_over_all_passes():
     np.testing.assert_allclose(found.barycentre[:, 2], 0.9 + 0.1 / 3.0, atol=1e-6)
 
 
-def test_planes_stand_evenly_from_start_to_end():
+def test_planes_are_equally_spaced_from_start_to_end():
     shares = np.linspace(0, 1, 30)
     found = trajectory_accuracy(along(shares), LINE)
     np.testing.assert_allclose(found.barycentre, along(shares), atol=1e-12)
@@ -60,7 +60,7 @@ def test_planes_stand_evenly_from_start_to_end():
 
 
 @pytest.mark.parametrize(("off", "met"), [(0.0049, 1), (0.0051, 0)])
-def test_a_plane_takes_what_is_within_5_mm(off, met):
+def test_a_plane_contains_the_samples_within_5_mm(off, met):
     first = along([0.0])
     near = along([0.0]) + off * LINE.direction
     if met:
@@ -71,7 +71,7 @@ def test_a_plane_takes_what_is_within_5_mm(off, met):
     assert trajectory_accuracy(first, LINE).worst == pytest.approx(0.0, abs=1e-12)
 
 
-def test_planes_that_a_run_never_met_are_left_out():
+def test_planes_without_samples_are_left_out():
     found = trajectory_accuracy(along(np.linspace(0, 0.5, 2001), (0, 0, 0.02)), LINE)
     assert found.planes_met == 15
     assert np.isnan(found.barycentre[15:]).all()
@@ -124,7 +124,7 @@ def test_a_steady_hand_takes_no_effort():
     assert effort(time, np.outer(time, [0.1, 0.2, 0.0])) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_effort_grows_with_the_square_of_the_way_and_with_mass():
+def test_effort_grows_with_the_square_of_the_distance_and_with_mass():
     rng = np.random.default_rng(1)
     time = np.arange(0, 5.0, 0.01)
     hand = np.cumsum(rng.standard_normal((500, 3)), axis=0) * 1e-4
@@ -143,7 +143,7 @@ def test_steering_counts_both_ways_and_no_jumps():
     assert steering_angle(angles) == pytest.approx(2.02)
 
 
-def test_steering_way_of_a_circle():
+def test_steering_translation_of_a_circle():
     angle = np.linspace(0, 2 * np.pi, 1001)
     circle = 0.1 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     assert steering_translation(circle) == pytest.approx(0.2 * np.pi, rel=1e-5)
@@ -164,7 +164,7 @@ def test_spectral_arc_length_of_a_bell():
     assert spectral_arc_length(speed, rate) == pytest.approx(-exact, rel=1e-5)
 
 
-def test_spectral_arc_length_tells_smooth_from_jerky_whatever_the_speed():
+def test_spectral_arc_length_distinguishes_smooth_from_jerky_at_any_speed():
     time = np.arange(0, 2, 0.01)
     smooth = np.sin(np.pi * time / 2) ** 2
     jerky = smooth * (1 + 0.8 * np.sin(2 * np.pi * 5 * time))
@@ -179,7 +179,7 @@ def test_spectral_arc_length_refuses_what_has_no_spectrum():
         spectral_arc_length(np.zeros(100), 100.0)
 
 
-def test_resampling_delays_nothing_and_keeps_what_a_hand_can_do():
+def test_resampling_has_no_delay_and_keeps_the_frequencies_of_a_hand():
     time = np.arange(0, 10, 1e-3)
     slow, fast = np.sin(2 * np.pi * 2 * time), 0.5 * np.sin(2 * np.pi * 200 * time)
     wanted, values = resampled(time, np.column_stack([slow + fast, slow]))

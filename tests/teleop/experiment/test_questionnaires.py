@@ -1,4 +1,4 @@
-"""Questionnaires: which end of each scale is the good one, and what is refused."""
+"""Questionnaires: the positive end of each scale, and invalid answers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_each_item_counts_for_its_scale_alone_and_the_right_way_round(item):
 
 
 @pytest.mark.parametrize("ticks", [[3] * 8, [3] * 10, [3] * 8 + [0], [3] * 8 + [6]])
-def test_what_is_no_answer_is_refused(ticks):
+def test_invalid_answers_are_refused(ticks):
     with pytest.raises(DataFileError, match="van der Laan"):
         van_der_laan(ticks)
 

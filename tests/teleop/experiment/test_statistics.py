@@ -68,7 +68,7 @@ def test_signed_ranks_agree_with_scipy_with_ties_and_zeros(seed, tail):
     assert found.p == pytest.approx(there.pvalue, rel=1e-10)
 
 
-def test_turned_round_the_sign_turns():
+def test_exchanged_samples_change_the_sign():
     rng = np.random.default_rng(3)
     first, second = rng.standard_normal((2, 20))
     one = signed_rank_test(first, second, tail="greater")
@@ -97,7 +97,7 @@ def test_description():
     assert found.std == pytest.approx(math.sqrt((1 + 9 + 4 + 36) / 3))
 
 
-def test_shapiro_wilk_tells_a_skewed_sample():
+def test_shapiro_wilk_rejects_a_skewed_sample():
     rng = np.random.default_rng(0)
     assert group_statistics(rng.standard_normal(26)).shapiro_p > 0.05
     assert group_statistics(rng.lognormal(0, 1.5, 26)).shapiro_p < 0.001
@@ -150,6 +150,6 @@ def test_bonferroni_multiplies_by_the_number_of_pairs():
     ],
     ids=["one condition", "no pairs", "nothing varies", "not finite"],
 )
-def test_what_cannot_be_analysed_is_refused(table):
+def test_invalid_samples_are_refused(table):
     with pytest.raises(DataFileError):
         repeated_measures(table)

@@ -1,4 +1,4 @@
-"""A trial: what is recorded is what the arm did, and what cannot be driven is refused."""
+"""A trial: the run records the motion of the arm, and invalid courses are refused."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def runs(iiwa, course):
 
 
 @pytest.mark.parametrize("condition", CONDITIONS, ids=lambda one: one.name)
-def test_a_run_tells_what_the_arm_did(iiwa, runs, condition):
+def test_a_run_records_the_motion_of_the_arm(iiwa, runs, condition):
     run = runs[condition.name]
     assert run.joint_names == iiwa.joints
     rows = np.linspace(0, len(run) - 1, 50).astype(int)
@@ -59,18 +59,18 @@ def test_a_run_tells_what_the_arm_did(iiwa, runs, condition):
     assert run.metadata["condition"] == condition.name
 
 
-def test_the_tool_is_held_while_the_group_turns(runs):
+def test_the_tool_is_held_while_the_group_moves(runs):
     run = runs[NOVEL.name]
     turning = run.group == 0
     assert turning.any()
     pieces = np.split(np.flatnonzero(turning), np.flatnonzero(np.diff(np.flatnonzero(turning)) > 1))
     for piece in pieces:
-        # The first steps of a piece still carry what the tool had left of its motion.
+        # In the first steps of a part the tool comes to rest.
         held = run.position[piece[10:]]
         assert np.linalg.norm(held - held[0], axis=1).max() < 1e-4
 
 
-def test_only_the_novel_controller_turns_groups(runs):
+def test_only_the_novel_controller_moves_groups(runs):
     assert (runs[END_EFFECTOR.name].group == NO_GROUP).all()
     assert (runs[ASSISTED.name].group == NO_GROUP).all()
     assert set(runs[NOVEL.name].mode) == {"end-effector", "null-space"}
@@ -81,7 +81,7 @@ def test_without_assistance_the_arm_stops_on_the_way(runs):
     assert runs[NOVEL.name].stopped.any()
 
 
-def test_the_same_chance_gives_the_same_trial(iiwa, course):
+def test_the_same_seed_gives_the_same_trial(iiwa, course):
     first, second = (
         run_trial(
             iiwa,
@@ -122,7 +122,7 @@ def test_measures_of_a_whole_trial(runs, course):
     assert found.planes_met >= 28
     assert found.turned > 0.1
     assert found.stops >= 1
-    # The hand goes the way of the line at least, less the sphere at its end.
+    # The hand moves at least the length of the line, less the sphere at its end.
     assert found.steering_translation > course.line.length - 0.05
 
 

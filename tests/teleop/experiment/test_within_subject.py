@@ -1,4 +1,4 @@
-"""The experiment: who drives what in which order, and that its numbers are those of its trials."""
+"""The experiment: orders of the conditions, and that its numbers are those of its trials."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SMALL = ExperimentPlan(operators=3, training=0, trials=1, time_limit=12.0)
 
 @pytest.fixture(scope="module")
 def saved(iiwa, course, tmp_path_factory):
-    """A very small experiment, broken off early, and the folder of its runs."""
+    """A very small experiment with a short time limit, and the folder of its runs."""
     folder = tmp_path_factory.mktemp("runs")
     return run_experiment(iiwa, course, SMALL, runs=folder), folder
 
@@ -46,7 +46,7 @@ def test_three_controllers_take_turns_evenly():
     assert sorted(first) == sorted([c.name for c in CONDITIONS] * 8)
 
 
-def test_every_operator_drives_every_controller(saved):
+def test_every_operator_uses_every_controller(saved):
     experiment, _ = saved
     assert list(experiment.drives) == [one.name for one in CONDITIONS]
     for drives in experiment.drives.values():
@@ -81,7 +81,7 @@ def test_an_operator_is_the_same_person_with_each_controller(iiwa, course):
     more = run_experiment(
         iiwa, course, ExperimentPlan(operators=4, training=0, trials=1, time_limit=1.0)
     )
-    # Whoever else takes part changes nobody, nor what they do.
+    # Other operators change neither the traits nor the trials of an operator.
     assert more.traits[:3] == small.traits
     for condition in small.drives:
         for one, other in zip(small.drives[condition], more.drives[condition], strict=False):
@@ -89,7 +89,7 @@ def test_an_operator_is_the_same_person_with_each_controller(iiwa, course):
 
 
 @pytest.mark.slow
-def test_processes_change_no_answer(saved, iiwa, course):
+def test_the_number_of_processes_changes_no_result(saved, iiwa, course):
     experiment, _ = saved
     again = run_experiment(iiwa, course, SMALL, jobs=2)
     for condition, drives in experiment.drives.items():
@@ -160,14 +160,14 @@ def test_every_table_and_picture_says_that_no_people_took_part(saved):
 
 @pytest.mark.slow
 def test_from_operator_to_recording_to_map():
-    """On TIAGo, which has a head: what was driven says where to stand."""
+    """On TIAGo, which has a head: the recorded postures give base poses."""
     arm = load_arm("tiago", torso_height=0.175)
     plan = ExperimentPlan(operators=3, training=1, trials=1)
     found = controller_maps(run_experiment(arm, find_course(arm), plan))
     assert [one.condition for one in found.maps] == [one.name for one in CONDITIONS]
     assert found.maps[0].shared_fraction == 1.0
     sizes = {one.condition: len(one.capability.cells) for one in found.maps}
-    # Who searches with the hand brings the arm to more places than who follows the line.
+    # Recovery by hand motion brings the arm to more postures than following the line.
     assert sizes["end-effector"] > sizes["novel"] > sizes["assisted"] > 10
     for one in found.maps:
         assert one.best is not None
@@ -177,7 +177,7 @@ def test_from_operator_to_recording_to_map():
 
 @pytest.mark.slow
 def test_the_experiment_of_the_paper(iiwa, course):
-    """26 operators, three trials each: what issue and paper ask for, by operators nobody fitted."""
+    """26 operators with three trials each, as in the paper, with traits that were not fitted."""
     plan = ExperimentPlan(conditions=(END_EFFECTOR, NOVEL))
     experiment = run_experiment(iiwa, course, plan, jobs=2)
     assert median_ratio(experiment, "accuracy") <= 0.5

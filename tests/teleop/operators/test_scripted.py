@@ -1,4 +1,4 @@
-"""Scripted operators on an arm that is only a point: what they do when it goes on or stops."""
+"""Scripted operators with a point as the arm: behaviour while it moves and when it stops."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STEADY = replace(OperatorTraits(), misjudging=1e-9, tremor=0.0)
 
 
 class Point:
-    """A tool that goes where it is told, up to a wall that opens one way or the other."""
+    """A tool that follows commands, up to a wall that some recovery opens."""
 
     def __init__(self, opens=lambda point: False, wall=0.75):
         self.p, self.turned, self.time, self.sideways = np.array(LINE.start), 0.0, 0.0, 0.0
@@ -87,12 +87,12 @@ def test_a_steady_operator_follows_the_line(approach):
     point = Point(**FREE)
     path, _ = drive(point, approach)
     assert np.abs(path[:, 1:] - [0.0, 1.0]).max() < 1e-6
-    # 1 m at 0.06 m/s, the last 6 cm of it slower, and a quarter of a second to begin.
+    # 1 m at 0.06 m/s, the last 6 cm slower, and a quarter of a second of reaction.
     assert point.time == pytest.approx(1.0 / 0.06 + 0.25, abs=1.0)
 
 
-def test_until_the_arm_stops_all_do_the_same():
-    """The controller makes no better driver: the same chance gives the same commands."""
+def test_until_the_arm_stops_all_controllers_get_the_same_commands():
+    """The same seed gives the same commands with every controller."""
     paths = []
     for approach in Recovery:
         point = Point()
@@ -101,14 +101,14 @@ def test_until_the_arm_stops_all_do_the_same():
     np.testing.assert_array_equal(*paths)
 
 
-def test_noise_leads_off_the_line_and_the_eye_brings_back():
+def test_noise_causes_errors_that_the_operator_corrects():
     path, _ = drive(Point(**FREE), Recovery.HAND, traits=OperatorTraits(), seed=1)
     off = np.linalg.norm(path[:, 1:] - [0.0, 1.0], axis=1)
-    # Misjudging by 8 mm a coordinate: off by millimetres, never by many of its deviations.
+    # Misjudgement of 8 mm per coordinate gives errors of millimetres.
     assert 0.002 < off.max() < 0.05
 
 
-def test_nobody_answers_before_the_reaction_time():
+def test_no_reaction_before_the_reaction_time():
     point = Point(**FREE)
     drive(point, Recovery.HAND, traits=replace(STEADY, reaction=0.4), seconds=2.0)
     speed = [np.linalg.norm(command.linear) for command in point.commands]
@@ -126,7 +126,7 @@ def test_the_hand_moves_on_for_the_reaction_time_when_the_arm_stops():
     assert last * SETTINGS.period == pytest.approx(reached + 0.3, abs=0.15)
 
 
-def test_the_novel_controller_turns_group_1_with_the_clutch_between():
+def test_the_novel_controller_moves_group_1_with_the_clutch_between():
     point = Point(opens=lambda point: abs(point.turned) > 0.3)
     path, habits = drive(point, Recovery.GROUP)
     assert np.linalg.norm(path[-1] - LINE.end) < 0.021
@@ -135,11 +135,11 @@ def test_the_novel_controller_turns_group_1_with_the_clutch_between():
     changes = [kinds[0], *(b for a, b in itertools.pairwise(kinds) if a != b)]
     assert changes == ["hand", "clutch", "group", "clutch", "hand"]
     assert kinds.count("clutch") * SETTINGS.period == pytest.approx(2.0, abs=0.05)
-    # What helped is known from now on, to the length of a step.
+    # The successful recovery is remembered, to the length of a step.
     assert habits.turns[0] == pytest.approx(point.turned, abs=0.01)
 
 
-def test_what_helped_is_done_at_once_the_next_time():
+def test_a_successful_recovery_is_tried_first_the_next_time():
     def opens(point):
         return point.turned > 1.0
 
@@ -150,12 +150,12 @@ def test_what_helped_is_done_at_once_the_next_time():
     assert habits.turns[0] > 1.0
     assert again.time < tried.time
     groups = [c.sign for c in again.commands if c.group == 0]
-    # At once, the right way; once more at most where a period was missing.
+    # The right direction at once; at most one more try where a period was missing.
     assert set(groups) == {1}
 
 
-def test_turning_the_wrong_way_ends_at_some_time():
-    """The group can be turned to 0.5 rad that way only: the operator tries the other one."""
+def test_the_direction_is_reversed_if_it_does_not_help():
+    """The group can move by 0.5 rad in that direction only: the operator tries the other one."""
 
     class Limited(Point):
         def step(self, command):
@@ -184,7 +184,7 @@ def test_end_effector_control_searches_with_the_hand_alone():
     assert 0 in habits.motions
 
 
-def test_tries_grow():
+def test_recoveries_grow():
     point = Point()
     drive(point, Recovery.GROUP, seconds=60.0)
     runs, length = [], 0
@@ -194,13 +194,13 @@ def test_tries_grow():
         elif length:
             runs.append(length * SETTINGS.period * SETTINGS.group_rate)
             length = 0
-    # The first four come to less than half a turn, after which it goes the other way. A period
+    # The first four add up to less than half a turn, then the direction is reversed. A period
     # more or less at either end.
     expected = STEADY.first_turn * STEADY.growth ** np.arange(4)
     np.testing.assert_allclose(runs[:4], expected, atol=0.01)
 
 
-def test_drawn_operators_differ_and_chance_repeats_them():
+def test_drawn_operators_differ_and_depend_on_the_seed():
     first, second, again = (OperatorTraits.drawn(np.random.default_rng(seed)) for seed in (1, 2, 1))
     assert first == again
     assert first.speed != second.speed
@@ -211,7 +211,7 @@ def test_drawn_operators_differ_and_chance_repeats_them():
 
 
 @pytest.mark.parametrize("period", [0.01, 0.05])
-def test_wandering_is_as_wide_whatever_the_period(period):
+def test_the_variance_of_the_process_does_not_depend_on_the_period(period):
     wander = GaussMarkovProcess(np.random.default_rng(0), std=0.5, memory=0.3, period=period)
     values, rates = [], []
     for _ in range(20_000):
@@ -226,7 +226,7 @@ def test_wandering_is_as_wide_whatever_the_period(period):
     assert np.std(slope - np.array(rates)[1:-1]) < 0.5 * np.sqrt(period / 0.3) * np.std(rates) * 2.0
 
 
-def test_a_memory_of_next_to_nothing_is_no_trouble():
+def test_a_tiny_time_constant_is_valid():
     habits = Experience(motions={0: np.zeros(6)})
     point = Point()
     drive(point, Recovery.HAND, habits=habits, seconds=25.0)

@@ -1,4 +1,4 @@
-"""Runs and their files: what is saved comes back, feeds a capability map, or is refused."""
+"""Runs and their files: round trips, capability maps of runs, and invalid files."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def made(n=40, seed=0, **changes):
 
 
 @pytest.mark.parametrize(("ending", "places"), [("csv", 1e-9), ("parquet", 0.0)])
-def test_what_is_saved_comes_back(tmp_path, ending, places):
+def test_run_file_round_trip(tmp_path, ending, places):
     run, path = made(), tmp_path / f"run.{ending}"
     save_run(path, run)
     back = load_run(path)
@@ -76,7 +76,7 @@ def test_nothing_is_left_where_a_run_cannot_be_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_its_library_parquet_says_what_to_install(tmp_path, monkeypatch):
+def test_without_its_library_parquet_gives_advice_to_install_it(tmp_path, monkeypatch):
     save_run(tmp_path / "run.parquet", made())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(OutputError, match=r"pip install 'tcs\[parquet\]'"):
@@ -107,7 +107,7 @@ def test_arrays_that_do_not_belong_together_are_refused(changes, said):
         made(**changes)
 
 
-def test_files_that_hold_no_run_are_refused(tmp_path):
+def test_files_without_a_run_are_refused(tmp_path):
     with pytest.raises(DataFileError, match="cannot be read: No such file"):
         load_run(tmp_path / "none.csv")
     with pytest.raises(DataFileError, match=r"must be \.csv or \.parquet"):
@@ -190,7 +190,7 @@ def test_arrays_are_read_only():
         made().joints[0, 0] = 1.0
 
 
-def test_the_hand_goes_where_the_commands_say_while_it_is_coupled():
+def test_the_hand_follows_the_commands_while_it_is_coupled():
     n = 201
     steady = {"linear": np.tile([0.1, 0.0, -0.2], (n, 1)), "angular": np.tile([0.3, 0, 0], (n, 1))}
     time, none, never = np.arange(n) * 0.01, np.full(n, NO_GROUP), np.zeros(n, dtype=bool)

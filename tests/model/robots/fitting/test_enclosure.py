@@ -56,7 +56,7 @@ def test_every_triangle_lies_inside_one_primitive(surfaces):
 
 
 def test_no_primitive_could_be_a_millimetre_smaller(surfaces):
-    """The proof can fail: shrink any one primitive, and some triangle stands out."""
+    """The proof can fail: if any one primitive is shrunk, some triangle protrudes."""
     for body, (_, shapes, surface) in surfaces.items():
         for i, shape in enumerate(shapes):
             thinner = min(shape.size) > 0.002
@@ -105,8 +105,8 @@ def test_number_of_shapes_is_small(robot):
     assert len(robot.load_primitives()) <= 70
 
 
-def test_what_stands_out_is_measured(pr2):
-    """Shapes drawn in by 5 mm leave triangles 5 mm out, and say so."""
+def test_protrusion_is_measured(pr2):
+    """Shapes shrunk by 5 mm leave triangles that protrude by 5 mm."""
     body = "l_forearm_link"
     (sound,) = (found for found in enclosure(pr2) if found.body == body)
     assert (sound.outside, sound.farthest) == (0, 0.0)
@@ -116,7 +116,7 @@ def test_what_stands_out_is_measured(pr2):
     assert 0.005 - 1e-5 <= worse.farthest <= 0.005 * np.sqrt(3)
 
 
-def test_a_surface_without_any_shape_stands_out_wholly(pr2):
+def test_a_surface_without_any_shape_protrudes_completely(pr2):
     body = "l_wrist_flex_link"
     bare = enclosure(_Shrunk.of(pr2, body, by=None))
     (found,) = (found for found in bare if found.body == body)
@@ -125,7 +125,7 @@ def test_a_surface_without_any_shape_stands_out_wholly(pr2):
 
 
 class _Shrunk(RobotFile):
-    """A robot whose shapes of one body are drawn in, or left out."""
+    """A robot with the shapes of one body shrunk, or left out."""
 
     body: str
     by: float | None

@@ -31,7 +31,7 @@ def box_at(size, xyz=(0, 0, 0), seed=None):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_turned_box_gets_its_own_box(seed):
+def test_a_rotated_box_is_fitted_by_an_equal_box(seed):
     points = corner_points(triangles_of(box_at((0.1, 0.2, 0.3), seed=seed)))
     R = tightest_orientation(points)
     # Facet normals are compared to 6 digits, which may tilt the frame by as much.

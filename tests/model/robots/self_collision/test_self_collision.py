@@ -1,4 +1,4 @@
-"""Self-collision: what is checked catches real contact, and what is not needs no check."""
+"""Self-collision: checked pairs detect real contact, and the others need no check."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def arm_bodies(pr2):
 
 
 def postures(pr2, torso, count, seed):
-    """Draw arm postures within soft limits, the rest where the robot file has it."""
+    """Draw arm postures within soft limits, other joints as in the robot file."""
     rest = pr2.with_mimics(pr2.joint_positions()) | {pr2.torso_joint: torso}
     for sample in sample_positions(pr2, count, seed):
         yield rest | {name: sample[name] for name in pr2.arm_joints}
@@ -76,7 +76,7 @@ def test_most_arm_postures_are_free(pr2, judge, arm_bodies, torso, share):
     assert np.mean(free) == pytest.approx(share, abs=0.07)
 
 
-def test_primitives_rarely_see_contact_that_hulls_do_not(pr2, judge, arm_bodies):
+def test_primitives_rarely_touch_where_hulls_do_not(pr2, judge, arm_bodies):
     hulls = SelfCollision(pr2, hulls=True)
     false = [
         bool(checked(pr2, judge.touching(q), arm_bodies))
@@ -111,7 +111,7 @@ def test_contact_of_hulls_that_primitives_miss_is_no_contact_of_surfaces(pr2, ju
     ],
     ids=["forearm folded into the torso", "hand down on the base"],
 )
-def test_reaching_into_the_own_body_is_seen(pr2, judge, arm_bodies, joints, far):
+def test_contact_of_the_arm_with_the_body_is_detected(pr2, judge, arm_bodies, joints, far):
     q = pr2.with_mimics(pr2.joint_positions()) | {pr2.torso_joint: 0.0115}
     q |= dict(zip(pr2.arm_joints, joints, strict=True))
     found = checked(pr2, judge.touching(q), arm_bodies)
@@ -146,8 +146,8 @@ def test_pairs_that_cannot_meet_do_not(pr2):
     assert surfaces.closest_approach(pair, pr2, seed=7) >= CLEAR
 
 
-def test_what_is_welded_to_the_base_is_looked_at_with_it(tmp_path):
-    """The base's primitives stand for a wall on it, too, into which the arm can swing."""
+def test_bodies_welded_to_the_base_are_checked_with_it(tmp_path):
+    """The base's primitives include a wall on it, which the arm can touch."""
     wall = (
         '<link name="wall"><visual><geometry><box size="0.1 0.4 0.6"/></geometry></visual></link>'
         '<joint name="wall_joint" type="fixed"><parent link="base"/><child link="wall"/>'

@@ -36,7 +36,7 @@ def pose(plant, frame, positions):
 
 
 @pytest.mark.parametrize("meshes", [False, True])
-def test_drake_has_nothing_to_say(pr2, meshes, capfd, caplog, tmp_path, monkeypatch):
+def test_drake_prints_no_warning(pr2, meshes, capfd, caplog, tmp_path, monkeypatch):
     monkeypatch.setenv("TCS_CACHE_DIR", str(tmp_path))
     with caplog.at_level(logging.DEBUG):
         parsed(kinematic_urdf(pr2.urdf, meshes), pr2)
@@ -45,8 +45,8 @@ def test_drake_has_nothing_to_say(pr2, meshes, capfd, caplog, tmp_path, monkeypa
     assert "warning" not in capfd.readouterr().err.lower()
 
 
-def test_drake_would_complain_about_the_original(pr2):
-    # Guards the test above: if the original were silent, silence would prove nothing.
+def test_drake_warns_about_the_original(pr2):
+    # Validates the test above: without warnings for the original it would prove nothing.
     root = ElementTree.parse(pr2.urdf_path()).getroot()
     assert len(root.findall("transmission")) > 0
     kept = ElementTree.fromstring(kinematic_urdf(pr2.urdf))
@@ -99,8 +99,8 @@ def test_kinematics_are_those_of_the_original(pr2, frame):
         np.testing.assert_allclose(p, expected[:3, 3], atol=1e-12)
 
 
-def test_drake_reads_the_original_alike(pr2, caplog):
-    """A second judge: Drake's own parser on the file as it is installed."""
+def test_drake_parses_the_original_with_the_same_result(pr2, caplog):
+    """Comparison with Drake's own parser on the file as installed."""
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
     packages = PackageMap()

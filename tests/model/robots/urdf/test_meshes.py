@@ -1,4 +1,4 @@
-"""The mesh cache: made once, by content, never half written."""
+"""The mesh cache: files are made once, named by content, and never written partially."""
 
 import numpy as np
 import pytest

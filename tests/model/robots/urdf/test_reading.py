@@ -1,4 +1,4 @@
-"""Reading a URDF, and what a broken one gets."""
+"""Reading a URDF, and the errors of a broken one."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filen
     ],
     ids=["not XML", "another format", "macros"],
 )
-def test_what_is_no_urdf_is_refused(text, message, tmp_path):
+def test_a_file_that_is_not_a_urdf_is_refused(text, message, tmp_path):
     path = tmp_path / "no.urdf"
     path.write_text(text)
     with pytest.raises(RobotError, match=rf"no\.urdf.*{message}"):
@@ -95,7 +95,7 @@ def test_round_bodies_become_polyhedra_around_them(geometry, reach, tmp_path):
     triangles = body_triangles(read_urdf(two_links(tmp_path, geometry=geometry)))["b"]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # No face cuts into a ball inside the body; 1e-12 is rounding.
+    # No face cuts into a sphere inside the body; 1e-12 is rounding.
     inner = 0.1
     assert np.abs(np.einsum("ij,ij->i", normals, triangles[:, 0])).min() >= inner - 1e-12
     corners = np.linalg.norm(triangles, axis=2).max()
