@@ -25,7 +25,7 @@ from tests.kernel.shapes import random_arm, random_joints, rotation
 
 DENSE = 2000
 ENDS = 2 * INSET
-"""Arcs end a hair inside the limits of joint 1."""
+"""Distance of the ends of arcs from the limits of joint 1, with a margin."""
 
 
 def arcs_of(arm, X_AG):
@@ -43,7 +43,7 @@ def distance_left(arm, chain, X_AG, angles):
     if free_joint(chain) == 0:
         v, other = chain.R[0].T @ (p_A7 - chain.p[0]), chain.p[1]
     else:
-        # L6's origin in L7 at zero, turned back by joint 7; the shoulder in L7.
+        # Origin of L6 in L7 at zero, rotated back by joint 7; the shoulder in L7.
         v, other = -chain.R[6].T @ chain.p[6], R_A7.T @ (chain.p[0] - p_A7)
     x = np.stack([c * v[0] + s * v[1], -s * v[0] + c * v[1], np.full_like(c, v[2])], axis=-1)
     square = np.sum((x - other) ** 2, axis=-1)
@@ -52,7 +52,7 @@ def distance_left(arm, chain, X_AG, angles):
 
 
 def in_some(arcs, angles, tolerance):
-    """Return whether each angle lies in one of the arcs, in any of its turns."""
+    """Return whether each angle lies in one of the arcs, modulo full turns."""
     turned = angles[:, None, None] + 2 * np.pi * np.arange(-2, 3)[:, None]
     inside = (turned >= arcs[:, 0] - tolerance) & (turned <= arcs[:, 1] + tolerance)
     return inside.any(axis=(1, 2))
@@ -97,7 +97,7 @@ def test_arcs_are_what_a_dense_scan_finds(chain):
         assert np.all(arcs[:, 0] <= arcs[:, 1])
         if limited:
             assert np.all((arcs >= lower) & (arcs <= upper))
-        # |SW|^2 turns by at most 1 m^2 per radian here; at an arc's end it may turn as the root.
+        # |SW|^2 changes by at most 1 m^2 per radian; at the end of an arc the angle changes as its root.
         assert np.all(in_some(arcs, angles[left > 1e-9], ENDS))
         assert not np.any(in_some(arcs, angles[left < -1e-9], -1e-12))
 
@@ -122,7 +122,7 @@ def test_feasible_angles_lie_in_the_arcs(chain):
 
 @pytest.mark.parametrize("spherical_shoulder", [False, True])
 @pytest.mark.parametrize("seed", range(15))
-def test_out_of_reach_and_out_of_limits_are_told_apart(seed, spherical_shoulder):
+def test_out_of_reach_and_out_of_limits_are_distinguished(seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, spherical_shoulder=spherical_shoulder)
     free = free_joint(chain)
@@ -137,7 +137,7 @@ def test_out_of_reach_and_out_of_limits_are_told_apart(seed, spherical_shoulder)
         if reach == OUT_OF_REACH:
             assert np.all(left < 1e-12)
         elif reach == OUT_OF_LIMITS:
-            # Some angle would do; arcs narrower than the scan's spacing excepted.
+            # Some angle suffices, except in arcs narrower than the scan's spacing.
             assert left.max() > -1e-5
 
 
@@ -200,7 +200,7 @@ def test_windows_are_those_of_the_reference(seed):
     assert sorted(map(tuple, windows[:found])) == sorted(expected)
 
 
-def test_no_row_of_the_first_look_has_more_windows_than_fit():
+def test_no_row_of_the_first_pass_has_more_windows_than_fit():
     # 48 samples, every other one feasible: the most windows there can be.
     slack = np.tile([1.0, -1.0], 24)
     windows = np.empty((MAX_WINDOWS, 2))

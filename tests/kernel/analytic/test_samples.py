@@ -33,7 +33,7 @@ def goal_of(arm, X_AG):
     return goal
 
 
-def lanes_at(arm, goal, branch, angles):
+def samples_at(arm, goal, branch, angles):
     """Return slack and measure of each angle of the free joint."""
     angles = np.atleast_1d(angles)
     slack, measure = np.full(len(angles), np.nan), np.full(len(angles), np.nan)
@@ -59,7 +59,7 @@ def test_some_branch_returns_the_joints_that_made_the_goal(chain, rng):
         goal = goal_of(arm, link_poses(chain, q)[-1])
         errors = []
         for branch in arm.branches:
-            slack, _ = lanes_at(arm, goal, branch, q[free])
+            slack, _ = samples_at(arm, goal, branch, q[free])
             joints = np.empty(7)
             sample_joints(arm, goal, branch, q[free], joints)
             # At a limit the slack is a difference of cosines, off by some 1e-12 at most.
@@ -72,7 +72,7 @@ def test_some_branch_returns_the_joints_that_made_the_goal(chain, rng):
     assert regular > 30
 
 
-def test_every_feasible_lane_reaches_the_goal_within_the_limits(chain, rng):
+def test_every_feasible_sample_reaches_the_goal_within_the_limits(chain, rng):
     arm = arm_solver(chain)
     seen = 0
     for _ in range(60):
@@ -80,7 +80,7 @@ def test_every_feasible_lane_reaches_the_goal_within_the_limits(chain, rng):
         goal = goal_of(arm, X_AG)
         angles = rng.uniform(-np.pi, np.pi, 60)
         for branch in arm.branches:
-            slack, measure = lanes_at(arm, goal, branch, angles)
+            slack, measure = samples_at(arm, goal, branch, angles)
             for angle, value in zip(angles[slack >= 0], measure[slack >= 0], strict=True):
                 q = np.empty(7)
                 sample_joints(arm, goal, branch, angle, q)
@@ -104,7 +104,7 @@ def test_samples_agree_with_the_reference_branch_by_branch(chain, rng):
         for angle in rng.uniform(-np.pi, np.pi, 6):
             expected = solutions(chain, X_AG, angle)
             for branch in arm.branches:
-                slack, _ = lanes_at(arm, goal, branch, angle)
+                slack, _ = samples_at(arm, goal, branch, angle)
                 exact = expected[tuple(branch)]
                 # Differences of cosines, each good to some 1e-15, and the same out of reach, where
                 # the search for narrow windows follows them. Where the elbow would be stretched
@@ -118,7 +118,7 @@ def test_samples_agree_with_the_reference_branch_by_branch(chain, rng):
                     sample_joints(arm, goal, branch, angle, q)
                     np.testing.assert_allclose(around(q - exact.q), 0.0, atol=1e-8)
     missing = [signs for signs in expected if list(signs) not in arm.branches.tolist()]
-    # Branches that were left out have no solution within the limits, ever.
+    # Branches that are left out never have a solution within the limits.
     for _ in range(50):
         expected = solutions(
             chain, link_poses(chain, random_joints(rng, chain))[-1], rng.uniform(-3, 3)
@@ -133,7 +133,7 @@ def test_slack_is_negative_out_of_reach(chain, rng):
         away = rng.normal(size=3)
         goal = goal_of(arm, (rotation(rng), away / np.linalg.norm(away) * (2 * length + 0.1)))
         for branch in arm.branches:
-            slack, _ = lanes_at(arm, goal, branch, rng.uniform(-3, 3, 20))
+            slack, _ = samples_at(arm, goal, branch, rng.uniform(-3, 3, 20))
             assert np.all(slack < 0)
 
 
@@ -146,18 +146,18 @@ def test_the_free_joint_out_of_its_limits_is_infeasible(name, rng):
         goal = goal_of(arm, link_poses(chain, q)[-1])
         outside = np.array([chain.lower[free] - 1e-6, chain.upper[free] + 1e-6, np.pi])
         for branch in arm.branches:
-            slack, _ = lanes_at(arm, goal, branch, outside)
+            slack, _ = samples_at(arm, goal, branch, outside)
             assert np.all(slack < 0)
 
 
 @pytest.mark.parametrize("turns", [-3, -1, 0, 2])
-def test_within_turns_an_angle_into_its_limits(turns):
+def test_within_shifts_an_angle_into_its_limits(turns):
     full = 2 * np.pi
     # A few roundings of an angle of up to 20 rad.
     assert within(1.0 + turns * full, 0.5, 3.0) == pytest.approx(1.0, abs=1e-14)
     assert within(-1.0 + turns * full, 4.5, 6.0) == pytest.approx(full - 1.0, abs=1e-14)
     assert within(-1.0 + turns * full, -np.inf, np.inf) == pytest.approx(-1.0, abs=1e-14)
     assert within(4.0 + turns * full, -np.inf, np.inf) == pytest.approx(4.0 - full, abs=1e-14)
-    # Wider than a turn, and not about zero.
+    # Wider than a full turn, and not about zero.
     assert within(-2.0 + turns * full, -1.0, 6.0) == pytest.approx(full - 2.0, abs=1e-14)
     assert within(np.nextafter(3.0, 4.0), 0.5, 3.0) == 3.0

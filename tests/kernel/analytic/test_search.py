@@ -1,4 +1,4 @@
-"""Where the kernel looks for solutions, held against where the reference looks."""
+"""Angles at which the kernel searches for solutions, compared with those of the reference."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_ties_are_not_left_to_rounding(lowered, seed, h, g):
     "spherical_shoulder", [False, True], ids=["spherical-wrist", "spherical-shoulder"]
 )
 @pytest.mark.parametrize("seed", range(1, 41, 2))
-def test_the_kernel_looks_where_the_reference_looks(lowered, seed, spherical_shoulder):
+def test_the_kernel_samples_where_the_reference_samples(lowered, seed, spherical_shoulder):
     rng = np.random.default_rng(seed)
     chain = chain_of(seed, lowered, spherical_shoulder=spherical_shoulder)
     scene, grid = toy_scene(chain, seed, obstacles=0), toy_grid()

@@ -1,4 +1,4 @@
-"""What is worked out once per arm: its class, its branches, its elbow's range."""
+"""Constants of an arm: its class, its branches, the range of its elbow."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_real_arms_belong_to_one_of_the_classes(name, free):
     assert free_joint(chain) == free
 
 
-def test_an_arm_of_both_classes_is_solved_as_it_stands():
+def test_an_arm_of_both_classes_is_not_reversed():
     # Spherical shoulder and spherical wrist, like a KUKA iiwa: reversed it fits as well.
     chain = straight_arm(np.full(7, 2.0), 0.0)
     assert arm_solver(chain).free == FIRST
@@ -48,7 +48,7 @@ def test_an_arm_of_both_classes_is_solved_as_it_stands():
     assert free_joint(chain) == FIRST
 
 
-def test_baxter_is_outside_and_the_message_says_by_how_much():
+def test_baxter_is_outside_and_the_message_states_the_distances():
     # Its URDF: shoulder 0.069 m from axis 1, wrist bend 0.01 m from the forearm's axis.
     with pytest.raises(ArmClassError) as caught:
         arm_solver(drake_arm("baxter").chain)
@@ -108,7 +108,7 @@ def test_link_frames_beside_the_meeting_point_are_refused(rng):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_the_reversed_arm_sees_its_base_where_the_tool_does(seed):
+def test_the_reversed_chain_exchanges_base_and_tool(seed):
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, spherical_shoulder=bool(seed % 2))
     back = reversed_chain(chain)
@@ -157,7 +157,7 @@ def test_signs_within_are_those_of_a_dense_sampling(interval):
 def test_signs_within_are_no_more_than_needed(interval):
     lower, upper = interval
     margin = min(abs(np.remainder(end + np.pi / 2, np.pi) - np.pi / 2) for end in interval)
-    # An end at a multiple of pi touches both halves: the answer may go either way there.
+    # An end at a multiple of pi belongs to both halves: either result is correct there.
     assume(margin > 1e-6)
     inside = np.sin(np.append(np.linspace(lower, upper, 2001), [lower, upper]))
     signs = _signs_within(lower, upper, True)
@@ -202,7 +202,7 @@ def test_limits_wider_than_a_turn_are_no_limits(lowered):
     lower, upper = chain.lower.copy(), chain.upper.copy()
     lower[3], upper[3] = -3.2, 3.2
     arm = arm_solver(chain._replace(lower=lower, upper=upper))
-    # The figures stay: an angle has to be turned into them.
+    # The numbers are kept: an angle must be shifted into them.
     assert (arm.lower[3], arm.upper[3]) == (-3.2, 3.2)
     assert arm.limit_cos[3] == -1.0
     assert len(arm.branches) == 4

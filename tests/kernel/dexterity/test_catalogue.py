@@ -215,6 +215,6 @@ def test_the_normalised_penalty_of_wide_limits_is_that_of_none(rng):
 def test_an_unknown_measure_is_reported_with_the_nearest_name(name, meant):
     with pytest.raises(UnknownNameError) as caught:
         dexterity(name)
-    said = str(caught.value)
-    assert said.startswith(f"unknown measure '{name}'. Known: inverse-condition, ")
-    assert said.endswith(f"Did you mean '{meant}'?")
+    message = str(caught.value)
+    assert message.startswith(f"unknown measure '{name}'. Known: inverse-condition, ")
+    assert message.endswith(f"Did you mean '{meant}'?")

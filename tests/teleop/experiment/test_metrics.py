@@ -173,7 +173,7 @@ def test_spectral_arc_length_distinguishes_smooth_from_jerky_at_any_speed():
 
 
 def test_spectral_arc_length_refuses_what_has_no_spectrum():
-    with pytest.raises(DataFileError, match="Record at 40 a second"):
+    with pytest.raises(DataFileError, match="Record at 40 samples a second"):
         spectral_arc_length(np.ones(100), 30.0)
     with pytest.raises(DataFileError, match="did not move"):
         spectral_arc_length(np.zeros(100), 100.0)
