@@ -97,7 +97,7 @@ def test_arcs_are_what_a_dense_scan_finds(chain):
         assert np.all(arcs[:, 0] <= arcs[:, 1])
         if limited:
             assert np.all((arcs >= lower) & (arcs <= upper))
-        # |SW|^2 changes by at most 1 m^2 per radian; at the end of an arc the angle changes as its root.
+        # |SW|^2 changes by at most 1 m^2 per radian here; at the end of an arc, as the square root.
         assert np.all(in_some(arcs, angles[left > 1e-9], ENDS))
         assert not np.any(in_some(arcs, angles[left < -1e-9], -1e-12))
 
