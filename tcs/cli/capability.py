@@ -57,7 +57,9 @@ class _Grid:
     ] = 16
     tool: Annotated[
         str | None,
-        typer.Option(help="Another frame of the robot as the tool.", show_default="its own"),
+        typer.Option(
+            help="Frame of the robot used as the tool.", show_default="that of the robot file"
+        ),
     ] = None
 
     def grid(self, grasps: str) -> MapGrid:
@@ -83,14 +85,17 @@ class _Scores:
     robot: options.Robot = "tiago"
     measure: Annotated[
         str,
-        typer.Option(help="Dexterity measure; by default the thesis's manipulability."),
+        typer.Option(help="Dexterity measure; the default is the manipulability of the thesis."),
     ] = _MEASURE
     visibility: Annotated[
-        str, typer.Option(help="corrected, or thesis for the equations as printed.")
+        str,
+        typer.Option(help="Visibility: corrected, or thesis for the equations as printed."),
     ] = "corrected"
     head: Annotated[
         str | None,
-        typer.Option(help="Name or YAML file of the head camera.", show_default="the robot's own"),
+        typer.Option(
+            help="Name or YAML file of the head camera.", show_default="that of the robot"
+        ),
     ] = None
 
 
@@ -120,11 +125,13 @@ class _Files:
     out: Annotated[Path, typer.Option(help="Map to write.")]
     text: Annotated[
         Path | None,
-        typer.Option(help="Also write the map as text: score x y z R11 .. R33, a line each."),
+        typer.Option(
+            help="Also write the map as text, with a line score x y z R11 .. R33 for each cell."
+        ),
     ] = None
 
     def check(self, *others: Path | None) -> None:
-        """Check before the work that the files can be written."""
+        """Check that the files can be written, before the map is made."""
         for path in (self.out, self.text, *others):
             if path is not None:
                 check_writable(path)
@@ -145,7 +152,8 @@ def from_ik(
     scores: _Scores,
     grid: _Grid,
     map_type: Annotated[
-        str, typer.Option("--type", "--kind", help="IHCM, or ICM without visibility.")
+        str,
+        typer.Option("--type", "--kind", help="Type of the map: IHCM, or ICM without visibility."),
     ] = "IHCM",
     grasps: Annotated[
         str, typer.Option(help="Tilts of the tool: side, top, side+top or all.")
@@ -154,7 +162,7 @@ def from_ik(
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Make a map by inverse kinematics of every cell around the tool."""
+    """Make a map (IHCM or ICM) by inverse kinematics of every cell around the tool."""
     from tcs.capability import map_from_ik
 
     files.check()
@@ -183,21 +191,26 @@ def record(
         Path | None,
         typer.Argument(
             metavar="CSV",
-            help="Recorded joint states: a row of joint names, then a row per sample, in radians.",
+            help="Recorded joint states: a row of joint names, then a row per sample [rad].",
             show_default="a simulated recording",
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Simulated: length of the recording.")] = 3200.0,
+    seconds: Annotated[
+        float, typer.Option(help="Simulated: length of the recording, in seconds.")
+    ] = 3200.0,
     scale: Annotated[
         float, typer.Option(help="Simulated: metres at the arm per metre at the master.")
     ] = 7.5,
     centre: Annotated[
         tuple[float, float],
-        typer.Option(metavar="X Y", help="Simulated: centre of the hand's box in the base, m."),
+        typer.Option(
+            metavar="X Y",
+            help="Simulated: centre of the workspace of the hand in the base frame, in metres.",
+        ),
     ] = (0.65, 0.0),
     seed: options.Seed = 0,
     save_csv: Annotated[
-        Path | None, typer.Option(help="Simulated: also write the joint states.")
+        Path | None, typer.Option(help="Simulated: also write the joint states to this file.")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
@@ -286,18 +299,24 @@ class _Task:
     samples: Annotated[int, typer.Option(help="Positions along a line or an arc.")] = 3
     heading_deg: Annotated[
         list[float] | None,
-        typer.Option(help="Headings of the grasps, deg.", show_default="0, 90 and -90"),
+        typer.Option(
+            help="Heading of a grasp, in degrees; may be repeated.", show_default="0, 90 and -90"
+        ),
     ] = None
-    approach: Annotated[str, typer.Option(help="side or top.")] = "side"
+    approach: Annotated[str, typer.Option(help="Approach of the grasps: side or top.")] = "side"
     pre_grasp: Annotated[
         list[float] | None,
-        typer.Option(help="Distance of a pre-grasp back along the approach, in metres."),
+        typer.Option(
+            help="Distance of a pre-grasp back along the approach, in metres; may be repeated."
+        ),
     ] = None
     direction_deg: Annotated[
-        int, typer.Option(help="Direction of a line: 0, 90, 180 or 270 deg.")
+        int, typer.Option(help="Direction of a line: 0, 90, 180 or 270 degrees.")
     ] = 90
-    start_deg: Annotated[float, typer.Option(help="Arc: the closed door, deg.")] = 0.0
-    end_deg: Annotated[float, typer.Option(help="Arc: the open door, deg.")] = 90.0
+    start_deg: Annotated[float, typer.Option(help="Arc: angle of the closed door, in degrees.")] = (
+        0.0
+    )
+    end_deg: Annotated[float, typer.Option(help="Arc: angle of the open door, in degrees.")] = 90.0
 
 
 @app.command("merge")
@@ -308,13 +327,16 @@ def merge_maps(
     torso_height: Annotated[
         float | None,
         typer.Option(
-            *_TORSO, help="Use only this torso height, in metres.", show_default="any of the map's"
+            *_TORSO, help="Use only this torso height, in metres.", show_default="any of the map"
         ),
     ] = None,
     scale: Annotated[str, typer.Option(help="Scale of the scores: fixed, or thesis.")] = "fixed",
     split: Annotated[
         bool,
-        typer.Option("--split", help="Use as many base poses as necessary, in the task's order."),
+        typer.Option(
+            "--split",
+            help="Find the fewest base poses that reach all positions, in the order of the task.",
+        ),
     ] = False,
     environment: Annotated[
         str | None,
@@ -325,15 +347,19 @@ def merge_maps(
     ] = None,
     task_at: Annotated[
         tuple[float, float, float],
-        typer.Option(metavar="X Y YAW_DEG", help="Pose of the task frame in the environment."),
+        typer.Option(
+            metavar="X Y YAW_DEG", help="Pose of the task frame in the environment (m, m, deg)."
+        ),
     ] = (0.0, 0.0, 0.0),
     robot: Annotated[
         str | None,
-        typer.Option(help="Name or YAML file of the robot.", show_default="the map's own"),
+        typer.Option(help="Name or YAML file of the robot.", show_default="that of the map"),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="CSV of every base pose: x, y, yaw_deg, torso_height, score."),
+        typer.Option(
+            help="CSV file to write, with every base pose: x, y, yaw_deg, torso_height, score."
+        ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help=_PICTURE)] = None,
     as_json: options.Json = False,
@@ -344,7 +370,7 @@ def merge_maps(
 
     if split and (out, picture, environment) != (None, None, None):
         raise typer.BadParameter(
-            "--split makes no single task map; leave out --out, --picture and --environment.",
+            "makes no single task map; leave out --out, --picture and --environment.",
             param_hint="--split",
         )
     if task.direction_deg % 90:
@@ -379,7 +405,7 @@ def merge_maps(
 
 
 def _shape(task: _Task) -> TaskShape:
-    """Return the parameters of a task in radians."""
+    """Return the parameters of a task, with angles in radians."""
     from tcs.capability import TaskShape
 
     return TaskShape(
@@ -400,10 +426,13 @@ def _shape(task: _Task) -> TaskShape:
 def show(
     capability: _Map,
     out: Annotated[Path, typer.Option(help=_PICTURE)],
-    tilt: Annotated[int, typer.Option(min=0, help="Number of the tilt.")] = 0,
+    tilt: Annotated[int, typer.Option(min=0, help="Number of the tool's tilt, from 0.")] = 0,
     height: Annotated[
         float | None,
-        typer.Option(help="Height of the tool, in metres.", show_default="that of most base poses"),
+        typer.Option(
+            help="Height of the tool above the floor, in metres.",
+            show_default="the one with most base poses",
+        ),
     ] = None,
     as_json: options.Json = False,
 ) -> None:
@@ -417,7 +446,7 @@ def show(
 
 
 def _check_picture(path: Path | None) -> None:
-    """Check before the work that a picture can be drawn there."""
+    """Check that a picture can be written there, before the result is computed."""
     if path is None:
         return
     if path.suffix != ".html":
@@ -441,11 +470,14 @@ def map_check(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Name or YAML file of a robot.", show_default="the map's own; without MAP tiago"
+            help="Name or YAML file of a robot.", show_default="that of MAP; without MAP tiago"
         ),
     ] = None,
     grasps: Annotated[
-        list[str] | None, typer.Option(help="side, top or all.", show_default="each of them")
+        list[str] | None,
+        typer.Option(
+            help="Tilts of the tool: side, top or all; may be repeated.", show_default="each"
+        ),
     ] = None,
     radius: _Radius = None,
     queries: Annotated[
@@ -455,7 +487,7 @@ def map_check(
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Compare a map with inverse kinematics at random tool poses."""
+    """Compare a capability map with inverse kinematics at random tool poses."""
     from tcs.capability import check_file, check_map
 
     if capability is not None:

@@ -39,7 +39,7 @@ Members = Annotated[
         min=1,
         max=3,
         help="Greatest number of base poses in the set: 1, 2 or 3.",
-        show_default="what the file holds",
+        show_default="that of the file",
     ),
 ]
 Page = Annotated[
@@ -75,10 +75,10 @@ Duration = Annotated[
 
 
 def check_export(export: Path | None, *, meshes: bool, as_json: bool) -> None:
-    """Reject options of a page without `--export`.
+    """Reject options of an exported page without `--export`.
 
     Raises:
-        typer.BadParameter: If there is no `--export`.
+        typer.BadParameter: If `--meshes` or `--json` is given without `--export`.
     """
     if export is None and (meshes or as_json):
-        raise typer.BadParameter("--meshes and --json need --export.", param_hint="--export")
+        raise typer.BadParameter("--meshes and --json require --export.", param_hint="--export")

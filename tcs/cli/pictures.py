@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tcs.output.report.shown_set import ShownSet
     from tcs.placement.store import ScoreFile
 
-_SHOWN_SET = "Shows the set selected from --here, or the one with the best scores."
+_SHOWN_SET = "The picture shows the set selected from --here, or the set with the best scores."
 SCORES = ("reachability", "manipulability")
 
 _Out = Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")]
@@ -52,7 +52,7 @@ def draw_map(
     """Draw the best score at each base position, from above, and the members of a set."""
     if score is not None and not states:
         raise typer.BadParameter(
-            "goes with --states only; without it both scores are drawn.", param_hint="--score"
+            "requires --states; without it both scores are drawn.", param_hint="--score"
         )
     if score not in (None, *SCORES):
         raise typer.BadParameter(f"must be one of {', '.join(SCORES)}.", param_hint="--score")
@@ -106,7 +106,7 @@ def _draw(
     *,
     as_json: bool,
 ) -> None:
-    """Draw the set selected from the current state, or the best one."""
+    """Draw the set selected from the current state, or the best set."""
     import tcs
     from tcs.cli.values import observed_settings, state_if_given
     from tcs.files.writing import check_writable

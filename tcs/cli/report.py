@@ -38,8 +38,8 @@ def report(
 ) -> None:
     """Write a page about a score file: base poses, scores, reasons and verification.
 
-    Reports the set selected from --here, or the one with the best scores. Answers are re-checked
-    with Drake; if one is false, the page states it and the exit code is 1.
+    The page shows the set selected from --here, or the set with the best scores. Answers are
+    re-checked with Drake; if one is false, the page states it and the exit code is 1.
     """
     from tcs.cli.values import observed_settings, state_if_given
 

@@ -23,14 +23,14 @@ def new(
     tool: Annotated[str, typer.Option(help="Link of the URDF that moves to the goals.")],
     base: Annotated[
         str | None,
-        typer.Option(help="Link at or beyond which the arm starts.", show_default="the root"),
+        typer.Option(help="Link from which on joints may belong to the arm.", show_default="root"),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="<urdf>.yaml")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draft a robot file from any URDF, with its collision primitives in a CSV file beside it."""
+    """Draft a robot file from any URDF, and a CSV file with its collision primitives."""
     from tcs.files.writing import check_writable
     from tcs.model.robots.draft import check_free, draft_robot, write_draft
 
@@ -70,7 +70,7 @@ def check(
     seed: options.Seed = 0,
     as_json: options.Json = False,
 ) -> None:
-    """Check a robot: arm class, limits, primitives, self-collision, IK; exit 1 if it is unfit."""
+    """Check a robot: arm class, limits, primitives, self-collision, IK; exit 1 if one fails."""
     from tcs.model.checkup import check_up
     from tcs.model.robots import load_robot
 
@@ -82,7 +82,7 @@ def check(
 
 
 def _report_check(found: dict[str, Any]) -> None:
-    """Print a check-up as text."""
+    """Print the result of a check as text."""
     arm, trip, contact = found["arm_class"], found["ik_round_trip"], found["self_collision"]
     echo = typer.echo
     echo(f"robot            {found['robot']}")
@@ -93,7 +93,7 @@ def _report_check(found: dict[str, Any]) -> None:
         f"{axes} {'parallel' if metres is None else f'{metres * 1e3:.3g} mm'}"
         for axes, metres in arm["metres_from_meeting"].items()
     )
-    echo(f"axes miss by     {distances}")
+    echo(f"axis distances   {distances}")
     echo(f"limits           {found['limits']['in_force']}")
     for name, joint in found["limits"]["joints"].items():
         echo(f"  {name:<28} {_range(joint)}")

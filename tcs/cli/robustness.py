@@ -71,7 +71,7 @@ def evaluate(
 ) -> None:
     """Evaluate the success of a set in randomly perturbed environments."""
     if members is not None and select != "uniform":
-        raise typer.BadParameter("goes with --select uniform only.", param_hint="--members")
+        raise typer.BadParameter("requires --select uniform.", param_hint="--members")
     import tcs
 
     loaded = tcs.load(file)
@@ -114,7 +114,7 @@ def robustify(
 ) -> None:
     """Estimate the success under error of the best sets, for `tcs select --delta`.
 
-    Without --observed, for every observed state that was scored.
+    Without --observed, the success is estimated for every observed state in the file.
     """
     import tcs
     from tcs.files.writing import check_writable
@@ -164,7 +164,7 @@ def report_robustified(result: Mapping[str, Any]) -> None:
 
 
 def _table(loaded: Any, observed: list[str] | None) -> int | None:
-    """Return the number of the table nearest to the observation, None without one."""
+    """Return the number of the table nearest to the observation, None without an observation."""
     if not observed:
         return None
     from tcs.placement.selection.observed import nearest_table

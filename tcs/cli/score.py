@@ -58,7 +58,7 @@ def score(
     max_members: Annotated[
         int,
         typer.Option(
-            min=1, max=3, help="Greatest number of members of a set; 3 takes seconds longer."
+            min=1, max=3, help="Greatest number of members of a set; with 3 it takes longer."
         ),
     ] = 2,
     observed: Annotated[
@@ -83,12 +83,13 @@ def score(
 ) -> None:
     """Score every initial configuration of a grid and build the sets to select from."""
     if (task is None) != everything:
-        raise typer.BadParameter("name a task, or give --all for all tasks.", param_hint="TASK")
+        raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
-        raise typer.BadParameter("needs one task, not --all.", param_hint="--observed")
+        raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
     if at and not frames:
         raise typer.BadParameter(
-            "needs --frames; with it, states the setting of the environment.", param_hint="--at"
+            "requires --frames: it is the setting of the environment at the observation.",
+            param_hint="--at",
         )
 
     from tcs.placement.scoring import default_path, files
@@ -122,7 +123,7 @@ def score(
     from tcs.model.scene import load_environment
 
     if out is None:
-        # Never overwrite the file of the task scored offline by default.
+        # By default, do not overwrite the file of the task scored offline.
         path = path.with_stem(f"{path.stem}-live")
     observation = tcs.Observation(
         joints=observed_settings(observed or (), load_environment(environment).observable_axes),

@@ -101,7 +101,8 @@ def explain(
         list[str] | None,
         typer.Option(
             metavar="AXIS=COST",
-            help="Cost of a metre (else 2) or radian (else 1) along an axis of the environment.",
+            help="Cost of a metre (default 2) or radian (default 1) along an axis of the "
+            "environment.",
         ),
     ] = None,
     travel: Annotated[

@@ -30,12 +30,12 @@ TorsoHeight = Annotated[
 ]
 _KEYS = (
     "W/S forward, A/D sideways, R/F up and down, U/O roll, I/K pitch, J/L yaw; M next mode, "
-    "1-4 joint group, Q/E turn it; C clutch, space all to zero, X back to the start."
+    "1-4 joint group, Q/E move it; C clutch, space all to zero, X back to the start."
 )
 
 
 class Limits(StrEnum):
-    """Behaviour at an invalid joint configuration."""
+    """Behaviour at a joint limit."""
 
     PAPER = "paper"
     CLAMPED = "clamped"
@@ -81,8 +81,8 @@ def live(
         bool,
         typer.Option(
             "--line",
-            help="Show the experiment's line, begin at its start, and print how accurately it was "
-            "followed.",
+            help="Show the line of the experiment, begin at its start, and print how accurately "
+            "it was followed.",
         ),
     ] = False,
     save: Annotated[
@@ -99,12 +99,13 @@ def live(
         given = [name for name, one in sources.items() if one and one.name == "COMMANDLINE"]
         if given:
             raise typer.BadParameter(
-                f"is for the live page; write the options of '{ctx.invoked_subcommand}' after it.",
+                f"belongs to the live page; give the options of '{ctx.invoked_subcommand}' after "
+                "its name.",
                 param_hint="--" + given[0].replace("_", "-"),
             )
         return
     if line and start_deg is not None:
-        raise typer.BadParameter("the line has a start of its own.", param_hint="--start-deg")
+        raise typer.BadParameter("--line sets the start posture.", param_hint="--start-deg")
 
     from tcs.files.writing import check_writable
     from tcs.output.view.teleop.session import LiveOptions, LiveSession
@@ -115,7 +116,7 @@ def live(
         check_format(save)
         check_writable(save)
     if line:
-        terminal.note("searching for a line that needs null-space motion; this takes some seconds.")
+        terminal.note("searching for a line that requires null-space motion, some seconds.")
     session = LiveSession(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
@@ -149,11 +150,11 @@ def line_text(result: LineResult) -> str:
 
     if result.time is None or result.accuracy is None:
         left = 1e3 * result.distance_left
-        return f"the end of the line was not reached: {left:.0f} mm are left."
+        return f"the end of the line was not reached: {left:.0f} mm remain."
     worst, met = 1e3 * result.accuracy.worst, result.accuracy.planes_met
     return (
         f"the line took {result.time:.1f} s; the greatest error of the mean path was {worst:.1f} "
-        f"mm ({met} of {PLANES} planes met)."
+        f"mm ({met} of {PLANES} planes crossed)."
     )
 
 
@@ -161,11 +162,11 @@ def line_text(result: LineResult) -> str:
 def replay(
     run: Annotated[
         Path,
-        typer.Argument(metavar="RUN", help="A run that `tcs teleop` saved.", show_default=False),
+        typer.Argument(metavar="RUN", help="A run saved by `tcs teleop`.", show_default=False),
     ],
     robot: Annotated[
         str | None,
-        typer.Option(help="Name or YAML file of its robot.", show_default="the run's own"),
+        typer.Option(help="Name or YAML file of the robot.", show_default="that of the run"),
     ] = None,
     export: options.Page = None,
     meshes: options.Meshes = False,
@@ -174,7 +175,7 @@ def replay(
     duration: options.Duration = None,
     as_json: options.PageJson = False,
 ) -> None:
-    """Play a saved run back in the browser, or write it as one page."""
+    """Play back a saved run in the browser, or write it as one page."""
     options.check_export(export, meshes=meshes, as_json=as_json)
 
     from tcs.files.writing import check_page
@@ -229,10 +230,19 @@ def _report_page(result: dict[str, Any]) -> None:
 def experiment(
     robot: options.Robot = "iiwa7",
     operators: Annotated[
-        int, typer.Option(min=3, max=1000, help="Scripted operators; the paper had 26 people.")
+        int,
+        typer.Option(
+            min=3, max=1000, help="Number of scripted operators; the paper had 26 people."
+        ),
     ] = 26,
-    trials: Annotated[int, typer.Option(min=1, max=1000, help="Experimental trials, each.")] = 3,
-    training: Annotated[int, typer.Option(min=0, max=1000, help="Training trials, each.")] = 4,
+    trials: Annotated[
+        int,
+        typer.Option(min=1, max=1000, help="Evaluated trials of each operator and controller."),
+    ] = 3,
+    training: Annotated[
+        int,
+        typer.Option(min=0, max=1000, help="Training trials of each operator and controller."),
+    ] = 4,
     torso_height: TorsoHeight = None,
     line_seed: Annotated[int, typer.Option(min=0, help="Seed of the search for the line.")] = 0,
     seed: options.Seed = 0,
@@ -240,18 +250,20 @@ def experiment(
         Path | None, typer.Option(help="Folder to write.", show_default="teleop-ROBOT")
     ] = None,
     runs: Annotated[
-        bool, typer.Option("--runs", help="Also save each experimental trial.")
+        bool, typer.Option("--runs", help="Also save the run of each evaluated trial.")
     ] = False,
-    runs_as: Annotated[str, typer.Option(help="csv, or parquet (extra `parquet` of tcs).")] = "csv",
+    runs_as: Annotated[
+        str, typer.Option(help="Format of the runs: csv, or parquet (extra `parquet` of tcs).")
+    ] = "csv",
     maps: Annotated[
-        bool, typer.Option("--maps", help="Also write the capability map of each controller.")
+        bool, typer.Option("--maps", help="Also write a capability map of each controller.")
     ] = False,
     jobs: Annotated[
         int, typer.Option(min=1, help="Number of processes; does not change the results.")
     ] = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Let scripted operators, not people, follow a line that needs null-space motion."""
+    """Compare controllers: scripted operators follow a line that requires null-space motion."""
     from tcs.files.writing import check_writable
     from tcs.model.robots import load_robot
     from tcs.output.report.teleop_files import FILES, make_experiment_folder, write_experiment
@@ -271,7 +283,7 @@ def experiment(
     make_experiment_folder(arm, folder, runs_as=suffix, maps=maps)
     for name in FILES:
         check_writable(folder / name)
-    with terminal.progress_bar("operators times controllers") as on_progress:
+    with terminal.progress_bar("operators and controllers") as on_progress:
         result = write_experiment(
             arm, plan, folder, line_seed=line_seed, runs_as=suffix, maps=maps,
             command=shlex.join(words), jobs=jobs, on_progress=on_progress,
@@ -297,7 +309,7 @@ def _report_experiment(result: dict[str, Any]) -> None:
     out.print(table)
     for one in result["maps"] or ():
         best = one["best"]
-        where = "no base pose holds the grasp"
+        where = "no base pose reaches the grasp"
         if best is not None:
             pose = f"x {best['x']:.2f} m, y {best['y']:.2f} m, {best['yaw_deg']:.1f} deg"
             where = f"best base pose {pose}, score {best['score']:.3f}"

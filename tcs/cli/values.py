@@ -26,7 +26,7 @@ def state_if_given(
     if here is not None:
         return current_state(here, torso)
     if torso:
-        raise typer.BadParameter("needs --here.", param_hint="--torso")
+        raise typer.BadParameter("requires --here.", param_hint="--torso")
     return None
 
 

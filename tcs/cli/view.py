@@ -16,7 +16,8 @@ def view(
         tuple[float, float, float] | None,
         typer.Option(
             metavar="X Y YAW_DEG",
-            help="Start with the set selected from here (m, m, deg), else with the best one.",
+            help="Start with the set selected from this base pose (m, m, deg); by default with "
+            "the best set.",
         ),
     ] = None,
     torso: options.Torso = 0.0,

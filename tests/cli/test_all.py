@@ -80,8 +80,8 @@ def test_every_name_and_number_is_printed_in_full(tcs_command, stand_in, tmp_pat
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        ((), 2, "name a task"),
-        (("shaving", "--all"), 2, "name a task, or give --all"),
+        ((), 2, "give a task"),
+        (("shaving", "--all"), 2, "give a task, or --all"),
         (("--all", "--environment", "bath"), 1, "bath"),
         (("--all", "--robot", "pr3"), 1, "pr2"),
     ],

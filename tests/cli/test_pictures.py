@@ -43,9 +43,9 @@ def test_scores_of_other_models_are_refused(tcs_command, small_file):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--score", "reachability"), "goes with --states"),
+        (("--score", "reachability"), "requires --states"),
         (("--states", "--score", "success"), "must be one of reachability"),
-        (("--torso", 0.1), "needs --here"),
+        (("--torso", 0.1), "requires --here"),
     ],
 )
 def test_options_that_do_not_go_together_are_misuse(tcs_command, small_file, words, message):

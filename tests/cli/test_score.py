@@ -273,7 +273,7 @@ def test_nothing_reached_is_an_answer(tcs_command, example, tmp_path, monkeypatc
     path = tmp_path / "o.tcs"
     ran = tcs_command("score", "shaving", "--out", path)
     assert ran.code == 0
-    assert "no goal is reached from anywhere" in ran.out
+    assert "no configuration reaches a goal" in ran.out
     assert tcs_command("score", "shaving", "--out", path, "--json").json["best"] is None
 
 

@@ -64,4 +64,4 @@ def test_impossible_observations_are_reported(tcs_command, corner, tmp_path, wor
 def test_all_rows_are_not_scored_as_found(tcs_command):
     ran = tcs_command("score", "--all", "--observed", "person_x=0.1")
     assert ran.code == 2
-    assert "needs one task" in ran.err
+    assert "requires one task" in ran.err

@@ -220,7 +220,7 @@ def test_the_line_is_there_to_follow_and_stands_in_the_run(tmp_path):
     course = find_course(load_arm("iiwa7"))
     # Nobody drove: all of the line is left.
     left = np.linalg.norm(np.subtract(course.line.end, course.line.start))
-    assert f"not reached: {1e3 * left:.0f} mm are left" in out
+    assert f"not reached: {1e3 * left:.0f} mm remain" in out
     run = load_run(path)
     assert run.metadata["line_end"] == pytest.approx(course.line.end)
     np.testing.assert_allclose(run.joints[0], course.joints, atol=1e-9)

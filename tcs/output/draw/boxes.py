@@ -48,8 +48,8 @@ def draw_boxes(
 ) -> Figure:
     """Return horizontal box plots of groups of samples, the first group on top.
 
-    A box spans the middle half of the samples. Its line is the median, its whiskers reach the 5th
-    and 95th percentile, and the dot is the mean; samples beyond are small rings.
+    A box extends from the first to the third quartile. Its line is the median, its whiskers extend
+    to the 5th and 95th percentile, and the dot is the mean; samples beyond are small rings.
 
     Args:
         groups: The groups.
@@ -100,7 +100,7 @@ def _draw(axes: Axes, y: float, box: BoxPlot) -> None:
         medianprops={"color": _INK, "lw": 1.6},
         whiskerprops={"color": _INK, "lw": 0.8},
         capprops={"color": _INK, "lw": 0.8},
-        # In the colour of the series: a box of equal samples consists of its dot.
+        # In the colour of the series: of a box of equal samples only the dot is visible.
         meanprops={"marker": "o", "mfc": COLOURS[box.series], "mec": _INK, "ms": 6.0},
         flierprops={"marker": "o", "mfc": "none", "mec": "#8a939c", "ms": 2.5, "mew": 0.6},
     )

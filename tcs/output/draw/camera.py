@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 SIZE = (1500, 1300)
 """Width and height of a view in pixels, before two by two are averaged."""
 FOCAL = 3.5
-"""Focal length over half the picture's height: from some 5 m away, a person and a robot fill it."""
+"""Focal length over half the image height: at 5 m, a person and a robot fill the image."""
 _FILLED = 0.94
 """Fraction of the picture that its subject may take up."""
 _NEAREST = 0.5
@@ -32,7 +32,7 @@ class Camera(NamedTuple):
 
 
 def nearest_camera(subject: FloatArray, azimuth: float) -> Camera:
-    """Return the nearest camera that has the whole subject in the picture.
+    """Return the nearest camera pose with the whole subject in the picture.
 
     Args:
         subject: Points that have to be in the picture [m], shape (n, 3).
@@ -40,8 +40,8 @@ def nearest_camera(subject: FloatArray, azimuth: float) -> Camera:
     """
     R = _axes(azimuth)
     right, up, backward = (subject @ R.T).T
-    # A point is in the picture where |sideways| <= half * (its distance along the view), and the
-    # same upward: four bounds on the camera's position, each with one point that binds.
+    # A point is in the picture if |sideways| <= half * (its distance along the view), and likewise
+    # upward: four bounds on the camera's position, each of them active at one point.
     half = np.array([SIZE[0] / SIZE[1], 1.0]) / FOCAL * _FILLED
     place, distance = np.zeros(3), -np.inf
     for axis, along in enumerate((right, up)):
@@ -63,7 +63,7 @@ def _axes(azimuth: float) -> FloatArray:
 
 
 def rays(pixels: IntArray) -> FloatArray:
-    """Return the directions of pixels in the camera's axes, one ahead of it, shape (n, 3).
+    """Return the directions of pixels in the camera's axes, with backward component -1, (n, 3).
 
     Args:
         pixels: Row and column of each, shape (n, 2).

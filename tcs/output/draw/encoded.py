@@ -14,11 +14,11 @@ _DEFAULT_METADATA = ("Creator", "Date", "Format", "Type")
 
 
 def as_svg(figure: Figure, name: str) -> bytes:
-    """Return a figure as an SVG whose text stays text.
+    """Return a figure as an SVG with its text as text elements.
 
     Args:
         figure: The figure.
-        name: A text unique within the page. It separates the ids of its figures, and makes the
+        name: A name unique within the page. It keeps the ids of the figures apart, and makes the
             bytes of a figure reproducible.
     """
     stream = io.BytesIO()
@@ -33,7 +33,7 @@ def as_png(figure: Figure, dpi: float = _DPI, *, colours: int | None = 256) -> b
     Args:
         figure: The figure.
         dpi: Pixels per inch.
-        colours: Number of colours; 256 take a fifth of the size. None keeps all of them, for
+        colours: Number of colours; 256 reduce the size to a fifth. None keeps all colours, for
             figures with a colour scale.
     """
     full, small = io.BytesIO(), io.BytesIO()

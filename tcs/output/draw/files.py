@@ -1,4 +1,4 @@
-"""Picture files, written whole or not at all."""
+"""Picture files, written completely or not at all."""
 
 from __future__ import annotations
 

@@ -51,9 +51,9 @@ def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: 
     """Colour each base position by its value, grey where the base is blocked.
 
     Args:
-        axes: Where to.
+        axes: The axes.
         places: The base positions.
-        values: Value of each, no colour where it is 0, shape (X, Y).
+        values: Value of each base position, without a colour where it is 0, shape (X, Y).
         most: Value at the upper end of the scale.
     """
     edges = (cell_edges(places.x), cell_edges(places.y))
@@ -104,7 +104,7 @@ def draw_base(
         ls="--" if is_here else "-",
         zorder=5,
     )
-    # A path effect would fill the outline: the casing is a patch of its own.
+    # A path effect would fill the outline, so the casing is a separate patch.
     axes.add_patch(Polygon(base.polygon, fill=False, edgecolor=CASING, lw=4.4 * size, zorder=4.9))
     axes.add_patch(outline)
     tip = (at.base_x + ARROW * math.cos(at.base_yaw), at.base_y + ARROW * math.sin(at.base_yaw))

@@ -33,15 +33,16 @@ class ScenePanel:
     solids: Sequence[Solid]
     """Everything in the scene."""
     subject: FloatArray
-    """Points that have to be in the picture, which is as close as that allows [m], (n, 3)."""
+    """Points that have to be in the picture, seen from as near as possible [m], shape (n, 3)."""
     azimuths: tuple[float, ...]
-    """Directions to look from [rad]; the one that shows most of the goals is taken, above all of
-    the goal that is shown, unless something hides the robot or the person from there."""
+    """Candidate directions from the subject to the camera [rad]. The one that shows most of the
+    goals is used, with most weight on the current goal, unless the robot or the person is hidden
+    from there."""
     caption: str
 
 
 class _Candidate(NamedTuple):
-    """What one direction shows."""
+    """The visible parts from one direction."""
 
     goals: float
     """Weighted pixels of the goals."""
@@ -87,9 +88,7 @@ def _render(view: ScenePanel) -> tuple[FloatArray, bool]:
     """Return the picture from the best direction, shape (h, w, 3), and whether it is whole."""
     mesh = Mesh.of(view.solids)
     weight = np.array([_GOALS.get(solid.category, 0.0) for solid in view.solids])[mesh.owner]
-    is_subject = np.array([solid.category is not Category.FURNITURE for solid in view.solids])[
-        mesh.owner
-    ]
+    is_subject = mesh.is_subject(view.solids)
     candidates = []
     for azimuth in view.azimuths:
         camera = nearest_camera(view.subject, azimuth)
@@ -97,13 +96,13 @@ def _render(view: ScenePanel) -> tuple[FloatArray, bool]:
         visible = raster.triangle[raster.triangle >= 0]
         goals, subject = float(weight[visible].sum()), int(is_subject[visible].sum())
         candidates.append(_Candidate(goals, subject, left_out, camera, raster))
-    # From behind furniture a goal may be visible past its edge, and nothing of the robot.
+    # From behind furniture, a goal may be visible beside it while the robot is hidden.
     clear = _UNHIDDEN * max(one.subject for one in candidates)
     unhidden = [one for one in candidates if one.subject >= clear]
     whole = [one for one in unhidden if not one.left_out]
     best = max(whole or unhidden, key=lambda one: one.goals)
     image = shade(view.solids, mesh, best.camera, best.raster)
     width, height = cameras.SIZE
-    # Averaging two by two pixels smooths the edges.
+    # The average of two by two pixels smooths the edges.
     smooth = image.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
     return np.asarray(smooth), not best.left_out

@@ -1,7 +1,7 @@
 """The nearest triangle in each pixel, and the walls that are left out because they hide too much.
 
-matplotlib's own 3-D axes sort whole faces, and shapes that enclose a robot's links pass through one
-another; so depth is compared pixel by pixel here.
+The 3-D axes of matplotlib sort whole faces, but the shapes that enclose a robot's links intersect
+each other. Depth is therefore compared pixel by pixel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tcs.output.draw.camera import FOCAL, Camera, IntArray
 from tcs.output.draw.solids import Category, FloatArray, Solid
 
 _WALL_TOP = 1.5
-"""Height from which on furniture may be left out [m]: walls and cupboards, not beds and chairs."""
+"""Least height of furniture that may be left out [m]: walls and cupboards, not beds and chairs."""
 _HIDES = 0.05
 """Fraction of the visible robot, person and goals that such a solid may hide."""
 
@@ -59,17 +59,15 @@ def rasterise_scene(
 ) -> tuple[Raster, tuple[int, ...]]:
     """Return the nearest surfaces, and the numbers of the solids that are left out.
 
-    Furniture as high as a wall is left out where it hides robot, person or goals, or surrounds the
-    camera: the camera often is outside the walls of an environment.
+    Furniture as high as a wall is left out if it hides robot, person or goals, or extends behind
+    the camera: the camera is often outside the walls of an environment.
 
     Args:
         solids: The solids.
         mesh: Their surfaces.
         camera: The camera.
     """
-    is_subject = np.array([solid.category is not Category.FURNITURE for solid in solids])[
-        mesh.owner
-    ]
+    is_subject = mesh.is_subject(solids)
     walls = [
         number
         for number, solid in enumerate(solids)
@@ -79,7 +77,7 @@ def rasterise_scene(
     shows_subject = (raster.triangle >= 0) & is_subject[raster.triangle]
     left_out = []
     for number in walls:
-        # A wall that reaches from before the camera to behind it cannot be drawn whole.
+        # A wall that extends from in front of the camera to behind it cannot be drawn completely.
         ahead = (camera.p - solids[number].corners) @ camera.R[2] > _CLOSEST
         wall = _rasterise(mesh, camera, mesh.owner == number)
         hidden = shows_subject & (wall.depth > raster.depth)
@@ -114,7 +112,8 @@ def _rasterise(mesh: Mesh, camera: Camera, is_drawn: NDArray[np.bool_]) -> Raste
     area = edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]
     low = np.maximum(np.floor(xy.min(axis=1)).astype(int), 0)
     high = np.minimum(np.ceil(xy.max(axis=1)).astype(int) + 1, [width, height])
-    # Counter-clockwise from outside is clockwise where y points down: the rest shows its back.
+    # Triangles are counter-clockwise from outside, hence clockwise in pixels, where y points down;
+    # the others face away.
     front = is_drawn & (area < 0.0) & is_ahead & np.all(low < high, axis=1)
     for i in np.flatnonzero(front):
         (x0, y0), (x1, y1) = low[i], high[i]

@@ -40,7 +40,7 @@ def shade(solids: Sequence[Solid], mesh: Mesh, camera: Camera, raster: Raster) -
     light = np.full(len(triangles), _AMBIENT)
     for direction, strength in _LIGHTS:
         light += strength * np.maximum(in_view @ (direction / np.linalg.norm(direction)), 0.0)
-    # Goals are signs, not things: their colours are those of the legend, whatever way they face.
+    # Goals are symbols: they have the colours of the legend, without shading.
     is_sign = np.array([solid.category in _SIGNS for solid in solids])
     light[is_sign[owner]] = 1.0
     base = np.array([to_rgb(solid.category.colour) for solid in solids])
@@ -87,7 +87,7 @@ def _floor(camera: Camera, pixels: IntArray) -> FloatArray:
     down = -directions[:, 2]
     reach = camera.p[2] / np.maximum(down, 1e-6)
     points = camera.p[:2] + reach[:, None] * directions[:, :2]
-    # A line is as wide as a pixel is on the floor there, but never less than 8 mm.
+    # A line has the width of a pixel on the floor there, but at least 8 mm.
     half = np.maximum(0.004, 1.2 * reach / (FOCAL * cameras.SIZE[1] / 2.0))
     from_line = np.abs(np.mod(points + 0.25, 0.5) - 0.25).min(axis=1)
     colours = np.where((from_line < half)[:, None], _LINE, _FLOOR)

@@ -21,7 +21,7 @@ _ROUND = 16
 
 
 class Category(Enum):
-    """What a solid belongs to, with its name in a legend and its colour."""
+    """Category of a solid, with its name in a legend and its colour."""
 
     FURNITURE = ("furniture", colours.FURNITURE)
     PERSON = ("person", colours.PERSON)
@@ -51,10 +51,10 @@ class Solid:
 
     @classmethod
     def placed(cls, category: Category, corners: FloatArray, R: FloatArray, p: FloatArray) -> Solid:
-        """Return the solid of corners given in a frame of their own.
+        """Return the solid of corners given in their own frame S.
 
         Args:
-            category: What it belongs to.
+            category: The category.
             corners: Corners in their own frame S [m], shape (n, 3).
             R: R_WS, orientation of S in the frame of the picture, shape (3, 3).
             p: p_WoSo_W, origin of S there [m], shape (3,).
@@ -99,7 +99,7 @@ def primitive_corners(shape: int, size: tuple[float, float, float]) -> FloatArra
         signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
         return np.asarray(signs * np.array(size))
     if shape not in (SPHERE, CAPSULE):
-        raise TcsError(f"no picture of shape {shape}: known are sphere, capsule, box.")
+        raise TcsError(f"shape {shape} cannot be drawn; must be a sphere, capsule or box.")
     half_length = size[1] if shape == CAPSULE else 0.0
     sphere = size[0] * _unit_sphere()
     cap = sphere[sphere[:, 2] >= 0.0] + np.array([0.0, 0.0, half_length])

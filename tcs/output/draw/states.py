@@ -57,7 +57,7 @@ def draw_states(
 
     Args:
         panels: Row by row, from the top.
-        rows: Settings that the states of each row share; "" for none.
+        rows: Settings that the states of each row share; may be "".
         columns: Settings that the states of each column share.
         members: The members of the set in the order of the tour.
         title: First line.
@@ -124,7 +124,7 @@ def _best_text(best: float, score: Score) -> str:
 
 
 def _shown_points(panels: Sequence[Sequence[StatePanel]]) -> FloatArray:
-    """Return corners of everything that every panel shows [m], shape (n, 2)."""
+    """Return corners of everything that has to be visible in every panel [m], shape (n, 2)."""
     found = []
     for panel in (panel for row in panels for panel in row):
         places = panel.places

@@ -47,7 +47,7 @@ def draw_tool_paths(
     views = (("to its left [m]", side), ("above [m]", np.array([0.0, 0.0, 1.0])))
     points = np.concatenate([*(path for group in groups for path in group.paths), [start, end]])
     along, left, above = (np.ptp(points @ axis) for axis in (level, side, views[1][1]))
-    # As high as the paths are wide, at the scale of the columns.
+    # The height of a row is the extent of the paths, at the scale of the columns.
     heights = np.clip(_COLUMN * np.array([left, above]) / along, 0.8, 4.0)
     figure = Figure(
         figsize=(_COLUMN * len(groups) + 0.6, float(heights.sum()) + 1.4), layout="constrained"

@@ -69,7 +69,7 @@ class Table:
 
     def __post_init__(self) -> None:
         """Check the shape."""
-        # An error in the program, never of a user.
+        # A violation is a defect of the program, not an error of the user.
         assert all(len(row) == len(self.columns) for row in self.rows), self.caption
 
     def texts(self) -> list[list[str]]:

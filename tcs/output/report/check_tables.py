@@ -19,7 +19,7 @@ def verification_table(report: ScoreReport) -> Table:
         rows.append([f"– {line.text}" if line.is_detail else _sentence_case(line.text), value])
     verdict = found.verdict
     if found.is_sound and not report.is_sound:
-        verdict = "THESE HOLD, BUT SOME POSTURES UNDER GOALS ARE FALSE"
+        verdict = "THESE ANSWERS HOLD, BUT SOME POSTURES IN THE SECTION GOALS ARE FALSE"
     rows.append(["Verdict", Cell(verdict, _tone(report.is_sound))])
     return Table(
         "Verification made with this report: pairs drawn at random from all state tables of the "

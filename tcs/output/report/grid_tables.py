@@ -56,7 +56,7 @@ def pairs_table(report: ScoreReport) -> Table:
         rest = found[MOST_PAIRS:]
         if rest:
             n = sum(times for _, times in rest)
-            names = (f"{len(rest)} other pairs", "")
+            names = (f"{len(rest)} other pair{'' if len(rest) == 1 else 's'}", "")
             rows.append([REASON_NAMES[reason], *names, f"{n:,}", percentage(n / total)])
     return Table(
         "Bodies in contact over all goals and configurations, most frequent first. Each "

@@ -24,7 +24,7 @@ from tcs.output.report.blocks import (
 )
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-"""The page may load and run nothing, whatever text it contains."""
+"""Content security policy: the page loads and runs nothing, whatever text it contains."""
 
 
 def as_html(page: Page) -> str:
@@ -111,7 +111,7 @@ def _(block: Table) -> str:
 def _(block: Picture) -> str:
     description = escape(block.description)
     if block.format == "svg":
-        # From its root element on: an XML declaration has no place within HTML.
+        # Start at the root element: an XML declaration is not allowed within HTML.
         drawing = block.content.decode("utf-8")
         drawing = drawing[drawing.index("<svg") :]
         drawing = re.sub(r"^<svg", f'<svg role="img" aria-label="{description}"', drawing)

@@ -33,7 +33,7 @@ from tcs.placement.scoring import Job, rebuild_scene
 from tcs.placement.store import ScoreFile
 
 _AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
-"""Corners of what is shown around the tool [m]: a hand, and the part of the body it is at."""
+"""Corners of the region shown around the tool [m]: the gripper and the nearby part of the body."""
 
 
 class ScoredScene(NamedTuple):
@@ -66,7 +66,7 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
     Args:
         file: A score file.
         shown: The set to mark.
-        scored: Its `scored_scene`, which is moved; built if it is not given.
+        scored: The result of `scored_scene`, built if None. The function moves the scene.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
@@ -87,7 +87,7 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
 
 
 def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
-    """Return a picture of the robot at each member, its arm at the goal it serves best there.
+    """Return a picture of the robot at each member, its arm at the goal of greatest dexterity.
 
     Args:
         file: A score file.
@@ -99,7 +99,7 @@ def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
     """
     if not shown.members:
         raise SelectionError(
-            "Nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
+            "nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
             "base can be placed."
         )
     scored = scored_scene(file, shown)
@@ -116,7 +116,7 @@ def member_figure(
         file: A score file.
         shown: The set.
         number: Number of the member, from 0.
-        scored: Its `scored_scene`, which is moved; built if it is not given.
+        scored: The result of `scored_scene`, built if None. The function moves the scene.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
@@ -132,7 +132,7 @@ def title_of(job: Job) -> str:
 
 
 def _set_environment(scene: Scene, member: InitialConfiguration) -> None:
-    """Set the joints of the environment as a configuration has them."""
+    """Set the joints of the environment to those of a configuration."""
     for name, value in member.environment:
         scene.set_joint(name, value)
 
@@ -140,7 +140,7 @@ def _set_environment(scene: Scene, member: InitialConfiguration) -> None:
 def _member_panel(
     file: ScoreFile, scored: ScoredScene, shown: ShownSet, number: int, *, is_close: bool = False
 ) -> ScenePanel:
-    """Return the panel of one member: robot and person, or the tool at its goal alone."""
+    """Return the panel of one member: robot and person, or a close view of the tool at its goal."""
     job, scene = scored
     member, h = shown.members[number], shown.indices[number]
     scores = file.tables[shown.table].scores
@@ -159,7 +159,7 @@ def _member_panel(
     ]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
     base = np.array([member.base_x, member.base_y, 0.0])
-    # From both sides, across the line from robot to person: neither hides the other.
+    # Views across the line from robot to person, from both sides: neither hides the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
     if is_close and current is not None:
         subject, angles_deg = goals[current] + _AROUND_A_GOAL, [60.0, -60.0, 120.0, -120.0]

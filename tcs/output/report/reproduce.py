@@ -46,7 +46,7 @@ def score_command(report: ScoreReport) -> str:
 def as_given(file: ScoreFile, key: str) -> str:
     """Return the name or path of a data file as it was given to `tcs score`.
 
-    A relative path that leads elsewhere from the current folder is returned as absolute path.
+    A relative path that is not valid in the current folder is returned as an absolute path.
 
     Args:
         file: The score file.

@@ -1,4 +1,4 @@
-"""Robustness report: Tables I and III of the TCS paper beside the figures of tcs."""
+"""Robustness report: results of tcs compared with Tables I and III of the TCS paper."""
 
 from __future__ import annotations
 
@@ -100,8 +100,8 @@ def findings(rows: Sequence[RowStudy], paper: Paper) -> list[Block]:
     items = []
     if known:
         items.append(
-            f"In {len(known) - len(short)} of {len(known)} rows the mean is equal to or above the "
-            "paper's."
+            f"In {len(known) - len(short)} of {len(known)} rows the mean is equal to or greater "
+            "than the paper's."
             + (
                 " Below the paper: " + "; ".join(_short_of(row, paper) for row in short) + "."
                 if short
@@ -143,8 +143,8 @@ def _gain_findings(rows: Sequence[RowStudy], paper: Paper) -> list[str]:
     gained = [row for row, gain in gains if gain.paired.mean > 0.0 and gain.paired.p < 0.01]
     most, greatest = max(gains, key=lambda one: one[1].paired.mean)
     text = (
-        f"Selecting by estimated success gains in {len(gained)} of {len(gains)} rows (p < 0.01, "
-        f"signed rank test), most in {most.name}: {signed(100.0 * greatest.paired.mean)} "
+        f"Selecting by estimated success improves {len(gained)} of {len(gains)} rows (p < 0.01, "
+        f"signed rank test), most of all {most.name}: {signed(100.0 * greatest.paired.mean)} "
         "percentage points."
     )
     known = [(row, gain) for row, gain in gains if paper.published(row.task, row.environment)]
@@ -155,7 +155,7 @@ def _gain_findings(rows: Sequence[RowStudy], paper: Paper) -> list[str]:
     ]
     if known:
         count = len(known) - len(below)
-        text += f" With it {count} of {len(known)} rows are equal to or above the paper's."
+        text += f" With it {count} of {len(known)} rows are equal to or greater than the paper's."
     if below:
         text += f" Below: {', '.join(below)}."
     return [text]
@@ -182,10 +182,7 @@ def _exception(row: RowStudy, members: int) -> str:
         f"{p_value(found.independent.p)}, signed rank p {p_value(found.paired.p)})."
     )
     if drawn.choices <= 20:
-        text += (
-            f" Only {drawn.choices} sets have a P_R equal to that of the best, which leaves little "
-            "choice."
-        )
+        text += f" Only {drawn.choices} sets have a P_R equal to that of the best set."
     else:
         text += (
             f" The set with the greatest P_R + P_M is one of {drawn.choices:,} with equal P_R; "
@@ -404,10 +401,10 @@ def _made(
             ]
         ),
         Text(
-            "As in the paper, the initial configurations are not planned again; a goal counts as "
-            "reached if any member of the set has a collision-free solution; collisions of the "
-            "base are not checked again; on the bed the person is at the nominal position (shift "
-            "0)."
+            "As in the paper, the initial configurations are not adapted to the errors; a goal "
+            "counts as reached if any member of the set has a collision-free solution; collisions "
+            "of the base are not checked again; on the bed the person is at the nominal position "
+            "(shift 0)."
         ),
         Collapsible("Score files", [Facts(scores)]),
     ]

@@ -13,7 +13,7 @@ COLUMNS = ("task", "environment", "method", "draw", "sample", "fraction", "goals
 
 
 def evaluations(row: RowStudy) -> Iterator[tuple[str, str, Evaluation]]:
-    """Yield method, draw ("common" or "independent") and samples of every evaluation of a row."""
+    """Yield method, draw ("common" or "independent") and result of every evaluation of a row."""
     yield "best set", "common", row.best
     yield "best single", "common", row.single
     if row.methods is not None:

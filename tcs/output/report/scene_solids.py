@@ -17,7 +17,7 @@ _ARROW = (0.15, 0.06, 0.010, 0.026)
 
 
 def robot_solids(scene: Scene) -> list[Solid]:
-    """Return the collision shapes of the robot where it is now."""
+    """Return the collision shapes of the robot in the present state of the scene."""
     categories = {Group.ARM: Category.ARM, Group.BODY: Category.ROBOT}
     return [
         part_solid(scene, part, categories[part.group])
@@ -27,7 +27,7 @@ def robot_solids(scene: Scene) -> list[Solid]:
 
 
 def environment_solids(scene: Scene) -> list[Solid]:
-    """Return the shapes of furniture, person and obstacles where they are now."""
+    """Return the shapes of furniture, person and obstacles in the present state of the scene."""
     return [part_solid(scene, part, category) for part, category in environment_parts(scene)]
 
 
@@ -44,7 +44,7 @@ def environment_parts(scene: Scene) -> list[tuple[Part, Category]]:
 
 
 def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
-    """Return an arrow for each goal: it ends at the goal and points as the tool does.
+    """Return an arrow for each goal: it ends at the goal and points along the tool's x axis.
 
     Args:
         scene: The scene.
@@ -65,7 +65,7 @@ def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
 
 
 def part_solid(scene: Scene, part: Part, category: Category) -> Solid:
-    """Return a collision shape where it is now."""
+    """Return a collision shape in the present state of the scene."""
     corners = primitive_corners(*shape_of(scene.built.scene_graph.model_inspector(), part))
     X_WP = scene.query_object().GetPoseInWorld(part.geometry)
     return Solid.placed(category, corners, X_WP.rotation().matrix(), X_WP.translation())

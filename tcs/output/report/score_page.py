@@ -53,9 +53,8 @@ def _map(report: ScoreReport) -> list[Block]:
             "png",
             "Two maps of the environment from above, coloured by the percentage of goals reached "
             "and by manipulability, with the robot's base at each stop.",
-            "The colour of a base position is the best score of a single configuration there; a "
-            "set of several can score higher than each of its members. Grey: the base cannot be "
-            "placed.",
+            "The colour of a base position is the best score of a single configuration there; the "
+            "score of a set can exceed those of its members. Grey: the base is blocked.",
         )
     ]
 
@@ -97,7 +96,9 @@ def _goals(report: ScoreReport) -> list[Block]:
     for goal in report.unreached if report.shown.members else ():
         fix = report.explanation(goal).fix
         if fix is not None:
-            blocks.append(Text(f"From stop 1, goal {goal} would be reached so: {fix.sentence}"))
+            blocks.append(
+                Text(f"The cheapest change from stop 1 that reaches goal {goal}: {fix.sentence}")
+            )
     if report.shown.members:
         blocks.append(Collapsible("Arm joints", [joints_table(report)]))
     return blocks
@@ -106,7 +107,7 @@ def _goals(report: ScoreReport) -> list[Block]:
 def _reasons(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = [
         Text(
-            "The checks, in their order: contact of the robot's body; contact of the gripper at "
+            "The checks in their order: contact of the robot's body; contact of the gripper at "
             "the goal with the environment or the person; reach of the arm; contact of the "
             "gripper with the robot; joint limits; contact of the arm."
         ),
@@ -121,9 +122,9 @@ def _verification(report: ScoreReport) -> list[Block]:
         return [Text("Nothing was re-checked: this report was made with --pairs 0 --dense 0.")]
     return [
         Text(
-            "Each stored answer drawn at random is set in Drake's model of the scene, which checks "
-            "the pose of the tool, the joint limits, all distances between bodies, and the "
-            "dexterity measure by Drake's own Jacobian."
+            "Stored answers drawn at random are re-checked with Drake's model of the scene: the "
+            "pose of the tool, the joint limits, all distances between bodies, and the dexterity "
+            "measure, computed from Drake's Jacobian."
         ),
         verification_table(report),
     ]
@@ -133,7 +134,7 @@ def _success(report: ScoreReport) -> list[Block]:
     table, record = success_table(report), success_record(report)
     if table is None or record is None:
         return [
-            Text("The file holds no estimates. This command estimates the best sets:"),
+            Text("The file contains no estimates. This command makes them for the best sets:"),
             Code(shlex.join(["tcs", "robustify", str(report.path)])),
         ]
     widths = "; ".join(
@@ -143,8 +144,8 @@ def _success(report: ScoreReport) -> list[Block]:
     blocks: list[Block] = [
         Text(
             f"Estimated by tcs {record['program_version']} from up to {record['samples']:,} "
-            f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. "
-            "In each sample the configurations stay as they are; arm postures are computed anew."
+            f"samples, seed {record['seed']}, with errors of {widths}; collisions {collisions}. In "
+            "each sample the configurations are unchanged and the arm postures are computed again."
         ),
         table,
     ]
@@ -152,8 +153,8 @@ def _success(report: ScoreReport) -> list[Block]:
     if members and report.success is not None and report.success.row_of(members) is None:
         blocks.append(
             Text(
-                "The set shown here is not one of the estimated sets. tcs evaluate estimates the "
-                "best set of a file."
+                "There is no estimate for the set shown here. `tcs evaluate` estimates the best "
+                "set of a file."
             )
         )
     return blocks

@@ -184,7 +184,7 @@ def make_score_report(
 
     Args:
         path: A score file.
-        here: The current state; without it the set with the best scores is reported.
+        here: The current state; if None, the set with the best scores is reported.
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
         sizes: How many pairs to verify.
@@ -192,7 +192,7 @@ def make_score_report(
 
     Raises:
         StoreError: If the file cannot be used, or was made from other models.
-        SelectionError: If no such set can be chosen.
+        SelectionError: If there is no such set.
     """
     begun, sizes = time.perf_counter(), sizes or CheckSizes()
     file = load_scores(path)

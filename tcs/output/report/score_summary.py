@@ -1,4 +1,4 @@
-"""The summary of a score report: the set, its scores, and how far they can be trusted."""
+"""The summary of a score report: the set, its scores, and the result of the verification."""
 
 from __future__ import annotations
 
@@ -37,23 +37,23 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
     if report.unreached:
         items.append(
             f"Not reached: {goals_text(report.unreached)}. The section Goals gives the reasons and "
-            "what would help."
+            "the changes that would help."
         )
     if report.shown.here is not None:
         here = base_pose_text(report.shown.here.to_json())
-        items.append(f"With the default weights this set is chosen for a robot at {here}.")
+        items.append(f"The set is selected with the default weights for a robot at {here}.")
     else:
         of_size = "" if report.max_members is None else f" of at most {report.max_members}"
         items.append(
-            f"Of the sets{of_size} in the file this one has the greatest P_R + P_M, wherever the "
-            "robot is now."
+            f"Of the sets{of_size} in the file this one has the greatest P_R + P_M, regardless of "
+            "the current base pose of the robot."
         )
     state = report.file.observed_states[report.shown.table]
     if state:
         values = settings_text(state_to_json(report.file.observed_axes, state))
         tables = len(report.file.tables)
         of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
-        items.append(f"It holds for the observed state {values}{of_states}.")
+        items.append(f"The scores are those of the observed state {values}{of_states}.")
     items += _success(report)
     return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
 
@@ -65,8 +65,8 @@ def unreached_everywhere(report: ScoreReport) -> list[str]:
         if counts.reached == 0 and counts.farthest is not None:
             found.setdefault(REASON_TEXTS[counts.farthest.reason], []).append(goal)
     return [
-        f"No configuration reaches {goals_text(goals)}. Those that passed the most checks failed "
-        f"with: {reason}."
+        f"No configuration reaches {goals_text(goals)}. Result of the configurations that passed "
+        f"the most checks: {reason}."
         for reason, goals in found.items()
     ]
 
@@ -90,8 +90,8 @@ def _soundness(report: ScoreReport) -> str:
         parts.append(f"Drake confirms each of the {len(report.findings)} postures shown here")
     if found.dense_checked:
         parts.append(
-            f"of {found.dense_checked:,} unreached pairs drawn at random {found.missed:,} are "
-            "reachable after all"
+            f"of {found.dense_checked:,} unreached pairs drawn at random, {found.missed:,} are "
+            "reachable"
         )
     if not parts:
         return "Nothing was re-checked with Drake."
@@ -107,6 +107,6 @@ def _success(report: ScoreReport) -> list[str]:
         return []
     low, high = percent(float(success.low[row])), percentage(float(success.high[row]))
     return [
-        "In the randomly perturbed environment it is estimated to reach "
+        "Estimated success in the randomly perturbed environment: "
         f"{percentage(float(success.success[row]))} of the goals (95% between {low} and {high})."
     ]

@@ -16,7 +16,7 @@ class ShownSet:
     """One set, its members in the order of the tour."""
 
     here: InitialConfiguration | None
-    """The current state for which the set was chosen; None for the best set anywhere."""
+    """The current state for which the set was selected; None for the set with the best scores."""
     members: tuple[InitialConfiguration, ...]
     """Its configurations; empty if no configuration reaches a goal."""
     indices: tuple[int, ...]
@@ -24,7 +24,7 @@ class ShownSet:
     table: int
     """Number of the state table that holds the set."""
     subtitle: str
-    """Its scores, as one line of text."""
+    """How the set was selected, and its scores, as one line of text."""
 
     @classmethod
     def of(
@@ -34,7 +34,7 @@ class ShownSet:
         max_members: int | None = None,
         observed: Mapping[str, float] | None = None,
     ) -> ShownSet:
-        """Return the set to choose from here, or the best one when `here` is None.
+        """Return the set selected for the current state, or the best set if `here` is None.
 
         Args:
             file: A score file.
@@ -49,7 +49,7 @@ class ShownSet:
             members = tuple(choice.members[i] for i in choice.order)
             indices = tuple(choice.indices[i] for i in choice.order)
             what = (
-                f"chosen for a robot at {base_pose_text(here.to_json())}, "
+                f"selected for a robot at {base_pose_text(here.to_json())}, "
                 f"travel cost {choice.cost:.2f}"
             )
         else:
@@ -58,7 +58,7 @@ class ShownSet:
             members = tuple(grid.configuration(h) for h in indices)
             what = "best set"
         if not members:
-            return cls(None, (), (), table, "no goal is reached from anywhere")
+            return cls(None, (), (), table, "no configuration reaches a goal")
         scores = scores_text(*sets.scores_of(tuple(sorted(indices))), file.metadata["measure"])
         return cls(here, members, indices, table, f"{what}: {scores}")
 

@@ -18,11 +18,11 @@ from tcs.output.words import axis_name, quantity
 from tcs.placement.store import ScoreFile
 
 MOST_PANELS = 60
-"""More would be too small to read on a page."""
+"""Greatest number of panels on a page; more would be too small to read."""
 
 
 def has_states(file: ScoreFile) -> bool:
-    """Return whether the environment has more than one state, but not too many to draw."""
+    """Return whether the environment has 2 to `MOST_PANELS` states."""
     return 1 < math.prod(Grid.from_dict(file.grid).environment_shape) <= MOST_PANELS
 
 
@@ -32,16 +32,16 @@ def states_figure(
     score: Score = "reachability",
     scored: ScoredScene | None = None,
 ) -> Figure:
-    """Return the map of each state of the environment, rows by columns, in one scale.
+    """Return the maps of all states of the environment, in rows and columns, with one scale.
 
-    Columns are the values of the environment's last axis, rows those of the others, the greatest
-    on top. With one axis alone there is one row.
+    Columns are the values of the environment's last axis, rows those of the other axes, the
+    greatest at the top. An environment with one axis has one row.
 
     Args:
         file: A score file.
-        shown: The set to mark, each member in the panel of the state it wants.
-        score: What to colour the places by.
-        scored: Its `scored_scene`, which is moved; built if it is not given.
+        shown: The set to mark, each member in the panel of its environment state.
+        score: The score that colours the base positions.
+        scored: The result of `scored_scene`, built if None. The function moves the scene.
 
     Raises:
         SelectionError: If the environment has one state only, or too many to draw.
@@ -52,13 +52,13 @@ def states_figure(
     states = math.prod(grid.environment_shape)
     if states == 1:
         raise SelectionError(
-            f"environment '{file.environment.get('name', '')}' has nothing to set, so there is one "
+            f"environment '{file.environment.get('name', '')}' has a single state, so there is one "
             "map only. Draw it without --states."
         )
     if states > MOST_PANELS:
         raise SelectionError(
-            f"the environment has {states} states, of which {MOST_PANELS} at most can be drawn on "
-            "one page. Draw the map without --states."
+            f"the environment has {states} states, but at most {MOST_PANELS} can be drawn on one "
+            "page. Draw the map without --states."
         )
     job, scene = scored or scored_scene(file, shown)
     base = base_outline(scene)
@@ -99,6 +99,6 @@ def states_figure(
 
 
 def _setting(axis: Axis, index: int) -> str:
-    """Return the name and a value of an axis."""
+    """Return the name of an axis and its value at an index."""
     key = f"{axis.name}_deg" if axis.unit == "deg" else axis.name
     return f"{axis_name(key)} {quantity(key, axis.start + index * axis.step)}"

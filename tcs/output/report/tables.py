@@ -1,4 +1,4 @@
-"""Tables of the robustness report: figures of tcs beside those of the TCS paper."""
+"""Tables of the robustness report: results of tcs compared with those of the TCS paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROUNDING = 0.05
 
 
 def table_1(rows: Sequence[RowStudy], paper: Paper) -> Table:
-    """Return Table I: the best set of each row beside the paper's figure and the difference."""
+    """Return Table I: the best set of each row, the paper's figure, and the difference."""
     columns = [
         Column("Task, environment", is_number=False),
         Column("tcs"),
@@ -223,7 +223,7 @@ def losses_table(row: RowStudy) -> Table:
 
 
 def find_contrast(row: RowStudy, members: int) -> Contrast | None:
-    """Return the contrast of with against without TC-manipulability, None if there is none."""
+    """Return the comparison of with and without TC-manipulability, None if there is none."""
     for contrast in row.methods.contrasts if row.methods is not None else ():
         if contrast.first == (members, True) and contrast.second == (members, False):
             return contrast

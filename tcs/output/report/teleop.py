@@ -51,39 +51,40 @@ def experiment_page(
     """Return the experiment as a page.
 
     Args:
-        experiment: What was done.
-        maps: The capability maps of it, if they were made.
-        seconds: How long it took, wall clock.
-        command: How to make it again.
+        experiment: The experiment.
+        maps: Its capability maps; None if they were not made.
+        seconds: Wall-clock time of the experiment [s].
+        command: Command that repeats the experiment.
     """
     plan, arm = experiment.plan, experiment.arm
     return Page(
-        title="Following a line that needs null-space motion",
+        title="Following a line that requires null-space motion",
         lead=(
-            f"{plan.operators} {SCRIPTED}, drive {arm.robot.title} along a straight line on which "
+            f"{plan.operators} {SCRIPTED}, move {arm.robot.title} along a straight line on which "
             f"joint {experiment.course.blocking + 1} meets its limit after three quarters of the "
-            f"way, {plan.trials} trials with each controller after {plan.training} of training."
+            f"length, in {plan.trials} trials with each controller after {plan.training} training "
+            "trials."
         ),
         sections=[
-            Section("What was found", [Bullets(findings(experiment))]),
+            Section("Findings", [Bullets(findings(experiment))]),
             Section("Accuracy, time, effort", _compared(experiment)),
             Section("Paths of the tool", _paths(experiment)),
             Section("Motion of the hand", motion_blocks(experiment)),
             Section("Trials", [trials_table(experiment), learning_table(experiment)]),
             *([] if maps is None else [Section("Capability maps", maps_blocks(experiment, maps))]),
-            Section("The operators", _operators(experiment)),
-            Section("How it was made", _made(experiment, seconds, command)),
+            Section("Operators", _operators(experiment)),
+            Section("Reproduction", _made(experiment, seconds, command)),
         ],
         foot=f"tcs {versions()[0][1]}, {today()}, seed {plan.seed}; {SCRIPTED}.",
     )
 
 
 def findings(experiment: Experiment) -> list[str]:
-    """Return the main findings in a sentence each."""
+    """Return the main findings, one sentence each."""
     tests = experiment.tested()
     sentences = [
-        f"These are {SCRIPTED}: the results show how the controllers affect one way of driving, "
-        "and nothing about what people feel."
+        f"The operators are {SCRIPTED}: the results show the effect of the controllers on one "
+        "behaviour, not their acceptance by people."
     ]
     for name in HYPOTHESES:
         test, ratio = tests[name], median_ratio(experiment, name)
@@ -91,16 +92,16 @@ def findings(experiment: Experiment) -> list[str]:
         there, here = (median_of(experiment, one, name) for one in (END_EFFECTOR.name, NOVEL.name))
         sentences.append(
             f"{NAMES[name]}: median {there} with end-effector control, {here} with the novel "
-            f"controller, {ratio:.2f} of it (paper: {theirs:.2f}); signed rank p "
+            f"controller, ratio {ratio:.2f} (paper: {theirs:.2f}); signed rank p "
             f"{p_value(test.p)}, r {test.effect:+.2f}."
         )
     for name in experiment.drives:
         finished = float(experiment.sample(name, "finished").mean())
         if finished < 1.0:
             sentences.append(
-                f"With {title_of(experiment, name)} {100 * finished:.0f} % of the trials came to "
+                f"With {title_of(experiment, name)} {100 * finished:.0f} % of the trials reached "
                 f"the end within {experiment.plan.time_limit:g} s; the others count with that "
-                "time, and with the planes that they met."
+                "time, and with the planes that they crossed."
             )
     return sentences
 
@@ -119,8 +120,8 @@ def _compared(experiment: Experiment) -> list[Block]:
                 as_svg(figure, f"teleop-{name}"),
                 "svg",
                 f"Box plots of {NAMES[name]} with each controller.",
-                f"{NAMES[name]}: means over the trials of each operator ({SCRIPTED}). Box: the "
-                "middle half; line: median; whiskers: 5th and 95th percentile; dot: mean.",
+                f"{NAMES[name]}: means over the trials of each operator ({SCRIPTED}). Box: first "
+                "to third quartile; line: median; whiskers: 5th and 95th percentile; dot: mean.",
             )
         )
     return [group_table(experiment), signed_rank_table(experiment), *figures]
@@ -140,9 +141,9 @@ def _paths(experiment: Experiment) -> list[Block]:
             as_svg(figure, "teleop-paths"),
             "svg",
             "Paths of the tool with each controller, from above and from the side.",
-            "Every trial that counts, from above (top) and from the side (bottom). Dashed: the "
-            "line, from the disc to the square; cross: where, without noise, the joint meets its "
-            f"limit. {SCRIPTED[0].upper()}{SCRIPTED[1:]}.",
+            "Every evaluated trial, from above (top) and from the side (bottom). Dashed: the "
+            "line, from the disc to the square; cross: the point at which, without noise, the "
+            f"joint meets its limit. {SCRIPTED[0].upper()}{SCRIPTED[1:]}.",
         )
     ]
 
@@ -162,16 +163,16 @@ def _operators(experiment: Experiment) -> list[Block]:
         )
     return [
         Text(
-            "Each operator has one way of driving for all controllers: pursue the line, notice "
-            "late, tremble, think when the arm stops, try something, and if it does not help, "
-            "something else, further. The controller decides what there is to try: motions of the "
-            "hand in a random direction with a random turn, or joint group 1 one way or the other. "
-            "What helped is remembered and tried first the next time."
+            "Each operator behaves in the same way with all controllers: it pursues the line with "
+            "a delay and a tremor, pauses when the arm stops, tries a recovery motion, and if that "
+            "does not help, another and larger one. The recovery motions depend on the controller: "
+            "motions of the hand in a random direction with a random rotation, or joint group 1 in "
+            "either direction. A successful recovery is remembered and tried first the next time."
         ),
         Table(
-            f"What operators are like, in m, s and rad; {SCRIPTED}. The values are ours, not "
-            "fitted to any outcome.",
-            [Column("trait", False), Column("usual"), Column("here")],
+            f"Parameters of the operators, in m, s and rad; {SCRIPTED}. The values are ours and "
+            "not fitted to any result.",
+            [Column("parameter", False), Column("default"), Column("here")],
             rows,
         ),
     ]
@@ -192,11 +193,14 @@ def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
                 *machine(),
                 ("Seed", str(plan.seed)),
                 ("Time", f"{seconds:.0f} s"),
-                ("Line", f"{_place(course.line.start)} to {_place(course.line.end)}, in the base"),
+                (
+                    "Line",
+                    f"{_place(course.line.start)} to {_place(course.line.end)}, in the base frame",
+                ),
                 ("Length", f"{course.line.length:.3f} m"),
                 ("Start posture", ", ".join(f"{q:.4f}" for q in course.joints) + " rad"),
                 (
-                    "Turns of joint 1 that open the way",
+                    "Rotations of joint 1 that allow the motion",
                     f"{turns[0]:.0f} to {turns[-1]:.0f} deg, found without noise in steps of 10",
                 ),
                 ("Controllers", "; ".join(settings)),
@@ -204,16 +208,15 @@ def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
             ]
         ),
         Collapsible(
-            "What differs from the paper",
+            "Differences from the paper",
             [
                 Bullets(
                     [
-                        "No people, so no questionnaires and no preference.",
-                        "The line is found by search; the paper does not give the coordinates of "
-                        "its own.",
-                        "A third controller that uses the redundancy automatically.",
-                        "Contacts are not checked during trials, as in the paper; the way that "
-                        "the search found is free of the robot's own body.",
+                        "There are no people, so there are no questionnaires and no preferences.",
+                        "The line is found by a search; the paper gives no coordinates.",
+                        "There is a third controller, which uses the redundancy automatically.",
+                        "Contacts are not checked during trials, as in the paper; the motion that "
+                        "the search found does not touch the robot's own body.",
                     ]
                 )
             ],

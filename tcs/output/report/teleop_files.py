@@ -33,7 +33,7 @@ FILES = ("experiment.html", "experiment.md", "trials.csv", "line.json")
 
 
 def make_experiment_folder(arm: Arm, out: Path, *, runs_as: str | None, maps: bool) -> Path | None:
-    """Make the folder of an experiment, and refuse what could not be written to it.
+    """Make the folder of an experiment, after a check that its files can be written.
 
     Args:
         arm: The arm.
@@ -54,7 +54,7 @@ def make_experiment_folder(arm: Arm, out: Path, *, runs_as: str | None, maps: bo
         check_format(runs / f"run{runs_as}")
     if maps:
         check_map_robot(arm)
-    # Last: what is refused leaves no empty folder behind.
+    # After the checks, so that an error leaves no empty folder.
     make_folder(runs or out)
     return runs
 
@@ -71,18 +71,18 @@ def write_experiment(
     jobs: int = 1,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Run an experiment, write its folder and return its numbers.
+    """Run an experiment, write its folder and return a summary as plain containers.
 
     Args:
         arm: The arm.
         plan: Operators, trials, seed and conditions.
-        out: The folder; `FILES`, and the runs and maps if requested.
+        out: The folder for `FILES`, and for runs and maps if requested.
         line_seed: Seed of the search for the line.
         runs_as: Suffix of the run files, ".csv" or ".parquet"; None to save none.
         maps: Whether to write the capability map of each controller.
         command: The command that repeats the experiment.
         jobs: Number of processes; the results do not depend on it.
-        on_progress: Called with the operators times controllers done, and in all.
+        on_progress: Called with the numbers of pairs of operator and controller done and in total.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -126,7 +126,7 @@ def write_experiment(
 
 
 def _line(arm: Arm, course: Course) -> dict[str, Any]:
-    """Return the line as JSON."""
+    """Return the line as plain containers."""
     return {
         "robot": arm.name,
         "torso_height": arm.torso_height,
@@ -139,7 +139,7 @@ def _line(arm: Arm, course: Course) -> dict[str, Any]:
 
 
 def _numbers(experiment: Experiment, maps: ControllerMaps | None) -> dict[str, Any]:
-    """Return medians, tests and maps as JSON."""
+    """Return medians, tests and maps as plain containers."""
     return {
         "medians": {
             condition: {

@@ -1,4 +1,4 @@
-"""Tables of the experiment with the teleoperated arm; each says that no people took part."""
+"""Tables of the experiment with the teleoperated arm; each states that no people took part."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ NAMES = {
     "accuracy": "accuracy: greatest error of the barycentre [mm]",
     "time": "completion time [s]",
     "effort": "effort: mean absolute work on the device [µJ]",
-    "work": "absolute work on the device in all [mJ]",
+    "work": "total absolute work on the device [mJ]",
     "steering_angle": "cumulative steering angle [rad]",
     "steering_translation": "cumulative steering translation [m]",
     "arc_length": "spectral arc length [-]",
-    "stops": "times the arm stopped",
-    "turned": "joint 1 turned through its group [rad]",
+    "stops": "number of stops of the arm",
+    "turned": "rotation of joint 1 by its group [rad]",
     "finished": "fraction of completed trials",
-    "planes_met": "normal planes met, of 30",
+    "planes_met": "normal planes crossed, of 30",
 }
 SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
-"""From SI units to those of `NAMES`."""
+"""Factors from SI units to those of `NAMES`."""
 
 
 def group_table(experiment: Experiment) -> Table:
@@ -53,7 +53,8 @@ def group_table(experiment: Experiment) -> Table:
             )
     titles = ("measure", "controller", "N", "median", "mean", "std", "Shapiro-Wilk W", "p")
     return Table(
-        f"Group statistics, as the paper's Table II; {SCRIPTED}. Last column: the paper's people.",
+        f"Group statistics, as in the paper's Table II; {SCRIPTED}. Last column: the people of the "
+        "paper.",
         [
             *(Column(title, i > 1) for i, title in enumerate(titles)),
             Column("median, paper"),
@@ -81,15 +82,15 @@ def signed_rank_table(experiment: Experiment) -> Table:
         )
     titles = ("measure", "alternative", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
     return Table(
-        "End-effector control (EE) against the novel controller (NV), as the paper's Table III: "
-        f"Levene's test, Wilcoxon's signed ranks; {SCRIPTED}.",
+        "End-effector control (EE) compared with the novel controller (NV), as in the paper's "
+        f"Table III: Levene's test, Wilcoxon's signed rank test; {SCRIPTED}.",
         [Column(title, i > 1) for i, title in enumerate(titles)],
         rows,
     )
 
 
 def motion_blocks(experiment: Experiment) -> list[Block]:
-    """Return steering, smoothness and time as the ITCM thesis compares them."""
+    """Return steering, smoothness and time, compared as in the ITCM thesis."""
     rows, pairs = [], []
     for name, found in experiment.varied().items():
         cells = []
@@ -119,12 +120,12 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
     return [
         Table(
             "Mean (std) over operators, and one-way analysis of variance with repeated measures, "
-            f"as the ITCM thesis; {SCRIPTED}.",
+            f"as in the ITCM thesis; {SCRIPTED}.",
             [Column("measure", False), *(Column(t) for t in titles), Column("F"), Column("p")],
             rows,
         ),
         Table(
-            f"Pairs: paired t tests, two-tailed, p times the number of pairs (Bonferroni); "
+            "Pairs of controllers: two-tailed paired t tests, p with Bonferroni correction; "
             f"{SCRIPTED}.",
             [
                 Column("measure", False),
@@ -134,15 +135,16 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
             pairs,
         ),
         Text(
-            "Steering is that of the hand that drives the tool; while the other hand turns the "
-            "joint group, it rests, and rests lengthen the spectral arc. Operators turn the hand "
-            "only when they try something: with the novel controller they never have to."
+            "Steering is the motion of the hand that moves the tool. This hand pauses while the "
+            "other one moves the joint group, and pauses increase the spectral arc length. "
+            "Operators rotate the hand only in recovery motions, which the novel controller does "
+            "not need."
         ),
     ]
 
 
 def trials_table(experiment: Experiment) -> Table:
-    """Return how the trials went."""
+    """Return means over the evaluated trials: completion, stops, work and planes."""
     rows = []
     for name in ("finished", "stops", "turned", "work", "planes_met"):
         scale = SCALE.get(name, 1.0)
@@ -150,8 +152,8 @@ def trials_table(experiment: Experiment) -> Table:
         rows.append([NAMES[name], *(number(mean) for mean in means)])
     titles = [title_of(experiment, name) for name in experiment.drives]
     return Table(
-        f"Means over the trials that count; {SCRIPTED}.",
-        [Column("what", False), *(Column(title) for title in titles)],
+        f"Means over the evaluated trials; {SCRIPTED}.",
+        [Column("measure", False), *(Column(title) for title in titles)],
         rows,
     )
 
@@ -169,7 +171,7 @@ def learning_table(experiment: Experiment) -> Table:
     numbered = [f"training {i + 1}" for i in range(plan.training)]
     numbered += [f"trial {i + 1}" for i in range(plan.trials)]
     return Table(
-        f"Median of each trial over operators: what they learn; {SCRIPTED}.",
+        f"Learning: median of each trial over operators; {SCRIPTED}.",
         [Column("controller", False), Column("measure", False), *(Column(n) for n in numbered)],
         rows,
     )
@@ -200,19 +202,19 @@ def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:
     titles = ("samples", "cells", "also in the first [%]", "mean score", "cells of the grasp")
     return [
         Text(
-            "All that was driven with a controller is one recording, and its map (ITCM) says from "
-            "where an operator with that controller reaches a tool pose. They are compared by one "
-            f"grasp: tool {maps.height:.2f} m above the floor, pitch "
+            "All evaluated trials with a controller form one recording. Its map (ITCM) contains "
+            "the base poses from which operators with that controller reach a tool pose. The maps "
+            f"are compared for one grasp: tool {maps.height:.2f} m above the floor, pitch "
             f"{math.degrees(maps.pitch):.1f} deg, roll {math.degrees(maps.roll):.1f} deg; base "
-            "poses are seen from the tool."
+            "poses are relative to the tool."
         ),
         Table(
-            f"Maps of what was driven, by controller; {SCRIPTED}.",
+            f"Maps by controller; {SCRIPTED}.",
             [
                 Column("controller", False),
                 *(Column(title) for title in titles),
                 Column("best base pose"),
-                Column("its score"),
+                Column("score"),
             ],
             rows,
         ),
@@ -220,7 +222,7 @@ def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:
 
 
 def title_of(experiment: Experiment, name: str) -> str:
-    """Return what a condition is called in tables."""
+    """Return the title of a condition in tables."""
     return next(one.title for one in experiment.plan.conditions if one.name == name)
 
 
@@ -230,7 +232,7 @@ def median_of(experiment: Experiment, condition: str, name: str) -> str:
 
 
 def number(value: float) -> str:
-    """Return three digits, without an exponent where there need be none.
+    """Return a number with three significant digits, without an unnecessary exponent.
 
     >>> number(0.01234), number(123.4), number(0.0)
     ('0.0123', '123', '0')

@@ -27,7 +27,7 @@ def write_report(
     seconds: float,
     command: str,
 ) -> tuple[Path, ...]:
-    """Write a robustness report and return its files, each whole or not at all.
+    """Write a robustness report, each file completely or not at all, and return their paths.
 
     Args:
         folder: Folder of the files, created if missing.

@@ -1,4 +1,4 @@
-"""Explanations as text: why a goal is not reached, and the nearest change that reaches it."""
+"""Explanations as text: why a goal is not reached, and the cheapest change that reaches it."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
     """Print why no configuration reaches the goal."""
     if result["unreachable"]:
         out.print(
-            f"{result['unreachable']:,} configurations reach it, but there is no way around the "
-            "furniture to any of them."
+            f"{result['unreachable']:,} configurations reach it, but the furniture blocks every "
+            "path to them."
         )
         return
     farthest = result["farthest"]
@@ -147,7 +147,8 @@ def _print_pairs(out: Console, result: Mapping[str, Any]) -> None:
         rest = blocking[MOST_PAIRS:]
         if rest:
             count = sum(pair["count"] for pair in rest)
-            table.add_row(what, f"{len(rest)} other pairs", "", f"{count:,}")
+            others = f"{len(rest)} other pair{'' if len(rest) == 1 else 's'}"
+            table.add_row(what, others, "", f"{count:,}")
     out.print(table)
 
 

@@ -65,7 +65,7 @@ def report_scores(result: Mapping[str, Any]) -> None:
     for key, what in (("best_single", "best base pose"), ("best", "best set")):
         best = result[key]
         if best is None:
-            out.print(f"{what}: none, no goal is reached from anywhere.")
+            out.print(f"{what}: none, no configuration reaches a goal.")
             continue
         scores = scores_text(best["reachability"], best["manipulability"], result["measure"])
         out.print(f"{what}: {scores}")
@@ -115,7 +115,7 @@ def report_choice(result: Mapping[str, Any]) -> None:
     scores = scores_text(result["reachability"], result["manipulability"], result["measure"])
     out.print(
         f"{scores}, travel cost {result['cost']:.2f}, utility {result['utility']:.3f} "
-        f"(chosen in {1e3 * result['seconds']:.1f} ms)"
+        f"(selected in {1e3 * result['seconds']:.1f} ms)"
     )
     if "success" in result:
         low, high = result["success_ci95"]
@@ -164,7 +164,7 @@ def new_table(*headings: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
     for heading in headings:
         right = heading.startswith(">")
-        # Names wrap in a narrow terminal: truncated, left and right arm would look the same.
+        # Names wrap in a narrow terminal; truncated names of the left and right arm look alike.
         table.add_column(
             heading.removeprefix(">"), justify="right" if right else "left", overflow="fold"
         )

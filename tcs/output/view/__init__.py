@@ -1,4 +1,4 @@
-"""A score file in Drake's Meshcat: its sets, any other configuration, and what each reaches.
+"""A score file in Drake's Meshcat: its sets, any other configuration, and their results.
 
 In: a score file and its scene. Out: a live viewer with sliders, or one self-contained page.
 """

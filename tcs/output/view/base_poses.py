@@ -1,4 +1,4 @@
-"""Capability maps and task maps as pictures or interactive pages: one file each."""
+"""Capability maps and task maps as pictures or interactive pages."""
 
 from __future__ import annotations
 

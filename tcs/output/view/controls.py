@@ -1,4 +1,4 @@
-"""The state of the viewer and its controls; needs no browser."""
+"""The state of the viewer and its controls, independent of a browser."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _PARTS = 1_000_000
 
 @dataclasses.dataclass(frozen=True)
 class ViewState:
-    """What the viewer shows."""
+    """State of the viewer."""
 
     along: tuple[int, ...]
     """Index of the configuration along each axis of the grid."""
@@ -50,7 +50,7 @@ class Slider:
 
     @property
     def tick(self) -> float:
-        """The step for Meshcat, which rounds to multiples of it whatever the lowest value is.
+        """The step for Meshcat, which rounds to its multiples regardless of the lowest value.
 
         >>> Slider("base x [m]", 0.1, 0.5, 0.2).tick
         0.1

@@ -43,7 +43,7 @@ class PlayStep:
 def play_steps(viewed: ViewedSet) -> tuple[PlayStep, ...]:
     """Return the steps of the animation: each member at each goal it serves.
 
-    For a set without members, because no goal is reached, it is the first configuration.
+    For a set without members (no goal is reached), the only step is the first configuration.
     """
     steps = [
         PlayStep(number, index, goal)
@@ -109,7 +109,7 @@ def _animation(shots: list[Snapshot], visible: list[set[str]]) -> MeshcatAnimati
                     last = RigidTransform(poses[number - 1])
                     animation.SetTransform(number * _HOLD - 1, path, last)
                 animation.SetTransform(number * _HOLD, path, RigidTransform(pose))
-    # The animation ends with its last key, which holds the last goal as long as the others.
+    # The animation ends with its last key; this one shows the last goal for as long as the others.
     end = RigidTransform(shots[-1].poses[SHOWN])
     animation.SetTransform(len(shots) * _HOLD, SHOWN, end)
     for path in sorted(set().union(*visible)):
@@ -121,7 +121,7 @@ def _animation(shots: list[Snapshot], visible: list[set[str]]) -> MeshcatAnimati
 
 
 def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
-    """Return a line for each member: its time in the animation, and what it reaches."""
+    """Return a line for each member: its time in the animation, and its results."""
     lines = []
     for number, index in enumerate(viewed.members):
         times = [at * _HOLD / _RATE for at, one in enumerate(steps) if one.member == number]
@@ -130,13 +130,13 @@ def _captions(viewed: ViewedSet, steps: tuple[PlayStep, ...]) -> list[str]:
             until = times[-1] + _HOLD / _RATE
             line = viewed.result(index).summary
             shown = f"member {number + 1} at {goals_text(goals)}"
-            lines.append(f"{times[0]:g} to {until:g} s: {shown}. It reaches {line}.")
+            lines.append(f"{times[0]:g} to {until:g} s: {shown}. Reached: {line}.")
     return lines or ["No configuration reaches a goal."]
 
 
 def _panel(title: str, lines: list[str]) -> str:
     """Return title, lines and the legend of the arrows as an overlay."""
-    # The space between the entries is where the browser may break the line.
+    # The browser may break the line at the spaces between the entries.
     colours = " ".join(
         '<span style="white-space:nowrap;margin-right:1em">'
         f'<span style="color:{REASON_COLOURS[one]}">&#9632;</span> {REASON_NAMES[one]}</span>'

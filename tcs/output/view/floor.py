@@ -31,7 +31,7 @@ _NEAREST = (*CHECKS, Reason.REACHED)
 
 @dataclass(frozen=True, eq=False)
 class FloorMap:
-    """The base positions with a colour; at the others no goal is reached, or nothing is known."""
+    """The base positions with a colour; the others reach no goal, or have no estimate."""
 
     places: FloatArray
     """x and y of their centres in W [m], shape (n, 2)."""
@@ -58,8 +58,8 @@ def floor_map(viewed: ViewedSet, state: int, goal: int, colouring: str) -> Floor
 
     Returns:
         At each base position, over all headings and torso heights: the best P_R, P_M or estimated
-        success of one configuration, or the reason that passed the most checks. The scale of P_R
-        and P_M ends at the best base position of this state.
+        success of one configuration, or the result of the configuration that passed the most
+        checks. The scale of P_R and P_M ends at the best base position of this state.
     """
     grid, scores = viewed.grid, viewed.scores
     places = PlaceMap.of_state(scores, grid, state)

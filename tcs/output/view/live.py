@@ -37,7 +37,7 @@ def open_meshcat(port: int | None = None) -> Meshcat:
         return Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
     except RuntimeError as error:
         where = "a port from 7000 to 7099" if port is None else f"port {port}"
-        raise OutputError(f"the viewer cannot listen at {where}. Name a free one.") from error
+        raise OutputError(f"the viewer cannot listen at {where}. Give a free one.") from error
     finally:
         log.setLevel(level)
 
@@ -78,7 +78,7 @@ class Viewer:
 
     @property
     def state(self) -> ViewState:
-        """What is shown now."""
+        """The present state."""
         return self._state
 
     def update(self) -> bool:
@@ -98,7 +98,7 @@ class Viewer:
             return False
         self._state = state
         for name, value in self._controls.values(state).items():
-            # Setting a slider that is being dragged would hold it back.
+            # Setting a slider that is being dragged would interrupt the drag.
             if abs(self._meshcat.GetSliderValue(name) - value) > 1e-6:
                 self._meshcat.SetSliderValue(name, value)
         self._show()

@@ -1,4 +1,4 @@
-"""The objects in the viewer: what Meshcat receives once, and what moves with the state."""
+"""The objects in the viewer: their shapes, sent once, and their poses in each state."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ ROBOT, ENVIRONMENT, GOALS, SHOWN, FLOOR, MEMBERS = (
 )
 """Paths of the objects in Meshcat."""
 _MARK_RADIUS = 0.018
-"""Radius of the sphere at the shown goal [m]: visible beside an arrow, and hides none."""
+"""Radius of the sphere at the shown goal [m]: visible beside an arrow, and does not hide it."""
 _ARROW = (0.16, 0.055, 0.009, 0.022)
 """Length of an arrow and of its head, half widths of shaft and head [m]."""
 _MEMBER = "#d7263d"
 _MAP_HEIGHT, _LINE_HEIGHT = 0.004, 0.008
-"""Heights above the floor [m], one above the other against flicker."""
+"""Heights above the floor [m], different to avoid flicker."""
 _CAMERA = np.array([1.9, -1.9, 1.3])
 """Position relative to the centre of the goals [m]: a whole bed and a robot are in view."""
 
@@ -61,13 +61,13 @@ class SceneObjects:
         """Read the objects of a scene.
 
         Args:
-            scene: The scene of the file, which is moved; built with meshes if they are shown.
+            scene: The scene of the file, built with meshes if they are shown. Snapshots move it.
             task: Its task.
             viewed: The scores and the set.
             meshes: Whether the robot is shown as its meshes, or as its collision shapes.
         """
         self._scene, self._task, self._viewed = scene, task, viewed
-        # Moves the base, which every snapshot places again.
+        # Moves the base; every snapshot sets its pose again.
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
         self._environment = _environment_shapes(scene)
@@ -78,7 +78,7 @@ class SceneObjects:
 
         Args:
             index: Flat index of the configuration.
-            goal: The goal that is shown. Where it is not reached, the arm rests.
+            goal: The goal that is shown. If it is not reached, the arm is in its rest posture.
         """
         result = self._viewed.result(index)
         scene, at = self._scene, result.configuration
@@ -190,7 +190,7 @@ def _resting_arm(scene: Scene) -> FloatArray:
 def _arrow() -> tuple[FloatArray, NDArray[np.int32]]:
     """Return corners and triangles of an arrow along x whose tip is at the origin.
 
-    The tip is at the goal, and the arrow points as the tool does.
+    The tip is at the goal, and the arrow points along the x axis of the tool.
     """
     length, head, thin, wide = _ARROW
     square = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])

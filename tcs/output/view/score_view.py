@@ -1,4 +1,4 @@
-"""The view of a score file: the set chosen from it in its scene, live or as one page."""
+"""The view of a score file: a selected set in its scene, live or as one page."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def make_score_view(
 
     Args:
         file: A score file.
-        here: The current state; without it the set with the best scores is shown.
+        here: The current state; if None, the set with the best scores is shown.
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
         meshes: Whether to show the robot with its meshes.
 
     Raises:
         StoreError: If the file was made from other models.
-        SelectionError: If no such set can be chosen.
+        SelectionError: If there is no such set.
     """
     shown = ShownSet.of(file, here, max_members, observed)
     job, scene = scored_scene(file, shown, meshes=meshes)

@@ -72,7 +72,7 @@ def robot_shapes(scene: Scene, meshes: bool) -> list[BodyShape]:
 def draw_shapes(
     meshcat: Meshcat, root: str, shapes: Sequence[BodyShape], *, compact: bool = False
 ) -> None:
-    """Add the shapes of bodies to Meshcat, each body under a path of its own.
+    """Add the shapes of bodies to Meshcat, each body under its own path.
 
     Args:
         meshcat: The Meshcat.

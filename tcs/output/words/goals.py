@@ -26,7 +26,7 @@ def goals_text(goals: Sequence[int]) -> str:
 
 
 def goals_by_reason(reasons: Iterable[Reason]) -> Mapping[Reason, tuple[int, ...]]:
-    """Return the goals that each reason keeps from being reached, without those reached.
+    """Return the unreached goals by reason.
 
     Args:
         reasons: The reason at each goal.

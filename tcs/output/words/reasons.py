@@ -49,7 +49,7 @@ COLOUR_NAMES = {
 
 
 def reason_of(name: str) -> Reason:
-    """Return the reason that JSON calls by this name.
+    """Return the reason with this name in JSON.
 
     >>> reason_of("too_far")
     <Reason.TOO_FAR: 1>

@@ -1,4 +1,4 @@
-"""Findings under error: what a set loses, and the errors that were drawn."""
+"""Results under error: the goals that a set loses, and the distributions of the errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def mean_and_std(evaluation: Evaluation) -> str:
 
 
 def lost_goal(loss: Loss) -> str:
-    """Return in a sentence why a goal is lost."""
+    """Return a sentence that states why a goal is lost."""
     return (
         f"Goal {loss.goal} ({frame_name(loss.body_frame)}) is reached in "
         f"{percent(loss.success)} % of the samples; in the others: {stopped_by(loss)}."
@@ -36,7 +36,7 @@ def lost_goal(loss: Loss) -> str:
 
 
 def stopped_by(loss: Loss) -> str:
-    """Return what stops the arm where a goal is lost, the most frequent reason first."""
+    """Return the reasons why a goal is lost, the most frequent first."""
     text = ", ".join(
         f"{REASON_TEXTS[reason]} ({percent(fraction, 0)} %)"
         for reason, fraction in loss.reasons.items()
@@ -48,7 +48,7 @@ def stopped_by(loss: Loss) -> str:
 
 
 def goes_with(loss: Loss) -> str:
-    """Return the error that losses go with: its mean in standard deviations."""
+    """Return the joint error with the largest mean in the losses, in standard deviations."""
     return f"{frame_name(loss.joint)} {loss.standardized_error:+.1f}"
 
 

@@ -1,4 +1,4 @@
-"""The checks of a score file, line by line."""
+"""The result of a verification, line by line."""
 
 from __future__ import annotations
 

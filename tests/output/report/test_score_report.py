@@ -133,7 +133,7 @@ def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
     assert single.unreached
     wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        assert f"From stop 1, goal {goal} would be reached so: " in wording
+        assert f"The cheapest change from stop 1 that reaches goal {goal}: " in wording
     assert f"Not reached: {goals_text(single.unreached)}." in wording
     assert "Nothing was re-checked" in wording
     assert "Of the sets of at most 1 in the file this one has the greatest P\\_R + P\\_M" in wording
@@ -145,7 +145,10 @@ def test_the_set_is_the_one_to_choose_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
     found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
     wording = as_markdown(make_score_page(found, command="c"))
-    assert "this set is chosen for a robot at x 0.60 m, y 0.70 m, heading 0 deg" in wording
+    assert (
+        "selected with the default weights for a robot at x 0.60 m, y 0.70 m, heading 0 deg"
+        in wording
+    )
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +190,9 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     assert found.verification.is_sound
     assert not found.is_sound
     assert [g for g in found.findings if not found.is_confirmed(g)] == [goal]
-    assert column(verification_table(found), "Result")[-1].startswith("THESE HOLD, BUT SOME")
+    assert column(verification_table(found), "Result")[-1].startswith(
+        "THESE ANSWERS HOLD, BUT SOME"
+    )
 
 
 def test_what_was_rechecked_is_reported(report):

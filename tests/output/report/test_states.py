@@ -77,7 +77,7 @@ def test_the_person_is_drawn_as_the_head_rest_has_them(file):
 def test_an_environment_without_states_has_one_map():
     file = score_file(grid=small_grid(nx=3, ny=2))
     assert not has_states(file)
-    with pytest.raises(SelectionError, match=r"has nothing to set.*without --states"):
+    with pytest.raises(SelectionError, match=r"has a single state.*without --states"):
         states_figure(file, ShownSet.of(file, None))
 
 
@@ -86,7 +86,7 @@ def test_too_many_states_are_refused():
     assert has_states(most)
     file = score_file(grid=small_grid(nx=2, ny=2, yaws=1, torsos=1, bed=21, head=3))
     assert not has_states(file)
-    with pytest.raises(SelectionError, match="63 states, of which 60 at most"):
+    with pytest.raises(SelectionError, match="63 states, but at most 60"):
         states_figure(file, ShownSet.of(file, None))
 
 

@@ -61,7 +61,7 @@ def group_button(number: int) -> str:
 
 
 def sliders() -> dict[str, tuple[float, float, float, float]]:
-    """Return each slider's lowest and highest value, step, and where it begins."""
+    """Return the lowest and highest value, the step and the initial value of each slider."""
     found = {}
     for unit, most, name in (("m/s", MOST_LINEAR, "move"), ("rad/s", MOST_ANGULAR, "turn")):
         for axis in AXES:
@@ -104,7 +104,7 @@ class Source(Protocol):
         ...
 
     def zero(self) -> None:
-        """Put every slider of a rate back to zero."""
+        """Reset every slider of a rate to zero."""
         ...
 
 
@@ -114,7 +114,7 @@ class OperatorCommand:
 
     command: Command
     lost: str = ""
-    """Why the input counts as lost, so that the command holds the arm; else empty."""
+    """Why the input counts as lost, so that the arm stops; else empty."""
     hint: str = ""
     """Advice after an input that has no effect; may be empty."""
     back: bool = False
@@ -160,7 +160,7 @@ class OperatorInput:
         if not reading.watched:
             # Meshcat keeps the state of the last browser.
             self._gamepad.forget()
-            lost = "no browser is connected to this page: the arm holds still until one is."
+            lost = "no browser is connected to this page: the arm stops until one is."
         if STOP in pressed:
             self._gamepad.give_up()
         if back or lost or STOP in pressed:
@@ -205,7 +205,7 @@ class OperatorInput:
         turns = TURN_DOWN in pressed or TURN_UP in pressed
         if len(self.modes) > 1:
             if in_null_space and moves:
-                self._hint = ("the tool is held in this mode: M selects the next mode.", now + 2.0)
+                self._hint = ("this mode holds the tool: M selects the next mode.", now + 2.0)
             if not in_null_space and turns:
                 self._hint = ("groups move in null-space mode: M selects it.", now + 2.0)
 
@@ -221,9 +221,9 @@ class OperatorInput:
         wanted[np.abs(wanted) < dead] = 0.0
         speeds = np.repeat((reading.sliders[SPEED], reading.sliders[TURN_SPEED]), 3)
         keys = np.zeros(6)
-        for name, (axis, way, _) in MOVES.items():
+        for name, (axis, direction, _) in MOVES.items():
             if now < self._until.get(name, -1.0):
-                keys[axis] += way
+                keys[axis] += direction
         wanted += speeds * (keys + np.array([*pad.linear, *pad.angular]))
         most = np.repeat((MOST_LINEAR, MOST_ANGULAR), 3)
         wanted = np.clip(wanted, -most, most)

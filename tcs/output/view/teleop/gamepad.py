@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 DEAD_ZONE = 0.15
-"""Fraction of the range by which worn sticks rest off zero."""
+"""Fraction of the range within which a stick counts as at rest."""
 STUCK_AFTER = 5.0
-"""Time for which a pushed stick may report exactly the same [s]: a browser in the background stops
+"""Time for which a pushed stick may report a constant value [s]: a browser in the background stops
 sending, and its last state would persist."""
 _PRESSED = 0.5
 A, B, LEFT_SHOULDER = 0, 1, 4
 UP, DOWN, LEFT, RIGHT = 12, 13, 14, 15
-"""Buttons as the W3C's standard gamepad numbers them."""
+"""Numbers of the buttons in the standard gamepad mapping of the W3C."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class GamepadState:
     buttons: tuple[float, ...]
 
     def pressed(self, button: int) -> bool:
-        """Whether a button is pressed; False for a missing button."""
+        """Return whether a button is pressed; False for a missing button."""
         return button < len(self.buttons) and self.buttons[button] > _PRESSED
 
     def stick(self, axis: int) -> float:
@@ -59,7 +59,7 @@ class GamepadCommand:
     clicks: tuple[int, ...] = ()
     """Buttons pressed since the last reading."""
     lost: str = ""
-    """Why the arm has to hold still; else empty."""
+    """Why the arm has to stop; empty if it need not."""
 
 
 class Gamepad:
@@ -83,7 +83,7 @@ class Gamepad:
         held, the left stick rolls and pitches instead. The cross moves a joint group, left and
         right, and selects one, up and down. A changes the mode, B is the clutch.
 
-        A lost gamepad holds the arm until it is back and was released, or `give_up` is called.
+        A lost gamepad stops the arm until it is back and was released, or `give_up` is called.
 
         Args:
             pad: State of the gamepad; None if there is none.
@@ -93,8 +93,8 @@ class Gamepad:
         if pad is None:
             if before is not None and self._active:
                 self._lost = (
-                    "gamepad lost: the arm holds still. Connect it and let go of its sticks, or "
-                    "press the space bar to go on without it."
+                    "gamepad lost: the arm stops. Connect it and release its sticks, or press the "
+                    "space bar to continue without it."
                 )
             self._active = False
             return GamepadCommand(lost=self._lost)
@@ -105,8 +105,8 @@ class Gamepad:
         elif self._active and now - self._changed > STUCK_AFTER:
             self._active = False
             self._lost = (
-                f"gamepad silent for {STUCK_AFTER:g} s while it is pushed: the arm holds still. "
-                "Let go of it, with this page in front."
+                f"no change from the gamepad for {STUCK_AFTER:g} s while a stick is pushed: the "
+                "arm stops. Release it, with this page in the foreground."
             )
         if before is None or not self._active:
             return GamepadCommand(lost=self._lost)

@@ -37,11 +37,11 @@ class MeshcatControls:
     """Sliders, buttons and gamepad of a Meshcat."""
 
     def __init__(self, meshcat: Meshcat, groups: int) -> None:
-        """Lay them out.
+        """Add the controls to Meshcat.
 
         Args:
-            meshcat: Where to.
-            groups: How many joint groups there are.
+            meshcat: The Meshcat.
+            groups: Number of joint groups.
         """
         self._meshcat = meshcat
         self._sliders = sliders()
@@ -52,7 +52,7 @@ class MeshcatControls:
             meshcat.AddSlider(name, low, high, step, value)
 
     def read(self) -> Reading:
-        """Return how the controls stand now."""
+        """Return the present state of the controls."""
         meshcat = self._meshcat
         pad = meshcat.GetGamepad()
         return Reading(
@@ -66,13 +66,13 @@ class MeshcatControls:
         )
 
     def zero(self) -> None:
-        """Put every slider of a rate back to zero."""
+        """Reset every slider of a rate to zero."""
         for name in RATE_SLIDERS:
             self._meshcat.SetSliderValue(name, 0.0)
 
 
 def key_name(key: str) -> str:
-    """Return what stands on a key that the browser knows by its place.
+    """Return the label of a key, given by its code in the browser.
 
     >>> key_name("KeyW"), key_name("Digit1"), key_name("Space")
     ('W', '1', 'space')
@@ -95,10 +95,10 @@ class LivePage:
         on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
     ) -> None:
-        """Lay out the page.
+        """Set up the page.
 
         Args:
-            meshcat: An empty one.
+            meshcat: An empty Meshcat.
             stage: The robot.
             arm: Its arm.
             start: Joint positions at the start [rad], shape (7,).

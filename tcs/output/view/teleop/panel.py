@@ -23,20 +23,20 @@ from tcs.teleop.control.status import ShortArray, range_fraction
 
 FloatArray = NDArray[np.float64]
 PANEL = "/Cameras/default/rotated/<object>/panel"
-"""Below the camera itself: what hangs there moves with it."""
+"""Path of the panel, a child of the camera, with which it moves."""
 FREE, LIMIT, SINGULAR = "free", "limit", "singular"
 COLOURS: Mapping[str, str] = {FREE: "#2ca02c", LIMIT: "#ff2020", SINGULAR: "#ff00ff"}
-"""Of a bar, as the paper has them: green, red at a limit, magenta at a singularity."""
+"""Colours of a bar, as in the paper: green, red at a limit, magenta at a singularity."""
 _TRACKS: Mapping[str, str] = {FREE: "#c8ccd4", LIMIT: "#ff9a9a", SINGULAR: "#ffa6ff"}
-"""Of the rest of a joint's range: at its lower limit the bar has no length."""
+"""Colours of the rest of a joint's range, visible where the bar is short."""
 LINES = ("mode", "message")
 _INK = {"mode": "#ffffff", "message": "#ffd24d"}
 _DISTANCE = 0.05
-"""From the camera [m]: behind its nearest plane (0.01 m), before anything that one looks at."""
+"""Distance from the camera [m]: beyond its near plane (0.01 m), in front of the scene."""
 _HALF_HEIGHT = math.tan(math.radians(37.5))
-"""Half the height of what Meshcat's camera sees at a distance of 1; it sees 75 degrees."""
+"""Half the height of the view of Meshcat's camera (75 degrees) at a distance of 1."""
 _WIDTH, _BOTTOM, _TOP = 1.56, -0.92, -0.48
-"""Of the panel; it fits into every window that is not much higher than wide."""
+"""Width, bottom and top of the panel; it fits into windows that are not much higher than wide."""
 _BAR = (0.185, 0.04)
 """Width and height of a bar."""
 _PITCH = _WIDTH / 7.0
@@ -47,14 +47,14 @@ _LINE_AT = {"mode": -0.55, "message": -0.625}
 _FONT, _SMALL = 0.044, 0.034
 _MOST_LETTERS = int((_WIDTH - 0.06) / (_FONT * ADVANCE))
 _KEPT = 40
-"""Lines of text kept in Meshcat, hidden: messages recur."""
+"""Number of hidden lines of text kept in Meshcat for reuse."""
 
 
 @dataclass(frozen=True, slots=True)
 class Readout:
     """Content of the panel."""
 
-    shares: tuple[float, ...]
+    fractions: tuple[float, ...]
     """Position of each joint in its range, 0 to 1."""
     states: tuple[str, ...]
     """`FREE`, `LIMIT` or `SINGULAR` of each joint."""
@@ -81,14 +81,14 @@ def readout(
     """
     # A continuous joint is shown from -pi to pi.
     turned = (np.asarray(joints) + math.pi) % (2.0 * math.pi) / (2.0 * math.pi)
-    shares = np.where(arm.bounded, range_fraction(arm, np.asarray(joints)), turned)
+    fractions = np.where(arm.bounded, range_fraction(arm, np.asarray(joints)), turned)
     other = SINGULAR if singular else FREE
     states = tuple(LIMIT if flag else other for flag in limits)
-    return Readout(tuple(np.clip(shares, 0.0, 1.0).tolist()), states, mode, message)
+    return Readout(tuple(np.clip(fractions, 0.0, 1.0).tolist()), states, mode, message)
 
 
 def state_facts(limits: ShortArray, singular: bool) -> str:
-    """Return which joints are at a limit and whether the posture is singular, as words.
+    """Return which joints are at a limit and whether the posture is singular, as text.
 
     >>> state_facts(np.array([0, 1, 0, -1, 0, 0, 0]), True)
     'at its limit: joint 2 (upper), joint 4 (lower); singular posture'
@@ -107,7 +107,7 @@ def mode_line(mode: str, group: tuple[int, ...] | None, number: int, clutch: boo
 
     Args:
         mode: Name of the mode.
-        group: Joints of the group that is chosen, counted from 0; None where there is none.
+        group: Joints of the selected group, counted from 0; None if none is selected.
         number: Number of that group, counted from 0.
         clutch: Whether the clutch decouples master and slave.
 
@@ -125,11 +125,11 @@ class Panel:
     """The panel of one arm in one Meshcat."""
 
     def __init__(self, meshcat: Meshcat, arm: Arm) -> None:
-        """Draw what does not change.
+        """Draw the constant parts.
 
         Args:
-            meshcat: Where to.
-            arm: The arm whose joints it shows.
+            meshcat: The Meshcat.
+            arm: The arm whose joints the panel shows.
         """
         self._meshcat = meshcat
         self._bounded = arm.bounded
@@ -146,16 +146,16 @@ class Panel:
     def show(self, now: Readout) -> None:
         """Show a readout; only changes are sent."""
         before = self._shown
-        for i, (share, state) in enumerate(zip(now.shares, now.states, strict=True)):
+        for i, (fraction, state) in enumerate(zip(now.fractions, now.states, strict=True)):
             if before is None or before.states[i] != state:
                 for one in COLOURS:
                     self._meshcat.SetProperty(f"{bar(i)}/{one}", "visible", one == state)
-            if before is None or before.shares[i] != share:
-                for path, name, value in bar_properties(i, share, bool(self._bounded[i])):
+            if before is None or before.fractions[i] != fraction:
+                for path, name, value in bar_properties(i, fraction, bool(self._bounded[i])):
                     self._meshcat.SetProperty(path, name, value)
         for line, text in (("mode", now.mode), ("message", now.message)):
             if before is None or getattr(before, line) != text:
-                self._say(line, text)
+                self._show_text(line, text)
         self._shown = now
 
     def text(self, line: str, text: str) -> str:
@@ -163,7 +163,7 @@ class Panel:
 
         Args:
             line: One of `LINES`.
-            text: What to write.
+            text: The text.
         """
         known = self._texts[line]
         if not text:
@@ -184,15 +184,16 @@ class Panel:
             known[text] = path
         return known[text]
 
-    def _say(self, line: str, text: str) -> None:
+    def _show_text(self, line: str, text: str) -> None:
+        """Show a text in a line, hide the one before, and delete the least recent ones."""
         path = self.text(line, text)
         known = self._texts[line]
-        for other, its in list(known.items()):
-            if its == path:
-                # The latest stands last, so that the oldest goes first.
+        for other, other_path in list(known.items()):
+            if other_path == path:
+                # Move the latest text to the end: the least recent one is deleted first.
                 known[other] = known.pop(other)
             elif self._shown is not None and getattr(self._shown, line) == other:
-                self._meshcat.SetProperty(its, "visible", False)
+                self._meshcat.SetProperty(other_path, "visible", False)
         if path:
             self._meshcat.SetProperty(path, "visible", True)
         while len(known) > _KEPT:
@@ -224,7 +225,7 @@ class Panel:
         self, name: str, colour: str, width: float, height: float, at: tuple[float, float, float]
     ) -> None:
         x, y = 0.5 * width, 0.5 * height
-        # Drawn from its left end on, so that its scale along x is its length.
+        # Drawn from its left end, so that a scale along x changes its length.
         corners = np.array([[-x, x, x, -x], [-y, -y, y, y], [0.0, 0.0, 0.0, 0.0]])
         faces = np.array([[0, 0], [1, 2], [2, 3]], dtype=np.int32)
         corners[0] += at[0]
@@ -244,7 +245,7 @@ class Panel:
             path, np.asfortranarray(corners), np.asfortranarray(faces), Rgba(0.0, 0.0, 0.0)
         )
         for channel, value in zip("rgb", to_rgb(colour), strict=True):
-            # Meshcat adds up light, and shows the sum on sRGB's curve.
+            # Meshcat adds light linearly and applies the sRGB transfer function to the sum.
             light = value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
             self._meshcat.SetProperty(f"{path}/<object>", f"material.emissive.{channel}", light)
             self._meshcat.SetProperty(f"{path}/<object>", f"material.specular.{channel}", 0.0)
@@ -257,27 +258,27 @@ def bar(i: int) -> str:
 
 
 def bar_middle(i: int) -> float:
-    """Return where a joint's bar is on the panel."""
+    """Return the position of the middle of a joint's bar along the panel."""
     return (i - 3.0) * _PITCH
 
 
-def bar_properties(i: int, share: float, bounded: bool) -> list[tuple[str, str, list[float]]]:
-    """Return what puts a bar where its joint stands: path, property, value.
+def bar_properties(i: int, fraction: float, bounded: bool) -> list[tuple[str, str, list[float]]]:
+    """Return the properties that set a bar to the position of its joint: path, property, value.
 
     Args:
         i: Number of the joint, from 0.
-        share: Where it stands between its limits, 0 to 1.
-        bounded: Whether it has limits; without, there is a mark and no fill.
+        fraction: Position of the joint in its range, 0 to 1.
+        bounded: Whether the joint has limits; if not, the bar has a mark and no fill.
     """
-    found = [(f"{bar(i)}/mark", "position", [share * _BAR[0], 0.0, 0.0])]
+    found = [(f"{bar(i)}/mark", "position", [fraction * _BAR[0], 0.0, 0.0])]
     for state in COLOURS if bounded else ():
-        # A scale of exactly 0 has no inverse, which the browser would complain about.
-        found.append((f"{bar(i)}/{state}/fill", "scale", [max(share, 1e-3), 1.0, 1.0]))
+        # A scale of exactly 0 has no inverse, for which the browser prints a warning.
+        found.append((f"{bar(i)}/{state}/fill", "scale", [max(fraction, 1e-3), 1.0, 1.0]))
     return found
 
 
 def _degrees(arm: Arm, i: int) -> tuple[str, str]:
-    """Return the limits of a joint as words."""
+    """Return the limits of a joint in degrees, as text."""
     if not arm.bounded[i]:
         return "continuous", ""
     return f"{math.degrees(arm.lower[i]):+.0f}", f"{math.degrees(arm.upper[i]):+.0f}"

@@ -30,14 +30,14 @@ from tcs.teleop.runs.run import NO_GROUP, Run
 
 FloatArray = NDArray[np.float64]
 PLACE, SPEED = "time [s]", "speed"
-PLAY, AGAIN = "play or hold (space)", "from the start (X)"
+PLAY, AGAIN = "play or pause (space)", "from the start (X)"
 _FRAME_PERIOD = 0.03
 """Time between two frames of the playback [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunView:
-    """A run with the arm that it belongs to."""
+    """A run with its arm."""
 
     arm: Arm
     run: Run
@@ -51,12 +51,12 @@ class RunView:
         if self.run.joint_names != self.arm.joints:
             raise DataFileError(
                 f"its joints are {', '.join(self.run.joint_names)}, but those of robot "
-                f"'{self.arm.name}' are {', '.join(self.arm.joints)}. Name its robot with --robot."
+                f"'{self.arm.name}' are {', '.join(self.arm.joints)}. Give its robot with --robot."
             )
 
     @property
     def course(self) -> tuple[FloatArray, FloatArray] | None:
-        """Start and end of the line that was to be followed [m], if the run names them."""
+        """Start and end of the line to follow [m]; None if the metadata contain none."""
         found = []
         for name in ("line_start", "line_end"):
             try:
@@ -70,7 +70,7 @@ class RunView:
         return (start, end) if (start != end).any() else None
 
     def draw(self, meshcat: Meshcat) -> None:
-        """Draw the way of the tool, and the line that was to be followed."""
+        """Draw the path of the tool, and the line to follow."""
         draw_path(meshcat, self.run.position)
         if self.course is not None:
             draw_course(meshcat, *self.course, GOAL_RADIUS)
@@ -88,12 +88,12 @@ class RunView:
 
     @property
     def length(self) -> float:
-        """How long it lasts [s]."""
+        """Duration [s]."""
         return float(self.run.time[-1] - self.run.time[0])
 
     def sample(self, seconds: float) -> int:
         """Return the number of the last sample at or before a time from the start [s]."""
-        # Times were rounded when they were written; a millionth of a second is far below a step.
+        # Times in files are rounded; a millionth of a second is far below a step.
         at = np.searchsorted(self.run.time, self.run.time[0] + seconds + 1e-6, side="right")
         return int(np.clip(at - 1, 0, len(self.run) - 1))
 
@@ -103,7 +103,7 @@ class RunView:
         return pose_of(R, self.run.position[i])
 
     def readout(self, i: int) -> Readout:
-        """Return what the panel shows at a sample."""
+        """Return the content of the panel at a sample."""
         run = self.run
         mode, number = str(run.mode[i]), int(run.group[i])
         groups = Settings().groups
@@ -117,20 +117,20 @@ class RunView:
 
 
 def load_run_view(path: Path, robot: str | None = None) -> RunView:
-    """Return the run in a file with the arm that it belongs to.
+    """Return the run in a file with its arm.
 
     Args:
         path: A file that `save_run` wrote.
         robot: Name or YAML file of the robot; None for the one in the run's metadata.
 
     Raises:
-        DataFileError: If the file cannot be read, names no robot, or is a run of another robot.
-        GridError: If the robot's torso cannot have the run's height.
+        DataFileError: If the file cannot be read, its metadata contain no robot, it is a run of
+            another robot, or its torso height is out of the range of the robot.
     """
     run = load_run(path)
     named = robot or run.metadata.get("robot")
     if not isinstance(named, str):
-        raise DataFileError(f"run '{path}': it names no robot. Name its robot with --robot.")
+        raise DataFileError(f"run '{path}': it names no robot. Give its robot with --robot.")
     height = run.metadata.get("torso_height", 0.0)
     if isinstance(height, bool) or not isinstance(height, int | float):
         raise DataFileError(
@@ -147,10 +147,10 @@ class Replay:
     """Playback of a run in a Meshcat, with a slider for its time."""
 
     def __init__(self, meshcat: Meshcat, stage: RobotDisplay, view: RunView) -> None:
-        """Show the first sample, and play on from there.
+        """Show the first sample; the playback starts there.
 
         Args:
-            meshcat: An empty one.
+            meshcat: An empty Meshcat.
             stage: The robot.
             view: The run.
         """
@@ -169,9 +169,9 @@ class Replay:
         self.show()
 
     def advance(self, seconds: float) -> None:
-        """Do what was requested for, and play on for so long [s] by the clock."""
+        """Apply the changes of the controls, then play for a wall-clock time [s]."""
         requested = self._meshcat.GetSliderValue(PLACE)
-        # Where it was put is rounded to the slider's step.
+        # The slider rounds the value that was set to its step.
         if abs(requested - self._slider) > 1e-9:
             self.place, self.playing = requested, False
         for name, before in self._clicks.items():
@@ -191,7 +191,7 @@ class Replay:
         self.show()
 
     def show(self) -> None:
-        """Show the sample of this time."""
+        """Show the sample at the present time of the playback."""
         i = self.view.sample(self.place)
         for path, pose in self._stage.poses(self.view.run.joints[i]).items():
             self._meshcat.SetTransform(path, pose)
@@ -199,7 +199,7 @@ class Replay:
         self._panel.show(self.view.readout(i))
 
     def run(self, duration: float | None = None) -> None:
-        """Play for so long [s], or until interrupted."""
+        """Play for a wall-clock time [s], or until interrupted."""
         begun = before = time.monotonic()
         while duration is None or before - begun < duration:
             time.sleep(_FRAME_PERIOD)

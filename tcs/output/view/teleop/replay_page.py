@@ -1,4 +1,4 @@
-"""A recorded run as one self-contained page that plays it."""
+"""A recorded run as one self-contained page with an animation."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from tcs.teleop import Arm
 _FRAME_RATE = 25
 """Frames per second of the page."""
 _MOST_FRAMES = 3000
-"""Frames of a page: longer runs get a lower rate, so that the page stays below 10 MB."""
+"""Greatest number of frames: longer runs have a lower rate, so that pages are below 10 MB."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportedPage:
-    """What was written."""
+    """Summary of a page that was written."""
 
     size: int
-    """[bytes]."""
+    """Size of the page [bytes]."""
     samples: int
     """Samples of the run."""
     seconds: float
@@ -62,8 +62,8 @@ def export_run(path: Path, page: Path, robot: str | None = None, *, meshes: bool
     notes = [view.summary]
     if meshes:
         notes.append(
-            "This page holds the robot's meshes in another format: every triangle in its place, no "
-            f"textures. Source according to the robot file: {file.source}"
+            "This page contains the robot's meshes, converted: every triangle at its original "
+            f"position, without textures. Origin and licence, from the robot file: {file.source}"
         )
     display = RobotDisplay(view.arm, meshes=meshes)
     text = replay_page(open_meshcat(), display, view, title=file.title, notes=notes).encode()
@@ -77,13 +77,13 @@ def export_run(path: Path, page: Path, robot: str | None = None, *, meshes: bool
 def replay_page(
     meshcat: Meshcat, stage: RobotDisplay, view: RunView, *, title: str, notes: Sequence[str] = ()
 ) -> str:
-    """Return one page that plays the run without a server.
+    """Return a page that plays the run without a server.
 
     Args:
-        meshcat: An empty one.
+        meshcat: An empty Meshcat.
         stage: The robot.
         view: The run.
-        title: First line, for a person.
+        title: First line.
         notes: Further lines.
     """
     rate = min(_FRAME_RATE, _MOST_FRAMES / max(view.length, 1e-9))
@@ -110,11 +110,11 @@ def replay_page(
 
 
 def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -> None:
-    """Let the bars go along, and change colour."""
+    """Animate the lengths and colours of the bars."""
     for i, bounded in enumerate(arm.bounded):
-        shares = [one.shares[i] for one in readouts]
-        for at in _keys(shares):
-            for path, name, value in bar_properties(i, shares[at], bool(bounded)):
+        fractions = [one.fractions[i] for one in readouts]
+        for at in _keys(fractions):
+            for path, name, value in bar_properties(i, fractions[at], bool(bounded)):
                 animation.SetProperty(at, path, name, value)
         states = [one.states[i] for one in readouts]
         for state in COLOURS:
@@ -122,7 +122,7 @@ def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -
 
 
 def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readout]) -> None:
-    """Let the lines of text change."""
+    """Animate the lines of text."""
     for line in LINES:
         texts = [getattr(one, line) for one in readouts]
         for text in dict.fromkeys(texts):
@@ -132,14 +132,14 @@ def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readou
 
 
 def _play_visible(animation: MeshcatAnimation, path: str, shown: list[bool]) -> None:
-    """Show and hide a thing; what is or is not there does not fade in between."""
+    """Animate the visibility of an object; it switches without a transition."""
     for at, visible in enumerate(shown):
         if at in (0, len(shown) - 1) or visible != shown[at - 1]:
             animation.SetProperty(at, path, "visible", visible)
 
 
 def _keys(values: Sequence[object]) -> list[int]:
-    """Return where a value is needed so that the browser's straight lines between meet them all.
+    """Return the indices of the keys from which linear interpolation reproduces all values.
 
     >>> _keys([1, 1, 1, 2, 3, 3, 3])
     [0, 2, 3, 4, 6]

@@ -17,21 +17,21 @@ from tcs.teleop import Arm
 
 FloatArray = NDArray[np.float64]
 ROBOT, TARGET, TOOL, PATH, COURSE = "robot", "target", "tool", "path", "course"
-"""Paths of the things in Meshcat."""
+"""Paths of the objects in Meshcat."""
 _AXES = (Rgba(0.85, 0.1, 0.1, 1.0), Rgba(0.1, 0.65, 0.1, 1.0), Rgba(0.1, 0.25, 0.9, 1.0))
 _TARGET_AXIS = (0.16, 0.006)
-"""Length and width of the target's axes [m]: longer and thinner than the tool's own."""
+"""Length and width of the target's axes [m]: longer and thinner than those of the tool."""
 _TOOL_AXIS = (0.09, 0.014)
 _PATH_COLOUR = rgba("#e6550d")
 _PATH_STEP = 0.002
-"""Between two points of the tool's path [m]."""
+"""Least distance between two points of the tool's path [m]."""
 _POINTS, _PIECES = 40, 50
-"""Points of a piece of the path, and pieces that are kept: 4 m. Only the last piece is sent."""
+"""Points per piece of the path, and number of pieces kept: 4 m. Only the last piece is sent."""
 _CAMERA, _LOOKED_AT = np.array([-0.7, -1.25, 0.65]), np.array([0.0, 0.0, -0.25])
-"""Camera, and what it looks at, from halfway between shoulder and tool [m]: forward is to the right
-and away, and the arm stands above the panel."""
+"""Positions of the camera and of its target, relative to the midpoint of shoulder and tool [m]: the
+robot's forward direction is to the right and away, and the arm is above the panel."""
 _BESIDE = 0.02
-"""An arm whose middle is farther to the left than this [m] is looked at from the left."""
+"""Lateral position of the midpoint beyond which the camera is on the left [m]."""
 
 
 class RobotDisplay:
@@ -42,7 +42,7 @@ class RobotDisplay:
 
         Args:
             arm: The arm.
-            meshes: Whether the robot is shown as its meshes where it has any.
+            meshes: Whether the robot is shown with its meshes, where it has any.
 
         Raises:
             RobotError: If the robot's model cannot be used.
@@ -53,7 +53,7 @@ class RobotDisplay:
         self._shoulder = arm.frames[0, :3, 3]
         bodies = {one.body for one in self._shapes}
         still = self._poses(bodies, np.zeros(len(arm.joints)))
-        # Half a radian in every joint moves whatever hangs on the arm.
+        # Half a radian in every joint moves every body that the arm carries.
         moved = self._poses(bodies, np.full(len(arm.joints), 0.5))
         self._moving = {
             body for body in bodies if not still[body].IsNearlyEqualTo(moved[body], 1e-9)
@@ -63,13 +63,13 @@ class RobotDisplay:
     def set_up(
         self, meshcat: Meshcat, tool: FloatArray, *, target: bool = True, compact: bool = False
     ) -> None:
-        """Give Meshcat everything there is.
+        """Add all objects to Meshcat.
 
         Args:
-            meshcat: An empty one.
-            tool: Where the tool is at first, in the base [m], shape (3,).
-            target: Whether there is a target to show; a recorded run does not say where it was.
-            compact: Whether meshes are handed over as bare triangles.
+            meshcat: An empty Meshcat.
+            tool: Initial position of the tool in the base frame [m], shape (3,).
+            target: Whether to show a target; recorded runs contain none.
+            compact: Whether meshes are sent as bare triangles.
         """
         draw_ground(meshcat)
         draw_shapes(meshcat, ROBOT, self._shapes, compact=compact)
@@ -89,7 +89,7 @@ class RobotDisplay:
         meshcat.SetCameraPose(middle + _CAMERA * [1.0, side, 1.0], middle + _LOOKED_AT)
 
     def poses(self, joints: FloatArray) -> Mapping[str, RigidTransform]:
-        """Return where everything that moves with the arm is, by its path.
+        """Return the poses of all bodies that move with the arm, by path in Meshcat.
 
         Args:
             joints: Joint positions [rad], shape (7,).
@@ -98,7 +98,7 @@ class RobotDisplay:
         return {_body(body): X_WL for body, X_WL in found.items()}
 
     def contacts(self) -> tuple[str, str] | None:
-        """Return two bodies of the robot that touch in the posture of the last poses, if any do."""
+        """Return two bodies of the robot in contact in the posture of the last poses, or None."""
         found = self._scene.violations()
         return found[0][:2] if found else None
 
@@ -109,7 +109,7 @@ class RobotDisplay:
 
 
 def pose_of(R: FloatArray, p: FloatArray) -> RigidTransform:
-    """Return a pose as Drake has it; rounding in the rotation is taken out."""
+    """Return a pose as a `RigidTransform`, with rounding errors of the rotation removed."""
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
 
 
@@ -118,38 +118,38 @@ def _body(body: BodyIndex) -> str:
 
 
 def draw_course(meshcat: Meshcat, start: FloatArray, end: FloatArray, radius: float) -> None:
-    """Draw a line to follow as the paper does: magenta, from a green sphere to a red one.
+    """Draw a line to follow as in the paper: magenta, from a green sphere to a red one.
 
     Args:
-        meshcat: Where to.
-        start: [m], shape (3,).
-        end: [m], shape (3,).
-        radius: Of the spheres [m]; who is in the red one has arrived.
+        meshcat: The Meshcat.
+        start: Start of the line [m], shape (3,).
+        end: End of the line [m], shape (3,).
+        radius: Radius of the spheres [m]; a trial ends inside the red one.
     """
-    way = np.asarray(end) - np.asarray(start)
-    length = float(np.linalg.norm(way))
+    along = np.asarray(end) - np.asarray(start)
+    length = float(np.linalg.norm(along))
     for name, place, colour in (("start", start, "#2ca02c"), ("end", end, "#ff2020")):
-        half_seen = rgba(colour)
-        half_seen.update(a=0.5)
-        meshcat.SetObject(f"{COURSE}/{name}", Sphere(radius), half_seen)
+        transparent = rgba(colour)
+        transparent.update(a=0.5)
+        meshcat.SetObject(f"{COURSE}/{name}", Sphere(radius), transparent)
         meshcat.SetTransform(f"{COURSE}/{name}", RigidTransform(place))
     meshcat.SetObject(f"{COURSE}/line", Cylinder(0.003, length), rgba("#ff00ff"))
-    along = RotationMatrix.MakeFromOneVector(way / length, 2)
-    meshcat.SetTransform(f"{COURSE}/line", RigidTransform(along, start + 0.5 * way))
+    R = RotationMatrix.MakeFromOneVector(along / length, 2)
+    meshcat.SetTransform(f"{COURSE}/line", RigidTransform(R, start + 0.5 * along))
 
 
 class Trail:
-    """The way of the tool, of which only the last piece is sent again."""
+    """The path of the tool in pieces, of which only the last one is sent again."""
 
     def __init__(self, meshcat: Meshcat) -> None:
-        """Begin without a way."""
+        """Start with an empty path."""
         self._meshcat = meshcat
         self._pieces: deque[str] = deque()
         self._points: list[FloatArray] = []
         self._number = 0
 
     def add(self, point: FloatArray) -> None:
-        """Go on to a point [m], shape (3,), if it is far enough from the last one."""
+        """Append a point [m], shape (3,), if it is at least `_PATH_STEP` from the last one."""
         points = self._points
         if points and float(np.linalg.norm(point - points[-1])) < _PATH_STEP:
             return
@@ -167,18 +167,18 @@ class Trail:
             self._meshcat.Delete(self._pieces.popleft())
 
     def clear(self) -> None:
-        """Forget the way."""
+        """Delete the path."""
         self._meshcat.Delete(PATH)
         self._pieces.clear()
         self._points = []
 
 
 def draw_path(meshcat: Meshcat, points: FloatArray, path: str = PATH) -> None:
-    """Draw a way.
+    """Draw a path of the tool.
 
     Args:
-        meshcat: Where to.
-        points: [m], shape (n, 3), n >= 2.
-        path: Where it is kept.
+        meshcat: The Meshcat.
+        points: Points of the path [m], shape (n, 3), n >= 2.
+        path: Path of the object in Meshcat.
     """
     meshcat.SetLine(path, np.asfortranarray(points.T), 3.0, _PATH_COLOUR)

@@ -41,7 +41,7 @@ class LiveOptions:
 
     Attributes:
         robot: Name or YAML file of the robot.
-        behaviour: Behaviour at an invalid joint configuration.
+        behaviour: Behaviour at a joint limit.
         condition: Key of `CONDITION_MODES`.
         start_deg: Start posture [deg], seven numbers; None to search for one.
         torso_height: Height of the torso joint [m]; None for the middle of its range.
@@ -80,7 +80,7 @@ class LiveSession:
             options: Robot, condition and start.
             port: Port of the page; None for the first free one.
             on_stop: Called with the reason whenever the arm stops.
-            record: Whether to record what is done; with a line it is recorded in any case.
+            record: Whether to record a run; with a line it is recorded in any case.
 
         Raises:
             OutputError: If the port cannot be used.
@@ -113,7 +113,7 @@ class LiveSession:
         self.url = str(meshcat.web_url())
 
     def run(self) -> Run | None:
-        """Return what was recorded; None where no browser was connected."""
+        """Return the recorded run; None if no browser was connected."""
         metadata: dict[str, Any] = {
             "tcs": tcs.__version__,
             "robot": self._options.robot,
@@ -137,5 +137,5 @@ def _start(arm: Arm, degrees: tuple[float, ...]) -> FloatArray:
     start = arm.checked([math.radians(value) for value in degrees], "start posture")
     outside = arm.limit_violation(start)
     if outside:
-        raise TcsError(f"start posture: {outside}. Give one within them with --start-deg.")
+        raise TcsError(f"start posture: {outside}. Give another with --start-deg.")
     return start

@@ -12,11 +12,11 @@ from tcs.teleop.control.status import range_fraction
 
 FloatArray = NDArray[np.float64]
 _CANDIDATES, _TRIED, _CLIMB = 3000, 20, 500
-"""Postures drawn, how many of the best are looked at, steps by which each is bettered."""
+"""Number of random postures, of the best ones that are refined, and of refinement steps."""
 _AHEAD = 0.8
-"""Cosine between the tool's x axis and straight ahead: within 37 degrees."""
+"""Least cosine of the angle between the tool's x axis and the robot's x axis: 37 degrees."""
 _AREA = ((0.4, 0.75), (-0.3, 0.3), (-0.4, 0.4))
-"""Where the tool may be from the shoulder: ahead, left, up, in shares of the arm's length."""
+"""Range of the tool position relative to the shoulder (forward, left, up), in arm lengths."""
 
 
 def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
@@ -28,7 +28,7 @@ def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
 
     Args:
         arm: The arm.
-        stage: Its robot.
+        stage: The robot display, which checks contacts.
     """
     rng = np.random.default_rng(0)
     area = _area(arm)
@@ -46,13 +46,13 @@ def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
         stage.poses(joints)
         if best > 0.0 and stage.contacts() is None:
             return np.array(joints)
-    # An arm that never points ahead begins in the middle of its range.
+    # Without such a posture, the start is in the middle of the joint ranges.
     low, high = (np.where(arm.bounded, ends, 0.0) for ends in (arm.lower, arm.upper))
     return np.asarray(0.5 * (low + high))
 
 
 def _area(arm: Arm) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest and the highest place of the tool in the base [m], shapes (3,)."""
+    """Return the bounds of the tool position in the base frame [m], shapes (3,)."""
     shoulder = arm.frames[0, :3, 3]
     length = float(np.linalg.norm(arm.frames[1:, :3, 3], axis=1).sum())
     low, high = np.array(_AREA).T * length
@@ -60,10 +60,10 @@ def _area(arm: Arm) -> tuple[FloatArray, FloatArray]:
 
 
 def _margin(arm: Arm, joints: FloatArray, low: FloatArray, high: FloatArray) -> float:
-    """Return the margin of a posture to limits and singularities; 0 where the tool is misplaced."""
+    """Return the margin of a posture to limits and singularities; 0 if the tool pose is invalid."""
     at = arm.kinematics(joints)
     if at.R[0, 0] < _AHEAD or (at.p < low).any() or (at.p > high).any():
         return 0.0
-    shares = range_fraction(arm, joints)
-    margin = float(np.minimum(shares, 1.0 - shares)[arm.bounded].min(initial=0.5))
+    fractions = range_fraction(arm, joints)
+    margin = float(np.minimum(fractions, 1.0 - fractions)[arm.bounded].min(initial=0.5))
     return max(margin, 0.0) * smallest_singular_value(at.jacobian, Settings().length)

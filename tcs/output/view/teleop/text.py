@@ -1,4 +1,4 @@
-"""Lines of text as triangles: Meshcat knows shapes only, and a page without a server no fonts."""
+"""Lines of text as triangles: Meshcat displays shapes only, and exported pages have no fonts."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 ADVANCE = 0.602
-"""From one letter to the next, in heights of the font: that of DejaVu Sans Mono."""
+"""Advance width of a letter of DejaVu Sans Mono, in font heights."""
 _FONT = FontProperties(family="DejaVu Sans Mono")
 _DETAIL = 24.0
-"""Height that curves are cut into straight lines at: as fine as the screen shows them."""
+"""Font height at which curves are converted to lines: as fine as the resolution of a screen."""
 
 
 def text_mesh(text: str) -> tuple[FloatArray, IntArray]:
     """Return corners, shape (3, n), and triangles, shape (3, m), of a line of text.
 
-    It begins at the origin and runs along x, its font 1 high. Nothing is returned of blanks.
+    The line begins at the origin and extends along x, with font height 1. Blanks have no triangles.
 
     >>> corners, faces = text_mesh("joint 4")
     >>> bool(corners[0].max() < 7 * ADVANCE)
@@ -41,8 +41,8 @@ def text_mesh(text: str) -> tuple[FloatArray, IntArray]:
 def _glyph(letter: str) -> FloatArray:
     """Return the trapezoids that fill a letter, shape (n, 4, 2).
 
-    The letter is cut at the height of every corner of its outlines. Between two neighbouring
-    heights its edges are straight and do not cross, so every second gap between them is ink.
+    The letter is divided at the height of every corner of its outlines. Between two neighbouring
+    heights the edges are straight and do not cross, so every second gap between them is filled.
     """
     if letter.isspace():
         return np.empty((0, 4, 2))

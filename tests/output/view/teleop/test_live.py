@@ -68,7 +68,7 @@ def test_a_lost_browser_is_told_once_and_recorded_as_a_stop(page, desk, told):
     drive(page, 200)
     assert page.last.stopped
     assert not page.last.rates.any()
-    assert told == ["no browser is connected to this page: the arm holds still until one is."]
+    assert told == ["no browser is connected to this page: the arm stops until one is."]
 
 
 def test_what_is_said_stays_to_be_read(page, desk):

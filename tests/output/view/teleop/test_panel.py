@@ -59,7 +59,7 @@ def shown(arm, joints, limits=NO_LIMITS, singular=False, message=""):
 def test_bars_stand_between_the_limits(iiwa):
     places = np.linspace(0.0, 1.0, 7)
     joints = iiwa.lower + places * (iiwa.upper - iiwa.lower)
-    np.testing.assert_allclose(shown(iiwa, joints).shares, places, atol=1e-12)
+    np.testing.assert_allclose(shown(iiwa, joints).fractions, places, atol=1e-12)
 
 
 def test_joints_that_turn_on_stand_where_they_have_turned_to():
@@ -68,7 +68,7 @@ def test_joints_that_turn_on_stand_where_they_have_turned_to():
     joints = np.where(arm.bounded, arm.lower, 0.0)
     for turns in (0.0, 2.0 * math.pi, -4.0 * math.pi):
         joints[free] = turns + 0.25 * math.pi
-        assert shown(arm, joints).shares[free] == pytest.approx(0.625)
+        assert shown(arm, joints).fractions[free] == pytest.approx(0.625)
 
 
 def test_a_limit_is_red_and_a_singularity_magenta():
@@ -105,7 +105,7 @@ def test_only_what_changes_is_sent(spy, iiwa, ready):
     moved = ready.copy()
     moved[2] += 0.1
     panel.show(shown(iiwa, moved, message="one"))
-    expected = bar_properties(2, shown(iiwa, moved).shares[2], True)
+    expected = bar_properties(2, shown(iiwa, moved).fractions[2], True)
     assert spy.sent == len(expected)
     for path, name, value in expected:
         assert spy.properties[path, name] == value
