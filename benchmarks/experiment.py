@@ -3,8 +3,8 @@
 Usage: python benchmarks/experiment.py [--robot iiwa7] [--operators 26] [--trials 3] [--training 4]
            [--seed 0] [--line-seed 0] [--jobs 2]
 
-It is what `tcs teleop experiment` runs. The operators are scripted, not people. The results depend
-on the seeds alone, not on the machine.
+It runs the same experiment as `tcs teleop experiment`. The operators are scripted, not people. The
+results depend only on the seeds, not on the machine.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ ARM_GAPS = ("gap_environment", "gap_body", "gap_arm")
 
 
 def sweep_costs(bench: Bench, repeats: int) -> None:
-    """Print scoring on one and on two threads, and what Drake needs to check each winner once."""
+    """Print times of scoring on one and two threads, and of Drake's checks of the best postures."""
     weights, pairs = bench.job.task.weights, bench.scores.reason.size
     checker = WinnersChecker(bench.lowered)
     winners = _winners(bench, checker)

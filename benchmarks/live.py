@@ -2,10 +2,9 @@
 
 Usage: python benchmarks/live.py [--repeats 5] [--rows shaving/bed ...] [--between 0.025]
 
-Times are those of the wheelchair tasks, with scene and machine code ready. The gain is that on the
-bed: the person lies between two stored shifts, and the best set of the nearest table and the best
-set scored live are both evaluated in the observed scene. Nothing here is a test: tests never
-depend on time.
+Times are those of the wheelchair tasks, with scene and machine code ready. The gain is measured on
+the bed: the person is between two stored shifts, and the best set of the nearest table and the
+best set scored live are both evaluated in the observed scene. This is a benchmark, not a test.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Peers that know the arm alone: EAIK, TRAC-IK and pinocchio; none of them checks contact.
+"""Peers that solve the arm alone, without contacts: EAIK, TRAC-IK and pinocchio.
 
-Each is an optional package (`pip install '.[benchmarks]'`) and is imported only when it is made.
-All take the arm from the lowered chain: frames, limits and tool are those of our own kernel.
+Each is an optional package (`pip install '.[benchmarks]'`) and is imported only when it is used.
+All use the arm of the lowered chain: frames, limits and tool are those of the tcs kernel.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from tcs.kernel.arrays import Chain, FloatArray
 SWEEP = 32
 """Values of the free joint that EAIK solves for: 0.087 rad apart on the PR2."""
 TIMEOUT = 0.005
-"""What TRAC-IK takes by default [s], by the clock."""
+"""Default time limit of TRAC-IK [s], wall time."""
 CALLS = (1, 5)
 TRACIK_TOLERANCE = 1e-5
-"""TRAC-IK's default."""
+"""Default tolerance of TRAC-IK."""
 RESTARTS, STEPS = 10, 100
-"""Of the damped least squares: random starts, and steps from each."""
+"""Damped least squares: number of random starts, and of steps from each."""
 DAMPING = 1e-2
 """Added to J J^T. On a dozen reachable pairs 1e-6 and 1e-3 took 2.0 starts, this took 1.5."""
 CONVERGED = 1e-4
@@ -63,7 +63,7 @@ class EaikSweep:
         for arm in self._arms:
             found = arm.IK(pair.X_AG)
             if found.num_solutions():
-                # Least-squares ones miss the goal.
+                # Least-squares solutions miss the goal.
                 q.append(np.asarray(found.Q)[~np.asarray(found.is_LS, dtype=bool)])
         postures = turned(np.concatenate(q), self._lower, self._upper)
         kept = np.all((postures >= self._lower) & (postures <= self._upper), axis=1)
@@ -155,7 +155,7 @@ class PinocchioClik:
             J = pin.computeFrameJacobian(model, data, q, tool, pin.ReferenceFrame.LOCAL)
             J = pin.Jlog6(X_TG.inverse()) @ J
             step = J.T @ np.linalg.solve(J @ J.T + damping, error)
-            # Clipped at every step, so that what it converges to is within the limits.
+            # Clipped at every step, so that the result is within the limits.
             q = np.clip(q + step, self._lower, self._upper)
         return None
 
@@ -188,7 +188,7 @@ def _roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
     """Return the URDF's angles of R = Rz(yaw) Ry(pitch) Rx(roll) [rad]."""
     across = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = float(np.arctan2(-R[2, 0], across))
-    # At a pitch of a quarter turn only roll and yaw together count; 1e-9 is rounding.
+    # At a pitch of 90 deg only the sum of roll and yaw is defined; 1e-9 is rounding.
     if across < 1e-9:
         return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
     return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))

@@ -1,8 +1,8 @@
-"""Drake's inverse kinematics and Drake's collision checker, on a plant as small as can be.
+"""Drake's inverse kinematics and Drake's collision checker, on the smallest possible plant.
 
-The plant is built from the lowered arrays: environment and the robot's other parts are fixed, and
-nothing but what the question needs is a joint. On the full plant of the scene (40 positions) the
-same inverse kinematics takes about twice as long, so this is Drake at its best.
+The plant is built from the lowered arrays: the environment and the other parts of the robot are
+fixed, and only the joints that a problem varies are joints. On the full plant of the scene (40
+positions) the same inverse kinematics takes about twice as long.
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, Shapes
 from tcs.model.scene import LoweredScene
 
 INSIDE_POSITION, INSIDE_ROTATION = 5e-4, 5e-3
-"""Half of what the judge allows [m, rad]: corners of a box and SNOPT's own tolerance fit too."""
+"""Half the tolerances of the judge [m, rad], which leaves room for the corners of the box and for
+the tolerance of SNOPT."""
 INFLUENCE = 0.01
-"""Beyond how many metres past the margin Drake may forget a pair. On a dozen reachable pairs and up
-to five tries this took 22 ms on average, 5 mm took 350 ms and 100 mm 520 ms."""
+"""Distance beyond the margin from which on Drake ignores a pair [m]. On a dozen reachable pairs and
+up to five tries this took 22 ms on average, 5 mm took 350 ms and 100 mm 520 ms."""
 BASE = ("base_x", "base_y", "base_yaw")
 TRIES = (1, 5)
 THREADS = 2
@@ -107,11 +108,11 @@ def add_arm(
         frame = link.body_frame()
     X = _pose(arrays.chain.R[7], arrays.chain.p[7])
     tool = plant.AddFrame(FixedOffsetFrame("tool", frame, X, robot))
-    # The checker wants one verdict for each pair of bodies, so each named body is one.
+    # The checker gives one result for each pair of bodies, so each named body is one body.
     bodies: dict[str, RigidBody] = {}
 
     def carrier(name: str, frame: Frame, instance: ModelInstanceIndex) -> RigidBody:
-        # Drake keeps "::" for names within a model instance.
+        # Drake reserves "::" for names within a model instance.
         key = f"{frame.name()} {name}".replace("::", " ")
         if key not in bodies:
             bodies[key] = plant.AddRigidBody(key, instance, inertia)
@@ -227,12 +228,12 @@ class WinnersChecker:
         self._checker = SceneGraphCollisionChecker(
             model=builder.Build(),
             robot_model_instances=[parts.robot],
-            # Only for paths, which are not checked here.
+            # Used only for paths, which are not checked here.
             edge_step_size=0.1,
-            # Overlaps only: its cheapest query.
+            # Overlaps only, the cheapest query.
             env_collision_padding=0.0,
             self_collision_padding=0.0,
-            # By default it heeds OMP_NUM_THREADS, and OMP_NUM_THREADS=1 would leave one context.
+            # The default follows OMP_NUM_THREADS, and OMP_NUM_THREADS=1 would give one context.
             implicit_context_parallelism=Parallelism(THREADS),
         )
 

@@ -1,4 +1,4 @@
-"""Our kernel on single pairs: one configuration, one goal, everything that a sweep does for it."""
+"""The tcs kernel on single pairs of configuration and goal, with all steps of a sweep."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tcs.kernel.contacts import Workspace, new_workspace
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import Scores
 
-# `score_slice` is this with memory of its own, but not compiled itself: from Python, a call costs
-# more than a pair.
+# `score_slice` does the same with memory of its own, but is not compiled: a call from Python takes
+# longer than a pair.
 from tcs.kernel.sweep import _score_slice
 from tcs.placement.tables import Reason
 

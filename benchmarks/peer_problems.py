@@ -1,8 +1,8 @@
-"""The problems that our kernel and its peers solve: one configuration, one goal; and their judge.
+"""The problems that the kernel and its peers solve, pairs of configuration and goal, and the judge.
 
-All are pairs whose base and gripper are free and whose goal is within reach: what is left when
-the cheap questions are answered. Whether a pair is reachable is decided by a dense scan of the
-free joint, which skips and refines nothing, not by the search that is being measured.
+In all pairs base and gripper are free and the goal is within reach: only inverse kinematics and
+collision checks of the arm are left. Whether a pair is reachable is decided by a dense scan of the
+free joint, not by the search that is measured.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ TASK, ENVIRONMENT, ROBOT = "shaving", "wheelchair", "pr2"
 IN_REACH = (Reason.REACHED, Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
 """Reasons of pairs whose base and gripper are free and whose goal is within reach."""
 POSITION_BAR = 1e-3
-"""How far a tool may be from its goal [m]: a thousand times what we allow ourselves, so that no
-iterative peer fails for the tolerance it stops at."""
+"""Tolerance of the tool position [m]: a thousand times that of `tcs verify`, so that no iterative
+peer fails because of its stopping tolerance."""
 ROTATION_BAR = 1e-2
-"""How far it may be turned from it [rad], likewise."""
+"""Tolerance of the tool orientation [rad], likewise."""
 LIMIT_ROUNDING = 1e-6
 """How far a joint may be past its limit [rad]: TRAC-IK keeps limits in single precision."""
 CONTACT_ROUNDING = 2e-6

@@ -4,9 +4,9 @@ Usage: python benchmarks/peers.py [--problems 100] [--seed 0] [--repeats 5]
            [--peers drake,eaik,tracik,pinocchio]
 
 The peers EAIK, TRAC-IK and pinocchio are optional: `pip install '.[benchmarks]'`; an absent one is
-skipped with a message. docs/benchmarks.md explains each line. Times of one run compare with
-each other: solvers take turns from problem to problem, and times of single problems are the
-processor's, which others on the machine do not add to.
+skipped with a message. docs/benchmarks.md explains each line. Times of one run are comparable:
+solvers alternate from problem to problem, and times of single problems are processor time, which
+excludes other programs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ OPTIONAL = {
     "tracik": ("TRAC-IK", TracIk),
     "pinocchio": ("pinocchio CLIK", PinocchioClik),
 }
-"""Peers that are packages of their own, by the name on the command line."""
+"""Peers that are separate packages, by their names on the command line."""
 NAMES = ("drake", *OPTIONAL)
 BLOCKS = 5
 """Number of blocks of problems; the range of ratios is taken over them."""
@@ -70,7 +70,7 @@ class Record:
 def main(arguments: list[str] | None = None) -> int:
     """Run every measurement and print it."""
     options = parse(arguments)
-    # Drake logs every context it makes.
+    # Drake logs every context that it creates.
     logging.getLogger("drake").setLevel(logging.WARNING)
     header("eaik", "pytracik", "pin")
     bench = Bench.build()
@@ -117,7 +117,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     command_line.add_argument("--problems", type=int, default=100, help="half of them reachable")
     command_line.add_argument("--seed", type=int, default=0)
     command_line.add_argument(
-        "--repeats", type=int, default=5, help="of the sweeps; 0 leaves them out"
+        "--repeats", type=int, default=5, help="repeats of the sweeps; 0 for none"
     )
     command_line.add_argument(
         "--peers", default=",".join(NAMES), help=f"some of {', '.join(NAMES)}; '' for none"

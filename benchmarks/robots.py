@@ -7,8 +7,8 @@ Each robot does each task in the wheelchair on the paper's grid, or with `--task
 Table I; a robot without a torso joint has a third of the configurations. The robots alternate, so
 that a load peak affects all of them. Then every unreached pair that only a search of the arm can
 decide is scanned densely, or `--limit` random ones for each reason. With `--finished` each row is
-appended to that file, and rows that stand in it are not measured again: it continues a run that was
-interrupted. Nothing here is a test: tests never depend on time.
+appended to that file, and rows in it are not measured again, which continues an interrupted run.
+This is a benchmark, not a test.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Work:
 
 
 def main() -> int:
-    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    """Run every measurement and print it; return 1 if an answer is false."""
     command_line = parser(__doc__)
     command_line.add_argument("--robots", default=",".join(robot_names()))
     command_line.add_argument("--tasks", default="shaving,feeding")

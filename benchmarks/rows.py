@@ -2,9 +2,9 @@
 
 Usage: python benchmarks/rows.py [--out DIR] [--pairs 500] [--dense 200] [--repeats 3]
 
-`tcs score --all` runs once as a process of its own, with machine code ready; bathing on the bed is
-scored again a few times for its spread. The files stay in DIR, if given, for
-`benchmarks/selection.py`. Nothing here is a test: tests never depend on time.
+`tcs score --all` runs once as a separate process, with machine code ready; bathing on the bed is
+scored again a few times for its spread. The files are kept in DIR, if given, for
+`benchmarks/selection.py`. This is a benchmark, not a test.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LOADS = 5
 
 
 def main() -> int:
-    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    """Run every measurement and print it; return 1 if an answer is false."""
     command_line = parser(__doc__)
     command_line.add_argument("--out", type=Path)
     command_line.add_argument("--pairs", type=int, default=500)

@@ -2,8 +2,8 @@
 
 Usage: python benchmarks/run.py [--task shaving] [--repeats 5] [--pairs 2000] [--dense 1000]
 
-Times of one run compare with each other; machines are shared and noisy, so medians and the
-range are printed. Nothing here is a test: tests never depend on time.
+Times of one run are comparable; because machines are shared and noisy, median and range are
+printed. This is a benchmark, not a test.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PLACES = 1000
 
 
 def main() -> int:
-    """Run every measurement and print it; the exit code is 1 when an answer was false."""
+    """Run every measurement and print it; return 1 if an answer is false."""
     options = parse()
     header()
     row("task", f"{options.task} in the wheelchair, PR2, seed {options.seed}")
@@ -68,7 +68,7 @@ def parse() -> argparse.Namespace:
 
 
 def lowered_times(options: argparse.Namespace) -> None:
-    """Measure scoring and set building, and the kernel against its plain-loop twin."""
+    """Measure scoring and set building, and compare the kernel with the plain-loop reference."""
     begun = time.perf_counter()
     job = load_job(options.task, "wheelchair", "pr2")
     lowered = job.lowered(job.scene())
@@ -101,7 +101,7 @@ def lowered_times(options: argparse.Namespace) -> None:
         reference_pairs.score(lowered.arrays, lowered.grid, int(h), int(g))
     each = (time.perf_counter() - begun) / len(picked)
     fast = statistics.median(times[1]) / max(1, np.count_nonzero(scores.reached))
-    row("plain-loop twin, per reached pair", f"{each:.3f} s; whole sweep / reached {fast:.2e} s")
+    row("plain-loop reference, reached pair", f"{each:.3f} s; whole sweep / reached {fast:.2e} s")
 
 
 def store_times(path: Path, repeats: int) -> None:

@@ -1,4 +1,4 @@
-"""Share of the measure in the time of the sample loop, by compiling the loop without it."""
+"""Fraction of the sample loop's time that the measure takes, by compiling the loop without it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tcs.kernel.arrays import FloatArray
 
 SAMPLES = 48
 ROUNDS = 20
-"""Passes over all goals in one timing: milliseconds, so that the clock is fine enough."""
+"""Passes over all goals in one timing, so that it takes milliseconds."""
 
 
 def measure_fractions(arm: ArmSolver, pairs: tuple[Pair, ...], repeats: int) -> list[float]:

@@ -31,7 +31,7 @@ CANDIDATES_AT_ONCE = 16
 
 
 def main() -> int:
-    """Run every measurement and print it; the exit code is 1 when an answer was not the best."""
+    """Run every measurement and print it; return 1 if an answer is not the best."""
     command_line = parser(__doc__)
     command_line.add_argument("files", nargs="*", type=Path, metavar="FILE")
     command_line.add_argument("--places", type=int, default=1000)
@@ -107,7 +107,7 @@ def measure(
         try:
             choice = select(tables, here, travel=travel, max_members=2)
         except SelectionError:
-            # Inside the furniture: no path starts there.
+            # No path starts inside the furniture.
             refused += 1
             continue
         processor_time.append(time.thread_time() - begun)

@@ -1,9 +1,9 @@
-"""Measure the control loop of teleoperation: its time, how it holds the tool, how smoothly it runs.
+"""Measure the control loop of teleoperation: times, tool displacement, and changes of joint rates.
 
 Usage: python benchmarks/teleop.py [--steps 2000] [--robots iiwa7 pr2 ...] [--seed 0]
 
-Times are of one whole step of `Teleoperation` in Python, by the processor's own clock and by the
-wall: command in, joints, flags and reason out. Nothing here is a test: tests never depend on time.
+Times are processor time and wall time of one whole step of `Teleoperation` in Python. This is a
+benchmark, not a test.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def switches(arm: Arm, settings: Settings, steps: int, seed: int) -> None:
 
 
 def random_command(rng: np.random.Generator, mode: Mode | None) -> Command:
-    """Return a brisk command of any kind."""
+    """Return a fast random command."""
     return Command(
         linear=tuple(0.2 * rng.normal(size=3)),
         angular=tuple(0.5 * rng.normal(size=3)),

@@ -1,4 +1,4 @@
-"""Score the same task with other robots: two that ship with tcs, and a PR2 that holds a spoon.
+"""Score the same task with other robots: two shipped ones, and a PR2 that holds a spoon.
 
 `pr2_spoon.yaml` beside this file is the PR2 with a further body and another tool frame. Any robot
 whose arm has seven revolute joints is supported; `tcs robot new` drafts its file from a URDF.
@@ -20,7 +20,7 @@ def main() -> None:
         best = tcs.summary(file)["best_single"]
         # P_R compares robots. P_M does not: its Jacobian mixes metres and radians.
         reachability = best["reachability"]
-        print(f"{file.robot['name']}: {reachability:.0%} of the goals from the best single place")
+        print(f"{file.robot['name']}: {reachability:.0%} of the goals from the best base pose")
 
 
 if __name__ == "__main__":

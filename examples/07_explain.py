@@ -1,4 +1,4 @@
-"""Explain why goals are not reached from a base pose, and the least change that would reach them.
+"""Explain why goals are not reached from a base pose, and the cheapest changes that reach them.
 
 A score file keeps a reason for each configuration and goal that is not reached; nothing is
 computed again.
@@ -22,7 +22,7 @@ def main() -> None:
         line = f"goal {goal}: {explained.reason.name.lower()}"
         if explained.pair is not None:
             line += f", {explained.pair[0]} would touch {explained.pair[1]}"
-        # The least change to a configuration that reaches the goal, as a sentence.
+        # The cheapest change to a configuration that reaches the goal, as a sentence.
         if not explained.is_reached and found.fix is not None:
             line += f". {found.fix.sentence}"
         print(line)

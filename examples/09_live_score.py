@@ -1,7 +1,7 @@
-"""Score the scene as it is observed, instead of using the nearest state that was scored.
+"""Score the scene as it is observed, instead of using the nearest scored state.
 
-The scene is built once; each observation then takes the time of the scoring alone, which is short
-enough to do when the robot has arrived and observes the person.
+The scene is built once; each observation then takes only the time of the scoring, which is short
+enough for scoring when the robot has arrived and observes the person.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def main() -> None:
     observations: dict[str, tcs.Observation | dict[str, float]] = {
         # The person sits 4 cm further forward than expected: person_x points backward [m].
         "observed joint": {"person_x": -0.04},
-        # A camera detects the head; the joints that explain it are found by least squares.
+        # A camera detects the head; the joints are fitted to its position by least squares.
         "observed frame": tcs.Observation(frames={"head": (0.47, 0.02, 1.23)}),
     }
     for source, observation in observations.items():

@@ -1,6 +1,6 @@
 """Export a set as one page that opens offline.
 
-`tcs view FILE --export PAGE` does the same; this example does it step by step.
+`tcs view FILE --export PAGE` does the same; this example shows the single steps.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ def main(folder: Path = Path("out/examples")) -> None:
     """Score feeding, and export the best set as a page."""
     folder.mkdir(parents=True, exist_ok=True)
     file = tcs.score("feeding")
-    # The scene is rebuilt from the models that the file names, whose digest it holds.
+    # The scene is rebuilt from the models of the file; their digest must be the stored one.
     job, scene, _ = rebuild_scene(file)
     # Without an observed state, table 0 is the only one.
     viewed = ViewedSet.of(file, 0, file.nominal.sets.best)

@@ -1,7 +1,7 @@
 """Teleoperate a seven-joint arm to a joint limit, leave it by null-space motion, and continue.
 
-With seven joints the arm can move while the tool stays. That frees a joint at its
-limit. Everything here is simulated; nothing is sent to a robot.
+An arm with seven joints can move while the tool is held, which moves a joint away from its limit.
+Everything is simulated; nothing is sent to a robot.
 """
 
 from __future__ import annotations
@@ -30,16 +30,14 @@ def main() -> None:
     session = Teleoperation(load_arm("iiwa7"), [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0], settings)
     drive_up(session)
 
-    # Let the arm come to rest, then turn its second joint group one way for a second and a half.
+    # Let the arm come to rest, then move its second joint group for a second and a half.
     for _ in range(50):
         before = session.step(Command())
     for _ in range(150):
         after = session.step(Command(mode=Mode.NULL_SPACE, group=1, sign=-1))
     drift = 1000.0 * np.linalg.norm(after.p - before.p)
-    turned = np.degrees(after.joints - before.joints)
-    print(
-        f"joints turned by {np.round(turned).astype(int).tolist()} deg, tool off by {drift:.3f} mm"
-    )
+    moved = np.degrees(after.joints - before.joints)
+    print(f"joints moved by {np.round(moved).astype(int).tolist()} deg, the tool by {drift:.3f} mm")
 
     drive_up(session)
 

@@ -97,7 +97,7 @@ def run(folder: Path) -> int:
     print(
         f"Compiling {timings['compile_seconds']:.1f} s, scoring {timings['scoring_seconds']:.2f} s,"
         f" sets {timings['sets_seconds']:.2f} s, selecting {1e3 * choices[0]['seconds']:.1f} ms; "
-        f"in all {time.perf_counter() - begun:.0f} s."
+        f"total {time.perf_counter() - begun:.0f} s."
     )
     print(f"Pictures: {folder / 'map.png'} and {folder / 'scene.png'}.")
     if not found.is_sound:

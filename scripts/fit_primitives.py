@@ -1,9 +1,9 @@
-"""Fit the collision primitives of a robot again, or find the pairs of bodies that need no check.
+"""Fit the collision primitives of a robot, or find the pairs of bodies that need no check.
 
-    python scripts/fit_primitives.py pr2            rewrites the primitives file that its YAML names
-    python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the YAML's last entry
+    python scripts/fit_primitives.py pr2            rewrites the primitives file of its YAML file
+    python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry
 
-The same meshes give the same files. Both take a few minutes; pairs depend on the primitives.
+The results are deterministic. Both commands take a few minutes; pairs depend on the primitives.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tcs.model.robots.self_collision import propose_disabled_pairs
 
 
 def main() -> int:
-    """Rewrite primitives or pairs of the robot that the arguments name."""
+    """Rewrite primitives or pairs of the robot given on the command line."""
     names = [argument for argument in sys.argv[1:] if argument != "--pairs"]
     if len(names) != 1:
         print(__doc__, file=sys.stderr)

@@ -59,7 +59,9 @@ PATTERNS = {word: re.compile(rf"(?<![\w-])(?:{word})(?![\w])", re.IGNORECASE) fo
 # Options and keys that other programs call, names of other packages, and words of the trade.
 ALLOWED = re.compile(
     r"--ask\b|\.kind\b|\bkind=\"(?:stable|linear|cubic)\"|\bmanager, kind\b|torso[_ ]lift|"
-    r"torso_lift\w*|shoulder_lift\w*|race condition|living room|head[- ]?room",
+    r"torso_lift\w*|shoulder_lift\w*|race condition|living room|head[- ]?room|"
+    r"\.reshape\(|\bsqueeze=False|\boverflow=\"fold\"|parameter\.replace\(kind=|`kind`|"
+    r"--lift\b",
     re.IGNORECASE,
 )
 

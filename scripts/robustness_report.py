@@ -25,8 +25,8 @@ from tcs.placement.scoring import default_path
 
 ROBOT = "pr2"
 SETS, SAMPLES = 200, 256
-"""Pairs and samples of the estimates for rows that have none: a quarter of a minute for a row, and
-within a percent of the default estimates of `tcs robustify`."""
+"""Pairs and samples of the estimates for rows without estimates: 15 s per row, and within a percent
+of the default estimates of `tcs robustify`."""
 
 
 def main() -> int:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from tcs.cli.values import axis_values, observed_settings, state_if_given
+
+if TYPE_CHECKING:
+    from tcs.model.grid import Axis, InitialConfiguration
+    from tcs.placement.selection import TravelWeights
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -42,43 +50,175 @@ Members = Annotated[
         show_default="that of the file",
     ),
 ]
-Page = Annotated[
-    Path | None,
+MetreWeight = Annotated[float, typer.Option(help="Cost of a metre of driving.")]
+TurnWeight = Annotated[float, typer.Option(help="Cost of a radian of base rotation.")]
+TorsoWeight = Annotated[float, typer.Option(help="Cost of a metre of torso motion.")]
+Travel = Annotated[
+    str,
     typer.Option(
-        metavar="PAGE",
-        help="Write one self-contained .html page with the animation, and exit.",
+        metavar="straight|around",
+        help="Path of the base: straight, as in the paper, or around the furniture.",
     ),
-]
-Meshes = Annotated[
-    bool,
-    typer.Option(
-        "--meshes",
-        help="With --export: show the robot's meshes in place of its collision shapes; the output "
-        "states their licence.",
-    ),
-]
-PageJson = Annotated[bool, typer.Option("--json", help="With --export: print one JSON object.")]
-Port = Annotated[
-    int | None,
-    typer.Option(
-        min=1024,
-        max=65535,
-        help="Port of the viewer.",
-        show_default="the first free one from 7000 on",
-    ),
-]
-Browser = Annotated[bool, typer.Option(help="Whether to open a browser.")]
-Duration = Annotated[
-    float | None,
-    typer.Option(min=0.0, help="Close after this many seconds.", show_default="at Ctrl-C"),
 ]
 
 
-def check_export(export: Path | None, *, meshes: bool, as_json: bool) -> None:
-    """Reject options of an exported page without `--export`.
+def axis_weight(default: str) -> typer.models.OptionInfo:
+    """Return the option `--axis-weight` with a text for its default."""
+    option: typer.models.OptionInfo = typer.Option(
+        metavar="AXIS=COST",
+        help="Cost of a metre or radian along an axis of the environment.",
+        show_default=default,
+    )
+    return option
 
-    Raises:
-        typer.BadParameter: If `--meshes` or `--json` is given without `--export`.
-    """
-    if export is None and (meshes or as_json):
-        raise typer.BadParameter("--meshes and --json require --export.", param_hint="--export")
+
+def frames(use: str) -> typer.models.OptionInfo:
+    """Return the option `--frames` with a help text."""
+    option: typer.models.OptionInfo = typer.Option(
+        "--frames", "--seen", metavar="FRAME=X,Y,Z", help=use
+    )
+    return option
+
+
+@dataclass(frozen=True, kw_only=True)
+class TravelCosts:
+    """Costs of travel."""
+
+    metre_weight: MetreWeight = 1.0
+    turn_weight: TurnWeight = 0.0
+    torso_weight: TorsoWeight = 0.0
+    axis_weight: Annotated[list[str] | None, axis_weight("0")] = None
+    travel: Travel = "straight"
+
+    @property
+    def axes(self) -> tuple[tuple[str, float], ...]:
+        """Cost along each axis of the environment that was given.
+
+        Raises:
+            SelectionError: If one is not of the form AXIS=COST.
+        """
+        return axis_values(self.axis_weight or (), "--axis-weight")
+
+    def weights(self) -> TravelWeights:
+        """Return the weights of the travel cost.
+
+        Raises:
+            SelectionError: If a weight is invalid.
+        """
+        from tcs.placement.selection import TravelWeights
+
+        return TravelWeights(
+            metre=self.metre_weight,
+            turn=self.turn_weight,
+            torso=self.torso_weight,
+            environment=self.axes,
+            route=self.travel,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShownOptions:
+    """The set that a picture, a report or a view shows."""
+
+    here: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y YAW_DEG",
+            help="Show the set selected from this base pose in the environment frame (m, m, deg).",
+            show_default="the set with the best scores",
+        ),
+    ] = None
+    torso: Torso = 0.0
+    max_members: Members = None
+    observed: Observed = None
+
+    def state(self) -> InitialConfiguration | None:
+        """Return the current state, or None without `--here`.
+
+        Raises:
+            typer.BadParameter: If there is a torso height without `--here`.
+        """
+        return state_if_given(self.here, self.torso)
+
+    def observation(self, axes: Sequence[Axis]) -> dict[str, float]:
+        """Return the observed state [m or rad].
+
+        Args:
+            axes: The observed axes of the score file.
+
+        Raises:
+            SelectionError: If a value is not of the form AXIS=VALUE.
+        """
+        return observed_settings(self.observed or (), axes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions:
+    """How many pairs are verified."""
+
+    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check with Drake.")] = 500
+    dense: Annotated[
+        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
+    ] = 200
+    seed: Seed = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowOptions:
+    """A viewer in the browser."""
+
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1024,
+            max=65535,
+            help="Port of the viewer.",
+            show_default="the first free one from 7000 on",
+        ),
+    ] = None
+    browser: Annotated[bool, typer.Option(help="Whether to open a browser.")] = True
+    duration: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Close after this many seconds.", show_default="at Ctrl-C"),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """A self-contained page in place of a viewer."""
+
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PAGE",
+            help="Write one self-contained .html page with the animation, and exit.",
+        ),
+    ] = None
+    meshes: Annotated[
+        bool,
+        typer.Option(
+            "--meshes",
+            help="With --export: show the robot's meshes in place of its collision shapes; the "
+            "output states their licence.",
+        ),
+    ] = False
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --export: print one JSON object.")
+    ] = False
+
+    def check(self) -> None:
+        """Check the options, and that the page can be written.
+
+        Raises:
+            typer.BadParameter: If `--meshes` or `--json` is given without `--export`.
+            OutputError: If the page cannot be written, or its name does not end in .html.
+        """
+        if self.export is None:
+            if self.meshes or self.as_json:
+                raise typer.BadParameter(
+                    "--meshes and --json require --export.", param_hint="--export"
+                )
+            return
+        from tcs.files.writing import check_page
+
+        check_page(self.export)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli import options
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 
 if TYPE_CHECKING:
@@ -18,20 +19,16 @@ if TYPE_CHECKING:
     from tcs.output.report.shown_set import ShownSet
     from tcs.placement.store import ScoreFile
 
-_SHOWN_SET = "The picture shows the set selected from --here, or the set with the best scores."
 SCORES = ("reachability", "manipulability")
 
 _Out = Annotated[Path, typer.Option(help="Picture to write: .png, .pdf or .svg.")]
-_Here = Annotated[tuple[float, float, float] | None, options.HERE]
 
 
+@expand_options
 def draw_map(
     file: options.File,
     out: _Out,
-    here: _Here = None,
-    torso: options.Torso = 0.0,
-    max_members: options.Members = None,
-    observed: options.Observed = None,
+    chosen: options.ShownOptions,
     states: Annotated[
         bool,
         typer.Option(
@@ -49,7 +46,10 @@ def draw_map(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Draw the best score at each base position, from above, and the members of a set."""
+    """Draw the best score at each base position, from above, and the members of a set.
+
+    The picture shows the set selected from --here, or the set with the best scores.
+    """
     if score is not None and not states:
         raise typer.BadParameter(
             "requires --states; without it both scores are drawn.", param_hint="--score"
@@ -69,58 +69,51 @@ def draw_map(
 
         return map_figure(loaded, shown)
 
-    _draw(figure, file, out, here, torso, max_members, observed, as_json=as_json)
+    _draw(figure, file, out, chosen, as_json=as_json)
 
 
+@expand_options
 def draw_picture(
     file: options.File,
     out: _Out,
-    here: _Here = None,
-    torso: options.Torso = 0.0,
-    max_members: options.Members = None,
-    observed: options.Observed = None,
+    chosen: options.ShownOptions,
     as_json: options.Json = False,
 ) -> None:
-    """Draw the robot at the base poses of a set, its arm at a goal, as collision shapes."""
+    """Draw the robot at the base poses of a set, its arm at a goal, as collision shapes.
+
+    The picture shows the set selected from --here, or the set with the best scores.
+    """
 
     def figure(loaded: ScoreFile, shown: ShownSet) -> Figure:
         from tcs.output.report.pictures import scene_figure
 
         return scene_figure(loaded, shown)
 
-    _draw(figure, file, out, here, torso, max_members, observed, as_json=as_json)
-
-
-for _command in (draw_map, draw_picture):
-    _command.__doc__ = f"{_command.__doc__}\n\n{_SHOWN_SET}"
+    _draw(figure, file, out, chosen, as_json=as_json)
 
 
 def _draw(
     figure: Callable[[ScoreFile, ShownSet], Figure],
     file: Path,
     out: Path,
-    here: tuple[float, float, float] | None,
-    torso: float,
-    max_members: int | None,
-    observed: list[str] | None,
+    chosen: options.ShownOptions,
     *,
     as_json: bool,
 ) -> None:
     """Draw the set selected from the current state, or the best set."""
     import tcs
-    from tcs.cli.values import observed_settings, state_if_given
     from tcs.files.writing import check_writable
     from tcs.output.draw import check_format, save_figure
 
-    chosen_from = state_if_given(here, torso)
+    here = chosen.state()
     check_format(out)
     check_writable(out)
     loaded = tcs.load(file)
 
     from tcs.output.report.shown_set import ShownSet
 
-    found = observed_settings(observed or (), loaded.observed_axes)
-    shown = ShownSet.of(loaded, chosen_from, max_members, found)
+    observed = chosen.observation(loaded.observed_axes)
+    shown = ShownSet.of(loaded, here, chosen.max_members, observed)
     save_figure(out, figure(loaded, shown))
     result = {"file": str(out), "members": [member.to_json() for member in shown.members]}
     terminal.print_result(result, lambda _: typer.echo(f"wrote {out}"), as_json=as_json)

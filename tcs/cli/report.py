@@ -10,11 +10,14 @@ from typing import Annotated, Any
 import typer
 
 from tcs.cli import options
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 
 
+@expand_options
 def report(
     file: options.File,
+    *,
     out: Annotated[
         Path,
         typer.Option(
@@ -22,18 +25,11 @@ def report(
             help="Page to write: .html, self-contained, or .md, text and tables only.",
         ),
     ],
-    here: Annotated[tuple[float, float, float] | None, options.HERE] = None,
-    torso: options.Torso = 0.0,
-    max_members: options.Members = None,
-    observed: options.Observed = None,
+    chosen: options.ShownOptions,
     markdown: Annotated[
         bool, typer.Option("--md", help="Also write text and tables as .md, under the same name.")
     ] = False,
-    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check with Drake.")] = 500,
-    dense: Annotated[
-        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
-    ] = 200,
-    seed: options.Seed = 0,
+    sizes: options.CheckOptions,
     as_json: options.Json = False,
 ) -> None:
     """Write a page about a score file: base poses, scores, reasons and verification.
@@ -41,22 +37,20 @@ def report(
     The page shows the set selected from --here, or the set with the best scores. Answers are
     re-checked with Drake; if one is false, the page states it and the exit code is 1.
     """
-    from tcs.cli.values import observed_settings, state_if_given
-
-    chosen_from = state_if_given(here, torso)
+    here = chosen.state()
 
     import tcs
     from tcs.output.report import CheckSizes, make_score_report, report_paths, write_score_report
 
     paths = report_paths(out, markdown=markdown)
-    found = observed_settings(observed or (), tcs.load(file).observed_axes)
+    found = chosen.observation(tcs.load(file).observed_axes)
     with terminal.progress_bar("pairs re-checked") as on_progress:
         answer = make_score_report(
             file,
-            here=chosen_from,
-            max_members=max_members,
+            here=here,
+            max_members=chosen.max_members,
             observed=found,
-            sizes=CheckSizes(pairs=pairs, dense=dense, seed=seed),
+            sizes=CheckSizes(pairs=sizes.pairs, dense=sizes.dense, seed=sizes.seed),
             on_progress=on_progress,
         )
     result = write_score_report(answer, paths, command=shlex.join(["tcs", *sys.argv[1:]]))

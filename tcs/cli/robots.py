@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from tcs.cli import options
 from tcs.output import terminal
+from tcs.output.terminal import robot_tables
 
 app = typer.Typer(
     help="Robots: draft a robot file from any URDF, and check a robot.", no_args_is_help=True
@@ -31,34 +32,12 @@ def new(
     as_json: options.Json = False,
 ) -> None:
     """Draft a robot file from any URDF, and a CSV file with its collision primitives."""
-    from tcs.files.writing import check_writable
-    from tcs.model.robots.draft import check_free, draft_robot, write_draft
+    from tcs.model.robots.draft import draft_to_files
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
-    check_writable(check_free(path))
     with terminal.progress_bar("bodies") as on_progress:
-        draft = draft_robot(urdf, tool, base=base, name=path.stem, on_progress=on_progress)
-    shapes = write_draft(draft, path)
-    robot = draft.robot
-    result = {
-        "file": str(path),
-        "primitives": str(shapes),
-        "arm_base": robot.arm_base,
-        "arm_joints": list(robot.arm_joints),
-        "torso_joint": robot.torso_joint,
-        "tool_frame": robot.tool_frame,
-        "disabled_pairs": len(robot.disabled_pairs),
-        "remarks": list(draft.remarks),
-    }
-    terminal.print_result(result, _report_draft, as_json=as_json)
-
-
-def _report_draft(result: dict[str, Any]) -> None:
-    """Print a draft as text."""
-    typer.echo(f"wrote {result['file']} and {result['primitives']}")
-    for remark in result["remarks"]:
-        typer.echo(f"- {remark}")
-    typer.echo(f"Review it, then: tcs robot check {result['file']}")
+        result = draft_to_files(urdf, tool, path, base=base, on_progress=on_progress)
+    terminal.print_result(result, robot_tables.report_draft, as_json=as_json)
 
 
 @app.command()
@@ -75,52 +54,7 @@ def check(
     from tcs.model.robots import load_robot
 
     found = check_up(load_robot(robot), samples=samples, seed=seed)
-    terminal.print_result(found.to_json(), _report_check, as_json=as_json)
+    terminal.print_result(found.to_json(), robot_tables.report_check, as_json=as_json)
     if not found.is_sound:
         terminal.note(f"robot '{found.robot.name}' is not fit for scoring.")
         raise typer.Exit(1)
-
-
-def _report_check(found: dict[str, Any]) -> None:
-    """Print the result of a check as text."""
-    arm, trip, contact = found["arm_class"], found["ik_round_trip"], found["self_collision"]
-    echo = typer.echo
-    echo(f"robot            {found['robot']}")
-    echo(
-        f"arm class        {arm['class'] or 'outside the closed-form classes, solved numerically'}"
-    )
-    distances = ", ".join(
-        f"{axes} {'parallel' if metres is None else f'{metres * 1e3:.3g} mm'}"
-        for axes, metres in arm["metres_from_meeting"].items()
-    )
-    echo(f"axis distances   {distances}")
-    echo(f"limits           {found['limits']['in_force']}")
-    for name, joint in found["limits"]["joints"].items():
-        echo(f"  {name:<28} {_range(joint)}")
-    shapes = found["enclosed"]
-    echo(f"enclosed         {shapes['triangles'] - shapes['outside']:,} of "
-         f"{shapes['triangles']:,} triangles")  # fmt: skip
-    echo("excess volume    " + ("largest: " if found["excess_volume"] else "none"))
-    largest = sorted(found["excess_volume"].items(), key=lambda item: -item[1])
-    for body, excess in largest[:5]:
-        echo(f"  {body:<28} {excess:.2f}")
-    margin = f"{contact['margin_m'] * 1e3:g} mm"
-    echo(f"self-collision   {len(contact['pairs'])} pairs closer than {margin}")
-    recovered = "tool poses solved" if arm["class"] is None else "postures recovered"
-    joints = trip["max_joint_error_rad"]
-    echo(
-        f"IK round trip    {trip['recovered']:,} of {trip['samples']:,} {recovered}, "
-        + ("" if joints is None else f"joints to {joints:.1e} rad, ")
-        + f"tool to {trip['max_position_error_m']:.1e} m"
-    )
-    for heading in ("problems", "notes"):
-        for line in found[heading]:
-            echo(f"{heading[:-1]:<16} {line}")
-
-
-def _range(joint: dict[str, Any]) -> str:
-    if joint["continuous"]:
-        return "continuous"
-    shown = {name: "[{:.4f}, {:.4f}]".format(*joint[name]) for name in ("in_force", "hard")}
-    same = shown["in_force"] == shown["hard"]
-    return shown["in_force"] + ("" if same else f"  hard {shown['hard']}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,9 +10,7 @@ import typer
 from tcs.cli import options
 from tcs.cli.values import observed_settings
 from tcs.output import terminal
-from tcs.output.terminal import tables
-from tcs.output.words import member_text, settings_text
-from tcs.output.words.robustness import BODY_COLLISIONS, error_width
+from tcs.output.terminal import robustness_tables
 
 _Errors = Annotated[
     Path | None,
@@ -90,7 +86,7 @@ def evaluate(
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
         )
-    terminal.print_result(found.to_json(), report_evaluation, as_json=as_json)
+    terminal.print_result(found.to_json(), robustness_tables.report_evaluation, as_json=as_json)
 
 
 def robustify(
@@ -139,28 +135,7 @@ def robustify(
         )
         tcs.save(path, done)
     result = {"file": str(path), **success_summary(done)}
-    terminal.print_result(result, report_robustified, as_json=as_json)
-
-
-def report_robustified(result: Mapping[str, Any]) -> None:
-    """Print the most robust set of each size with its estimate."""
-    out = terminal.results_console()
-    table = tables.new_table("observed", "set", ">success", ">95 % interval", ">sets", "members")
-    for row in result["tables"]:
-        state = settings_text(row["observed"]) or "-"
-        for best in row["best"]:
-            low, high = best["ci95"]
-            table.add_row(
-                state,
-                f"of {len(best['members'])}",
-                f"{best['success']:.1%}",
-                f"{low:.1%} to {high:.1%}",
-                f"{best['sets']:,}",
-                "; ".join(member_text(member) for member in best["members"]),
-            )
-    out.print(table)
-    out.print(f"wrote {result['file']}. To select by success, with the current base X Y YAW_DEG:")
-    typer.echo(f"tcs select {shlex.quote(result['file'])} --here X Y YAW_DEG --delta 1")
+    terminal.print_result(result, robustness_tables.report_robustified, as_json=as_json)
 
 
 def _table(loaded: Any, observed: list[str] | None) -> int | None:
@@ -171,33 +146,3 @@ def _table(loaded: Any, observed: list[str] | None) -> int | None:
 
     settings = observed_settings(observed, loaded.observed_axes)
     return nearest_table(loaded, observed=settings).index
-
-
-def report_evaluation(result: Mapping[str, Any]) -> None:
-    """Print the success of a set under error."""
-    out = terminal.results_console()
-    if result["members"]:
-        out.print(tables.members_table(result["members"]))
-    else:
-        out.print(f"one of {result['choices']:,} sets with equal P_R is drawn for each sample")
-    interval = ""
-    if result["ci95"] is not None:
-        low, high = result["ci95"]
-        interval = f" (95 % interval {low:.1%} to {high:.1%})"
-    out.print(
-        f"without error {result['reachability']:.1%} of the goals, manipulability "
-        f"{result['manipulability']:.3f}"
-    )
-    out.print(
-        f"under error {result['mean']:.1%} of the goals{interval}, "
-        f"standard deviation {result['std']:.1%}; all goals in {result['complete']:.1%} of "
-        f"{result['samples']:,} samples"
-    )
-    goals = ", ".join(f"{i}: {part:.1%}" for i, part in enumerate(result["per_goal"]))
-    out.print(f"by goal  {goals}")
-    widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
-    out.print(f"errors  {widths}")
-    out.print(f"collisions  {BODY_COLLISIONS[result['body_collisions']]}")
-    if result["clipped"]:
-        out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
-    out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")

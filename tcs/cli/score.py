@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tcs.cli import options
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
 
@@ -70,12 +71,9 @@ def score(
     ] = None,
     frames: Annotated[
         list[str] | None,
-        typer.Option(
-            "--frames",
-            "--seen",
-            metavar="FRAME=X,Y,Z",
-            help="Score the environment from the observed position of a frame on the person or "
-            "the furniture, in the environment frame (m; a quaternion ,QW,QX,QY,QZ may follow).",
+        options.frames(
+            "Score the environment from the observed position of a frame on the person or the "
+            "furniture, in the environment frame (m; a quaternion ,QW,QX,QY,QZ may follow)."
         ),
     ] = None,
     at: options.At = None,
@@ -136,12 +134,10 @@ def score(
     terminal.print_result(result, tables.report_observed, as_json=as_json)
 
 
+@expand_options
 def verify(
     file: options.File,
-    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check.")] = 500,
-    dense: Annotated[
-        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
-    ] = 200,
+    sizes: options.CheckOptions,
     strata: Annotated[
         bool,
         typer.Option(
@@ -158,12 +154,11 @@ def verify(
         ),
     ] = None,
     jobs: options.Jobs = 2,
-    seed: options.Seed = 0,
     as_json: options.Json = False,
 ) -> None:
     """Re-check answers with Drake and estimate the recall of the search."""
     if limit is not None and not strata:
-        raise typer.BadParameter("needs --strata.", param_hint="--limit")
+        raise typer.BadParameter("requires --strata.", param_hint="--limit")
 
     import tcs
 
@@ -171,12 +166,12 @@ def verify(
     with terminal.progress_bar("pairs") as on_progress:
         found = tcs.verify(
             loaded,
-            pairs=pairs,
-            dense=dense,
+            pairs=sizes.pairs,
+            dense=sizes.dense,
             strata=strata,
             limit=limit,
             jobs=jobs,
-            seed=seed,
+            seed=sizes.seed,
             on_progress=on_progress,
         )
     terminal.print_result(found.to_json(), tables.report_verification, as_json=as_json)

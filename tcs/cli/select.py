@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 from tcs.cli import options, robustness
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
 
 
+@dataclass(frozen=True, kw_only=True)
+class _ChangeCosts(options.TravelCosts):
+    """Costs of changes of the configuration, with the defaults of `fix_weights`."""
+
+    turn_weight: options.TurnWeight = 0.3
+    axis_weight: Annotated[list[str] | None, options.axis_weight("2 per metre, 1 per radian")] = (
+        None
+    )
+    travel: options.Travel = "around"
+
+
+@expand_options
 def select(
     file: options.File,
+    *,
     here: Annotated[tuple[float, float, float], options.HERE],
     torso: options.Torso = 0.0,
     at: options.At = None,
@@ -20,37 +35,21 @@ def select(
     beta: Annotated[float, typer.Option(help="Weight of the manipulability, P_M.")] = 1.0,
     gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
     delta: robustness.Delta = 0.0,
-    metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
-    turn_weight: Annotated[float, typer.Option(help="Cost of a radian of base rotation.")] = 0.0,
-    torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso motion.")] = 0.0,
-    axis_weight: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="AXIS=COST",
-            help="Cost of a metre or radian along an axis of the environment.",
-        ),
-    ] = None,
-    travel: Annotated[
-        str,
-        typer.Option(help="Path of the base: straight, as in the paper, or around the furniture."),
-    ] = "straight",
+    costs: options.TravelCosts,
     max_members: options.Members = None,
     observed: options.Observed = None,
     frames: Annotated[
         list[str] | None,
-        typer.Option(
-            "--frames",
-            "--seen",
-            metavar="FRAME=X,Y,Z",
-            help="Observed position of a body frame in the environment frame (m), in place of "
-            "--observed.",
+        options.frames(
+            "Observed position of a body frame in the environment frame (m), in place of "
+            "--observed."
         ),
     ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Select the set with the greatest utility from the current state."""
     import tcs
-    from tcs.cli.values import axis_values, current_state, frame_values, observed_settings
+    from tcs.cli.values import current_state, frame_values, observed_settings
 
     loaded = tcs.load(file)
     choice = tcs.select(
@@ -59,13 +58,7 @@ def select(
         weights=tcs.UtilityWeights(
             reachability=alpha, manipulability=beta, travel=gamma, success=delta
         ),
-        travel=tcs.TravelWeights(
-            metre=metre_weight,
-            turn=turn_weight,
-            torso=torso_weight,
-            environment=axis_values(axis_weight or (), "--axis-weight"),
-            route=travel,
-        ),
+        travel=costs.weights(),
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
@@ -74,8 +67,10 @@ def select(
     terminal.print_result(result, tables.report_choice, as_json=as_json)
 
 
+@expand_options
 def explain(
     file: options.File,
+    *,
     goal: Annotated[int, typer.Option(help="Number of the goal, from 0.", show_default=False)],
     configuration: Annotated[
         int | None,
@@ -94,21 +89,7 @@ def explain(
     ] = None,
     torso: options.Torso = 0.0,
     at: options.At = None,
-    metre_weight: Annotated[float, typer.Option(help="Cost of a metre of driving.")] = 1.0,
-    turn_weight: Annotated[float, typer.Option(help="Cost of a radian of base rotation.")] = 0.3,
-    torso_weight: Annotated[float, typer.Option(help="Cost of a metre of torso motion.")] = 1.0,
-    axis_weight: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="AXIS=COST",
-            help="Cost of a metre (default 2) or radian (default 1) along an axis of the "
-            "environment.",
-        ),
-    ] = None,
-    travel: Annotated[
-        str,
-        typer.Option(metavar="straight|around", help="Path of the base."),
-    ] = "around",
+    costs: _ChangeCosts,
     observed: options.Observed = None,
     as_json: options.Json = False,
 ) -> None:
@@ -116,10 +97,10 @@ def explain(
     if configuration is not None and here is not None:
         raise typer.BadParameter("give --configuration or --here, not both.", param_hint="--here")
     if here is None and (at or torso):
-        raise typer.BadParameter("--torso and --at need --here.", param_hint="--here")
+        raise typer.BadParameter("--torso and --at require --here.", param_hint="--here")
 
     import tcs
-    from tcs.cli.values import axis_values, current_state, observed_settings
+    from tcs.cli.values import current_state, observed_settings
     from tcs.model.grid import Grid
     from tcs.output.terminal.explanations import report_explanation
     from tcs.placement.reasons import fix_weights
@@ -131,11 +112,11 @@ def explain(
         current_state(here, torso, at or ()) if here is not None else configuration,
         weights=fix_weights(
             Grid.from_dict(loaded.grid),
-            metre=metre_weight,
-            turn=turn_weight,
-            torso=torso_weight,
-            environment=axis_values(axis_weight or (), "--axis-weight"),
-            route=travel,
+            metre=costs.metre_weight,
+            turn=costs.turn_weight,
+            torso=costs.torso_weight,
+            environment=costs.axes,
+            route=costs.travel,
         ),
         observed=observed_settings(observed or (), loaded.observed_axes),
     )

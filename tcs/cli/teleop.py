@@ -7,16 +7,14 @@ import time
 import webbrowser
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from tcs.cli import options
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
-from tcs.output.terminal import tables
-
-if TYPE_CHECKING:
-    from tcs.teleop.experiment.trial import LineResult
+from tcs.output.terminal import tables, teleop_tables
 
 app = typer.Typer()
 TorsoHeight = Annotated[
@@ -51,8 +49,10 @@ class Condition(StrEnum):
 
 
 @app.callback(invoke_without_command=True)
+@expand_options
 def live(
     ctx: typer.Context,
+    *,
     robot: options.Robot = "iiwa7",
     behaviour: Annotated[
         Limits,
@@ -89,9 +89,7 @@ def live(
         Path | None,
         typer.Option(metavar="RUN", help="Write the run at the end: .csv or .parquet."),
     ] = None,
-    port: options.Port = None,
-    browser: options.Browser = True,
-    duration: options.Duration = None,
+    window: options.WindowOptions,
 ) -> None:
     """Teleoperate an arm in the browser by keys, sliders or gamepad; `experiment` and `replay`."""
     if ctx.invoked_subcommand is not None:
@@ -122,14 +120,14 @@ def live(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
             start_deg=start_deg, torso_height=torso_height, line=line,
         ),
-        port=port, on_stop=typer.echo, record=save is not None,
+        port=window.port, on_stop=typer.echo, record=save is not None,
     )  # fmt: skip
     title = session.arm.robot.title
     terminal.note(f"{title}, {condition}, limits as in {behaviour}. {_KEYS}")
-    _open(session.url, browser)
+    _open(session.url, window.browser)
     begun = time.perf_counter()
     try:
-        session.page.run(duration)
+        session.page.run(window.duration)
     except KeyboardInterrupt:
         terminal.note(f"closed after {time.perf_counter() - begun:.0f} s.")
     finally:
@@ -140,56 +138,37 @@ def live(
             save_run(save, run)
             typer.echo(f"wrote {save}: {len(run)} samples, {run.time[-1] - run.time[0]:.1f} s")
     if session.course is not None and run is not None:
-        typer.echo(line_text(line_result(run, session.course.line)))
+        typer.echo(teleop_tables.line_text(line_result(run, session.course.line)))
     terminal.note(session.page.timing())
 
 
-def line_text(result: LineResult) -> str:
-    """Return how accurately a line was followed, in one line."""
-    from tcs.teleop.experiment.metrics import PLANES
-
-    if result.time is None or result.accuracy is None:
-        left = 1e3 * result.distance_left
-        return f"the end of the line was not reached: {left:.0f} mm remain."
-    worst, met = 1e3 * result.accuracy.worst, result.accuracy.planes_met
-    return (
-        f"the line took {result.time:.1f} s; the greatest error of the mean path was {worst:.1f} "
-        f"mm ({met} of {PLANES} planes crossed)."
-    )
-
-
 @app.command()
+@expand_options
 def replay(
     run: Annotated[
         Path,
         typer.Argument(metavar="RUN", help="A run saved by `tcs teleop`.", show_default=False),
     ],
+    *,
     robot: Annotated[
         str | None,
         typer.Option(help="Name or YAML file of the robot.", show_default="that of the run"),
     ] = None,
-    export: options.Page = None,
-    meshes: options.Meshes = False,
-    port: options.Port = None,
-    browser: options.Browser = True,
-    duration: options.Duration = None,
-    as_json: options.PageJson = False,
+    page: options.ExportOptions,
+    window: options.WindowOptions,
 ) -> None:
     """Play back a saved run in the browser, or write it as one page."""
-    options.check_export(export, meshes=meshes, as_json=as_json)
-
-    from tcs.files.writing import check_page
-
-    if export is not None:
+    page.check()
+    if page.export is not None:
         from tcs.output.view.teleop.replay_page import export_run
 
-        check_page(export)
-        page = export_run(run, export, robot, meshes=meshes)
+        written = export_run(run, page.export, robot, meshes=page.meshes)
         result = {
-            "file": str(export), "bytes": page.size, "samples": page.samples,
-            "seconds": page.seconds, "meshes": meshes, "source": page.source if meshes else None,
+            "file": str(page.export), "bytes": written.size, "samples": written.samples,
+            "seconds": written.seconds, "meshes": page.meshes,
+            "source": written.source if page.meshes else None,
         }  # fmt: skip
-        terminal.print_result(result, _report_page, as_json=as_json)
+        terminal.print_result(result, tables.report_page, as_json=page.as_json)
         return
 
     from tcs.output.view import open_meshcat
@@ -197,12 +176,12 @@ def replay(
     from tcs.output.view.teleop.replay import load_run_view
 
     view = load_run_view(run, robot)
-    meshcat = open_meshcat(port)
+    meshcat = open_meshcat(window.port)
     playback = Replay(meshcat, RobotDisplay(view.arm, meshes=True), view)
     typer.echo(f"{view.arm.robot.title}: {view.summary}")
-    _open(meshcat.web_url(), browser)
+    _open(meshcat.web_url(), window.browser)
     try:
-        playback.run(duration)
+        playback.run(window.duration)
     except KeyboardInterrupt:
         terminal.note("closed.")
 
@@ -211,19 +190,6 @@ def _open(url: str, browser: bool) -> None:
     terminal.note(f"open {url} in a browser; Ctrl-C ends.")
     if browser:
         webbrowser.open(url)
-
-
-def _report_page(result: dict[str, Any]) -> None:
-    """Print size and duration of a page, and the source of its meshes."""
-    typer.echo(
-        f"wrote {result['file']}: {result['bytes'] / 1e6:.1f} MB, {result['seconds']:.1f} s of "
-        f"{result['samples']} samples"
-    )
-    if result["meshes"]:
-        typer.echo(
-            "The page contains the robot's meshes; their licence applies when you share it. "
-            f"Origin and licence, from the robot file: {result['source']}"
-        )
 
 
 @app.command()
@@ -288,32 +254,4 @@ def experiment(
             arm, plan, folder, line_seed=line_seed, runs_as=suffix, maps=maps,
             command=shlex.join(words), jobs=jobs, on_progress=on_progress,
         )  # fmt: skip
-    terminal.print_result(result, _report_experiment, as_json=as_json)
-
-
-def _report_experiment(result: dict[str, Any]) -> None:
-    """Print medians, tests and files."""
-    from tcs.output.report.teleop_tables import NAMES, SCALE
-    from tcs.teleop.experiment.within_subject import SCRIPTED
-
-    out = terminal.results_console()
-    out.print(f"{result['operators']} {SCRIPTED}, robot {result['robot']}, seed {result['seed']}")
-    conditions = list(result["medians"])
-    table = tables.new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
-    for name, text in NAMES.items():
-        scale = SCALE.get(name, 1.0)
-        cells = [f"{scale * result['medians'][c][name]:.3g}" for c in conditions]
-        test = result["tests"].get(name)
-        cells += ["", ""] if test is None else [f"{test['p']:.2g}", f"{test['effect']:.3f}"]
-        table.add_row(text, *cells)
-    out.print(table)
-    for one in result["maps"] or ():
-        best = one["best"]
-        where = "no base pose reaches the grasp"
-        if best is not None:
-            pose = f"x {best['x']:.2f} m, y {best['y']:.2f} m, {best['yaw_deg']:.1f} deg"
-            where = f"best base pose {pose}, score {best['score']:.3f}"
-        out.print(f"map of {one['condition']}: {one['cells']:,} cells; {where}")
-    out.print(f"wrote {', '.join(result['files'])}")
-    if result["runs"]:
-        out.print(f"runs in {result['runs']}")
+    terminal.print_result(result, teleop_tables.report_experiment, as_json=as_json)

@@ -179,7 +179,7 @@ def test_nothing_to_choose_from(tcs_command, tmp_path):
     tcs.save(path, score_file(share=0.0))
     ran = tcs_command("select", path, *HERE)
     assert ran.code == 1
-    assert "Nothing to choose from" in ran.err
+    assert "Nothing to select" in ran.err
 
 
 def test_the_observed_shift_is_reported(tcs_command, tmp_path):

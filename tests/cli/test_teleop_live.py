@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tcs.cli.teleop import line_text
+from tcs.output.terminal.teleop_tables import line_text
 from tcs.teleop import Command, Teleoperation, load_arm
 from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.trial import line_result

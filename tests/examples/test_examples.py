@@ -23,7 +23,7 @@ PRINTED = {
     "08_capability_map": r"[1-9]\d* base poses reach both.*score 0\.[1-9]",
     "09_live_score": r"observed joint: 100%.*observed frame: 100%",
     "10_viewer_page": r"wrote .*feeding\.html, 2\.\d MB",
-    "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*tool off by 0\.0\d\d mm\n"
+    "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*the tool by 0\.0\d\d mm\n"
     r"8\.\d s, 1\.5\d m up",
 }
 WRITTEN = {

@@ -7,12 +7,13 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from tcs.errors import OutputError, RobotError, UnknownNameError
-from tcs.files.writing import scratch_folder, whole_file
+from tcs.files.writing import check_writable, scratch_folder, whole_file
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
@@ -165,6 +166,44 @@ def write_draft(draft: Draft, path: Path) -> Path:
         shapes.unlink()
         raise
     return shapes
+
+
+def draft_to_files(
+    urdf: str | Path,
+    tool: str,
+    path: Path,
+    *,
+    base: str | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Draft a robot file, write it with its primitives, and return a summary as plain containers.
+
+    Args:
+        urdf: Path of the URDF, or its `package://` address.
+        tool: T, the link that moves to the goals.
+        path: The YAML file; it must not exist yet. Its stem is the name of the robot.
+        base: Link at or beyond which the arm starts; None is the root.
+        on_progress: Called with the number of bodies fitted and of all bodies.
+
+    Raises:
+        OutputError: If one of the files exists or cannot be written.
+        UnknownNameError: As `draft_robot`.
+        RobotError: As `draft_robot`.
+    """
+    check_writable(check_free(path))
+    draft = draft_robot(urdf, tool, base=base, name=path.stem, on_progress=on_progress)
+    shapes = write_draft(draft, path)
+    robot = draft.robot
+    return {
+        "file": str(path),
+        "primitives": str(shapes),
+        "arm_base": robot.arm_base,
+        "arm_joints": list(robot.arm_joints),
+        "torso_joint": robot.torso_joint,
+        "tool_frame": robot.tool_frame,
+        "disabled_pairs": len(robot.disabled_pairs),
+        "remarks": list(draft.remarks),
+    }
 
 
 def check_free(path: Path) -> Path:

@@ -24,9 +24,7 @@ from tcs.output.report.blocks import (
 )
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.teleop_tables import (
-    NAMES,
     PAPER,
-    SCALE,
     group_table,
     learning_table,
     maps_blocks,
@@ -38,6 +36,7 @@ from tcs.output.report.teleop_tables import (
     trials_table,
 )
 from tcs.output.words import p_value
+from tcs.output.words.teleop import NAMES, SCALE
 from tcs.teleop.experiment.course import BLOCKED_AFTER
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL

@@ -8,6 +8,7 @@ import numpy as np
 
 from tcs.output.report.blocks import Block, Column, Table, Text
 from tcs.output.words import p_value
+from tcs.output.words.teleop import NAMES, SCALE
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment
@@ -15,21 +16,6 @@ from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experimen
 PAPER = {"accuracy": (0.0572, 0.0351), "time": (37.09, 36.65), "effort": (0.25e-6, 0.11e-6)}
 """Medians of end-effector control and of the novel controller: null-space paper, Table II, of 26
 people."""
-NAMES = {
-    "accuracy": "accuracy: greatest error of the barycentre [mm]",
-    "time": "completion time [s]",
-    "effort": "effort: mean absolute work on the device [µJ]",
-    "work": "total absolute work on the device [mJ]",
-    "steering_angle": "cumulative steering angle [rad]",
-    "steering_translation": "cumulative steering translation [m]",
-    "arc_length": "spectral arc length [-]",
-    "stops": "number of stops of the arm",
-    "turned": "rotation of joint 1 by its group [rad]",
-    "finished": "fraction of completed trials",
-    "planes_met": "normal planes crossed, of 30",
-}
-SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
-"""Factors from SI units to those of `NAMES`."""
 
 
 def group_table(experiment: Experiment) -> Table:

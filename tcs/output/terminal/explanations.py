@@ -75,7 +75,7 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
     """Print the nearest configuration that reaches the goal, or why none does."""
     fix, explained = result["nearest_reaching"], result["explained"]
     if fix is None:
-        _print_hopeless(out, result)
+        _print_unreached(out, result)
         return
     if not fix["changes"]:
         return
@@ -99,7 +99,7 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
         )
 
 
-def _print_hopeless(out: Console, result: Mapping[str, Any]) -> None:
+def _print_unreached(out: Console, result: Mapping[str, Any]) -> None:
     """Print why no configuration reaches the goal."""
     if result["unreachable"]:
         out.print(

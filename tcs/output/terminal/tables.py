@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import typer
 from rich import box
 from rich.table import Table
 
@@ -146,6 +147,19 @@ def report_verification(found: Mapping[str, Any]) -> None:
         table.add_row("time of the scan of unreached pairs", f"{found['scan_seconds']:.1f} s")
     table.add_row("verdict", found["verdict"])
     results_console().print(table)
+
+
+def report_page(result: Mapping[str, Any]) -> None:
+    """Print the size of an exported page, and the source of the meshes in it."""
+    run = ""
+    if "samples" in result:
+        run = f", {result['seconds']:.1f} s of {result['samples']} samples"
+    typer.echo(f"wrote {result['file']}: {result['bytes'] / 1e6:.1f} MB{run}")
+    if result["meshes"]:
+        typer.echo(
+            "The page contains the robot's meshes; their licence applies when you share it. "
+            f"Origin and licence, from the robot file: {result['source']}"
+        )
 
 
 def members_table(

@@ -1,4 +1,4 @@
-"""Reasons: why a goal is not reached, and the least change that would reach it.
+"""Reasons: why a goal is not reached, and the cheapest change of the configuration that reaches it.
 
 In: a loaded score file, a goal and a configuration; neither simulator nor compiler is needed. Out:
 an explanation with the reason, the counts of all reasons over the grid, and the nearest

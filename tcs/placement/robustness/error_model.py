@@ -18,7 +18,7 @@ Offsets = Mapping[str, NDArray[np.float64]]
 """Error of each joint in each sample [m or rad], shapes (samples,)."""
 
 MAX_SAMPLES = 1_000_000
-"""More samples are a mistake: a hundredth of a percentage point needs no more."""
+"""Greatest number of samples: sufficient for a hundredth of a percentage point."""
 MAX_SEED = 2**63 - 1
 """Greatest seed."""
 
@@ -89,8 +89,8 @@ class ErrorModel:
         check_draws(samples, seed)
         if not self.errors:
             raise TcsError(
-                "No joint has an error, so there is nothing to evaluate. Name joints in an error "
-                "file (--errors), or in the environment file under 'errors'."
+                "No joint has an error, so there is nothing to evaluate. Give errors of joints in "
+                "an error file (--errors), or in the environment file under 'errors'."
             )
         return {
             name: error.draw(named_generator(seed, f"{stream}/{name}"), samples)

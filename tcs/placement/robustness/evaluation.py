@@ -132,7 +132,7 @@ def evaluate(
 
     In each sample the joints of the error model are displaced by random errors. A goal is reached
     if any member of the set has a collision-free solution for it. The initial configurations are
-    not planned again, the arm is. The same seed gives the same samples for every set.
+    unchanged; arm postures are computed again. The same seed gives the same samples for every set.
 
     Args:
         file: A score file; or its trials, which is faster for repeated evaluation.
@@ -230,8 +230,8 @@ def _chosen(
     sets = scored.sets
     if not len(sets.candidates):
         raise SelectionError(
-            "Nothing to evaluate: no goal is reached from any initial configuration. See the "
-            "reasons with `tcs explain`."
+            "Nothing to evaluate: no initial configuration reaches a goal. See the reasons with "
+            "`tcs explain`."
         )
     if not isinstance(select, str):
         given = np.array([int(h) for h in select], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Goals lost under error: what stops the arm, and which joint error goes with the losses."""
+"""Goals lost under error: the reasons, and the joint error that is largest in the losses."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     reached = np.array([found.reason == Reason.REACHED for found in outcomes])
     # A gripper blocked by the robot may be free from another base pose.
     blocked = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
-    hopeless = np.all([found.reason == blocked for found in outcomes], axis=0)
+    unavoidable = np.all([found.reason == blocked for found in outcomes], axis=0)
     robot = trials.lowered.robot_bodies
     others = (*trials.lowered.environment_bodies, *robot)
     found = []
@@ -114,4 +114,4 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
             )
         )
     found.sort(key=lambda loss: loss.success)
-    return Losses(tuple(found), float(np.mean(~hopeless @ evaluation.weights)))
+    return Losses(tuple(found), float(np.mean(~unavoidable @ evaluation.weights)))

@@ -17,7 +17,7 @@ from tcs.kernel.sweep import score_slice
 from tcs.placement.tables import Reason
 
 BATCH = 500
-"""Pairs of configuration and sample that a thread evaluates in one go: milliseconds of work."""
+"""Pairs of configuration and sample that a thread evaluates at a time: milliseconds of work."""
 
 
 class BasePoses(NamedTuple):

@@ -1,4 +1,4 @@
-"""Study of score files under error: what each row of Table I reaches, loses and could gain."""
+"""Study of score files under error: success, losses and gains of each row of Table I."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class RowStudy:
 
 
 def check_row(path: Path, file: ScoreFile, task: str, environment: str, robot: str) -> None:
-    """Refuse a score file whose content is not the row that its name promises.
+    """Refuse a score file whose content is not the row that its name states.
 
     Args:
         path: Path of the score file.
@@ -99,7 +99,7 @@ def check_row(path: Path, file: ScoreFile, task: str, environment: str, robot: s
         found = file.metadata[key]
         if found != name:
             raise StoreMismatchError(
-                f"Score file '{path}' is of {key} '{found}', not '{name}' as its name says. Name "
+                f"Score file '{path}' has {key} '{found}', not '{name}' as its name states. Give "
                 "another folder of score files, or remove this file to have the row scored."
             )
 
@@ -179,7 +179,7 @@ def study_rows(
         # Compile once, not in every process.
         Trials.of(load_scores(paths[0]), on_compile=on_compile)
     done = []
-    # Processes: much of the work is Python's and Drake's own, which threads share badly.
+    # Processes, because much of the work holds the global interpreter lock.
     work = Parallel(n_jobs=min(jobs, len(paths)), return_as="generator")
     for row in work(delayed(study_row)(path, plan) for path in paths):
         done.append(row)

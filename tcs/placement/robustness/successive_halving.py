@@ -63,11 +63,12 @@ def successive_halving(
 ) -> Estimates:
     """Return estimates of the success of sets, with the most samples for the best of them.
 
-    All sets are evaluated on the same samples, so that their differences are known far better than
-    their means. Each round rejects the sets that are significantly worse than the leader: the upper
-    confidence bound of their mean paired difference is negative. The bounds hold for all sets and
-    rounds jointly with 95 % confidence (Bonferroni), as far as means of that many differences are
-    normally distributed. The better half of the others continues; ties go to the first.
+    All sets are evaluated on the same samples, so that the variance of their differences is much
+    smaller than that of their means. Each round rejects the sets that are significantly worse than
+    the leader: the upper confidence bound of their mean paired difference is negative. The bounds
+    hold for all sets and rounds jointly with 95 % confidence (Bonferroni), as far as means of that
+    many differences are normally distributed. The better half of the others continues; ties go to
+    the first.
 
     Args:
         sets: Numbers of the members of each set, shape (K, m).

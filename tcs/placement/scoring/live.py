@@ -43,7 +43,7 @@ class LiveScorer:
         on_compile: Callable[[], None] | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
-        """Load everything, build the scene and compile the kernel.
+        """Load the models, build the scene and compile the kernel.
 
         Args:
             task: As for `tcs.score`; so are `environment`, `robot`, `measure`, `jobs` and
@@ -78,7 +78,7 @@ class LiveScorer:
         Returns:
             Scores and sets of the one observed state, for every function that takes a score file.
             The entry `observation` of its metadata holds the observed frames, the joint values
-            they were explained by, and the error of the frames in the scored scene.
+            fitted to them, and the error of the frames in the scored scene.
 
         Raises:
             UnknownNameError: If a joint or frame does not exist.

@@ -140,7 +140,7 @@ def select(
         frames: Positions of body frames in W [m], by name, in place of `observed`.
 
     Raises:
-        SelectionError: If no goal is reached from anywhere, the current state is not finite, is out
+        SelectionError: If no configuration reaches a goal, the current state is not finite, is out
             of range or lacks an axis with a weight, `max_members` is not stored, no set is
             reachable around the furniture, or delta is above 0 and no set has an estimate, or no
             triple although `max_members` is 3.
@@ -169,8 +169,8 @@ def select(
     _check_members(max_members, sets.max_members)
     if not len(sets.candidates):
         raise SelectionError(
-            "Nothing to choose from: no goal is reached from any initial configuration. See the "
-            "reasons with `tcs explain`, then change the task, the grid or the environment."
+            "Nothing to select: no initial configuration reaches a goal. See the reasons with "
+            "`tcs explain`, then change the task, the grid or the environment."
         )
     legs = legs_from(
         here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
@@ -178,7 +178,7 @@ def select(
     if not np.any(legs.reachable):
         raise SelectionError(
             f"From ({here.base_x:.2f}, {here.base_y:.2f}) m no path around the furniture leads to "
-            "any candidate base pose. Check the position, or take straight lines."
+            "any candidate base pose. Check the position, or use straight lines."
         )
     if weights.success > 0.0:
         chosen = best_estimated(sets, tables.success, legs, weights, max_members)

@@ -158,9 +158,9 @@ class LatticeDistances(Distances):
             entries = square[self._movable[square[:, 0], square[:, 1]]]
             if not len(entries):
                 raise SelectionError(
-                    f"Current state: the base at ({x:.2f}, {y:.2f}) m is where the scores find it "
-                    "in collision, so no path around the furniture starts there. Check the "
-                    "position, or take straight lines."
+                    f"Current state: by the scores, the base is in collision at ({x:.2f}, {y:.2f}) "
+                    "m, so no path around the furniture starts there. Check the position, or use "
+                    "straight lines."
                 )
         else:
             i, j = np.indices((nx, ny))

@@ -36,8 +36,8 @@ def best_estimated(
     """
     if success is None:
         raise SelectionError(
-            "Weight delta needs success under error, which was not estimated for any set of this "
-            "table. Estimate it first: tcs robustify FILE."
+            "Weight delta requires success under error, which was not estimated for any set of "
+            "this table. Estimate it first: tcs robustify FILE."
         )
     best: tuple[int, ...] | None = None
     most = -np.inf
@@ -57,7 +57,7 @@ def best_estimated(
     if best is None:
         raise SelectionError(
             "No set whose success under error was estimated is reachable from here with at most "
-            f"{max_members} members. Take --delta 0, or estimate more sets: tcs robustify FILE "
+            f"{max_members} members. Use --delta 0, or estimate more sets: tcs robustify FILE "
             "--sets."
         )
     return best
@@ -74,7 +74,7 @@ def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: i
     if not success.of_size(3).size:
         raise SelectionError(
             "max_members is 3 and weight delta above 0, but success under error was not estimated "
-            "for any set of three. Take max_members 2, or delta 0."
+            "for any set of three. Use max_members 2, or delta 0."
         )
 
 

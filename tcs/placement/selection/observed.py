@@ -140,7 +140,7 @@ def _nearest_to_frames(
     least = float(error[index].min())
     if least > MAX_FRAME_ERROR:
         raise SelectionError(
-            f"Observed frames ({', '.join(frames)}) are {least:.2f} m from where they were scored, "
+            f"Observed frames ({', '.join(frames)}) are {least:.2f} m from their scored positions, "
             f"more than {MAX_FRAME_ERROR:.2f} m. Check the frames and the state of the "
             "environment, or score the scene as it is."
         )

@@ -232,13 +232,13 @@ def current_values(
         values[name] = value
     for name, value in values.items():
         check_coordinate(name, value)
-    # Full rotations mean nothing, and would cost digits in the differences of headings.
+    # Full rotations have no effect, and would reduce the accuracy of differences of headings.
     values["base_yaw"] = math.remainder(here.base_yaw, 2.0 * math.pi)
     missing = [name for name in names if name not in values]
     if missing:
         raise SelectionError(
-            f"Current state lacks {', '.join(missing)}, which the travel weights charge for. "
-            "Give its current value, or weight 0."
+            f"Current state lacks {', '.join(missing)}, which has a travel weight. Give its "
+            "current value, or weight 0."
         )
     return values
 

@@ -17,8 +17,8 @@ Number = TypeVar("Number", float, NDArray[np.float64])
 class UtilityWeights:
     """Weights of the terms of the utility, TCS eq. (5); each a number from 0 to 1e9.
 
-    The travel weight is per metre. By default it is 0.05: one metre costs five percent of the
-    task. At 1, a metre would cancel a task that is reached in full.
+    The travel weight is per metre. At the default of 0.05, one metre of travel costs as much as
+    five percent of P_R. At 1, one metre would offset a P_R of 1.
     """
 
     reachability: float = 1.0

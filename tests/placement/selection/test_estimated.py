@@ -135,7 +135,7 @@ def test_three_members_are_not_chosen_by_estimates_of_two():
     assert sets.triples.kept
     file = with_success(plain, estimated(sets, np.random.default_rng(1), 5, 20))
     weights = UtilityWeights(success=1.0)
-    with pytest.raises(SelectionError, match=r"for any set of three\. Take max_members 2"):
+    with pytest.raises(SelectionError, match=r"for any set of three\. Use max_members 2"):
         select(file, HERE, weights=weights, max_members=3)
     # Without max_members the best set with an estimate is selected.
     assert (

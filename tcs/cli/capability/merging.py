@@ -1,0 +1,158 @@
+"""The command `tcs capability merge`: merge a map over the grasps of a task."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tcs.cli import options
+from tcs.cli.capability.groups import PICTURE, TORSO, Map, check_picture
+from tcs.cli.option_groups import expand_options
+from tcs.files.writing import check_writable
+from tcs.output import terminal
+from tcs.output.terminal import capability_tables
+
+if TYPE_CHECKING:
+    from tcs.capability import TaskShape
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions:
+    """A task of grasps by the name of its shape."""
+
+    task: Annotated[str, typer.Option(help="pick-and-place, linear or curved.")]
+    height: Annotated[float, typer.Option(help="Height of the tool above the floor, in metres.")]
+    length: Annotated[
+        float,
+        typer.Option(
+            help="Distance from the first to the last position, or radius of an arc, in metres."
+        ),
+    ] = 0.15
+    samples: Annotated[int, typer.Option(help="Positions along a line or an arc.")] = 3
+    heading_deg: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Heading of a grasp, in degrees; may be repeated.", show_default="0, 90 and -90"
+        ),
+    ] = None
+    approach: Annotated[str, typer.Option(help="Approach of the grasps: side or top.")] = "side"
+    pre_grasp: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Distance of a pre-grasp back along the approach, in metres; may be repeated."
+        ),
+    ] = None
+    direction_deg: Annotated[
+        int, typer.Option(help="Direction of a line: 0, 90, 180 or 270 degrees.")
+    ] = 90
+    start_deg: Annotated[float, typer.Option(help="Arc: angle of the closed door, in degrees.")] = (
+        0.0
+    )
+    end_deg: Annotated[float, typer.Option(help="Arc: angle of the open door, in degrees.")] = 90.0
+
+
+@expand_options
+def merge_maps(
+    capability: Map,
+    task: TaskOptions,
+    torso_height: Annotated[
+        float | None,
+        typer.Option(
+            *TORSO, help="Use only this torso height, in metres.", show_default="any of the map"
+        ),
+    ] = None,
+    scale: Annotated[str, typer.Option(help="Scale of the scores: fixed, or thesis.")] = "fixed",
+    split: Annotated[
+        bool,
+        typer.Option(
+            "--split",
+            help="Find the fewest base poses that reach all positions, in the order of the task.",
+        ),
+    ] = False,
+    environment: Annotated[
+        str | None,
+        typer.Option(
+            help="Name or YAML file of an environment: also print the best base pose that is "
+            "feasible in it."
+        ),
+    ] = None,
+    task_at: Annotated[
+        tuple[float, float, float],
+        typer.Option(
+            metavar="X Y YAW_DEG", help="Pose of the task frame in the environment (m, m, deg)."
+        ),
+    ] = (0.0, 0.0, 0.0),
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of the robot.", show_default="that of the map"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file to write, with every base pose: x, y, yaw_deg, torso_height, score."
+        ),
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help=PICTURE)] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Merge a map over the grasps of a task, and print its best base pose."""
+    from tcs.capability import Surroundings, load_map, merge, write_base_poses
+    from tcs.capability import split as split_task
+
+    if split and (out, picture, environment) != (None, None, None):
+        raise typer.BadParameter(
+            "makes no single task map; leave out --out, --picture and --environment.",
+            param_hint="--split",
+        )
+    if task.direction_deg % 90:
+        raise typer.BadParameter("must be a multiple of 90.", param_hint="--direction-deg")
+    if out is not None:
+        check_writable(out)
+    check_picture(picture)
+    loaded = load_map(capability)
+    grasps = _shape(task).task(loaded.grid.step)
+    if split:
+        stops = split_task(loaded, grasps, torso_height=torso_height, scale=scale)
+        sequence = {"task": grasps.name, "stops": [stop.to_json() for stop in stops]}
+        terminal.print_result(sequence, capability_tables.report_stops, as_json=as_json)
+        return
+    begun = time.perf_counter()
+    task_map = merge(loaded, grasps, torso_height=torso_height, scale=scale)
+    result = capability_tables.task_map_result(task_map, time.perf_counter() - begun)
+    if out is not None:
+        write_base_poses(out, task_map)
+    if picture is not None:
+        from tcs.output.view.base_poses import save_task_map
+
+        save_task_map(picture, task_map)
+    if environment is not None:
+        x, y, yaw_deg = task_at
+        around = Surroundings.load(
+            capability, loaded, environment, (x, y, math.radians(yaw_deg)), robot=robot
+        )
+        base, rejected = around.best(task_map)
+        result |= {"best_in_environment": base.to_json(), "rejected": rejected}
+    terminal.print_result(result, capability_tables.report_merged, as_json=as_json)
+
+
+def _shape(task: TaskOptions) -> TaskShape:
+    """Return the parameters of a task, with angles in radians."""
+    from tcs.capability import TaskShape
+
+    return TaskShape(
+        shape=task.task,
+        height=task.height,
+        length=task.length,
+        samples=task.samples,
+        headings=tuple(math.radians(h) for h in task.heading_deg or (0.0, 90.0, -90.0)),
+        approach=task.approach,
+        pre_grasps=tuple(task.pre_grasp or ()),
+        direction_deg=task.direction_deg,
+        start=math.radians(task.start_deg),
+        end=math.radians(task.end_deg),
+    )

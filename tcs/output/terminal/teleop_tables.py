@@ -1,0 +1,53 @@
+"""Results of teleoperation as text: how a line was followed, and the experiment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tcs.output.terminal.console import results_console
+from tcs.output.terminal.tables import new_table
+from tcs.output.words.teleop import NAMES, SCALE
+
+if TYPE_CHECKING:
+    from tcs.teleop.experiment.trial import LineResult
+
+
+def line_text(result: LineResult) -> str:
+    """Return how accurately a line was followed, in one line."""
+    from tcs.teleop.experiment.metrics import PLANES
+
+    if result.time is None or result.accuracy is None:
+        left = 1e3 * result.distance_left
+        return f"the end of the line was not reached: {left:.0f} mm remain."
+    worst, met = 1e3 * result.accuracy.worst, result.accuracy.planes_met
+    return (
+        f"the line took {result.time:.1f} s; the greatest error of the mean path was {worst:.1f} "
+        f"mm ({met} of {PLANES} planes crossed)."
+    )
+
+
+def report_experiment(result: dict[str, Any]) -> None:
+    """Print medians, tests and files."""
+    from tcs.teleop.experiment.within_subject import SCRIPTED
+
+    out = results_console()
+    out.print(f"{result['operators']} {SCRIPTED}, robot {result['robot']}, seed {result['seed']}")
+    conditions = list(result["medians"])
+    table = new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
+    for name, text in NAMES.items():
+        scale = SCALE.get(name, 1.0)
+        cells = [f"{scale * result['medians'][c][name]:.3g}" for c in conditions]
+        test = result["tests"].get(name)
+        cells += ["", ""] if test is None else [f"{test['p']:.2g}", f"{test['effect']:.3f}"]
+        table.add_row(text, *cells)
+    out.print(table)
+    for one in result["maps"] or ():
+        best = one["best"]
+        where = "no base pose reaches the grasp"
+        if best is not None:
+            pose = f"x {best['x']:.2f} m, y {best['y']:.2f} m, {best['yaw_deg']:.1f} deg"
+            where = f"best base pose {pose}, score {best['score']:.3f}"
+        out.print(f"map of {one['condition']}: {one['cells']:,} cells; {where}")
+    out.print(f"wrote {', '.join(result['files'])}")
+    if result["runs"]:
+        out.print(f"runs in {result['runs']}")
