@@ -54,7 +54,7 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
         *("selection.py", "teleop.py"),
     ],
 )
-def test_each_script_says_how_it_is_used(script):
+def test_each_script_describes_its_usage(script):
     command = [sys.executable, str(FOLDER / script), "--help"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -87,7 +87,7 @@ def test_an_absent_peer_is_skipped_with_a_line(module, monkeypatch, capsys, pack
     assert printed.count("\n") == 1
 
 
-def test_a_peer_that_cannot_take_the_arm_says_why(module, capsys):
+def test_a_peer_that_cannot_solve_the_arm_gives_the_reason(module, capsys):
     script = module("peers")
 
     def refuse(chain):
@@ -97,7 +97,7 @@ def test_a_peer_that_cannot_take_the_arm_says_why(module, capsys):
     assert re.fullmatch(r"EAIK +skipped: no closed form\n", capsys.readouterr().out)
 
 
-def test_the_urdf_handed_over_is_the_arm(module, chain):
+def test_the_exported_urdf_is_the_arm(module, chain):
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(module("peer_arms").urdf(chain), "urdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("arm_base"))

@@ -41,7 +41,7 @@ def test_one_root_catches_every_error(error):
     assert issubclass(error, TcsError)
 
 
-def test_unknown_name_says_what_was_asked_what_there_is_and_what_was_meant():
+def test_an_unknown_name_lists_the_known_ones_and_the_nearest():
     error = UnknownNameError("frame", "haed", ["torso", "head"], where="goal 3 of task 'shaving'")
     assert str(error) == (
         "goal 3 of task 'shaving': unknown frame 'haed'. Known: head, torso. Did you mean 'head'?"
@@ -49,7 +49,7 @@ def test_unknown_name_says_what_was_asked_what_there_is_and_what_was_meant():
     assert (error.what, error.name, error.known) == ("frame", "haed", ("head", "torso"))
 
 
-def test_unknown_name_guesses_nothing_far_off():
+def test_an_unknown_name_suggests_no_distant_name():
     message = str(UnknownNameError("frame", "xyz", ["head"]))
     assert message == "unknown frame 'xyz'. Known: head."
 

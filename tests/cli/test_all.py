@@ -53,7 +53,7 @@ def test_all_thirteen_rows_of_the_paper_are_scored(tcs_command, stand_in, tmp_pa
     assert all(row["file_bytes"] > 1000 for row in rows)
 
 
-def test_a_person_gets_one_line_a_row(tcs_command, stand_in, tmp_path):
+def test_the_text_has_one_line_for_each_row(tcs_command, stand_in, tmp_path):
     ran = tcs_command("score", "--all", "--environment", "bed-no-wall", "--out", tmp_path)
     assert stand_in == [("shaving", "bed-no-wall")]
     (line,) = [line for line in ran.out.splitlines() if "shaving" in line]

@@ -43,7 +43,7 @@ def test_only_candidates_by_default(tcs_command, tmp_path):
     assert f"{len(table):,} rows" in ran.out
 
 
-def test_unwritable_place(tcs_command, small_file, tmp_path):
+def test_unwritable_path(tcs_command, small_file, tmp_path):
     ran = tcs_command("export", small_file, "--out", tmp_path / "none" / "scores.csv")
     assert ran.code == 1
     assert ran.err.count("\n") == 1

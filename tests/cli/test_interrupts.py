@@ -186,7 +186,7 @@ files.score = score
     assert ran.err == "tcs: interrupted; no half-written file is left.\n"
 
 
-def test_interrupt_that_compiled_code_swallows_still_counts(tcs_command, tmp_path, monkeypatch):
+def test_an_interrupt_dropped_by_compiled_code_takes_effect(tcs_command, tmp_path, monkeypatch):
     def score(*_arguments, on_progress, **_options):
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)

@@ -43,7 +43,7 @@ def test_a_draft_overwrites_nothing(tcs_command, folder):
         (("made_up.urdf", "--tool", "tool", "--out", "mine.yml"), "must end in .yaml"),
     ],
 )
-def test_what_cannot_be_drafted_is_one_line(tcs_command, folder, arguments, message):
+def test_a_urdf_that_cannot_be_drafted_is_one_line(tcs_command, folder, arguments, message):
     ran = tcs_command("robot", "new", *arguments)
     assert ran.code == 1
     assert ran.err.count("\n") == 1

@@ -98,7 +98,7 @@ def test_verify_scans_whole_strata(tcs_command, corner_file):
 def test_a_limit_needs_strata(tcs_command, corner_file):
     ran = tcs_command("verify", corner_file, "--limit", 5)
     assert ran.code == 2
-    assert "needs --strata" in ran.err
+    assert "requires --strata" in ran.err
 
 
 def test_verify_finds_a_forged_answer(tcs_command, corner_file, tmp_path):
@@ -219,9 +219,7 @@ def test_unknown_frame_names_the_nearest(tcs_command, tmp_path):
         pytest.param("/proc/out.tcs", id="no files allowed"),
     ],
 )
-def test_place_that_cannot_be_written_is_refused_before_the_work(
-    tcs_command, tmp_path, stand_in, place
-):
+def test_an_unwritable_path_is_refused_before_the_work(tcs_command, tmp_path, stand_in, place):
     (tmp_path / "file").touch()
     (tmp_path / "folder").mkdir()
     ran = tcs_command("score", "shaving", "--out", tmp_path / place)
@@ -241,7 +239,7 @@ def test_file_is_named_after_its_content(tcs_command, tmp_path, stand_in, monkey
     assert options["jobs"] == 2
 
 
-def test_the_measure_is_handed_on_and_named(tcs_command, example, tmp_path, monkeypatch):
+def test_the_measure_is_passed_on_and_named(tcs_command, example, tmp_path, monkeypatch):
     measures = []
 
     def score(*_arguments, measure, **_options):
@@ -283,7 +281,7 @@ def test_impossible_jobs_are_misuse(tcs_command, stand_in, jobs):
     assert stand_in == []
 
 
-def test_mistakes_of_ours_are_not_swallowed(tcs_command, tmp_path, monkeypatch):
+def test_defects_of_the_program_keep_their_traceback(tcs_command, tmp_path, monkeypatch):
     def score(*_arguments, **_options):
         raise ZeroDivisionError("a mistake")
 

@@ -61,7 +61,7 @@ def test_impossible_observations_are_reported(tcs_command, corner, tmp_path, wor
     assert not path.exists()
 
 
-def test_all_rows_are_not_scored_as_found(tcs_command):
+def test_all_rows_are_not_scored_as_observed(tcs_command):
     ran = tcs_command("score", "--all", "--observed", "person_x=0.1")
     assert ran.code == 2
     assert "requires one task" in ran.err

@@ -174,7 +174,7 @@ def test_missing_file(tcs_command, tmp_path, verb):
     assert "none.tcs' cannot be read: No such file or directory." in ran.err
 
 
-def test_nothing_to_choose_from(tcs_command, tmp_path):
+def test_nothing_to_select(tcs_command, tmp_path):
     path = tmp_path / "none.tcs"
     tcs.save(path, score_file(share=0.0))
     ran = tcs_command("select", path, *HERE)

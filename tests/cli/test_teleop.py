@@ -24,9 +24,9 @@ def test_maps_of_a_robot_without_a_head_are_refused_before_the_work(tcs_command,
     assert "'iiwa7': no head" in ran.err
 
 
-@pytest.mark.parametrize(("robot", "lift"), [("tiago", 2.0), ("tiago", "nan"), ("iiwa7", 0.1)])
-def test_a_lift_out_of_range_is_refused(tcs_command, tmp_path, robot, lift):
-    words = ["--robot", robot, "--lift", lift, "--out", tmp_path / "out"]
+@pytest.mark.parametrize(("robot", "height"), [("tiago", 2.0), ("tiago", "nan"), ("iiwa7", 0.1)])
+def test_a_torso_height_out_of_range_is_refused(tcs_command, tmp_path, robot, height):
+    words = ["--robot", robot, "--lift", height, "--out", tmp_path / "out"]
     ran = tcs_command("teleop", "experiment", *words)
     assert ran.code == 1
     assert "is out of range; its torso goes from" in ran.err
@@ -42,7 +42,7 @@ def test_fewer_or_more_than_can_be_run_are_a_misuse(tcs_command, tmp_path, optio
     assert option in ran.err
 
 
-def test_a_folder_that_cannot_be_made_is_told_before_the_work(tcs_command, tmp_path):
+def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tcs_command, tmp_path):
     (tmp_path / "file").write_text("")
     ran = tcs_command("teleop", "experiment", "--out", tmp_path / "file" / "out")
     assert ran.code == 1

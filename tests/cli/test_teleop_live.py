@@ -39,21 +39,21 @@ def saved(tmp_path_factory):
 
 
 def refused(ran, *words):
-    """Whether it ended in one line with these words."""
+    """Return whether a command failed with one line that contains these words."""
     return ran.code == 1 and ran.err.count("\n") == 1 and all(word in ran.err for word in words)
 
 
-def test_unknown_robot_is_told(tcs_command):
-    assert refused(tcs_command("teleop", "--robot", "nobody", "--no-browser"), "nobody", "iiwa7")
+def test_an_unknown_robot_is_refused(tcs_command):
+    assert refused(tcs_command("teleop", "--robot", "unknown", "--no-browser"), "unknown", "iiwa7")
 
 
-def test_a_start_beyond_the_limits_is_told_before_anything_opens(tcs_command):
+def test_a_start_beyond_the_limits_is_refused_before_the_page_opens(tcs_command):
     start = (0, 0, 0, 130, 0, 0, 0)
     ran = tcs_command("teleop", "--start-deg", *start, "--no-browser")
     assert refused(ran, "joint 4", "2.2689", "--start-deg")
 
 
-def test_an_arm_of_six_joints_is_told(tcs_command, tmp_path):
+def test_an_arm_of_six_joints_is_refused(tcs_command, tmp_path):
     import yaml
 
     models = Path(__file__).resolve().parents[2] / "models" / "robots"
@@ -68,18 +68,18 @@ def test_an_arm_of_six_joints_is_told(tcs_command, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["run.txt", "none/run.csv"])
-def test_a_run_that_cannot_be_written_is_told_before_anything_opens(tcs_command, tmp_path, name):
+def test_a_run_that_cannot_be_written_is_refused_before_the_page_opens(tcs_command, tmp_path, name):
     ran = tcs_command("teleop", "--save", tmp_path / name, "--no-browser")
     assert refused(ran, str(tmp_path / name))
 
 
-def test_options_of_the_live_page_do_not_get_lost_before_a_command(tcs_command, saved):
+def test_options_of_the_live_page_are_refused_before_a_command(tcs_command, saved):
     ran = tcs_command("teleop", "--robot", "pr2", "replay", saved)
     assert ran.code == 2
     assert "live page" in ran.err
 
 
-def test_a_port_that_is_taken_is_told(tcs_command):
+def test_an_occupied_port_is_refused(tcs_command):
     with socket.socket() as taken:
         taken.bind(("localhost", 0))
         taken.listen()
@@ -88,7 +88,7 @@ def test_a_port_that_is_taken_is_told(tcs_command):
     assert refused(ran, f"port {port}")
 
 
-def test_nothing_is_written_where_nobody_has_looked(tcs_command, tmp_path):
+def test_nothing_is_written_without_a_connected_browser(tcs_command, tmp_path):
     path = tmp_path / "run.csv"
     ran = tcs_command("teleop", "--no-browser", "--duration", 0.2, "--save", path)
     assert ran.code == 0
@@ -113,10 +113,12 @@ def test_a_page_of_another_name_is_not_written(tcs_command, saved, tmp_path):
     assert not page.exists()
 
 
-@pytest.mark.parametrize(("robot", "lift"), [("tiago", "99"), ("tiago", "nan"), ("iiwa7", "0.1")])
-def test_a_lift_that_the_torso_cannot_have_is_refused(tcs_command, robot, lift):
-    ran = tcs_command("teleop", "--robot", robot, "--lift", lift, "--no-browser", "--duration", 0.1)
-    assert refused(ran, robot, lift, "out of range")
+@pytest.mark.parametrize(("robot", "height"), [("tiago", "99"), ("tiago", "nan"), ("iiwa7", "0.1")])
+def test_a_torso_height_out_of_range_is_refused(tcs_command, robot, height):
+    ran = tcs_command(
+        "teleop", "--robot", robot, "--torso-height", height, "--no-browser", "--duration", 0.1
+    )
+    assert refused(ran, robot, height, "out of range")
 
 
 def test_a_run_is_played_back(tcs_command, saved):
@@ -126,19 +128,19 @@ def test_a_run_is_played_back(tcs_command, saved):
     assert "http://localhost:" in ran.err
 
 
-def test_runs_that_cannot_be_played_are_told(tcs_command, saved, tmp_path):
+def test_runs_that_cannot_be_played_are_refused(tcs_command, saved, tmp_path):
     broken = tmp_path / "broken.csv"
     broken.write_text("time,x\n0,1\n")
-    nobody = tmp_path / "nobody.csv"
-    nobody.write_text(saved.read_text().replace('""robot""', '""belongs to""'))
-    lifted = tmp_path / "lifted.csv"
-    lifted.write_text(
+    unnamed = tmp_path / "unnamed.csv"
+    unnamed.write_text(saved.read_text().replace('""robot""', '""belongs to""'))
+    misplaced = tmp_path / "misplaced.csv"
+    misplaced.write_text(
         saved.read_text().replace('""torso_height"": 0.0', '""torso_height"": ""up""')
     )
     assert refused(tcs_command("teleop", "replay", tmp_path / "none.csv"), "none.csv")
     assert refused(tcs_command("teleop", "replay", broken), "broken.csv", "missing")
-    assert refused(tcs_command("teleop", "replay", nobody), "nobody.csv", "--robot")
-    assert refused(tcs_command("teleop", "replay", lifted), "lifted.csv", "'up'")
+    assert refused(tcs_command("teleop", "replay", unnamed), "unnamed.csv", "--robot")
+    assert refused(tcs_command("teleop", "replay", misplaced), "misplaced.csv", "'up'")
     ran = tcs_command("teleop", "replay", saved, "--robot", "panda")
     assert refused(ran, saved.name, "panda", "--robot")
 
@@ -151,18 +153,18 @@ def test_meshes_and_json_are_for_pages_only(tcs_command, saved):
 
 
 @contextmanager
-def looking(port):
-    """Look at a page as a browser would: hold a websocket open, and read what comes."""
+def connected_browser(port):
+    """Hold a websocket to a page open and read from it, as a browser does."""
     request = (
         f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
         "Sec-WebSocket-Version: 13\r\n\r\n"
     )
-    with socket.create_connection(("localhost", port)) as eye:
-        eye.sendall(request.encode())
+    with socket.create_connection(("localhost", port)) as browser:
+        browser.sendall(request.encode())
 
         def read():
-            while eye.recv(65536):
+            while browser.recv(65536):
                 pass
 
         thread = threading.Thread(target=read)
@@ -170,13 +172,13 @@ def looking(port):
         try:
             yield
         finally:
-            eye.shutdown(socket.SHUT_RDWR)
+            browser.shutdown(socket.SHUT_RDWR)
             thread.join()
 
 
 @contextmanager
 def live_page(*words):
-    """A live page in a process of its own, and where it is."""
+    """A live page in a separate process, and its port."""
     with socket.socket() as free:
         free.bind(("localhost", 0))
         port = free.getsockname()[1]
@@ -193,16 +195,16 @@ def live_page(*words):
 
 
 @pytest.mark.slow
-def test_ctrl_c_writes_what_was_driven(tmp_path):
+def test_ctrl_c_writes_the_run(tmp_path):
     path = tmp_path / "run.csv"
     with live_page("--save", path, "--start-deg", *READY_DEG) as (running, port):
-        with looking(port):
+        with connected_browser(port):
             time.sleep(1.5)
             running.send_signal(signal.SIGINT)
             running.wait(30)
-        said = running.stderr.read()
+        stderr = running.stderr.read()
     assert running.returncode == 0
-    assert "closed after" in said
+    assert "closed after" in stderr
     run = load_run(path)
     assert len(run) > 20
     assert run.metadata["robot"] == "iiwa7"
@@ -211,14 +213,14 @@ def test_ctrl_c_writes_what_was_driven(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_line_is_there_to_follow_and_stands_in_the_run(tmp_path):
+def test_the_line_is_stored_in_the_run(tmp_path):
     path = tmp_path / "run.csv"
     with live_page("--line", "--save", path, "--duration", 3) as (running, port):
-        with looking(port):
+        with connected_browser(port):
             out = running.communicate(timeout=60)[0]
     assert running.returncode == 0
     course = find_course(load_arm("iiwa7"))
-    # Nobody drove: all of the line is left.
+    # The arm was not moved: the whole line remains.
     left = np.linalg.norm(np.subtract(course.line.end, course.line.start))
     assert f"not reached: {1e3 * left:.0f} mm remain" in out
     run = load_run(path)
@@ -226,27 +228,27 @@ def test_the_line_is_there_to_follow_and_stands_in_the_run(tmp_path):
     np.testing.assert_allclose(run.joints[0], course.joints, atol=1e-9)
 
 
-def test_how_well_a_line_was_followed_is_told():
+def test_the_accuracy_along_a_line_is_reported():
     arm = load_arm("iiwa7")
     session = Teleoperation(arm, np.radians(READY_DEG))
     start = session.step().p
     line = Line(tuple(start), (start[0], start[1] + 0.2, start[2]))
     command = Command(linear=(0.0, 0.1, 0.0))
-    # Two seconds of waiting, and a try in vain before, are not the line's.
-    asked = [Command()] * 200 + [Command(linear=(0.1, 0.0, 0.0))] * 100
-    rows = [(one, session.step(one)) for one in asked]
+    # Two seconds of waiting and an earlier attempt are not part of the result.
+    commands = [Command()] * 200 + [Command(linear=(0.1, 0.0, 0.0))] * 100
+    rows = [(one, session.step(one)) for one in commands]
     session.place(np.radians(READY_DEG))
     rows += [(one, session.step(one)) for one in [Command()] * 50 + [command] * 190]
-    told = line_text(line_result(run_from_steps(arm, rows, {}), line))
+    text = line_text(line_result(run_from_steps(arm, rows, {}), line))
     # 0.18 m to the sphere at 0.1 m/s, and some time to speed up.
-    seconds = float(told.split("took ")[1].split(" s")[0])
+    seconds = float(text.split("took ")[1].split(" s")[0])
     assert 1.8 <= seconds <= 1.9
-    worst = float(told.split("was ")[1].split(" mm")[0])
-    # The last plane that is met has samples on one side only, up to 5 mm away.
+    worst = float(text.split("was ")[1].split(" mm")[0])
+    # The last plane that is crossed has samples on one side only, up to 5 mm away.
     assert worst < 5.0
 
 
-def test_a_line_has_a_start_of_its_own(tcs_command):
+def test_a_line_excludes_a_start_posture(tcs_command):
     ran = tcs_command("teleop", "--line", "--start-deg", *READY_DEG, "--no-browser")
     assert ran.code == 2
 

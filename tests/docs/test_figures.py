@@ -67,7 +67,7 @@ def test_check_writes_nothing_and_fails(figures, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
-def test_saved_figures_say_where_they_were_measured(path):
+def test_saved_figures_state_machine_and_versions(path):
     saved = json.loads(path.read_text(encoding="utf-8"))
     assert {"command", "date", "machine", "load", "python", "versions"} <= set(saved)
     assert (CHECKOUT / saved["command"].split()[1]).is_file()

@@ -43,7 +43,7 @@ def test_pages_fit_the_screen(site, browser, width):
 
 
 @pytest.mark.slow
-def test_what_does_not_fit_is_found(site, browser):
+def test_mismatched_parts_are_found(site, browser):
     show_on(browser, PHONE)
     browser.driver.get((site / "index.html").as_uri())
     browser.driver.execute_script("""

@@ -23,7 +23,7 @@ def lines_of(figure):
     return found
 
 
-def test_a_line_starts_where_to_stand_and_points_where_the_robot_faces():
+def test_a_line_starts_at_the_base_position_and_points_along_its_heading():
     figure = draw_base_poses([view([[1.0, 2.0, np.pi / 2, 0.3]])], title="t")
     (segment,) = lines_of(figure).get_segments()
     np.testing.assert_allclose(segment, [[1.0, 2.0], [1.0, 2.02]], atol=1e-12)

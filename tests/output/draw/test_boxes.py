@@ -55,7 +55,7 @@ def test_each_cloud_has_a_panel(count, rng):
     assert texts == ["one", "two", "best set"]
 
 
-def test_pictures_as_bytes_are_the_same_again(groups):
+def test_pictures_as_bytes_are_reproducible(groups):
     def draw():
         return draw_boxes(groups, SERIES, label="goals [%]")
 

@@ -12,10 +12,10 @@ from tcs.output.draw import Category, colours
 from tests.output.draw.vision import VISION, as_seen, difference
 
 CLEAR = 15.0
-"""A difference seen at a glance: 2.3 is just noticeable (Mahy, Van Eycken and Oosterlinck, 1994),
-this is six times as much."""
+"""A clear difference: six times the just noticeable one of 2.3 (Mahy, Van Eycken and Oosterlinck,
+1994)."""
 SCALE = [tuple(c) for c in matplotlib.colormaps[colours.SCALE](np.linspace(0.0, 1.0, 65))[:, :3]]
-IN_SPACE = {kind.label: kind.colour for kind in Category}
+IN_SPACE = {category.label: category.colour for category in Category}
 FROM_ABOVE = {
     "furniture": colours.FURNITURE,
     "person": colours.PERSON,
@@ -26,9 +26,9 @@ FROM_ABOVE = {
 }
 
 
-def test_the_simulation_knows_what_is_known():
-    # Red and green of the same lightness: apart with all cones, hard to tell without the middle
-    # ones. White has no colour for anybody.
+def test_the_simulation_reproduces_known_differences():
+    # Red and green of equal lightness differ with all cones and are similar without the middle
+    # ones. White is neutral under every colour vision.
     assert difference("#c05050", "#6f7f35", "all cones") > 50
     assert difference("#c05050", "#6f7f35", "deuteranopia") < 20
     for vision in VISION:
@@ -48,7 +48,7 @@ def test_colours_of_a_legend_are_distinct(palette, vision):
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_a_better_score_is_lighter_for_everybody(vision):
+def test_a_better_score_is_lighter_under_every_colour_vision(vision):
     lightness = [as_seen(colour, vision)[0] for colour in SCALE]
     assert np.all(np.diff(lightness) > 0.0)
     assert lightness[-1] - lightness[0] > 60.0
@@ -65,7 +65,7 @@ def test_cased_lines_stand_out_on_every_score(line, vision):
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_where_nothing_is_scored_looks_like_no_score(vision):
+def test_positions_without_a_score_have_no_colour(vision):
     # The lowest score with a colour is next to the dark end; grey and white are light.
     for colour in (colours.BLOCKED, colours.EMPTY):
         assert min(difference(colour, score, vision) for score in SCALE[:32]) > CLEAR

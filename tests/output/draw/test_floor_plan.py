@@ -19,7 +19,7 @@ def axes():
 
 
 @pytest.mark.parametrize(("width", "wording"), [(4.0, 1.0), (2.0, 0.5)])
-def test_the_scale_bar_is_as_long_as_it_says(axes, width, wording):
+def test_the_scale_bar_has_the_stated_length(axes, width, wording):
     frame(axes, [np.array([[0.0, 0.0], [width, 2.0]])], margin=0.0)
     draw_scale_bar(axes)
     (bar,) = axes.lines

@@ -97,7 +97,7 @@ def test_map_is_written(places, chair, tmp_path, ending):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_nothing_reached_and_one_place_only():
+def test_no_reached_goal_and_a_single_base_position():
     grid = small_grid(nx=1, ny=1)
     scores = random_scores(grid, 3, seed=2, share=0.0)
     figure = draw_map(PlaceMap.of(scores, grid), [], [], title="t")

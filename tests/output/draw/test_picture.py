@@ -35,7 +35,7 @@ def share(image, category):
     return float(np.mean(hue @ wanted > 0.9995))
 
 
-def test_what_is_nearer_hides_what_is_behind():
+def test_nearer_solids_hide_others():
     # The camera looks from +x.
     near, far = [1.0, 0.0, 1.3], [-1.0, 0.0, 0.6]
     for categories in ((Category.ARM, Category.PERSON), (Category.PERSON, Category.ARM)):
@@ -48,7 +48,7 @@ def test_what_is_nearer_hides_what_is_behind():
         assert share(image, categories[1]) == 0.0
 
 
-def test_solids_that_pass_through_one_another_are_both_seen():
+def test_intersecting_solids_are_both_visible():
     both = (sphere(Category.ARM, [0.0, -0.1, 1.0]), sphere(Category.PERSON, [0.0, 0.1, 1.0]))
     image = picture(draw_scene([view(*both)], title=""))
     arm, person = share(image, Category.ARM), share(image, Category.PERSON)
@@ -58,7 +58,7 @@ def test_solids_that_pass_through_one_another_are_both_seen():
 
 
 @pytest.mark.parametrize("order", [(0.0, np.pi), (np.pi, 0.0)])
-def test_the_side_that_shows_the_goals_is_taken(order):
+def test_the_side_that_shows_the_goals_is_used(order):
     wall = primitive_corners(BOX, (0.05, 2.0, 2.0))
     solids = (
         Solid.placed(Category.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
@@ -128,7 +128,7 @@ def test_one_panel_for_each_view_and_a_legend():
     assert labels == [Category.ARM.label, Category.CURRENT_GOAL.label]
 
 
-def test_what_is_behind_the_camera_is_left_out():
+def test_solids_behind_the_camera_are_left_out():
     image = picture(draw_scene([view(sphere(Category.ARM, [18.0, 0.0, 7.0]))], title=""))
     assert share(image, Category.ARM) == 0.0
 

@@ -24,7 +24,7 @@ def area(polygon):
     ("shape", "size", "exact", "rel"),
     [
         # A box is drawn as it is; 16 corners around a circle leave out 2.6 % of its area, and the
-        # flat bands of a ball a little more.
+        # flat bands of a sphere slightly more.
         pytest.param(BOX, (0.1, 0.2, 0.3), 0.048, 1e-12, id="box"),
         pytest.param(SPHERE, (0.2, 0.0, 0.0), 4 / 3 * np.pi * 0.008, 0.08, id="sphere"),
         pytest.param(CAPSULE, (0.1, 0.4, 0.0), np.pi * (0.008 + 4e-3 / 3), 0.05, id="capsule"),

@@ -85,7 +85,7 @@ def test_there_is_no_other_state():
         PlaceMap.of_state(SCORES, GRID, 6)
 
 
-def test_nothing_in_reach_anywhere():
+def test_no_configuration_reaches_a_goal():
     grid = small_grid(nx=3, ny=3, head=2)
     scores = random_scores(grid, 2, seed=0, share=0.0)
     found = [StatePanel(PlaceMap.of_state(scores, grid, state), [], []) for state in range(2)]

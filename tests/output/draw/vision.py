@@ -1,4 +1,4 @@
-"""How colours look to people with and without all three kinds of cones."""
+"""Simulation of colour vision with all three types of cones, and without one of them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ VISION = {
         ]
     ),
 }
-"""Matrices on linear RGB for the whole loss of a kind of cone: Machado, Oliveira and Fernandes, "A
+"""Matrices on linear RGB for the complete loss of one type of cone: Machado, Oliveira and Fernandes, "A
 Physiologically-based Model for Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009."""
 _XYZ = np.array(
     [

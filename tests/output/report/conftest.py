@@ -33,7 +33,7 @@ def score_path(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def paper():
-    """The paper, as if its wheelchair were the small room."""
+    """The paper, with the small environment in place of its wheelchair."""
     plain = load_paper().model_dump(by_alias=True)
     for table in ("table_1", "table_3"):
         for row in plain[table]:

@@ -43,13 +43,13 @@ def test_pictures_are_there_and_small():
 def test_a_file_of_another_row_is_refused(tmp_path):
     scores = tmp_path / "scores"
     scores.mkdir()
-    # The first row that is looked for; what it holds was scored for another robot.
+    # The file of the first row contains scores of another robot.
     file = score_file()
     file.metadata["robot"] = "tiago"
     save_scores(scores / "shaving-wheelchair-pr2.tcs", file)
-    for task, room in load_paper().rows():
-        if (task, room) != ("shaving", "wheelchair"):
-            path = scores / f"{task}-{room}-pr2.tcs"
+    for task, environment in load_paper().rows():
+        if (task, environment) != ("shaving", "wheelchair"):
+            path = scores / f"{task}-{environment}-pr2.tcs"
             path.write_bytes((scores / "shaving-wheelchair-pr2.tcs").read_bytes())
     done = run("--scores", scores, "--out", tmp_path / "docs", cwd=tmp_path)
     assert done.returncode == 1

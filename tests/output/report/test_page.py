@@ -74,7 +74,7 @@ def everything():
     )
 
 
-def test_whatever_is_said_stays_text(everything):
+def test_all_text_is_escaped(everything):
     reader = read(everything)
     assert "script" not in reader.tags
     assert "".join(reader.text).count(HOSTILE) == 13
@@ -103,7 +103,7 @@ def test_tones_are_classes_beside_the_words():
 
 
 @pytest.mark.parametrize("write", [as_html, as_markdown])
-def test_what_is_no_block_is_named(write):
+def test_an_unknown_block_is_named(write):
     with pytest.raises(TypeError, match=r"a page has no block of type float"):
         write(page_of(1.5))
 

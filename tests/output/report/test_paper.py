@@ -30,6 +30,6 @@ def test_tables_agree_where_they_print_the_same():
         assert next(cell for cell in cells if cell) == (best.mean, best.std)
 
 
-def test_what_the_paper_does_not_have_is_none():
+def test_figures_missing_in_the_paper_are_none():
     assert load_paper().published("shaving", "kitchen") is None
     assert load_paper().compared("scratching_chest", "bed", 1) is None

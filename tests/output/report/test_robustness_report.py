@@ -29,7 +29,7 @@ def column(table, title):
     return [row[titles.index(title)] for row in table.texts()]
 
 
-def test_table_1_puts_the_papers_figure_and_the_difference_beside_ours(study, lossless, paper):
+def test_table_1_has_the_figure_of_the_paper_and_the_difference(study, lossless, paper):
     table = table_1([study, lossless], paper)
     ours = column(table, "tcs")
     assert ours[1] == "100.0 (0.0)"
@@ -46,7 +46,7 @@ def test_a_row_is_short_when_its_printed_mean_is_below_the_papers(study, lossles
     assert not is_short(lossless, paper)
 
 
-def test_table_3_says_na_where_the_paper_does(study, paper):
+def test_table_3_has_na_where_the_paper_does(study, paper):
     feeding = dataclasses.replace(study, task="feeding")
     table = table_3([study, feeding], paper)
     assert column(table, "Members") == ["1", "2", "1", "2"]

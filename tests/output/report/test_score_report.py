@@ -129,7 +129,7 @@ def test_every_configuration_counts_once_for_each_goal(report):
         assert counts.get(name, 0) == np.count_nonzero(scores.reason == reason)
 
 
-def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
+def test_goals_that_one_base_pose_misses_have_a_reason_and_a_change(single):
     assert single.unreached
     wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
@@ -141,7 +141,7 @@ def test_goals_that_one_place_misses_get_a_reason_and_a_remedy(single):
     assert [row for row in goals_table(single).texts() if row[2] == "nowhere"]
 
 
-def test_the_set_is_the_one_to_choose_from_here(score_path):
+def test_the_set_is_the_one_selected_from_here(score_path):
     here = InitialConfiguration(base_x=0.6, base_y=0.7, base_yaw=0.0, torso=0.0)
     found = make_score_report(score_path, here=here, sizes=CheckSizes(pairs=0, dense=0))
     wording = as_markdown(make_score_page(found, command="c"))
@@ -195,7 +195,7 @@ def test_a_false_posture_that_only_the_report_shows_is_found(score_path, tmp_pat
     )
 
 
-def test_what_was_rechecked_is_reported(report):
+def test_the_number_of_checks_is_reported(report):
     found = dict(
         zip(*(column(verification_table(report), t) for t in ("Check", "Result")), strict=True)
     )
@@ -272,7 +272,7 @@ def test_on_the_command_line(score_path, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["page.html", "page.md"]
 
 
-def test_nothing_in_reach_is_a_page_too(tmp_path):
+def test_a_file_without_reached_goals_has_a_page(tmp_path):
     path = tmp_path / "far.tcs"
     save_scores(path, score("shaving", write_environment(tmp_path, "far", FAR)))
     found = make_score_report(path, sizes=CHECK)

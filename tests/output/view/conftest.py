@@ -9,22 +9,22 @@ from tests.placement.tables.small import random_scores, small_grid
 
 
 def made(grid, goals, members, *, share=0.5, success=None) -> ViewedSet:
-    """Random viewed."""
+    """Return a set with random scores."""
     return ViewedSet(grid, random_scores(grid, goals, seed=3, share=share), members, success)
 
 
 @pytest.fixture
 def bed() -> ViewedSet:
-    """Answers for a bed of three heights and a head rest of two angles."""
+    """Random scores for a bed with three heights and two head rest angles."""
     return made(small_grid(bed=3, head=2), 4, (50, 200))
 
 
 @pytest.fixture
 def estimated(bed) -> ViewedSet:
     """The same, with estimates of success of two singles and a pair."""
-    nobody = -1
+    none = -1
     table = SuccessTable(
-        members=np.array([[50, nobody], [98, nobody], [50, 200]], np.int32),
+        members=np.array([[50, none], [98, none], [50, 200]], np.int32),
         success=np.array([0.25, 0.75, 0.9]),
         low=np.array([0.2, 0.7, 0.85]),
         high=np.array([0.3, 0.8, 0.95]),
@@ -35,13 +35,13 @@ def estimated(bed) -> ViewedSet:
 
 @pytest.fixture
 def shaving_set(shaving) -> ViewedSet:
-    """Random answers for shaving in the wheelchair: what is shown, not what is true."""
+    """Random scores for shaving in the wheelchair, which no scene produced."""
     return made(small_grid(), len(shaving.goals), (5, 30))
 
 
 @pytest.fixture
 def objects(scene, shaving, shaving_set) -> SceneObjects:
-    """Their things, the robot as its collision shapes."""
+    """The objects of the scene, with the robot as its collision shapes."""
     return SceneObjects(scene, shaving, shaving_set, meshes=False)
 
 

@@ -18,7 +18,7 @@ def test_first_is_the_first_member_at_a_goal_it_reaches(bed):
     assert controls.heading(state) == "member 1 of 2"
 
 
-def test_there_is_a_slider_for_whatever_can_move(bed):
+def test_every_variable_axis_has_a_slider(bed):
     names = [slider.name for slider in Controls(bed).sliders]
     assert names == [
         "set member", "goal", "floor colour", "bed height [m]", "head rest [deg]",
@@ -27,7 +27,7 @@ def test_there_is_a_slider_for_whatever_can_move(bed):
     ]  # fmt: skip
 
 
-def test_what_has_one_value_has_no_slider():
+def test_a_single_value_has_no_slider():
     alone = made(small_grid(2, 2, 1, 1), 1, (1,))
     names = [slider.name for slider in Controls(alone).sliders]
     assert names == ["floor colour", "base x [m]", "base y [m]"]
@@ -42,7 +42,7 @@ def test_every_slider_goes_through_all_its_values(bed):
             assert controls.values(after)[slider.name] == pytest.approx(value, abs=1e-12)
 
 
-def test_standing_elsewhere_moves_that_axis_alone(bed):
+def test_another_base_pose_moves_that_axis_alone(bed):
     controls = Controls(bed)
     before = controls.first()
     after = controls.moved(before, "base x [m]", -0.3 + 0.04)
@@ -100,7 +100,7 @@ def test_goals_and_colours_are_stepped_through_in_rings(estimated):
     assert state == controls.first()
 
 
-def test_without_a_set_one_can_still_stand_somewhere(bed):
+def test_without_a_set_the_free_base_positions_are_shown(bed):
     nothing = ViewedSet(bed.grid, bed.scores, (), None)
     controls = Controls(nothing)
     state = controls.first()

@@ -19,7 +19,7 @@ def test_every_goal_of_the_set_is_shown_once_at_the_member_that_serves_it_best(b
         assert bed.joints(step.index, step.goal) is not None
 
 
-def test_without_a_set_something_is_shown_all_the_same(objects, shaving_set):
+def test_without_a_set_the_first_configuration_is_shown(objects, shaving_set):
     nothing = ViewedSet(shaving_set.grid, shaving_set.scores, (), None)
     assert len(play_steps(nothing)) == 1
     assert "No configuration reaches a goal" in export_page(
@@ -29,10 +29,10 @@ def test_without_a_set_something_is_shown_all_the_same(objects, shaving_set):
 
 def test_page_states_what_it_is_and_fits_into_three_megabytes(objects, shaving_set):
     text = export_page(
-        open_meshcat(), objects, shaving_set, title="Shaving & more", notes=["By <nobody>."]
+        open_meshcat(), objects, shaving_set, title="Shaving & more", notes=["By <no one>."]
     )
     assert "Shaving &amp; more" in text
-    assert "By &lt;nobody&gt;." in text
+    assert "By &lt;no one&gt;." in text
     assert text.count("</body>") == 1
     assert len(text.encode()) < 3e6
 
@@ -51,8 +51,8 @@ class Recorder:
         self.shown.setdefault(path, {})[frame] = visible
 
 
-def test_whatever_is_shown_stands_still_until_the_next_goal(objects, shaving_set, monkeypatch):
-    """The browser moves things in straight lines between keys: there must be none to move along."""
+def test_objects_are_at_rest_until_the_next_goal(objects, shaving_set, monkeypatch):
+    """The browser interpolates between keys, so no object may differ between two neighbouring keys."""
     monkeypatch.setattr(export, "MeshcatAnimation", Recorder)
     shots = [objects.snapshot(step.index, step.goal) for step in play_steps(shaving_set)]
     seen = [set(map(str, shot.arrows)) for shot in shots]

@@ -32,7 +32,7 @@ def configurations_at(viewed, state, x, y):
 
 
 @pytest.mark.parametrize("state", [0, 4])
-def test_reason_is_the_one_that_came_nearest(bed, state):
+def test_the_reason_is_that_of_the_most_checks_passed(bed, state):
     floor = floor_map(bed, state, 2, "reason")
     nx, ny = bed.grid.axis("base_x").count, bed.grid.axis("base_y").count
     assert len(floor.places) == nx * ny
@@ -58,7 +58,7 @@ def test_colours_rise_with_the_best_score_of_a_place(bed, colouring):
     assert min(best) > 0.0
 
 
-def test_success_lies_where_a_single_place_has_an_estimate(estimated):
+def test_success_is_shown_where_a_single_has_an_estimate(estimated):
     per_state = estimated.grid.size // 6
     for h in (50, 98):
         floor = floor_map(estimated, h // per_state, 0, "success")
@@ -91,6 +91,6 @@ def test_success_belongs_to_its_own_state_and_has_the_colour_of_its_value(bed):
         np.testing.assert_allclose(floor.colours, [matplotlib.colormaps["viridis"](value)[:3]])
 
 
-def test_success_can_be_asked_for_only_where_it_is_stored(bed, estimated):
+def test_success_is_available_only_where_it_is_stored(bed, estimated):
     assert colourings(bed) == ("reachability", "manipulability", "reason")
     assert colourings(estimated) == (*colourings(bed), "success")

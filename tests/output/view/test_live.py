@@ -54,7 +54,7 @@ def test_snapshot_has_the_arm_where_the_table_has_it(objects, scene, shaving_set
     assert X_WB.translation() == pytest.approx([at.base_x, at.base_y, 0.0])
 
 
-def test_arm_rests_where_the_goal_is_not_reached(objects, scene, shaving_set):
+def test_the_arm_is_at_rest_if_the_goal_is_not_reached(objects, scene, shaving_set):
     reached = shaving_set.scores.reached
     index = int(np.flatnonzero((~reached).sum(axis=1) >= 2)[0])
     first, second = np.flatnonzero(~reached[index])[:2]
@@ -93,7 +93,7 @@ def test_a_slider_moves_the_robot_and_reports_the_result(viewer, meshcat, report
     assert reported[1:] == [f"other configuration: {line}"]
 
 
-def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shaving_set):
+def test_choosing_a_member_moves_the_other_sliders(viewer, meshcat, shaving_set):
     meshcat.SetSliderValue("set member", 2.0)
     assert viewer.update()
     at = shaving_set.grid.configuration(shaving_set.members[1])
@@ -103,7 +103,7 @@ def test_choosing_a_member_takes_the_other_sliders_along(viewer, meshcat, shavin
 
 
 class Spy:
-    """Notes what it is asked to show."""
+    """Records the objects and properties that it receives."""
 
     def __init__(self):
         self.visible, self.moved = {}, set()

@@ -44,7 +44,7 @@ def test_line_states_each_goal_that_is_missed():
     )
 
 
-def test_goals_are_shared_out_among_the_members_that_reach_them(bed):
+def test_goals_are_assigned_to_members_that_reach_them(bed):
     served = [bed.served(number) for number in range(len(bed.members))]
     together = sorted(goal for goals in served for goal in goals)
     reached = bed.scores.reached[list(bed.members)].any(axis=0)

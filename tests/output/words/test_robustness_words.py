@@ -33,7 +33,7 @@ def test_reasons_are_reported_from_one_in_twenty_on():
 
 
 @pytest.mark.parametrize(("share", "is_stated"), [(0.19, False), (0.2, True), (1.0, True)])
-def test_a_pair_is_reported_where_it_is_in_the_way_in_one_of_five(share, is_stated):
+def test_a_pair_is_reported_if_it_collides_in_one_of_five_samples(share, is_stated):
     pair = ("l_forearm_link", "bed::pillow")
     text = stopped_by(loss({Reason.ARM_BLOCKED: 1.0}, pair, share))
     assert text.endswith("; most often l forearm and pillow") == is_stated
@@ -51,6 +51,6 @@ def test_an_error_is_reported_with_its_side(tilt, text):
     assert goes_with(loss({Reason.TOO_FAR: 1.0}, standardized_error=tilt)) == text
 
 
-def test_shares_and_points():
+def test_percentages_and_points():
     assert (percent(0.98407), percent(0.5, 0)) == ("98.4", "50")
     assert (signed(2.349), signed(-0.04), signed(-0.06)) == ("+2.3", "0.0", "-0.1")

@@ -78,7 +78,7 @@ def test_driving_ahead_and_left_leads_there(yaw_deg):
     assert (x, y) == pytest.approx((after.base_x, after.base_y), abs=1e-14)
 
 
-def test_changes_tell_values_and_units():
+def test_changes_have_values_and_units():
     before = configuration(x=1.0, yaw_deg=350, bed_height=0.1, head_rest_deg=35)
     after = configuration(x=0.7, yaw_deg=10, bed_height=0.1, head_rest_deg=70)
     assert [change.to_json() for change in changes_between(before, after)] == [

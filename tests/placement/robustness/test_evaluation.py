@@ -59,7 +59,7 @@ def test_a_goal_counts_when_any_member_reaches_it(bed_trials):
     assert all(np.any(either & ~one.reached) for one in alone)
 
 
-def test_growing_a_set_never_lowers_it(chair_trials, rng):
+def test_growing_a_set_never_lowers_its_success(chair_trials, rng):
     first, second = drawn_sets(chair_trials.file, rng, 1)[0]
     one = evaluate(chair_trials, samples=50, select=[first])
     two = evaluate(chair_trials, samples=50, select=[first, second])

@@ -52,7 +52,7 @@ def test_rounds_double_up_to_all_samples():
     assert round_sizes(10) == (10,)
 
 
-def test_estimates_are_those_of_the_samples_each_set_has_had(field, sets):
+def test_estimates_use_the_samples_of_each_set(field, sets):
     found = successive_halving(sets, WEIGHTS, 1024, field.attempt)
     for k in range(len(sets)):
         fractions = field.fractions(sets[k : k + 1], found.samples[k])

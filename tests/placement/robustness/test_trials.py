@@ -170,11 +170,11 @@ def test_drake_confirms_solutions_in_perturbed_environments(trials, rng):
 
 
 def is_of_base(scene, name):
-    return any(part.name == name and part.group.name == "BODY" for part in scene.built.parts)
+    return any(part.name == name and part.group is Group.BODY for part in scene.built.parts)
 
 
 def is_of_environment(scene, name):
-    return any(part.name == name and part.group.name == "ROOM" for part in scene.built.parts)
+    return any(part.name == name and part.group is Group.ENVIRONMENT for part in scene.built.parts)
 
 
 @pytest.mark.slow

@@ -82,11 +82,11 @@ def assert_same_scores(one, other):
 @pytest.mark.parametrize(
     "observation", [None, {}, {"person_x": 0.0, "head_tilt": 0.0, "wheelchair_yaw": 0.0}]
 )
-def test_nothing_off_gives_the_offline_scores_exactly(scorer, small_file, observation):
+def test_without_observed_errors_the_scores_are_the_offline_ones(scorer, small_file, observation):
     assert_same_scores(scorer.score(observation).nominal, small_file.nominal)
 
 
-def test_a_frame_where_it_belongs_gives_the_offline_scores_exactly(scorer, small_file, head):
+def test_a_nominal_frame_gives_the_offline_scores_exactly(scorer, small_file, head):
     file = scorer.score(Observation(frames={"head": head}))
     assert_same_scores(file.nominal, small_file.nominal)
     assert file.metadata["observation"]["frame_position_error"] < 1e-9
@@ -100,7 +100,7 @@ def test_a_stored_shift_gives_its_table_exactly(bed_scorer, bedside, shift):
     assert_same_scores(bed_scorer.score({"person_y": shift}).nominal, table)
 
 
-def test_scoring_leaves_no_trace_for_the_next(scorer, small_file):
+def test_scoring_does_not_affect_the_next_one(scorer, small_file):
     moved = scorer.score({"person_x": 0.05, "head_tilt": 0.1})
     assert not np.array_equal(moved.nominal.scores.dexterity, small_file.nominal.scores.dexterity)
     assert_same_scores(scorer.score().nominal, small_file.nominal)
@@ -142,7 +142,7 @@ def test_drake_refutes_scores_of_another_observation(scorer, small_file):
     assert verify(swapped, pairs=20, dense=0).false_reached == 20
 
 
-def test_a_set_is_chosen_from_what_was_scored_live(scorer):
+def test_a_set_is_selected_from_a_live_score(scorer):
     file = scorer.score({"person_x": 0.03})
     choice = select(file, HERE)
     assert choice.members
@@ -162,7 +162,7 @@ def test_frames_with_orientation_determine_the_joints(scorer):
     assert entry["frame_rotation_error"] < 1e-8
 
 
-def test_a_place_alone_is_explained_by_the_most_likely_joints(scorer, head):
+def test_a_position_alone_is_fitted_by_the_most_likely_joints(scorer, head):
     seen = [head[0] + 0.04, head[1], head[2]]
     entry = scorer.score(Observation(frames={"head": seen})).metadata["observation"]
     assert entry["frame_position_error"] < 1e-8
@@ -207,7 +207,7 @@ def test_a_frame_on_the_bed_determines_the_shift(bed_scorer):
         ),
     ],
 )
-def test_what_cannot_be_is_refused(scorer, observation, error, message):
+def test_impossible_values_are_refused(scorer, observation, error, message):
     with pytest.raises(error, match=message):
         scorer.score(observation)
 
@@ -227,6 +227,6 @@ def test_what_cannot_be_is_refused(scorer, observation, error, message):
         ({"neck_body": 0.1}, "follows 'head_rest'"),
     ],
 )
-def test_what_the_robot_sets_is_not_observed(bed_scorer, observation, message):
+def test_axes_of_the_grid_cannot_be_observed(bed_scorer, observation, message):
     with pytest.raises(Exception, match=message):
         bed_scorer.score(observation)

@@ -51,7 +51,7 @@ def scored(files):
     return score("feeding", environment, robot)
 
 
-def test_the_file_says_that_ik_was_numeric(scored, tmp_path, capsys):
+def test_the_file_records_numeric_ik(scored, tmp_path, capsys):
     assert scored.metadata["ik"] == "numeric"
     figures = summary(scored)
     assert figures["ik"] == "numeric"
@@ -63,7 +63,7 @@ def test_the_file_says_that_ik_was_numeric(scored, tmp_path, capsys):
     assert NUMERIC_NOTE in printed
 
 
-def test_the_closed_form_says_so_too_without_a_note(capsys):
+def test_the_closed_form_is_recorded_without_a_note(capsys):
     figures = {
         "ik": "analytic", "configurations": 1, "goals": 1, "scoring_seconds": 0.1, "candidates": 0,
         "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x", "pairs": 1,

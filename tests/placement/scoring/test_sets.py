@@ -146,7 +146,7 @@ def test_too_many_candidates_for_triples(monkeypatch):
         build_sets(random_scores(grid, 2, seed=0), grid, max_members=3)
 
 
-def test_too_many_triples_of_places(monkeypatch):
+def test_too_many_triples_of_base_cells(monkeypatch):
     grid = small_grid(nx=6)
     scores = random_scores(grid, 5, seed=0)
     monkeypatch.setattr(triples, "MOST_GROUPS", 3)

@@ -298,7 +298,7 @@ def test_expensive_travel_selects_a_near_set(tables):
     assert len(near.indices) == 1
 
 
-def test_nothing_reached_anywhere():
+def test_no_goal_is_reached():
     grid = small_grid()
     sets = build_sets(random_scores(grid, 3, seed=0, share=0.0), grid)
     with pytest.raises(SelectionError, match="no goal is reached from any initial configuration"):

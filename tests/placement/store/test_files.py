@@ -75,7 +75,7 @@ def test_names_may_be_text_or_paths(path, file):
     assert_same(load_scores(str(path)), load_scores(path))
 
 
-def test_nothing_but_the_file_is_left(path, file):
+def test_only_the_file_is_left(path, file):
     save_scores(path, file)
     save_scores(path, file)
     assert [found.name for found in path.parent.iterdir()] == [path.name]
@@ -92,7 +92,7 @@ def test_nothing_but_the_file_is_left(path, file):
     ],
     ids=lambda value: getattr(value, "strerror", None) or str(value) or "Ctrl-C",
 )
-def test_a_failure_leaves_the_old_file_and_no_half_one(path, file, monkeypatch, place, raised):
+def test_a_failure_leaves_the_old_file_and_no_partial_one(path, file, monkeypatch, place, raised):
     path.write_bytes(b"the old file")
 
     def fail(*arguments, **options):
@@ -131,7 +131,7 @@ def test_an_impossible_folder_is_refused(tmp_path, file, folder):
         save_scores(tmp_path / folder / "shaving.tcs", file)
 
 
-def test_a_folder_is_no_target(tmp_path, file):
+def test_a_folder_is_refused_as_target(tmp_path, file):
     with pytest.raises(OutputError, match="cannot be written"):
         save_scores(tmp_path, file)
     assert list(tmp_path.iterdir()) == []
@@ -148,7 +148,7 @@ def test_an_unwritable_folder_is_refused(path, file, monkeypatch):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_folder_or_pipe_is_no_file(tmp_path):
+def test_a_folder_or_pipe_is_refused_as_file(tmp_path):
     with pytest.raises(StoreError, match="not a regular file"):
         load_scores(tmp_path)
     os.mkfifo(tmp_path / "pipe")
@@ -235,7 +235,7 @@ def test_a_newer_file_is_refused(path, file):
         load_scores(path)
 
 
-def test_an_older_file_gets_one_line_that_says_what_to_do(path, file):
+def test_an_older_file_is_refused_with_one_line_of_advice(path, file):
     joblib.dump(encode(file) | {"format_version": 2}, path)
     with pytest.raises(StoreFormatError) as refused:
         load_scores(path)

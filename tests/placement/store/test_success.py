@@ -30,7 +30,7 @@ def with_estimates(**changes):
     return dataclasses.replace(file, tables=(dataclasses.replace(table, success=success),))
 
 
-def test_what_is_saved_is_loaded(tmp_path):
+def test_a_saved_file_is_loaded_unchanged(tmp_path):
     path, file = tmp_path / "file.tcs", with_estimates()
     save_scores(path, file)
     back = load_scores(path).nominal.success

@@ -5,7 +5,7 @@ from tcs.placement.tables import tc_manipulability, tc_reachability
 from tests.placement.tables.small import random_scores, set_scores, small_grid
 
 
-def test_reachability_is_the_weighted_share():
+def test_reachability_is_the_weighted_fraction():
     reached = np.array([[True, False, True], [False, False, False], [True, True, True]])
     np.testing.assert_array_equal(
         tc_reachability(reached, np.array([0.5, 0.25, 0.25])), [0.75, 0.0, 1.0]

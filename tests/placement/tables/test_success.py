@@ -64,7 +64,7 @@ def test_the_most_robust_set_has_the_greatest_lower_bound():
         ("samples", [64, 64, 1], "has shape"),
     ],
 )
-def test_what_contradicts_itself_is_refused(name, value, message):
+def test_contradictory_arguments_are_refused(name, value, message):
     wrong = np.array(value, dtype=PARTS[name].dtype)
     with pytest.raises(TcsError, match=message):
         SuccessTable(**{**PARTS, name: wrong})

@@ -44,10 +44,10 @@ def meshcat(shared_meshcat):
 
 
 class Instead:
-    """A Meshcat of which some functions are a test's own.
+    """A Meshcat with some functions replaced by those of a test.
 
-    A class made inside a test holds its Meshcat in a cycle, which whichever thread collects
-    garbage takes apart: Drake ends the process where that is not the one that made it.
+    A class defined inside a test is part of a reference cycle with its Meshcat, which any thread
+    may collect; Drake ends the process if that is not the thread that created the Meshcat.
     """
 
     def __init__(self, meshcat, **own):
@@ -59,7 +59,7 @@ class Instead:
 
 @dataclass
 class Desk:
-    """Controls that a test moves."""
+    """Controls operated by a test."""
 
     sliders: dict[str, float] = field(
         default_factory=lambda: {name: value for name, (*_, value) in sliders().items()}
@@ -86,15 +86,15 @@ def desk():
 
 
 @pytest.fixture
-def told():
+def reasons():
     return []
 
 
 @pytest.fixture
-def page(meshcat, iiwa_stage, iiwa, ready, told, desk):
-    """A live page whose controls are the desk's."""
+def page(meshcat, iiwa_stage, iiwa, ready, reasons, desk):
+    """A live page with the controls of the desk."""
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=told.append
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
     )
     found.hand.source = desk
     return found
@@ -104,8 +104,8 @@ def page(meshcat, iiwa_stage, iiwa, ready, told, desk):
 def driven(iiwa):
     """A run of 9 s: down to a limit, a joint group, and out to where the arm is stretched."""
     session = Teleoperation(iiwa, [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
-    asked = [(Command(linear=(0.0, 0.0, -0.2)), 300)]
-    asked += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
-    asked += [(Command(mode=Mode.END_EFFECTOR, linear=(0.25, 0.0, 0.1)), 500)]
-    rows = [(command, session.step(command)) for command, count in asked for _ in range(count)]
+    commands = [(Command(linear=(0.0, 0.0, -0.2)), 300)]
+    commands += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
+    commands += [(Command(mode=Mode.END_EFFECTOR, linear=(0.25, 0.0, 0.1)), 500)]
+    rows = [(command, session.step(command)) for command, count in commands for _ in range(count)]
     return run_from_steps(iiwa, rows, {"robot": "iiwa7", "torso_height": 0.0, "condition": "novel"})

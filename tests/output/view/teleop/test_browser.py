@@ -1,4 +1,4 @@
-"""The live page and the played run in a headless Chromium: what is seen there, and what it does."""
+"""The live page and the playback of a run in a headless Chromium."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.output.view.teleop.conftest import MODES
 
 pytestmark = pytest.mark.slow
 HOLD = 0.4
-"""How long the page is driven after a key [s]: to be heard, to move, and to come to rest."""
+"""Time for which the page runs after a key [s]: the arm moves and comes to rest."""
 
 
 @pytest.fixture(scope="module")
@@ -25,20 +25,20 @@ def browser():
 
 
 @pytest.fixture
-def told():
+def reasons():
     return []
 
 
 @pytest.fixture
-def page(iiwa, iiwa_stage, ready, browser, told):
+def page(iiwa, iiwa_stage, ready, browser, reasons):
     """A live page, seen in the browser."""
     meshcat = open_meshcat()
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=told.append
+        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
     )
     browser.open(meshcat.web_url(), "tool")
     until(found, lambda: meshcat.GetNumActiveConnections() == 1)
-    # A closed page of the test before may still count for a moment.
+    # The closed page of the previous test may still count for a moment.
     found.run(0.2)
     found.url = meshcat.web_url()
     yield found
@@ -46,7 +46,7 @@ def page(iiwa, iiwa_stage, ready, browser, told):
 
 
 def until(page, done, patience=20.0):
-    """Drive until something is so."""
+    """Run the page until a condition holds."""
     end = time.monotonic() + patience
     while not done():
         assert time.monotonic() < end, f"not so after {patience:g} s"
@@ -70,13 +70,13 @@ def slide(browser, page, name, value):
 
 
 def near(browser, colour):
-    """How many pixels of the picture have about that colour."""
+    """Return the number of pixels with about this colour."""
     wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
     return int((np.abs(browser.picture() - wanted).max(axis=2) < 12).sum())
 
 
 def shown_states(browser, states=tuple(COLOURS)):
-    """Which colour of each bar is visible in the browser's scene."""
+    """Return which colours of each bar are visible in the scene of the browser."""
     script = """
     const camera = viewer.scene_tree.find(["Cameras", "default", "rotated", "<object>"]);
     const bars = camera.children["panel"].children["bar"].children;
@@ -87,7 +87,7 @@ def shown_states(browser, states=tuple(COLOURS)):
 
 
 def pads(browser, pad):
-    """Let the browser have a gamepad, or none."""
+    """Give the browser a gamepad, or none."""
     browser.driver.execute_script(
         """
         const given = arguments[0];
@@ -115,7 +115,7 @@ def test_page_loads_without_complaint_and_keys_move_the_tool(page, browser):
     assert [name for name in browser.fetched() if not name.startswith(ours)] == []
 
 
-def test_slider_drives_and_space_puts_it_back(page, browser):
+def test_a_slider_moves_the_tool_and_space_resets_it(page, browser):
     before = page.last.p.copy()
     slide(browser, page, "move y [m/s]", 0.1)
     page.run(0.5)
@@ -135,7 +135,7 @@ def test_null_space_mode_moves_the_elbow_and_keeps_the_tool(page, browser, iiwa)
     elbow = iiwa.link_poses(page.last.joints)[3, :3, 3]
     press(browser, page, "e", 8)
     assert np.linalg.norm(iiwa.link_poses(page.last.joints)[3, :3, 3] - elbow) > 0.02
-    # The issue's bound: 0.1 mm.
+    # Bound on the displacement of the tool: 0.1 mm.
     assert np.linalg.norm(page.last.p - tool) < 1e-4
 
 
@@ -179,7 +179,7 @@ def test_panel_stays_when_the_camera_moves(page, browser):
     assert changed < 0.02
 
 
-def test_a_gamepad_drives_and_the_arm_stops_when_it_is_lost(page, browser, told):
+def test_a_gamepad_drives_and_the_arm_stops_when_it_is_lost(page, browser, reasons):
     at_rest = {"axes": [0, 0, 0, 0], "buttons": [0] * 17}
     pads(browser, at_rest)
     page.run(1.0)
@@ -193,7 +193,7 @@ def test_a_gamepad_drives_and_the_arm_stops_when_it_is_lost(page, browser, told)
     here = page.last.p.copy()
     page.run(0.5)
     np.testing.assert_array_equal(page.last.p, here)
-    assert [line for line in told if "gamepad lost" in line]
+    assert [line for line in reasons if "gamepad lost" in line]
     press(browser, page, " ")
     page.run(0.2)
     assert page.last.reason == ""
@@ -208,7 +208,7 @@ def test_a_closed_browser_stops_the_arm(page, browser):
     assert not page.last.rates.any()
 
 
-def test_played_run_needs_no_server(browser, iiwa, iiwa_stage, driven, tmp_path):
+def test_the_page_of_a_run_needs_no_server(browser, iiwa, iiwa_stage, driven, tmp_path):
     film = RunView(iiwa, driven)
     path = tmp_path / "run.html"
     meshcat = open_meshcat()
@@ -219,14 +219,14 @@ def test_played_run_needs_no_server(browser, iiwa, iiwa_stage, driven, tmp_path)
     const tool = viewer.scene_tree.find(["drake", "tool"]).object.position;
     return [tool.x, tool.y, tool.z];
     """
-    # Pictures come 25 a second: times that one of them has, apart from rounding.
+    # Times of frames, of which there are 25 per second.
     for seconds in (0.0, 2.0, 3.6, 8.8):
         browser.driver.execute_script(
             "viewer.animator.pause(); viewer.animator.seek(arguments[0]);", seconds
         )
         i = film.sample(seconds)
         tool = browser.driver.execute_script(where)
-        # Between two pictures the tool moves by a hundredth of a metre at most.
+        # Between two frames the tool moves by a hundredth of a metre at most.
         assert tool == pytest.approx(driven.position[i].tolist(), abs=1e-3)
         assert shown_states(browser) == [[state] for state in film.readout(i).states]
     assert browser.complaints() == []

@@ -34,11 +34,11 @@ def hand(desk):
     return OperatorInput(desk, MODES, 4)
 
 
-def twist(heard):
-    return np.array([*heard.command.linear, *heard.command.angular])
+def twist(received):
+    return np.array([*received.command.linear, *received.command.angular])
 
 
-def test_every_button_has_a_key_of_its_own_and_none_folds_the_controls():
+def test_every_button_has_its_own_key_and_none_hides_the_controls():
     keys = list(buttons(4).values())
     assert len(keys) == len(set(keys))
     # H hides the browser's own controls.
@@ -46,18 +46,18 @@ def test_every_button_has_a_key_of_its_own_and_none_folds_the_controls():
 
 
 @pytest.mark.parametrize("name", MOVES)
-def test_a_press_moves_one_way_for_a_moment(hand, desk, name):
-    axis, way, _ = MOVES[name]
+def test_a_press_moves_the_tool_for_a_moment(hand, desk, name):
+    axis, direction, _ = MOVES[name]
     assert not twist(hand.listen(0.0)).any()
     desk.press(name)
     expected = np.zeros(6)
-    expected[axis] = way * desk.sliders[SPEED if axis < 3 else TURN_SPEED]
+    expected[axis] = direction * desk.sliders[SPEED if axis < 3 else TURN_SPEED]
     np.testing.assert_allclose(twist(hand.listen(1.0)), expected)
     np.testing.assert_allclose(twist(hand.listen(1.0 + 0.9 * TAP)), expected)
     assert not twist(hand.listen(1.0 + 1.01 * TAP)).any()
 
 
-def test_a_held_key_goes_on_by_its_repeats(hand, desk):
+def test_a_held_key_continues_by_its_repeats(hand, desk):
     for i in range(50):
         desk.press("ahead")
         assert twist(hand.listen(0.1 * i))[0] > 0.0
@@ -70,13 +70,13 @@ def test_sliders_move_and_have_a_dead_zone(hand, desk):
     assert twist(hand.listen(0.1))[0] == pytest.approx(0.1)
 
 
-def test_nothing_asks_for_more_than_the_most(hand, desk):
+def test_commands_do_not_exceed_the_greatest_rates(hand, desk):
     desk.sliders[X] = desk.sliders[SPEED] = MOST_LINEAR
     desk.press("ahead")
     assert twist(hand.listen(0.0))[0] == MOST_LINEAR
 
 
-def test_space_stops_everything_and_puts_sliders_back(hand, desk):
+def test_space_stops_the_arm_and_resets_the_sliders(hand, desk):
     desk.sliders[X] = 0.2
     desk.press("up")
     assert twist(hand.listen(0.0)).any()
@@ -84,15 +84,15 @@ def test_space_stops_everything_and_puts_sliders_back(hand, desk):
     assert not twist(hand.listen(0.01)).any()
     assert not twist(hand.listen(0.02)).any()
     assert desk.sliders[X] == 0.0
-    # Speeds are no rates: they stay.
+    # The speed sliders are not reset.
     assert desk.sliders[SPEED] == sliders()[SPEED][3]
 
 
-def test_modes_take_turns_and_groups_turn_only_in_theirs(hand, desk):
+def test_modes_alternate_and_groups_move_only_in_null_space_mode(hand, desk):
     desk.press(TURN_UP)
-    heard = hand.listen(0.0)
-    assert heard.command.sign == 0
-    assert "null-space mode" in heard.hint
+    received = hand.listen(0.0)
+    assert received.command.sign == 0
+    assert "null-space mode" in received.hint
     desk.press(NEXT_MODE)
     assert hand.listen(0.01).command.sign == 0
     desk.press(group_button(2))
@@ -115,17 +115,17 @@ def test_tool_rates_are_not_sent_while_the_tool_is_held(hand, desk):
     desk.press(NEXT_MODE)
     hand.listen(0.0)
     desk.press("ahead")
-    heard = hand.listen(0.01)
-    assert not twist(heard).any()
-    assert "held" in heard.hint
+    received = hand.listen(0.01)
+    assert not twist(received).any()
+    assert "holds the tool" in received.hint
 
 
-def test_one_mode_alone_says_so(desk):
+def test_a_single_mode_gives_a_hint(desk):
     hand = OperatorInput(desk, (Mode.END_EFFECTOR,), 4)
     desk.press(NEXT_MODE)
-    heard = hand.listen(0.0)
-    assert heard.command.mode is Mode.END_EFFECTOR
-    assert "only" in heard.hint
+    received = hand.listen(0.0)
+    assert received.command.mode is Mode.END_EFFECTOR
+    assert "only" in received.hint
 
 
 def test_clutch_stays_until_it_is_pressed_again(hand, desk):
@@ -136,19 +136,19 @@ def test_clutch_stays_until_it_is_pressed_again(hand, desk):
     assert not hand.listen(6.0).command.clutch
 
 
-def test_without_a_browser_the_arm_is_held_and_sliders_go_back(hand, desk):
+def test_without_a_browser_the_arm_stops_and_sliders_are_reset(hand, desk):
     desk.sliders[X] = 0.2
     hand.listen(0.0)
     desk.watched = False
-    heard = hand.listen(0.01)
-    assert heard.command.clutch
-    assert not twist(heard).any()
-    assert "no browser" in heard.lost
+    received = hand.listen(0.01)
+    assert received.command.clutch
+    assert not twist(received).any()
+    assert "no browser" in received.lost
     desk.watched = True
     assert not twist(hand.listen(0.02)).any()
 
 
-def test_what_a_gamepad_said_to_a_browser_that_is_gone_is_forgotten(hand, desk):
+def test_gamepad_input_of_a_closed_browser_is_ignored(hand, desk):
     rest, push = GamepadState((0.0,) * 4, ()), GamepadState((0.0, -1.0, 0.0, 0.0), ())
     desk.pad = rest
     hand.listen(0.0)
@@ -166,15 +166,15 @@ def test_what_a_gamepad_said_to_a_browser_that_is_gone_is_forgotten(hand, desk):
     assert twist(hand.listen(9.2))[0] > 0.0
 
 
-def test_a_lost_gamepad_holds_the_arm_until_space(hand, desk):
+def test_a_lost_gamepad_stops_the_arm_until_space(hand, desk):
     desk.pad = GamepadState((0.0,) * 4, ())
     hand.listen(0.0)
     hand.listen(0.01)
     desk.sliders[X] = 0.2
     desk.pad = None
-    heard = hand.listen(0.02)
-    assert heard.command.clutch
-    assert "gamepad lost" in heard.lost
+    received = hand.listen(0.02)
+    assert received.command.clutch
+    assert "gamepad lost" in received.lost
     desk.press("ahead")
     assert "gamepad lost" in hand.listen(0.5).lost
     desk.press(STOP)
@@ -207,7 +207,7 @@ def test_gamepad_chooses_mode_and_group(hand, desk):
 def test_back_to_the_start_holds_for_a_step(hand, desk):
     desk.sliders[X] = 0.2
     desk.press(BACK)
-    heard = hand.listen(0.0)
-    assert heard.back
-    assert not twist(heard).any()
+    received = hand.listen(0.0)
+    assert received.back
+    assert not twist(received).any()
     assert not hand.listen(0.01).back

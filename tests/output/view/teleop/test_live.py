@@ -28,7 +28,7 @@ def test_a_slider_moves_the_tool(page, desk):
     desk.sliders[FORWARD] = 0.1
     drive(page, 50)
     moved = page.last.p - before
-    # Half a second at 0.1 m/s, less what it takes to start.
+    # Half a second at 0.1 m/s, less the acceleration.
     assert 0.03 < moved[0] <= 0.05
     assert np.abs(moved[1:]).max() < 1e-3
 
@@ -42,7 +42,7 @@ def test_a_group_turns_while_the_tool_stays(page, desk):
         desk.press(TURN_UP)
         drive(page, 5)
     after = page.session.arm.link_poses(page.last.joints)[3, :3, 3]
-    # The bound on the tool is 0.1 mm.
+    # Bound on the displacement of the tool: 0.1 mm.
     assert np.linalg.norm(page.last.p - before) < 1e-4
     assert np.linalg.norm(after - elbow) > 0.02
 
@@ -61,25 +61,25 @@ def test_back_to_the_start(page, desk, ready, meshcat):
     assert not page.last.rates.any()
 
 
-def test_a_lost_browser_is_told_once_and_recorded_as_a_stop(page, desk, told):
+def test_a_lost_browser_is_reported_once_and_recorded_as_a_stop(page, desk, reasons):
     desk.sliders[FORWARD] = 0.1
     drive(page, 20)
     desk.watched = False
     drive(page, 200)
     assert page.last.stopped
     assert not page.last.rates.any()
-    assert told == ["no browser is connected to this page: the arm stops until one is."]
+    assert reasons == ["no browser is connected to this page: the arm stops until one is."]
 
 
-def test_what_is_said_stays_to_be_read(page, desk):
+def test_a_message_stays_visible_for_a_while(page, desk):
     desk.watched = False
     drive(page, 1)
-    said = page.last.reason
+    reason = page.last.reason
     desk.watched = True
     drive(page, 1)
     assert page.last.reason == ""
     begun = page._message_until
-    assert page.message(begun - 0.01) == said
+    assert page.message(begun - 0.01) == reason
     assert page.message(begun + 0.01) == ""
 
 
@@ -103,7 +103,7 @@ def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
     assert "singular" in page.message(page._message_until + 1.0)
 
 
-def test_recording_begins_when_somebody_looks(meshcat, iiwa_stage, iiwa, ready, desk):
+def test_recording_begins_when_a_browser_connects(meshcat, iiwa_stage, iiwa, ready, desk):
     recorder = Recorder(iiwa)
     page = LivePage(
         meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=lambda _: None,
@@ -125,8 +125,8 @@ def test_recorder_gives_what_it_was_given(iiwa, ready, driven, monkeypatch):
 
     monkeypatch.setattr(module, "_BLOCK", 10)
     session = Teleoperation(iiwa, ready)
-    asked = [Command(linear=(0.1, 0.0, 0.0)), Command(mode=Mode.NULL_SPACE, group=0, sign=1)]
-    rows = [(asked[i > 20], session.step(asked[i > 20])) for i in range(33)]
+    commands = [Command(linear=(0.1, 0.0, 0.0)), Command(mode=Mode.NULL_SPACE, group=0, sign=1)]
+    rows = [(commands[i > 20], session.step(commands[i > 20])) for i in range(33)]
     found = Recorder(iiwa)
     for row in rows:
         found.add(*row)
@@ -144,7 +144,7 @@ def test_the_page_has_all_its_controls(page, meshcat):
 
 
 @pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
-def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
+def test_start_postures_are_collision_free_and_allow_motion(name, meshcat):
     arm = load_arm(name, torso_height=0.1)
     stage = RobotDisplay(arm, meshes=False)
     start = start_posture(arm, stage)
@@ -159,11 +159,11 @@ def test_arms_begin_with_room_to_move_and_touch_nothing(name, meshcat):
     assert before[0] > arm.frames[0, 0, 3]
     assert not page.last.singular
     page.hand.source = None
-    for way in np.vstack([np.eye(3), -np.eye(3)]):
+    for direction in np.vstack([np.eye(3), -np.eye(3)]):
         page.session.place(start)
         for _ in range(60):
-            last = page.session.step(_towards(0.1 * way))
-        assert (last.p - before) @ way > 0.03, f"{name} is blocked along {way}"
+            last = page.session.step(_towards(0.1 * direction))
+        assert (last.p - before) @ direction > 0.03, f"{name} is blocked along {direction}"
 
 
 def _towards(linear):
@@ -172,7 +172,7 @@ def _towards(linear):
     return Command(linear=linear)
 
 
-def test_stage_moves_what_hangs_on_the_arm_and_nothing_else(iiwa_stage, iiwa, ready):
+def test_only_bodies_carried_by_the_arm_move(iiwa_stage, iiwa, ready):
     poses = iiwa_stage.poses(ready)
     # Seven links; column and base stand still.
     assert len(poses) == 7
@@ -182,17 +182,17 @@ def test_stage_moves_what_hangs_on_the_arm_and_nothing_else(iiwa_stage, iiwa, re
     assert np.linalg.norm(farthest - tool) < 0.1
 
 
-def test_a_posture_that_touches_itself_is_told(page, iiwa_stage, iiwa, ready):
-    folded = ready.copy()
-    folded[[1, 3]] = 2.0, -2.0
-    page.session.place(folded)
+def test_self_contact_is_shown(page, iiwa_stage, iiwa, ready):
+    posture = ready.copy()
+    posture[[1, 3]] = 2.0, -2.0
+    page.session.place(posture)
     drive(page, 1)
     for _ in range(8):
         page.show()
     assert "touches" in page.message(page._message_until + 1.0)
 
 
-def test_a_port_that_is_taken_is_told(shared_meshcat):
+def test_an_occupied_port_is_refused(shared_meshcat):
     with pytest.raises(OutputError, match=f"port {shared_meshcat.port()}"):
         open_meshcat(shared_meshcat.port())
 
@@ -201,27 +201,29 @@ def test_a_run_at_the_pace_of_the_clock(page):
     page.run(duration=0.3)
     # 30 steps in 0.3 s; a busy machine may drop some, and a step may fall on either end.
     assert page.steps.count + page.dropped in range(28, 34)
-    # A loop that is late takes up to 7 steps from picture to picture.
+    # A late loop takes up to 7 steps from frame to frame.
     assert page.pictures.count - 1 >= page.steps.count // 7
 
 
-def test_an_arm_that_never_points_ahead_begins_in_the_middle(iiwa, iiwa_stage, monkeypatch):
+def test_without_a_forward_posture_the_start_is_in_the_middle_of_the_ranges(
+    iiwa, iiwa_stage, monkeypatch
+):
     monkeypatch.setattr("tcs.output.view.teleop.start._AHEAD", 1.1)
     np.testing.assert_allclose(start_posture(iiwa, iiwa_stage), np.zeros(7), atol=1e-12)
 
 
-def test_a_reason_that_comes_and_goes_is_told_once(page, desk, told):
+def test_a_recurring_reason_is_reported_once(page, desk, reasons):
     for i in range(6):
         desk.watched = bool(i % 2)
         drive(page, 1)
-    assert len(told) == 1
+    assert len(reasons) == 1
     page._message_until = 0.0
     desk.watched = False
     drive(page, 1)
-    assert len(told) == 2
+    assert len(reasons) == 2
 
 
-def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
+def test_the_clutch_is_shown_only_if_the_operator_engaged_it(page, desk):
     assert page.mode_line() == "end-effector mode"
     desk.press("clutch")
     drive(page, 1)
@@ -232,7 +234,7 @@ def test_the_clutch_is_shown_where_a_person_pressed_it(page, desk):
     assert page.mode_line() == "end-effector mode"
 
 
-def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
+def test_the_target_is_shown_at_its_pose(page, desk, meshcat, monkeypatch):
     moved = {}
 
     monkeypatch.setattr(page, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))
@@ -241,7 +243,7 @@ def test_the_target_is_shown_where_it_is(page, desk, meshcat, monkeypatch):
     page.show()
     np.testing.assert_allclose(moved["target"].translation(), page.last.target_p, atol=1e-12)
     np.testing.assert_allclose(moved["tool"].translation(), page.last.p, atol=1e-12)
-    # It runs ahead of a tool that has to speed up first.
+    # The target leads the tool while the tool accelerates.
     assert (page.last.target_p - page.last.p)[0] > 1e-4
 
 
@@ -254,24 +256,24 @@ def test_a_key_moves_the_arm_for_a_moment_of_the_clock(page, desk):
     assert not np.any(page._input.command.linear)
 
 
-def test_hints_are_said(page, desk):
+def test_hints_are_shown(page, desk):
     desk.press(TURN_UP)
     drive(page, 1)
     assert "null-space mode" in page.message(time.perf_counter())
 
 
-def test_postures_that_touch_are_passed_over(iiwa, iiwa_stage):
-    class Touchy:
-        looked = 0
+def test_postures_in_contact_are_skipped(iiwa, iiwa_stage):
+    class InContact:
+        checked = 0
 
         def poses(self, joints):
             return iiwa_stage.poses(joints)
 
         def contacts(self):
-            self.looked += 1
-            return ("arm", "column") if self.looked < 3 else None
+            self.checked += 1
+            return ("arm", "column") if self.checked < 3 else None
 
-    stage = Touchy()
+    stage = InContact()
     other = start_posture(iiwa, stage)
-    assert stage.looked == 3
+    assert stage.checked == 3
     assert not np.array_equal(other, start_posture(iiwa, iiwa_stage))

@@ -24,7 +24,7 @@ NO_LIMITS = np.zeros(7, np.int8)
 
 
 class Spy:
-    """Notes what it is asked to show."""
+    """Records the objects and properties that it receives."""
 
     def __init__(self):
         self.properties, self.drawn, self.deleted, self.sent = {}, [], [], 0
@@ -56,13 +56,13 @@ def shown(arm, joints, limits=NO_LIMITS, singular=False, message=""):
     return readout(arm, np.asarray(joints), limits, singular, "end-effector mode", message)
 
 
-def test_bars_stand_between_the_limits(iiwa):
+def test_bars_show_the_position_between_the_limits(iiwa):
     places = np.linspace(0.0, 1.0, 7)
     joints = iiwa.lower + places * (iiwa.upper - iiwa.lower)
     np.testing.assert_allclose(shown(iiwa, joints).fractions, places, atol=1e-12)
 
 
-def test_joints_that_turn_on_stand_where_they_have_turned_to():
+def test_continuous_joints_are_shown_from_minus_pi_to_pi():
     arm = load_arm("pr2")
     free = int(np.flatnonzero(~arm.bounded)[0])
     joints = np.where(arm.bounded, arm.lower, 0.0)
@@ -76,7 +76,7 @@ def test_a_limit_is_red_and_a_singularity_magenta():
     assert COLOURS[SINGULAR] == "#ff00ff"
 
 
-def test_red_goes_before_magenta_before_green(iiwa, ready):
+def test_red_has_priority_over_magenta_and_magenta_over_green(iiwa, ready):
     limits = NO_LIMITS.copy()
     limits[3] = -1
     assert shown(iiwa, ready).states == (FREE,) * 7
@@ -111,7 +111,7 @@ def test_only_what_changes_is_sent(spy, iiwa, ready):
         assert spy.properties[path, name] == value
 
 
-def test_one_line_is_seen_at_a_time_and_old_ones_are_forgotten(spy, iiwa, ready):
+def test_one_line_is_visible_at_a_time_and_old_ones_are_deleted(spy, iiwa, ready):
     panel = Panel(spy, iiwa)
     texts = [f"reason {i}" for i in range(60)]
     for text in ("", *texts, "", texts[0], texts[-1]):
@@ -124,7 +124,7 @@ def test_one_line_is_seen_at_a_time_and_old_ones_are_forgotten(spy, iiwa, ready)
         assert len(spy.visible(*lines - set(spy.deleted))) == (1 if text else 0)
     assert len(spy.deleted) >= 20
     drawn = [path for path in spy.drawn if path.startswith(f"{PANEL}/message/")]
-    # The first one had been forgotten and was written again; the last one was still there.
+    # The first one had been deleted and was written again; the last one was still there.
     assert len(drawn) == 61
 
 
@@ -139,11 +139,11 @@ def test_long_texts_stay_on_the_panel(iiwa, meshcat):
     spy = Wide()
     panel = Panel(spy, iiwa)
     edge = spy.farthest
-    panel.text("message", "the arm stands still and says why, at length; " * 8)
+    panel.text("message", "the arm stops for a reason that takes many words; " * 8)
     assert spy.farthest <= edge
 
 
-def test_everything_hangs_on_the_camera(iiwa, meshcat):
+def test_every_part_is_a_child_of_the_camera(iiwa, meshcat):
     Panel(meshcat, iiwa)
     for path in ("back", *(f"bar/{i}/{state}/fill" for i in range(7) for state in COLOURS)):
         assert meshcat.HasPath(f"/Cameras/default/rotated/<object>/panel/{path}")
@@ -154,7 +154,7 @@ def test_words():
     assert mode_line("pose", None, 0, True) == "pose mode; clutch engaged"
 
 
-def test_limits_stand_below_the_bars(spy, monkeypatch):
+def test_limits_are_written_below_the_bars(spy, monkeypatch):
     written = []
 
     def text_mesh(text):

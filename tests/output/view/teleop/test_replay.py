@@ -33,7 +33,7 @@ def test_samples_are_those_of_their_time(film):
     assert film.sample(99.0) == len(film.run) - 1
 
 
-def test_the_tool_is_where_the_arm_has_it(film, iiwa):
+def test_the_tool_pose_is_that_of_the_arm(film, iiwa):
     for i in (0, 350, 899):
         at = iiwa.kinematics(film.run.joints[i])
         # Quaternions and back again: rounding.
@@ -41,7 +41,7 @@ def test_the_tool_is_where_the_arm_has_it(film, iiwa):
         np.testing.assert_allclose(film.tool(i).translation(), at.p, atol=1e-12)
 
 
-def test_the_panel_tells_modes_limits_and_singularities(film):
+def test_the_panel_shows_modes_limits_and_singularities(film):
     run = film.run
     assert film.readout(0).mode == "end-effector mode"
     assert film.readout(350).mode == "null-space mode, group 1 (joints 1 2 3)"
@@ -65,7 +65,7 @@ def test_it_plays_by_the_clock_and_ends(replay, film):
     assert not replay.playing
 
 
-def test_the_slider_goes_elsewhere_and_holds(replay, meshcat):
+def test_the_slider_sets_the_time_and_pauses(replay, meshcat):
     replay.advance(0.123)
     replay.advance(0.123)
     assert replay.playing
@@ -94,7 +94,7 @@ def test_speed_and_buttons(replay, meshcat, monkeypatch):
     assert (replay.place, replay.playing) == (0.0, True)
 
 
-def test_the_arm_stands_where_the_run_has_it(replay, meshcat, iiwa_stage, film, monkeypatch):
+def test_the_arm_is_in_the_posture_of_the_run(replay, meshcat, iiwa_stage, film, monkeypatch):
     moved = {}
 
     monkeypatch.setattr(replay, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))

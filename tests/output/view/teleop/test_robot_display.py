@@ -18,7 +18,7 @@ from tests.output.view.teleop.conftest import Instead
 
 
 class Spy:
-    """Keeps the lines it is asked to draw."""
+    """Records the lines that it receives."""
 
     def __init__(self):
         self.lines, self.sent = {}, 0
@@ -49,7 +49,7 @@ def spy():
     return Spy()
 
 
-def test_the_way_is_whole_and_only_its_end_is_sent_again(spy):
+def test_the_path_is_complete_and_only_its_end_is_sent_again(spy):
     trail = Trail(spy)
     way = along(300)
     for point in way:
@@ -59,7 +59,7 @@ def test_the_way_is_whole_and_only_its_end_is_sent_again(spy):
     assert spy.sent < 300 * 25
 
 
-def test_a_tool_that_stands_still_draws_nothing(spy):
+def test_a_tool_at_rest_draws_nothing(spy):
     trail = Trail(spy)
     for _ in range(5):
         trail.add(np.ones(3))
@@ -67,7 +67,7 @@ def test_a_tool_that_stands_still_draws_nothing(spy):
     assert not spy.lines
 
 
-def test_a_long_way_forgets_where_it_began(spy):
+def test_a_long_path_loses_its_oldest_pieces(spy):
     trail = Trail(spy)
     way = along(3000)
     for point in way:
@@ -77,7 +77,7 @@ def test_a_long_way_forgets_where_it_began(spy):
     np.testing.assert_array_equal(kept, way[-len(kept) :])
 
 
-def test_after_a_jump_the_way_begins_anew(spy):
+def test_after_a_jump_a_new_path_begins(spy):
     trail = Trail(spy)
     for point in along(50):
         trail.add(point)
@@ -108,7 +108,7 @@ def test_live_there_is_a_target_and_played_back_there_is_none(iiwa_stage, meshca
 
 
 @pytest.mark.parametrize("name", ["pr2", "tiago", "panda"])
-def test_the_robot_stands_where_the_arm_has_it(name):
+def test_the_robot_is_in_the_posture_of_the_arm(name):
     arm = load_arm(name, torso_height=0.2)
     stage = RobotDisplay(arm, meshes=False)
     joints = arm.random_joints(np.random.default_rng(1), 1)[0]
@@ -121,7 +121,7 @@ def test_the_robot_stands_where_the_arm_has_it(name):
 
 
 @pytest.mark.parametrize(("name", "left"), [("pr2", True), ("pr2_right", False), ("iiwa7", False)])
-def test_arms_are_looked_at_from_their_own_side(name, left, meshcat):
+def test_the_camera_is_on_the_side_of_the_arm(name, left, meshcat):
     seen = []
     arm = load_arm(name)
     spy = Instead(meshcat, SetCameraPose=lambda *places: seen.append(places))

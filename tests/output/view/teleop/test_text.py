@@ -40,7 +40,7 @@ def test_letters_stand_beside_each_other():
     np.testing.assert_allclose(last[0], alone[0] + 2 * ADVANCE, atol=1e-12)
 
 
-def test_blanks_are_nothing():
+def test_blanks_have_no_triangles():
     corners, faces = text_mesh("  ")
     assert corners.shape == (3, 0)
     assert faces.shape == (3, 0)

@@ -31,7 +31,7 @@ def test_steps_do_not_drift():
     assert clock.now == pytest.approx(100.0 + 10.0 + 1e-4, abs=1e-6)
 
 
-def test_a_sleep_that_ends_early_takes_one_step_all_the_same():
+def test_a_sleep_that_ends_early_takes_one_step():
     _, pace = paced(over=-1e-4)
     assert [pace.wait() for _ in range(5)] == [(1, 0)] * 5
 
@@ -48,7 +48,7 @@ def test_a_late_loop_makes_up_for_a_few_steps_and_drops_the_rest():
     assert pace.wait() == (1, 0)
 
 
-def test_times_say_median_and_late_ones():
+def test_timing_reports_medians_and_dropped_steps():
     times = Durations()
     assert times.summary() == "none"
     for i in range(101):
@@ -57,7 +57,7 @@ def test_times_say_median_and_late_ones():
     assert times.count == 101
 
 
-def test_of_very_many_times_the_oldest_are_forgotten(monkeypatch):
+def test_the_oldest_of_many_durations_are_dropped(monkeypatch):
     monkeypatch.setattr("tcs.output.view.teleop.timing._KEPT", 10)
     times = Durations()
     for i in range(100):
