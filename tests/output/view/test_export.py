@@ -52,7 +52,7 @@ class Recorder:
 
 
 def test_objects_are_at_rest_until_the_next_goal(objects, shaving_set, monkeypatch):
-    """The browser interpolates between keys, so no object may differ between two neighbouring keys."""
+    """The browser interpolates between keys, so objects must be at rest between changes."""
     monkeypatch.setattr(export, "MeshcatAnimation", Recorder)
     shots = [objects.snapshot(step.index, step.goal) for step in play_steps(shaving_set)]
     seen = [set(map(str, shot.arrows)) for shot in shots]
