@@ -29,8 +29,8 @@ VISION = {
         ]
     ),
 }
-"""Matrices on linear RGB for the complete loss of one type of cone: Machado, Oliveira and Fernandes,
-"A Physiologically-based Model for Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009."""
+"""Matrices on linear RGB for the loss of one type of cone: Machado, Oliveira and Fernandes, "A
+Physiologically-based Model for Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009."""
 _XYZ = np.array(
     [
         [0.4124564, 0.3575761, 0.1804375],
