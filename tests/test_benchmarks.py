@@ -132,18 +132,18 @@ def test_a_small_run_prints_every_part():
         # Columns are two spaces or more apart, and names may be indented.
         name, *cells = re.split(r"  +", line.strip())
         texts.setdefault(name, []).append(" | ".join(cells))
-    # Ours finds what the dense scan finds, and what it finds stands before Drake.
+    # The kernel finds what the dense scan finds, and Drake confirms it.
     answers, times = texts["tcs kernel, the best one"]
     assert answers == "2 of 2 | 2 of 2 | 0 of 2 | 0 of 2 | 1.0"
     assert "(" in times
     free = texts["Drake IK, min distance, 5 tries"][0].split(" | ")[3]
     assert free == "0 of 2"
     assert all(texts[name][0].startswith("skipped: ") for name in ("EAIK", "TRAC-IK"))
-    # Drake's checker has a context for each thread, and refuses no winner.
+    # Drake's checker has a context for each thread, and finds no winner in collision.
     assert texts["checker's contexts; winners hit"] == ["2; 0"]
     parts = ("base check", "prefilter: too far", "inverse kinematics", "measure")
     shares = [float(texts[p][0].split(" %")[0]) for p in (*parts, "collision of arm and gripper")]
-    # All of it, up to what rounding to three digits leaves out; each part is a real one.
+    # The parts add up to the whole within the rounding to three digits, and none is zero.
     assert sum(shares) == pytest.approx(100.0, abs=0.01)
     assert min(shares) > 0.0
 

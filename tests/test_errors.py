@@ -14,7 +14,7 @@ CLASSES = [
 
 
 def drawn_parents() -> dict[str, str | None]:
-    """Each class in the tree of the module docstring, with the class it hangs from."""
+    """Return each class in the tree of the module docstring, with its parent class."""
     parents: dict[str, str | None] = {}
     above: list[tuple[int, str]] = []
     for line in (tcs.errors.__doc__ or "").splitlines():

@@ -105,7 +105,7 @@ def test_every_row_is_sound(tcs_command, tmp_path):
     rows = tcs_command("score", "--all", "--out", tmp_path, "--json").json["rows"]
     assert len(rows) == 13
     for row in rows:
-        # The published sets of two do all of every task, or nearly.
+        # The published sets of two reach all goals of every task, or nearly all.
         assert row["best"]["reachability"] >= 0.99
         found = tcs.verify(tcs.load(row["file"]), pairs=30, dense=0)
         assert found.is_sound

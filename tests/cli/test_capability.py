@@ -217,7 +217,7 @@ def test_an_unknown_task_or_file_is_one_line(made, tcs_command, tmp_path):
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory):
-    """A robot file of the user's own, and a map made with it."""
+    """A user-defined robot file, and a map made with it."""
     from typer.testing import CliRunner
 
     from tcs.cli.app import app
@@ -273,7 +273,7 @@ def test_the_head_option(own, tcs_command, tmp_path):
         seen[name] = load_map(path).visibility
     np.testing.assert_array_equal(seen["mine"], seen["tiago"])
     assert tcs_command("capability", "from-ik", "--head", head, "--out", out, *COARSE).code == 0
-    # A camera with a narrower view; straight ahead nothing changes.
+    # A camera with a narrower view, which changes nothing straight ahead.
     narrow = load_map(out).visibility
     assert (narrow <= seen["tiago"]).all()
     assert (narrow < seen["tiago"]).any()

@@ -82,7 +82,7 @@ def test_observed_state(tcs_command, tmp_path):
 def test_report(tcs_command, stored):
     file = tcs.load(stored)
     scores = file.nominal.scores
-    # One that the arm keeps from the goal.
+    # A configuration at which the arm is the reason.
     h = int((scores.reason[:, 2] == Reason.ARM_BLOCKED).argmax())
     out = tcs_command("explain", stored, "--goal", 2, "--configuration", h).out
     explained = tcs.explain(file, 2, h)

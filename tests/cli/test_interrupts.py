@@ -43,7 +43,7 @@ files.score = score
 
 
 def run_on_terminal(code: str, *words: str) -> str:
-    """What a command draws on a terminal of its own."""
+    """Return what a command draws on a pseudo-terminal."""
     ours, theirs = pty.openpty()
     with subprocess.Popen(
         [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=theirs, stdin=theirs
@@ -171,7 +171,7 @@ def test_a_handler_of_the_calling_program_stays(tcs_command):
 
 
 def test_interrupt_in_a_callback_of_compiled_code_is_one_line(process, tmp_path):
-    """Python prints such an interrupt and carries on, as llvmlite's callbacks cannot raise."""
+    """Python prints such an interrupt and continues, as callbacks of llvmlite cannot raise."""
     before = """
 import ctypes, signal
 import tcs.placement.scoring.files as files

@@ -51,7 +51,7 @@ def test_python_runs(tmp_path, monkeypatch, capsys):
     class Sound:
         is_sound = True
 
-    # The long work is tested elsewhere; here, that it is called as it can be called.
+    # The functions are tested elsewhere; this checks that the calls are valid.
     monkeypatch.setattr(tcs, "score", lambda *a, **o: calls.append((a, o)) or score_file())
     monkeypatch.setattr(tcs, "verify", lambda *a, **o: calls.append((a, o)) or Sound)
     exec(compile(blocks("python")[0], "README.md", "exec"), {})

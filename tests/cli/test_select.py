@@ -194,7 +194,7 @@ def test_the_observed_shift_is_reported(tcs_command, tmp_path):
         assert result["frame_position_error"] == pytest.approx(0.02)
     message = tcs_command("select", path, *HERE, "--observed", "person_y=0.04")
     assert "scored for person y 0.05 m; observed person y differs by -0.01 m" in message.out
-    # A zero that comes out negative has no sign.
+    # A negative zero is printed without a sign.
     exact = tcs_command("select", path, *HERE, "--observed", "person_y=-0.0")
     assert "scored for person y 0 m; observed person y is the scored one" in exact.out
 

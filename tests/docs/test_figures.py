@@ -32,7 +32,7 @@ def test_no_page_differs_from_the_saved_figures(figures):
 
 
 def test_every_block_and_cell_is_read(figures):
-    # A mistyped opening would be a comment that nothing checks.
+    # A block with a mistyped opening would not be checked.
     for page in figures.pages():
         text = page.read_text(encoding="utf-8")
         found = len(figures.BLOCK.findall(text)) + len(figures.CELL.findall(text))

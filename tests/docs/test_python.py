@@ -21,7 +21,7 @@ def test_blocks_run(page, tmp_path, monkeypatch):
     # Files that a block reads: any will do, so one that is made in a second.
     for name in re.findall(r'tcs\.load\("(.+?)"\)', "".join(blocks)):
         tcs.save(name, tcs.score("feeding"))
-    # What the sentence before a block has introduced.
+    # Names introduced by the sentence before a block.
     pose = {"base_x": 1.4, "base_y": -1.2, "base_yaw": math.pi, "torso": 0.0}
     names = {"tcs": tcs, "here": tcs.InitialConfiguration(**pose)}
     for block in blocks:

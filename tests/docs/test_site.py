@@ -44,7 +44,7 @@ def test_equations_are_set(site):
     text = (site / "method.html").read_text(encoding="utf-8")
     assert text.count("<math ") >= 6
     assert "$$" not in re.sub(r"<pre>.*?</pre>", "", text, flags=re.S)
-    # What the converter does not know stays as it was written, with its backslash.
+    # Commands that the converter does not support keep their backslash.
     equations = re.findall(r"<math .*?</math>", text, flags=re.S)
     assert [equation for equation in equations if "\\" in equation or "&#x0005C;" in equation] == []
 
@@ -110,7 +110,7 @@ def test_every_exported_name_is_described(site):
         if not (CHECKOUT / module.replace(".", "/") / "__init__.py").is_file():
             continue
         there = vars(importlib.import_module(module))
-        # Constants and names of types have no home of their own that Sphinx could find.
+        # Sphinx does not describe constants and type aliases separately.
         names = [n for n in there.get("__all__", []) if isinstance(there[n], (type, FunctionType))]
         missing += [f"{module}.{n}" for n in names if described.isdisjoint(homes(module, n))]
     assert missing == []

@@ -1,4 +1,4 @@
-"""What a picture from above is made of."""
+"""Parts of a picture from above."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def picture(figure, panel=0):
 
 
 def share(image, category):
-    """Share of the pixels with the hue of a category."""
+    """Return the fraction of the pixels with the hue of a category."""
     colour = np.array(to_rgb(category.colour))
     wanted = colour / np.linalg.norm(colour)
     hue = image / np.maximum(np.linalg.norm(image, axis=-1, keepdims=True), 1e-9)
@@ -52,7 +52,7 @@ def test_intersecting_solids_are_both_visible():
     both = (sphere(Category.ARM, [0.0, -0.1, 1.0]), sphere(Category.PERSON, [0.0, 0.1, 1.0]))
     image = picture(draw_scene([view(*both)], title=""))
     arm, person = share(image, Category.ARM), share(image, Category.PERSON)
-    # Mirror images of one another but for the light.
+    # The views are mirror images except for the light.
     assert arm == pytest.approx(person, rel=0.15)
     assert arm > 0.01
 
@@ -64,7 +64,7 @@ def test_the_side_that_shows_the_goals_is_used(order):
         Solid.placed(Category.FURNITURE, wall, np.eye(3), [1.0, 0.0, 2.0]),
         sphere(Category.GOAL, [0.0, 0.0, 1.0], 0.2),
     )
-    # From +x the wall is in the way.
+    # From +x the wall hides the robot.
     image = picture(draw_scene([view(*solids, azimuths=order)], title=""))
     assert share(image, Category.GOAL) > 0.002
 
@@ -102,7 +102,7 @@ def test_no_edge_within_a_surface_that_two_solids_share():
     corners = primitive_corners(BOX, (0.3, 0.3, 0.3))
     turned = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    # One cube twice, cut into other triangles: which is nearer is up to rounding, pixel by pixel.
+    # The same cube twice with different triangles: rounding decides which is nearer in a pixel.
     cubes = [Solid.placed(Category.ARM, corners, R, [0, 0, 1]) for R in (turned, turned @ quarter)]
     one, both = (picture(draw_scene([view(*some)], title="")) for some in (cubes[:1], cubes))
     # Within a face: away from where it ends, and from the floor.

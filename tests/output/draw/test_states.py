@@ -17,7 +17,7 @@ SCORES = random_scores(GRID, 3, seed=4, share=0.3)
 
 @pytest.fixture
 def panels():
-    """Two heights by three head rests; the second member wants the state at the top right."""
+    """Two heights by three head rest angles; the second member has the state at the top right."""
     corners = primitive_corners(BOX, (0.2, 0.1, 0.3))
     person = Solid.placed(Category.PERSON, corners, np.eye(3), [0.0, 0.3, 0.3])
     members = {5: [(2, stand(x=-0.5, y=0.3))], 0: [(1, stand(x=0.1, y=0.5))]}

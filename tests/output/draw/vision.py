@@ -43,7 +43,7 @@ _WHITE = _XYZ.sum(axis=1)
 
 
 def as_seen(colour, vision):
-    """A colour in CIE L*a*b* as it is seen; lightness 0 to 100 first."""
+    """Return a colour as perceived in CIE L*a*b*; lightness 0 to 100 first."""
     rgb = np.array(to_rgb(colour))
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     ratio = _XYZ @ np.clip(VISION[vision] @ linear, 0.0, 1.0) / _WHITE
@@ -52,5 +52,5 @@ def as_seen(colour, vision):
 
 
 def difference(first, second, vision):
-    """CIE 1976 difference of two colours as they are seen."""
+    """Return the CIE 1976 difference of two perceived colours."""
     return float(np.linalg.norm(as_seen(first, vision) - as_seen(second, vision)))

@@ -57,7 +57,7 @@ def pictures(score_path):
 
 @pytest.fixture(scope="session")
 def lossless(study):
-    """The same row, had everything been reached in every sample."""
+    """The same row with every goal reached in every sample."""
     best = dataclasses.replace(study.best, reached=study.best.reached | True)
     return dataclasses.replace(
         study, task="brushing", best=best, losses=dataclasses.replace(study.losses, goals=())

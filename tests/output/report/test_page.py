@@ -27,7 +27,7 @@ EMPTY = {"br", "img", "meta", "link", "path"}
 
 
 class Reader(HTMLParser):
-    """Checks that tags are closed in order, and collects what they say."""
+    """Checks that tags are closed in order, and collects their text."""
 
     def __init__(self):
         super().__init__()

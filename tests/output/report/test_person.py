@@ -1,4 +1,4 @@
-"""What pictures and the viewer show as the person: the model that the environment file names."""
+"""Pictures and the viewer show the model named in the environment file as the person."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COUNTER = """
 
 
 def categories(pr2, path) -> dict[str, set[Category]]:
-    """Return what the shapes of each model are shown as."""
+    """Return the category of the shapes of each model."""
     found: dict[str, set[Category]] = {}
     for part, category in environment_parts(Scene(SceneSpec(pr2, load_environment(path)))):
         found.setdefault(part.name.split("::")[0], set()).add(category)

@@ -13,7 +13,7 @@ from tcs.output.report.samples import evaluations, samples_csv
 
 @pytest.fixture(scope="module")
 def table(study, lossless):
-    """Every sample, read back."""
+    """Every sample, read from the file."""
     return list(csv.DictReader(io.StringIO(samples_csv([study, lossless]).decode())))
 
 

@@ -33,13 +33,13 @@ FAR = {
     "base_yaw": (0, 90, 4),
     "torso": (0.15, 0.15, 1),
 }
-"""Where nothing is in reach."""
+"""Base poses from which no goal is within reach."""
 CHECK = CheckSizes(pairs=12, dense=6, seed=3)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_pictures():
-    """Pictures that take a tenth of the time; what is on them is tested elsewhere."""
+    """Smaller pictures, which take a tenth of the time; their content is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tcs.output.draw.camera.SIZE", (300, 260))
         patch.setattr("tcs.output.report.score_report._DPI", 30)
@@ -53,7 +53,7 @@ def report(score_path, _small_pictures):
 
 @pytest.fixture(scope="module")
 def single(score_path, _small_pictures):
-    """About one place only, which does not reach every goal."""
+    """A report on a single base pose, which does not reach every goal."""
     return make_score_report(score_path, max_members=1, sizes=CheckSizes(pairs=0, dense=0))
 
 
@@ -116,7 +116,7 @@ def test_joints_and_stops_are_those_of_the_file(report):
 
 def test_every_configuration_counts_once_for_each_goal(report):
     for row in reasons_table(report).texts():
-        # Six shares rounded to a hundredth.
+        # Six percentages rounded to a hundredth.
         assert sum(float(cell) for cell in row[2:]) == pytest.approx(100.0, abs=0.03)
     scores = report.scored.scores
     counts = {}
@@ -153,7 +153,7 @@ def test_the_set_is_the_one_selected_from_here(score_path):
 
 @pytest.fixture(scope="module")
 def false_path(score_path, tmp_path_factory):
-    """The file with the postures of all pairs a degree off at one joint."""
+    """The file with an error of one degree in one joint of all postures."""
     file = load_scores(score_path)
     scores = file.nominal.scores
     path = tmp_path_factory.mktemp("false") / "false.tcs"
@@ -234,7 +234,7 @@ def test_data_files_are_named_as_they_were_given(report, tmp_path, monkeypatch):
     )
     monkeypatch.chdir(tmp_path)
     assert (as_given(file, "robot"), as_given(file, "task")) == ("mine.yaml", "shaving")
-    # From another folder the relative path would lead nowhere.
+    # From another folder the relative path would be invalid.
     monkeypatch.chdir(tmp_path.parent)
     assert as_given(file, "robot") == str(own)
 

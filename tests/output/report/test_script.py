@@ -38,7 +38,7 @@ def test_invalid_options_are_refused_in_one_line_before_the_work(tmp_path, words
 def test_a_file_of_another_row_is_refused(tmp_path):
     scores = tmp_path / "out" / "scores"
     scores.mkdir(parents=True)
-    # What it holds was scored in the wheelchair.
+    # The file was scored in the wheelchair.
     save_scores(scores / "shaving-bed-pr2.tcs", score_file())
     done = run("--rows", "shaving/bed", cwd=tmp_path)
     assert done.returncode == 1

@@ -70,7 +70,7 @@ def test_the_person_is_drawn_as_the_head_rest_has_them(file):
     flat, raised = (
         [p.vertices for p in axes.collections[2].get_paths()] for axes in figure.axes[:2]
     )
-    # The head comes forward as the rest goes up.
+    # The head moves forward as the head rest is raised.
     assert not all(np.allclose(a, b) for a, b in zip(flat, raised, strict=False))
 
 

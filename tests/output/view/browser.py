@@ -1,4 +1,4 @@
-"""A headless Chromium that looks at the viewer, for tests; absent parts skip a test with a line."""
+"""A headless Chromium for tests of the viewer; tests are skipped if it is not installed."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Page:
         self.driver = driver
 
     def open(self, url: str, ready: str) -> None:
-        """Open a page and wait until there is something at a path of the scene."""
+        """Open a page and wait until the scene has an object at a path."""
         self.driver.get(url)
         self.wait(lambda: self.has(ready))
 
     def has(self, path: str) -> bool:
-        """Whether there is something to see at a path."""
+        """Return whether an object at a path is visible."""
         steps = "/".join(["drake", *([path] if path else [])]).split("/")
         script = """
         if (typeof viewer === "undefined") return false;
@@ -54,7 +54,7 @@ class Page:
         return bool(self.driver.execute_script(script, steps))
 
     def arrows(self) -> dict[int, list[str]]:
-        """The reasons whose arrow is seen, by goal."""
+        """Return the reasons whose arrows are visible, by goal."""
         seen = self.driver.execute_script(SEEN)
         return {
             int(goal): [name for name in names if name != "<object>"]
@@ -62,7 +62,7 @@ class Page:
         }
 
     def picture(self, *hidden: str) -> np.ndarray:
-        """What the browser shows, some paths hidden meanwhile, shape (h, w, 3)."""
+        """Return a screenshot with some paths hidden, shape (h, w, 3)."""
         show = "viewer.set_property(arguments[0], 'visible', arguments[1]); viewer.set_dirty();"
         for path in hidden:
             self.driver.execute_script(show, ["drake", path], False)
@@ -82,7 +82,7 @@ class Page:
         return [entry for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"]
 
     def wait(self, done: Callable[[], object]) -> None:
-        """Wait until something is so."""
+        """Wait until a condition holds."""
         end = time.monotonic() + PATIENCE
         while not done():
             assert time.monotonic() < end, f"not so after {PATIENCE:.0f} s"
@@ -90,7 +90,7 @@ class Page:
 
 
 def chromium() -> Iterator[Page]:
-    """Give a page of a new browser, or skip."""
+    """Yield a page of a new browser, or skip the test."""
     webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium")
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     control = shutil.which("chromedriver")

@@ -26,24 +26,24 @@ def viewer(spec, shaving, shaving_set):
 
 @pytest.fixture
 def live(page, viewer):
-    """The viewer, seen in the browser."""
+    """The viewer in the browser."""
     page.open(viewer.url, "robot")
     page.wait(lambda: page.has("environment") and page.has("floor"))
     return page
 
 
 def expected(viewed, index):
-    """The arrows that should be seen."""
+    """Return the arrows that should be visible."""
     return {g: [one.name.lower()] for g, one in enumerate(viewed.result(index).reasons)}
 
 
 def changed(before, after):
-    """How many pixels look different."""
+    """Return the number of pixels that differ."""
     return np.count_nonzero(np.any(abs(before - after) > 20, axis=2))
 
 
 def controller(page, name):
-    """The slider of that name, as an element to click at."""
+    """Return the slider of that name as an element to click on."""
     return page.driver.execute_script(
         "return [...document.querySelectorAll('.dg .cr')].find(row => "
         "row.querySelector('.property-name')?.textContent === arguments[0])"

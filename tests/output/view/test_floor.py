@@ -13,7 +13,7 @@ from tcs.output.view.floor import colourings
 from tcs.output.words import REASON_COLOURS
 from tcs.placement.tables import Reason, SuccessTable
 
-# Worst first: blocked where it stands, then the checks in the order in which they are made.
+# Worst first: base blocked, then the other checks in their order.
 ORDER = [
     Reason.BODY_BLOCKED, Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT, Reason.TOO_FAR,
     Reason.GRIPPER_BLOCKED_BY_ROBOT, Reason.JOINT_LIMITS, Reason.ARM_BLOCKED, Reason.REACHED,
@@ -21,7 +21,7 @@ ORDER = [
 
 
 def configurations_at(viewed, state, x, y):
-    """Flat indices of every way to stand at a place."""
+    """Return the flat indices of all configurations at a base position."""
     found = []
     heights, heads = viewed.grid.environment_shape
     at = np.unravel_index(state, (heights, heads))

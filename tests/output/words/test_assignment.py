@@ -29,7 +29,7 @@ def test_the_member_with_the_greatest_dexterity_serves_a_goal():
 
 
 def test_a_goal_reached_without_dexterity_is_served():
-    """At a singular posture the measure is 0, and the goal is reached all the same."""
+    """At a singular posture the measure is 0 although the goal is reached."""
     grid = small_grid()
     scores = random_scores(grid, 2, seed=0, share=1.0)
     dexterity = np.zeros_like(scores.dexterity)

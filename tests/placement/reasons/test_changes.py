@@ -49,7 +49,7 @@ def configuration(x=0.0, y=0.0, yaw_deg=0.0, torso=0.15, **environment):
         ({"table_slide": 0.5}, {"table_slide": 0.4}, "Change the table slide by -10 cm."),
         ({"chair_turn_deg": 0}, {"chair_turn_deg": 20}, "Change the chair turn by +20 deg."),
         ({}, {}, "Nothing needs to change."),
-        # Less than a person would notice.
+        # Below the rounding of the sentence.
         ({}, {"x": 0.0004, "yaw_deg": 0.04}, "Nothing needs to change."),
     ],
 )

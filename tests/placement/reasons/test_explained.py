@@ -39,7 +39,7 @@ def test_nearest_is_nearest_along_every_axis():
         off = off + np.abs(np.angle(np.exp(1j * (at["base_yaw"] - stated["base_yaw"]))))
         assert off[index] == off.min()
         assert [name for name, _ in ordered.environment] == ["bed_height", "head_rest"]
-        # The stated configuration itself, except for whole turns.
+        # The stated configuration, except for full rotations.
         assert dict(ordered.environment) == {
             name: stated[name] for name in ("bed_height", "head_rest")
         }

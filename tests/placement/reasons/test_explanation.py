@@ -28,7 +28,7 @@ def cost(before, after, weights):
 
 
 def nearest(file, goal, before, weights):
-    """The cheapest configuration that reaches a goal, by looking at every one."""
+    """Return the cheapest configuration that reaches a goal, by exhaustive search."""
     grid, scores = Grid.from_dict(file.grid), file.nominal.scores
     best = None
     for h in range(grid.size):
@@ -182,7 +182,7 @@ def test_distances_are_straight_from_a_base_in_contact(bedside):
     assert explained.explained.reason == Reason.BODY_BLOCKED
     assert explained.weights.route == "around"
     assert (explained.fix.route, explained.fix.index) == ("straight", 52)
-    # A robot with a pose error is where it is, on its own side of the bed.
+    # A robot with a pose error remains on its side of the bed.
     place = dataclasses.replace(grid.configuration(blocked), base_x=0.06)
     explained = tcs.explain(file, 0, place)
     assert explained.explained.index == blocked
@@ -266,7 +266,7 @@ def test_goal_that_nothing_reaches():
         plain = explained.to_json()
         assert plain["nearest_reaching"] is None
         assert plain["reasons"]["reached"] == 0
-        # Nothing in the way, and still too far: those came farthest.
+        # Free of contact but too far: these passed the most checks.
         assert plain["farthest"] == {"reason": "too_far", "of": 4, "stopped": 4}
         assert plain["blocking_pairs"][0] == {
             "pair": ["base", "bed"],

@@ -134,7 +134,7 @@ def test_the_ceiling_ignores_a_gripper_blocked_by_the_robot():
     for outcome in (trials.outcome(h, {}) for h in (0, 1)):
         blocked = outcome.reason[0] == Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
         outcome.reason[0, blocked] = Reason.GRIPPER_BLOCKED_BY_ROBOT
-    # In sample 0 goal 1 is no longer hopeless, in sample 2 it still is.
+    # In sample 0 another base pose may reach goal 1, in sample 2 none can.
     found = losses(trials, evaluation)
     assert nominal == pytest.approx(1.0 - 0.25 * 2 / 4)
     assert found.ceiling == pytest.approx(1.0 - 0.25 * 1 / 4)

@@ -21,7 +21,7 @@ def scores_with(grid, blocked):
 
 
 def plain_moves(scores, grid, lattice):
-    """The same moves by plain loops over all places, one state at a time."""
+    """Return the same moves by plain loops over all positions, one state at a time."""
     free = {}
     for h in range(grid.size):
         *state, i, j, yaw, torso = grid.indices(h).tolist()
@@ -54,14 +54,14 @@ def test_moves_agree_with_plain_loops(seed, bed):
     rng = np.random.default_rng(seed)
     scores = scores_with(grid, np.flatnonzero(rng.random(grid.size) < 0.75))
     lattice = lattice_of(scores, grid)
-    # 0.6 m are three places 0.2 m apart, and one more stands for all beyond.
+    # 0.6 m are three positions 0.2 m apart, and one more represents all beyond.
     assert lattice.start == pytest.approx((-0.7 - 0.8, 0.1 - 0.8), abs=1e-15)
     np.testing.assert_array_equal(lattice.moves, plain_moves(scores, grid, lattice))
 
 
 def test_a_heading_has_to_be_free_at_both_ends_of_a_move():
     grid = small_grid(nx=2, ny=1, yaws=2, torsos=1)
-    # The first place is free with the first heading only, the second with the second.
+    # The first position is free with the first heading only, the second with the second.
     lattice = lattice_of(scores_with(grid, [1, 2]), grid)
     inside = (round(BORDER / 0.2) + 1,) * 2
     assert not lattice.moves[0][inside]
@@ -71,7 +71,7 @@ def test_a_heading_has_to_be_free_at_both_ends_of_a_move():
 def test_everything_free_allows_every_move():
     grid = small_grid(nx=1, ny=1, yaws=1, torsos=1)
     lattice = lattice_of(scores_with(grid, []), grid)
-    # Neither axis has a step of its own that means anything: 0.1 m.
+    # Neither axis has more than one value, so the step is 0.1 m.
     assert lattice.step == (0.1, 0.1)
     x, y = lattice.shape
     assert (x, y) == (15, 15)

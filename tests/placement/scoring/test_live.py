@@ -53,7 +53,7 @@ def bed_scorer(bedside):
 
 @pytest.fixture
 def head(scorer):
-    """Where the head is when everything is in its place: x y z qw qx qy qz."""
+    """The nominal pose of the head: x y z qw qx qy qz."""
     return seven(scorer)
 
 
@@ -108,7 +108,7 @@ def test_scoring_does_not_affect_the_next_one(scorer, small_file):
 
 def test_moving_chair_and_robot_together_changes_nothing_that_is_reached(scorer, small_file):
     # Along x by one step of the grid: the chair with the person on it, and the columns of the
-    # grid with it. Chair and robot both stand on the same floor.
+    # grid with it. Chair and robot are on the same floor.
     moved = scorer.score({"wheelchair_x": 0.1}).nominal.scores
     rows = (8, 2, 4, 2, -1)
     here = small_file.nominal.scores.dexterity.reshape(rows)[:-1]
@@ -137,7 +137,7 @@ def test_drake_confirms_what_was_scored_live(small_environment, tmp_path):
 
 def test_drake_refutes_scores_of_another_observation(scorer, small_file):
     file = scorer.score({"person_x": 0.03})
-    # The scores of the nominal scene in a file that says where the person was found.
+    # The scores of the nominal scene in a file with another observation.
     swapped = dataclasses.replace(file, tables=small_file.tables)
     assert verify(swapped, pairs=20, dense=0).false_reached == 20
 
@@ -167,7 +167,7 @@ def test_a_position_alone_is_fitted_by_the_most_likely_joints(scorer, head):
     entry = scorer.score(Observation(frames={"head": seen})).metadata["observation"]
     assert entry["frame_position_error"] < 1e-8
     joints = entry["joints"]
-    # The person's spread is 5 cm and the chair's 1.25 cm: shares go with the squares.
+    # Standard deviations of 5 cm (person) and 1.25 cm (chair): fractions are as their squares.
     assert abs(joints["person_x"]) == pytest.approx(0.04 * 16 / 17, abs=1e-6)
     assert joints["wheelchair_x"] == pytest.approx(0.04 / 17, abs=1e-6)
 

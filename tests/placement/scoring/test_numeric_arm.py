@@ -96,7 +96,7 @@ def test_it_is_chosen_from_and_explained_like_any_other(scored):
 
 @pytest.mark.slow
 def test_baxter_feeds_a_person_in_a_wheelchair():
-    """The robot that ships with such an arm, on the whole grid."""
+    """The shipped robot with such an arm, on the whole grid."""
     file = score("feeding", "wheelchair", "baxter")
     assert file.metadata["ik"] == "numeric"
     assert file.nominal.sets.best_single

@@ -1,4 +1,4 @@
-"""The robots that ship, from robot file to grid and lowered scene."""
+"""The shipped robots, from robot file to grid and lowered scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def test_torso_levels_are_heights_the_robot_has(name):
     job = load_job("feeding", "wheelchair", robot)
     levels = job.grid.axis("torso").values
     if robot.torso_joint is None:
-        # One height, not three times the same place.
+        # One height, not three times the same configuration.
         assert list(levels) == [0.0]
         assert job.grid.size == 61 * 61 * 8
     else:

@@ -34,9 +34,9 @@ def test_a_file_is_verified_by_the_measure_it_was_made_with(small_file, small_en
     found = verify(file, pairs=40, dense=10)
     assert found.is_sound
     assert found.measure == found.to_json()["measure"] == measure
-    # Refinement leaves next to nothing, by this measure too.
+    # Refinement leaves almost no shortfall, by this measure too.
     assert found.mean_shortfall < 1e-3
-    # The same answers, but by another measure: every number is off.
+    # The same answers, but by another measure: every value differs.
     forged = dataclasses.replace(file, metadata={**file.metadata, "measure": "isotropy"})
     wrong = verify(forged, pairs=40, dense=0)
     assert wrong.false_reached == 0

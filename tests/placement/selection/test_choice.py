@@ -130,7 +130,7 @@ def test_equals_brute_force_over_all_kept_sets(
 
 
 def floor_with_walls(grid, seed, fraction):
-    """A floor on which this fraction of the grid's positions is blocked."""
+    """Return a lattice on which this fraction of the positions is blocked."""
     rng = np.random.default_rng(seed)
     blocked = rng.random((grid.axis("base_x").count, grid.axis("base_y").count)) < fraction
     reason = np.full((grid.size, 1), Reason.TOO_FAR, dtype=np.uint8)
@@ -383,7 +383,7 @@ def test_a_lowered_torso_and_a_single_value_are_allowed():
     spec["torso"] |= {"start": 0.2, "step": 0.1}
     grid = Grid.from_spec(spec)
     tables = SelectionTables(build_sets(random_scores(grid, 3, seed=0), grid), grid)
-    # One bed height was scored, which says nothing about its range.
+    # Only one bed height was scored, so its range is unknown.
     bed = {"environment": (("bed_height", 0.3),), "environment_units": ("m",)}
     select(tables, state(torso=0.0, **bed))
     with pytest.raises(SelectionError, match=r"cover 0\.2 to 0\.4 m"):

@@ -31,7 +31,7 @@ def position(lattice, i, j):
 
 
 def distances_over(lattice):
-    """Distances whose cells are all places of a lattice, row by row."""
+    """Return distances whose cells are all positions of a lattice, row by row."""
     xy = np.array([position(lattice, i, j) for i, j in np.ndindex(lattice.shape)])
     return LatticeDistances(xy, lattice)
 

@@ -1,4 +1,4 @@
-"""A small score file with everything in it."""
+"""A small score file with all parts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHIFT = {"name": "person_y", "unit": "m", "start": -0.05, "step": 0.05, "count":
 
 
 def score_file(*, grid=None, share=0.4, tables=1, options=None, **changes):
-    """Return a file with so many tables, each with other scores, its sets built with options."""
+    """Return a file with several tables of different scores; `options` are those of the sets."""
     grid = grid or small_grid(nx=6, ny=4, bed=2)
     scored = [random_scores(grid, 5, seed=1 + i, share=share) for i in range(tables)]
     parts = {

@@ -96,7 +96,7 @@ def test_a_failure_leaves_the_old_file_and_no_partial_one(path, file, monkeypatc
     path.write_bytes(b"the old file")
 
     def fail(*arguments, **options):
-        # Half a file is there by now.
+        # By now, half the file is written.
         if place == "joblib.dump":
             arguments[1].write(b"half")
         raise raised
@@ -184,7 +184,7 @@ def test_a_flipped_bit_is_refused(path, file):
 
 
 def test_flipped_bytes_never_crash(tmp_path, file):
-    """Whatever a byte turns into, the answer is a sound file or one of our errors."""
+    """Whatever value a byte has, the result is a valid file or a `TcsError`."""
     joblib.dump(encode(file), tmp_path / "whole")
     whole = (tmp_path / "whole").read_bytes()
     rng = np.random.default_rng(0)
@@ -355,7 +355,7 @@ def test_a_forged_file_is_refused_in_one_line(path, file, section, name, change)
 
 
 def test_a_compressed_array_must_have_its_stated_size(path, file):
-    """What decompresses to more than its shape says is refused before it fills the memory."""
+    """Data that decompress to more than their shape are refused before they fill the memory."""
     content = encode(file)
     bomb = np.frombuffer(zlib.compress(bytes(100_000_000)), dtype=np.uint8)
     content["tables"][0]["sets"]["pair_sum"]["bytes"] = bomb

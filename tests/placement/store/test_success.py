@@ -1,4 +1,4 @@
-"""Estimates in score files: they survive, old files do without, forged ones are refused."""
+"""Estimates in score files: round trip, files without estimates, and forged ones."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from tcs.placement.tables import Reason, ScoreTable
 
 
 def small_grid(nx=4, ny=3, yaws=2, torsos=2, *, step=0.2, bed=0, head=0):
-    """A grid of base places `step` apart, with a bed height and a head rest on request."""
+    """Return a grid of base positions `step` apart, optionally with bed height and head rest."""
     spec = {}
     if bed:
         spec["bed_height"] = {"unit": "m", "start": 0.0, "step": 0.1, "count": bed}
@@ -77,7 +77,7 @@ def all_sets(scores, grid, min_distance, rule="paper", same_environment=False, m
             p, q = np.round(p, 3), np.round(q, 3)
         if same_environment and at[a].environment != at[b].environment:
             return False
-        # A nanometre short is not short: steps of 0.2 are no binary fractions.
+        # A nanometre less is accepted: steps of 0.2 are no binary fractions.
         return math.dist(p, q) >= min_distance - 1e-9
 
     pairs = {
@@ -107,5 +107,5 @@ def all_sets(scores, grid, min_distance, rule="paper", same_environment=False, m
 
 
 def order_of(rule, scores):
-    """What sets with these P_R and P_M are ordered by, greatest first."""
+    """Return the keys by which sets with these P_R and P_M are ordered, greatest first."""
     return tuple(scores) if rule == "code2015" else scores[0] + scores[1]

@@ -10,7 +10,7 @@ NO_MOVES = BaseLattice(start=(0.0, 0.0), step=(0.5, 0.5), moves=np.zeros((4, 2, 
 
 
 def parts():
-    """Three candidates on two places 0.5 m apart; only the pair (4, 7) is kept."""
+    """Three candidates at two base positions 0.5 m apart; only the pair (4, 7) is kept."""
     return {
         "rule": "paper",
         "max_members": 2,

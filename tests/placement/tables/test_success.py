@@ -36,7 +36,7 @@ def test_the_most_robust_set_has_the_greatest_lower_bound():
     a, b, c, d = (int(h) for h in sets.candidates[:4])
     members = np.array([[a, -1], [b, -1], [c, -1], [a, d]], dtype=np.int32)
     table = SuccessTable(**{**PARTS, "members": members})
-    # (c,) has the greatest mean, of which less is known.
+    # (c,) has the greatest mean, but a wider interval.
     high, low = PARTS["high"], np.array([0.4, 0.2, 0.6, 0.7])
     assert table.most_robust(sets) == (a, d)
     assert table.most_robust(sets, max_members=1) == (c,)

@@ -31,7 +31,7 @@ def reasons():
 
 @pytest.fixture
 def page(iiwa, iiwa_stage, ready, browser, reasons):
-    """A live page, seen in the browser."""
+    """A live page in the browser."""
     meshcat = open_meshcat()
     found = LivePage(
         meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append

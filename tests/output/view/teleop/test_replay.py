@@ -123,7 +123,7 @@ def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
     command = Command(angular=(0.0, 0.0, 0.1))
     rows = [(command, session.step(command)) for _ in range(400)]
     run = run_from_steps(iiwa, rows, {})
-    # As if a sample had been kept every two seconds, for thirteen minutes.
+    # Thirteen minutes with a sample every two seconds.
     long = RunView(iiwa, dataclasses.replace(run, time=200.0 * run.time))
     assert long.length > 790
     text = replay_page(open_meshcat(), iiwa_stage, long, title="long")

@@ -35,7 +35,7 @@ class Spy:
 
     @property
     def points(self):
-        """All points, in the order of the way."""
+        """Return all points in the order of the path."""
         pieces = sorted(self.lines.items(), key=lambda one: int(one[0].split("/")[1]))
         return np.vstack([pieces[0][1], *(piece[1:] for _, piece in pieces[1:])])
 
@@ -55,7 +55,7 @@ def test_the_path_is_complete_and_only_its_end_is_sent_again(spy):
     for point in way:
         trail.add(point)
     np.testing.assert_array_equal(spy.points, way)
-    # A way sent whole each time would come to 300 * 301 / 2 points.
+    # A path sent completely each time would have 300 * 301 / 2 points.
     assert spy.sent < 300 * 25
 
 
@@ -115,7 +115,7 @@ def test_the_robot_is_in_the_posture_of_the_arm(name):
     stage.poses(joints)
     X_WT = stage._scene.tool_pose()
     at = arm.kinematics(joints)
-    # Two ways through the same chain: rounding.
+    # Two computations along the same chain: rounding.
     np.testing.assert_allclose(X_WT.translation(), at.p, atol=1e-12)
     np.testing.assert_allclose(X_WT.rotation().matrix(), at.R, atol=1e-12)
 

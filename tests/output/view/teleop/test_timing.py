@@ -6,7 +6,7 @@ from tcs.output.view.teleop.timing import MOST_AT_ONCE, Durations, StepClock
 
 
 class Clock:
-    """A clock that sleeping moves, a hair too far each time."""
+    """A clock that each sleep advances slightly too far."""
 
     def __init__(self, over=1e-4):
         self.now, self.over = 100.0, over
@@ -27,7 +27,7 @@ def test_steps_do_not_drift():
     clock, pace = paced()
     steps = sum(pace.wait()[0] for _ in range(1000))
     assert steps == 1000
-    # Every step has its own time, so 1000 hairs do not add up: one is left.
+    # The schedule is absolute, so the excess does not accumulate over 1000 steps.
     assert clock.now == pytest.approx(100.0 + 10.0 + 1e-4, abs=1e-6)
 
 
