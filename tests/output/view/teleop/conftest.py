@@ -102,7 +102,7 @@ def page(meshcat, iiwa_stage, iiwa, ready, reasons, desk):
 
 @pytest.fixture(scope="session")
 def driven(iiwa):
-    """A run of 9 s: down to a limit, a motion of a joint group, and out until the arm is stretched."""
+    """A run of 9 s: down to a limit, a motion of a joint group, and out to a stretched arm."""
     session = Teleoperation(iiwa, [0.0, 0.6, 0.0, -1.4, 0.0, 1.0, 0.0])
     commands = [(Command(linear=(0.0, 0.0, -0.2)), 300)]
     commands += [(Command(mode=Mode.NULL_SPACE, group=0, sign=1), 100)]
