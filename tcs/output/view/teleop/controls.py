@@ -145,7 +145,7 @@ class OperatorInput:
         """The control mode."""
         return self.modes[self._mode]
 
-    def listen(self, now: float) -> OperatorCommand:
+    def read(self, now: float) -> OperatorCommand:
         """Return the operator's input.
 
         Args:
@@ -153,16 +153,16 @@ class OperatorInput:
         """
         reading = self.source.read()
         pressed = self._pressed(reading, now)
-        pad = self._gamepad.look(reading.pad, now)
-        self._obey(pressed, pad, now)
+        pad = self._gamepad.update(reading.pad, now)
+        self._apply_switches(pressed, pad, now)
         back = BACK in pressed
         lost = pad.lost
         if not reading.watched:
             # Meshcat keeps the state of the last browser.
-            self._gamepad.forget()
+            self._gamepad.reset()
             lost = "no browser is connected to this page: the arm stops until one is."
         if STOP in pressed:
-            self._gamepad.give_up()
+            self._gamepad.dismiss()
         if back or lost or STOP in pressed:
             self._until.clear()
             if any(reading.sliders[name] for name in RATE_SLIDERS):
@@ -183,7 +183,7 @@ class OperatorInput:
                 self._until[name] = now + TAP
         return found
 
-    def _obey(self, pressed: Mapping[str, int], pad: GamepadCommand, now: float) -> None:
+    def _apply_switches(self, pressed: Mapping[str, int], pad: GamepadCommand, now: float) -> None:
         """Change mode, group and clutch."""
         in_null_space = self.mode in NULL_SPACE_MODES
         for number in range(self.groups):

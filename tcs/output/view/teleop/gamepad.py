@@ -76,14 +76,14 @@ class Gamepad:
         self._active = False
         self._lost = ""
 
-    def look(self, pad: GamepadState | None, now: float) -> GamepadCommand:
+    def update(self, pad: GamepadState | None, now: float) -> GamepadCommand:
         """Return the present command.
 
         Left stick: forward and sideways; right stick: up, and yaw. With the left shoulder button
         held, the left stick rolls and pitches instead. The cross moves a joint group, left and
         right, and selects one, up and down. A changes the mode, B is the clutch.
 
-        A lost gamepad stops the arm until it is back and was released, or `give_up` is called.
+        A lost gamepad stops the arm until it is back and was released, or `dismiss` is called.
 
         Args:
             pad: State of the gamepad; None if there is none.
@@ -125,11 +125,11 @@ class Gamepad:
             clicks=clicks,
         )
 
-    def give_up(self) -> None:
+    def dismiss(self) -> None:
         """Continue without a lost gamepad."""
         self._lost = ""
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Ignore the gamepad until it was at rest."""
         self._active, self._lost = False, ""
 

@@ -86,7 +86,7 @@ class LivePage:
     def __init__(
         self,
         meshcat: Meshcat,
-        stage: RobotDisplay,
+        display: RobotDisplay,
         arm: Arm,
         start: FloatArray,
         *,
@@ -99,7 +99,7 @@ class LivePage:
 
         Args:
             meshcat: An empty Meshcat.
-            stage: The robot.
+            display: The robot.
             arm: Its arm.
             start: Joint positions at the start [rad], shape (7,).
             settings: Settings of the controller.
@@ -112,19 +112,19 @@ class LivePage:
             TcsError: If the start posture is not seven finite numbers.
         """
         self.session = Teleoperation(arm, start, settings, modes[0])
-        self.hand = OperatorInput(
+        self.operator = OperatorInput(
             MeshcatControls(meshcat, len(settings.groups)), modes, len(settings.groups)
         )
         self.steps, self.pictures, self.worked = Durations(), Durations(), Durations()
         self.dropped = 0
-        self._meshcat, self._stage, self._arm = meshcat, stage, arm
+        self._meshcat, self._display, self._arm = meshcat, display, arm
         self._start = np.array(start, dtype=np.float64)
         self._on_stop, self._on_step = on_stop, on_step
         self._message, self._message_until = "", 0.0
         self._touching = ""
         self._seen = False
         self._shown = 0
-        stage.set_up(meshcat, arm.kinematics(self._start).p)
+        display.set_up(meshcat, arm.kinematics(self._start).p)
         self._panel = Panel(meshcat, arm)
         self._trail = Trail(meshcat)
         self._input = OperatorCommand(Command())
@@ -134,7 +134,7 @@ class LivePage:
     def step(self) -> Step:
         """Read the controls and advance the arm by one period."""
         begun = time.perf_counter()
-        operator_input = self._input = self.hand.listen(begun)
+        operator_input = self._input = self.operator.read(begun)
         if operator_input.back:
             self.session.place(self._start)
             self._trail.clear()
@@ -160,10 +160,10 @@ class LivePage:
         """Send the changes to the browser."""
         begun = time.perf_counter()
         last, meshcat = self.last, self._meshcat
-        for path, pose in self._stage.poses(last.joints).items():
+        for path, pose in self._display.poses(last.joints).items():
             meshcat.SetTransform(path, pose)
         if self._shown % _CHECK_EVERY == 0:
-            touching = self._stage.contacts()
+            touching = self._display.contacts()
             self._touching = "" if touching is None else f"{touching[0]} touches {touching[1]}"
         self._shown += 1
         meshcat.SetTransform(TOOL, pose_of(last.R, last.p))
@@ -198,7 +198,7 @@ class LivePage:
 
     def mode_line(self) -> str:
         """Return the control mode in one line."""
-        number = self.hand.group
+        number = self.operator.group
         chosen = self.last.mode is Mode.NULL_SPACE
         group = self.session.settings.groups[number] if chosen else None
         clutch = self._input.command.clutch and not self._input.lost

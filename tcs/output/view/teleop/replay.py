@@ -29,8 +29,8 @@ from tcs.teleop.runs.files import load_run
 from tcs.teleop.runs.run import NO_GROUP, Run
 
 FloatArray = NDArray[np.float64]
-PLACE, SPEED = "time [s]", "speed"
-PLAY, AGAIN = "play or pause (space)", "from the start (X)"
+TIME, SPEED = "time [s]", "speed"
+PLAY, RESTART = "play or pause (space)", "from the start (X)"
 _FRAME_PERIOD = 0.03
 """Time between two frames of the playback [s]."""
 
@@ -146,54 +146,54 @@ def load_run_view(path: Path, robot: str | None = None) -> RunView:
 class Replay:
     """Playback of a run in a Meshcat, with a slider for its time."""
 
-    def __init__(self, meshcat: Meshcat, stage: RobotDisplay, view: RunView) -> None:
+    def __init__(self, meshcat: Meshcat, display: RobotDisplay, view: RunView) -> None:
         """Show the first sample; the playback starts there.
 
         Args:
             meshcat: An empty Meshcat.
-            stage: The robot.
+            display: The robot.
             view: The run.
         """
-        self._meshcat, self._stage, self.view = meshcat, stage, view
-        stage.set_up(meshcat, view.run.position[0], target=False)
+        self._meshcat, self._display, self.view = meshcat, display, view
+        display.set_up(meshcat, view.run.position[0], target=False)
         view.draw(meshcat)
         self._panel = Panel(meshcat, view.arm)
         meshcat.AddButton(PLAY, "Space")
-        meshcat.AddButton(AGAIN, "KeyX")
+        meshcat.AddButton(RESTART, "KeyX")
         # A hundredth of a second is one sample at the paper's rate.
-        meshcat.AddSlider(PLACE, 0.0, max(view.length, 0.01), 0.01, 0.0)
+        meshcat.AddSlider(TIME, 0.0, max(view.length, 0.01), 0.01, 0.0)
         meshcat.AddSlider(SPEED, 0.1, 4.0, 0.1, 1.0)
-        self._clicks = {PLAY: 0, AGAIN: 0}
+        self._clicks = {PLAY: 0, RESTART: 0}
         self._slider = 0.0
-        self.place, self.playing = 0.0, True
+        self.time, self.playing = 0.0, True
         self.show()
 
     def advance(self, seconds: float) -> None:
         """Apply the changes of the controls, then play for a wall-clock time [s]."""
-        requested = self._meshcat.GetSliderValue(PLACE)
+        requested = self._meshcat.GetSliderValue(TIME)
         # The slider rounds the value that was set to its step.
         if abs(requested - self._slider) > 1e-9:
-            self.place, self.playing = requested, False
+            self.time, self.playing = requested, False
         for name, before in self._clicks.items():
             self._clicks[name] = self._meshcat.GetButtonClicks(name)
             pressed = self._clicks[name] - before
-            if name == AGAIN and pressed:
-                self.place, self.playing = 0.0, True
+            if name == RESTART and pressed:
+                self.time, self.playing = 0.0, True
             elif name == PLAY and pressed % 2:
-                ended = self.place >= self.view.length
-                self.place = 0.0 if ended else self.place
+                ended = self.time >= self.view.length
+                self.time = 0.0 if ended else self.time
                 self.playing = ended or not self.playing
         if self.playing:
-            self.place += seconds * self._meshcat.GetSliderValue(SPEED)
-            if self.place >= self.view.length:
-                self.place, self.playing = self.view.length, False
-        self._slider = self._meshcat.SetSliderValue(PLACE, self.place)
+            self.time += seconds * self._meshcat.GetSliderValue(SPEED)
+            if self.time >= self.view.length:
+                self.time, self.playing = self.view.length, False
+        self._slider = self._meshcat.SetSliderValue(TIME, self.time)
         self.show()
 
     def show(self) -> None:
         """Show the sample at the present time of the playback."""
-        i = self.view.sample(self.place)
-        for path, pose in self._stage.poses(self.view.run.joints[i]).items():
+        i = self.view.sample(self.time)
+        for path, pose in self._display.poses(self.view.run.joints[i]).items():
             self._meshcat.SetTransform(path, pose)
         self._meshcat.SetTransform(TOOL, self.view.tool(i))
         self._panel.show(self.view.readout(i))

@@ -75,13 +75,13 @@ def export_run(path: Path, page: Path, robot: str | None = None, *, meshes: bool
 
 
 def replay_page(
-    meshcat: Meshcat, stage: RobotDisplay, view: RunView, *, title: str, notes: Sequence[str] = ()
+    meshcat: Meshcat, display: RobotDisplay, view: RunView, *, title: str, notes: Sequence[str] = ()
 ) -> str:
     """Return a page that plays the run without a server.
 
     Args:
         meshcat: An empty Meshcat.
-        stage: The robot.
+        display: The robot.
         view: The run.
         title: First line.
         notes: Further lines.
@@ -89,12 +89,12 @@ def replay_page(
     rate = min(_FRAME_RATE, _MOST_FRAMES / max(view.length, 1e-9))
     count = math.ceil(view.length * rate) + 1
     samples = [view.sample(number / rate) for number in range(count)]
-    stage.set_up(meshcat, view.run.position[0], target=False, compact=True)
+    display.set_up(meshcat, view.run.position[0], target=False, compact=True)
     view.draw(meshcat)
     panel = Panel(meshcat, view.arm)
     readouts = [view.readout(i) for i in samples]
     panel.show(readouts[0])
-    shots = [{**stage.poses(view.run.joints[i]), TOOL: view.tool(i)} for i in samples]
+    shots = [{**display.poses(view.run.joints[i]), TOOL: view.tool(i)} for i in samples]
     for path, pose in shots[0].items():
         meshcat.SetTransform(path, pose)
     animation = MeshcatAnimation(rate)

@@ -19,7 +19,7 @@ _AREA = ((0.4, 0.75), (-0.3, 0.3), (-0.4, 0.4))
 """Range of the tool position relative to the shoulder (forward, left, up), in arm lengths."""
 
 
-def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
+def start_posture(arm: Arm, display: RobotDisplay) -> FloatArray:
     """Return a start posture far from limits and singularities [rad], shape (7,).
 
     The result is deterministic. Of postures within the limits whose tool points forward, it has a
@@ -28,7 +28,7 @@ def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
 
     Args:
         arm: The arm.
-        stage: The robot display, which checks contacts.
+        display: The robot display, which checks contacts.
     """
     rng = np.random.default_rng(0)
     area = _area(arm)
@@ -43,8 +43,8 @@ def start_posture(arm: Arm, stage: RobotDisplay) -> FloatArray:
             margin = _margin(arm, near, *area)
             if margin > best:
                 best, joints = margin, near
-        stage.poses(joints)
-        if best > 0.0 and stage.contacts() is None:
+        display.poses(joints)
+        if best > 0.0 and display.contacts() is None:
             return np.array(joints)
     # Without such a posture, the start is in the middle of the joint ranges.
     low, high = (np.where(arm.bounded, ends, 0.0) for ends in (arm.lower, arm.upper))

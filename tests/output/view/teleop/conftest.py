@@ -20,7 +20,7 @@ def iiwa():
 
 
 @pytest.fixture(scope="session")
-def iiwa_stage(iiwa):
+def iiwa_display(iiwa):
     return RobotDisplay(iiwa, meshes=False)
 
 
@@ -91,12 +91,12 @@ def reasons():
 
 
 @pytest.fixture
-def page(meshcat, iiwa_stage, iiwa, ready, reasons, desk):
+def page(meshcat, iiwa_display, iiwa, ready, reasons, desk):
     """A live page with the controls of the desk."""
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
     )
-    found.hand.source = desk
+    found.operator.source = desk
     return found
 
 

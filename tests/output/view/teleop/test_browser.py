@@ -30,11 +30,11 @@ def reasons():
 
 
 @pytest.fixture
-def page(iiwa, iiwa_stage, ready, browser, reasons):
+def page(iiwa, iiwa_display, ready, browser, reasons):
     """A live page in the browser."""
     meshcat = open_meshcat()
     found = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES, on_stop=reasons.append
     )
     browser.open(meshcat.web_url(), "tool")
     until(found, lambda: meshcat.GetNumActiveConnections() == 1)
@@ -208,11 +208,11 @@ def test_a_closed_browser_stops_the_arm(page, browser):
     assert not page.last.rates.any()
 
 
-def test_the_page_of_a_run_needs_no_server(browser, iiwa, iiwa_stage, driven, tmp_path):
+def test_the_page_of_a_run_needs_no_server(browser, iiwa, iiwa_display, driven, tmp_path):
     film = RunView(iiwa, driven)
     path = tmp_path / "run.html"
     meshcat = open_meshcat()
-    path.write_text(replay_page(meshcat, iiwa_stage, film, title="A run"))
+    path.write_text(replay_page(meshcat, iiwa_display, film, title="A run"))
     del meshcat
     browser.open(path.as_uri(), "robot")
     where = """

@@ -103,13 +103,13 @@ def test_a_stretched_arm_turns_the_bars_magenta(page, desk, iiwa):
     assert "singular" in page.message(page._message_until + 1.0)
 
 
-def test_recording_begins_when_a_browser_connects(meshcat, iiwa_stage, iiwa, ready, desk):
+def test_recording_begins_when_a_browser_connects(meshcat, iiwa_display, iiwa, ready, desk):
     recorder = Recorder(iiwa)
     page = LivePage(
-        meshcat, iiwa_stage, iiwa, ready, settings=Settings(), modes=MODES, on_stop=lambda _: None,
-        on_step=recorder.add,
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES,
+        on_stop=lambda _: None, on_step=recorder.add,
     )  # fmt: skip
-    page.hand.source = desk
+    page.operator.source = desk
     desk.watched = False
     drive(page, 5)
     assert recorder.run({}) is None
@@ -146,19 +146,19 @@ def test_the_page_has_all_its_controls(page, meshcat):
 @pytest.mark.parametrize("name", ["iiwa7", "pr2", "pr2_right", "tiago", "panda"])
 def test_start_postures_are_collision_free_and_allow_motion(name, meshcat):
     arm = load_arm(name, torso_height=0.1)
-    stage = RobotDisplay(arm, meshes=False)
-    start = start_posture(arm, stage)
+    display = RobotDisplay(arm, meshes=False)
+    start = start_posture(arm, display)
     assert arm.limit_violation(start) == ""
-    stage.poses(start)
-    assert stage.contacts() is None
-    np.testing.assert_array_equal(start, start_posture(arm, stage))
+    display.poses(start)
+    assert display.contacts() is None
+    np.testing.assert_array_equal(start, start_posture(arm, display))
     page = LivePage(
-        meshcat, stage, arm, start, settings=Settings(), modes=MODES, on_stop=lambda _: None
+        meshcat, display, arm, start, settings=Settings(), modes=MODES, on_stop=lambda _: None
     )
     before = page.last.p.copy()
     assert before[0] > arm.frames[0, 0, 3]
     assert not page.last.singular
-    page.hand.source = None
+    page.operator.source = None
     for direction in np.vstack([np.eye(3), -np.eye(3)]):
         page.session.place(start)
         for _ in range(60):
@@ -172,8 +172,8 @@ def _towards(linear):
     return Command(linear=linear)
 
 
-def test_only_bodies_carried_by_the_arm_move(iiwa_stage, iiwa, ready):
-    poses = iiwa_stage.poses(ready)
+def test_only_bodies_carried_by_the_arm_move(iiwa_display, iiwa, ready):
+    poses = iiwa_display.poses(ready)
     # Seven links; column and base stand still.
     assert len(poses) == 7
     tool = iiwa.kinematics(ready).p
@@ -182,7 +182,7 @@ def test_only_bodies_carried_by_the_arm_move(iiwa_stage, iiwa, ready):
     assert np.linalg.norm(farthest - tool) < 0.1
 
 
-def test_self_contact_is_shown(page, iiwa_stage, iiwa, ready):
+def test_self_contact_is_shown(page, iiwa_display, iiwa, ready):
     posture = ready.copy()
     posture[[1, 3]] = 2.0, -2.0
     page.session.place(posture)
@@ -206,10 +206,10 @@ def test_a_run_at_the_pace_of_the_clock(page):
 
 
 def test_without_a_forward_posture_the_start_is_in_the_middle_of_the_ranges(
-    iiwa, iiwa_stage, monkeypatch
+    iiwa, iiwa_display, monkeypatch
 ):
     monkeypatch.setattr("tcs.output.view.teleop.start._AHEAD", 1.1)
-    np.testing.assert_allclose(start_posture(iiwa, iiwa_stage), np.zeros(7), atol=1e-12)
+    np.testing.assert_allclose(start_posture(iiwa, iiwa_display), np.zeros(7), atol=1e-12)
 
 
 def test_a_recurring_reason_is_reported_once(page, desk, reasons):
@@ -262,18 +262,18 @@ def test_hints_are_shown(page, desk):
     assert "null-space mode" in page.message(time.perf_counter())
 
 
-def test_postures_in_contact_are_skipped(iiwa, iiwa_stage):
+def test_postures_in_contact_are_skipped(iiwa, iiwa_display):
     class InContact:
         checked = 0
 
         def poses(self, joints):
-            return iiwa_stage.poses(joints)
+            return iiwa_display.poses(joints)
 
         def contacts(self):
             self.checked += 1
             return ("arm", "column") if self.checked < 3 else None
 
-    stage = InContact()
-    other = start_posture(iiwa, stage)
-    assert stage.checked == 3
-    assert not np.array_equal(other, start_posture(iiwa, iiwa_stage))
+    display = InContact()
+    other = start_posture(iiwa, display)
+    assert display.checked == 3
+    assert not np.array_equal(other, start_posture(iiwa, iiwa_display))

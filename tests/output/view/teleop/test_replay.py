@@ -9,7 +9,7 @@ from tcs.errors import DataFileError
 from tcs.output.view import open_meshcat
 from tcs.output.view.teleop import Replay, RunView, replay_page
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR
-from tcs.output.view.teleop.replay import AGAIN, PLACE, PLAY, SPEED
+from tcs.output.view.teleop.replay import PLAY, RESTART, SPEED, TIME
 from tcs.teleop import Command, Teleoperation, load_arm
 from tcs.teleop.runs.recorder import run_from_steps
 from tests.output.view.teleop.conftest import Instead
@@ -21,8 +21,8 @@ def film(iiwa, driven):
 
 
 @pytest.fixture
-def replay(meshcat, iiwa_stage, film):
-    return Replay(meshcat, iiwa_stage, film)
+def replay(meshcat, iiwa_display, film):
+    return Replay(meshcat, iiwa_display, film)
 
 
 def test_samples_are_those_of_their_time(film):
@@ -59,9 +59,9 @@ def test_the_panel_shows_modes_limits_and_singularities(film):
 
 def test_it_plays_by_the_clock_and_ends(replay, film):
     replay.advance(0.5)
-    assert replay.place == pytest.approx(0.5)
+    assert replay.time == pytest.approx(0.5)
     replay.advance(100.0)
-    assert replay.place == film.length
+    assert replay.time == film.length
     assert not replay.playing
 
 
@@ -69,38 +69,38 @@ def test_the_slider_sets_the_time_and_pauses(replay, meshcat):
     replay.advance(0.123)
     replay.advance(0.123)
     assert replay.playing
-    meshcat.SetSliderValue(PLACE, 4.0)
+    meshcat.SetSliderValue(TIME, 4.0)
     replay.advance(0.5)
-    assert replay.place == pytest.approx(4.0)
+    assert replay.time == pytest.approx(4.0)
     assert not replay.playing
 
 
 def test_speed_and_buttons(replay, meshcat, monkeypatch):
     meshcat.SetSliderValue(SPEED, 2.0)
     replay.advance(1.0)
-    assert replay.place == pytest.approx(2.0)
-    clicks = {PLAY: 0, AGAIN: 0}
+    assert replay.time == pytest.approx(2.0)
+    clicks = {PLAY: 0, RESTART: 0}
 
     monkeypatch.setattr(replay, "_meshcat", Instead(meshcat, GetButtonClicks=clicks.__getitem__))
     clicks[PLAY] = 1
     replay.advance(1.0)
-    assert (replay.place, replay.playing) == (pytest.approx(2.0), False)
-    clicks[AGAIN] = 1
+    assert (replay.time, replay.playing) == (pytest.approx(2.0), False)
+    clicks[RESTART] = 1
     replay.advance(0.0)
-    assert (replay.place, replay.playing) == (0.0, True)
+    assert (replay.time, replay.playing) == (0.0, True)
     replay.advance(100.0)
     clicks[PLAY] = 2
     replay.advance(0.0)
-    assert (replay.place, replay.playing) == (0.0, True)
+    assert (replay.time, replay.playing) == (0.0, True)
 
 
-def test_the_arm_is_in_the_posture_of_the_run(replay, meshcat, iiwa_stage, film, monkeypatch):
+def test_the_arm_is_in_the_posture_of_the_run(replay, meshcat, iiwa_display, film, monkeypatch):
     moved = {}
 
     monkeypatch.setattr(replay, "_meshcat", Instead(meshcat, SetTransform=moved.__setitem__))
-    replay.place = 5.0
+    replay.time = 5.0
     replay.show()
-    for path, pose in iiwa_stage.poses(film.run.joints[500]).items():
+    for path, pose in iiwa_display.poses(film.run.joints[500]).items():
         assert moved[path].IsExactlyEqualTo(pose)
 
 
@@ -109,8 +109,8 @@ def test_another_robots_run_is_refused(driven):
         RunView(load_arm("panda"), driven)
 
 
-def test_page_is_whole_and_small(iiwa_stage, film):
-    text = replay_page(open_meshcat(), iiwa_stage, film, title="iiwa & co", notes=["<by> me"])
+def test_page_is_whole_and_small(iiwa_display, film):
+    text = replay_page(open_meshcat(), iiwa_display, film, title="iiwa & co", notes=["<by> me"])
     assert "iiwa &amp; co" in text
     assert "&lt;by&gt; me" in text
     assert text.count("</body>") == 1
@@ -118,7 +118,7 @@ def test_page_is_whole_and_small(iiwa_stage, film):
     assert len(text.encode()) < 5e6
 
 
-def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
+def test_long_runs_get_fewer_pictures(iiwa, iiwa_display, ready):
     session = Teleoperation(iiwa, ready)
     command = Command(angular=(0.0, 0.0, 0.1))
     rows = [(command, session.step(command)) for _ in range(400)]
@@ -126,15 +126,15 @@ def test_long_runs_get_fewer_pictures(iiwa, iiwa_stage, ready):
     # Thirteen minutes with a sample every two seconds.
     long = RunView(iiwa, dataclasses.replace(run, time=200.0 * run.time))
     assert long.length > 790
-    text = replay_page(open_meshcat(), iiwa_stage, long, title="long")
+    text = replay_page(open_meshcat(), iiwa_display, long, title="long")
     assert len(text.encode()) < 10e6
 
 
-def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_stage, meshcat):
+def test_the_line_of_a_trial_is_shown(driven, iiwa, iiwa_display, meshcat):
     ends = {"line_start": [0.6, 0.2, 0.9], "line_end": [-0.1, 0.2, 0.9]}
     film = RunView(iiwa, dataclasses.replace(driven, metadata=ends))
     np.testing.assert_array_equal(film.course[1], ends["line_end"])
-    Replay(meshcat, iiwa_stage, film)
+    Replay(meshcat, iiwa_display, film)
     assert meshcat.HasPath("course/line")
 
 
@@ -154,7 +154,7 @@ def test_a_run_without_a_line_shows_none(driven, iiwa, ends):
     assert RunView(iiwa, dataclasses.replace(driven, metadata=ends)).course is None
 
 
-def test_pictures_of_a_long_run_go_to_its_end(iiwa_stage, driven, iiwa):
+def test_pictures_of_a_long_run_go_to_its_end(iiwa_display, driven, iiwa):
     seen = []
 
     class Noting(RunView):
@@ -163,7 +163,7 @@ def test_pictures_of_a_long_run_go_to_its_end(iiwa_stage, driven, iiwa):
             return super().sample(seconds)
 
     long = Noting(iiwa, dataclasses.replace(driven, time=20.0 * driven.time))
-    replay_page(open_meshcat(), iiwa_stage, long, title="long")
+    replay_page(open_meshcat(), iiwa_display, long, title="long")
     assert len(seen) <= 3002
     # Even times, the last one less than a picture after the end.
     assert np.ptp(np.diff(seen)) < 1e-9

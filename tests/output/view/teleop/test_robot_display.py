@@ -97,12 +97,12 @@ def test_rounding_in_a_rotation_is_no_error():
     np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
 
 
-def test_live_there_is_a_target_and_played_back_there_is_none(iiwa_stage, meshcat):
-    iiwa_stage.set_up(meshcat, np.array([0.6, 0.0, 1.0]))
+def test_live_there_is_a_target_and_played_back_there_is_none(iiwa_display, meshcat):
+    iiwa_display.set_up(meshcat, np.array([0.6, 0.0, 1.0]))
     assert meshcat.HasPath(TARGET)
     assert meshcat.HasPath(TOOL)
     meshcat.Delete()
-    iiwa_stage.set_up(meshcat, np.array([0.6, 0.0, 1.0]), target=False)
+    iiwa_display.set_up(meshcat, np.array([0.6, 0.0, 1.0]), target=False)
     assert not meshcat.HasPath(TARGET)
     assert meshcat.HasPath(TOOL)
 
@@ -110,10 +110,10 @@ def test_live_there_is_a_target_and_played_back_there_is_none(iiwa_stage, meshca
 @pytest.mark.parametrize("name", ["pr2", "tiago", "panda"])
 def test_the_robot_is_in_the_posture_of_the_arm(name):
     arm = load_arm(name, torso_height=0.2)
-    stage = RobotDisplay(arm, meshes=False)
+    display = RobotDisplay(arm, meshes=False)
     joints = arm.random_joints(np.random.default_rng(1), 1)[0]
-    stage.poses(joints)
-    X_WT = stage._scene.tool_pose()
+    display.poses(joints)
+    X_WT = display._scene.tool_pose()
     at = arm.kinematics(joints)
     # Two computations along the same chain: rounding.
     np.testing.assert_allclose(X_WT.translation(), at.p, atol=1e-12)
