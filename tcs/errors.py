@@ -24,6 +24,17 @@ import difflib
 from collections.abc import Iterable
 
 
+def one_line(text: str, most: int = 80) -> str:
+    r"""Return a text from a file for a message: short, and without line breaks or control codes.
+
+    >>> one_line("a\nb")
+    'a b'
+    """
+    # `split` also splits at the separators of lines and paragraphs of Unicode.
+    shown = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    return shown if len(shown) <= most else f"{shown[:most]}..."
+
+
 class TcsError(Exception):
     """Base class of the exceptions of `tcs`; the message is one line on which a user can act."""
 
@@ -48,7 +59,7 @@ class UnknownNameError(TcsError):
         hint = f" Did you mean '{near[0]}'?" if near else ""
         prefix = f"{where}: " if where else ""
         listed = ", ".join(self.known) or "none"
-        super().__init__(f"{prefix}unknown {what} '{name}'. Known: {listed}.{hint}")
+        super().__init__(f"{prefix}unknown {what} '{one_line(name)}'. Known: {listed}.{hint}")
 
 
 class DataFileError(TcsError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,8 @@ def read_bags(
     samples, torso_heights, found = [], [], set[str]()
     where = f"bag '{paths[0]}'" + (f" and {len(paths) - 1} more" if len(paths) > 1 else "")
     for path in paths:
-        if not path.exists():
-            raise DataFileError(f"bag '{path}' does not exist.")
+        if not os.path.isdir(path) and not os.path.isfile(path):
+            raise DataFileError(f"bag '{path}' does not exist, or is neither a file nor a folder.")
         try:
             # ROS 2 bags without message definitions use those of a long-term release; joint states
             # have not changed since.
@@ -75,6 +76,13 @@ def read_bags(
         except AnyReaderError as error:
             cause = " ".join(str(error).split())
             raise DataFileError(f"bag '{path}' cannot be read: {cause}.") from None
+        except DataFileError:
+            raise
+        except Exception as error:
+            # Its readers raise errors of many classes for a damaged bag.
+            raise DataFileError(
+                f"bag '{path}' is damaged ({type(error).__name__} while reading)."
+            ) from None
     if not samples:
         missing = [name for name in wanted if name not in found]
         cause = f"{', '.join(missing)} missing" if missing else "never all in one message"

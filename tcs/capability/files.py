@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 
 from tcs.capability.grid import MapGrid
-from tcs.capability.map import CapabilityMap
+from tcs.capability.map import MAX_TORSO_HEIGHTS, CapabilityMap
 from tcs.errors import StoreError, StoreFormatError, TcsError
-from tcs.files.compression import ascending_from, compress, decompress, differences
+from tcs.files.compression import (
+    AtMost,
+    ascending_from,
+    check_claims,
+    compress,
+    decompress,
+    differences,
+)
 from tcs.files.joblib_file import check_header, check_types, header, write_joblib
 from tcs.files.plain import plain
 from tcs.files.reader import explained, read_joblib
@@ -71,6 +78,7 @@ def _encode(capability: CapabilityMap) -> dict[str, Any]:
 
 def _decode(content: object) -> CapabilityMap:
     content = check_header(content, FORMAT, FORMAT_VERSION)
+    check_claims(content)
     types = {"map_type": str, "step": float, "yaw_bins": int, "tilts": list, "torso_height": float}
     check_types(content, {**types, "manipulability_scale": float, "metadata": dict})
     tilts = content["tilts"]
@@ -79,7 +87,7 @@ def _decode(content: object) -> CapabilityMap:
     grid = MapGrid(content["step"], content["yaw_bins"], tuple((p, r) for p, r in tilts))
     keys = ascending_from(decompress(content, "key_step", "u8", (None,)), 2**62, "cells")
     count = (keys.size,)
-    joints = decompress(content, "joints", "f4", (None, 7))
+    joints = decompress(content, "joints", "f4", (AtMost(keys.size), 7))
     try:
         return CapabilityMap(
             map_type=content["map_type"],
@@ -87,7 +95,7 @@ def _decode(content: object) -> CapabilityMap:
             cells=grid.cells_of(keys),
             manipulability=decompress(content, "manipulability", "f4", count),
             visibility=decompress(content, "visibility", "f4", count),
-            torso_heights=decompress(content, "torso_heights", "f8", (None,)),
+            torso_heights=decompress(content, "torso_heights", "f8", (AtMost(MAX_TORSO_HEIGHTS),)),
             torso_height=content["torso_height"],
             free_torso_heights=decompress(content, "free_torso_heights", "u4", count),
             manipulability_scale=content["manipulability_scale"],
@@ -112,7 +120,7 @@ def robot_reference(
         StoreError: If the stored file is missing.
     """
     stored = str(capability.metadata["robot"]) if robot is None else robot
-    if robot is not None or stored in robot_names() or Path(stored).is_file():
+    if robot is not None or stored in robot_names() or os.path.isfile(stored):
         return stored
     raise StoreError(
         f"{WHAT} '{path}' was made for robot '{stored}', which does not ship with tcs and whose "

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, PositiveNumber, read_document
+from tcs.files.documents import Document, FieldOfViewDeg, read_document
 from tcs.files.paths import DataFiles
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import RobotFile
@@ -24,8 +24,8 @@ class HeadFile(Document):
     """Frame of the URDF at the camera, x along its view with the head at zero."""
     pan_joint: str
     tilt_joint: str
-    horizontal_fov_deg: PositiveNumber
-    vertical_fov_deg: PositiveNumber
+    horizontal_fov_deg: FieldOfViewDeg
+    vertical_fov_deg: FieldOfViewDeg
     source: str
 
 

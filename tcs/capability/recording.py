@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import DataFileError
+from tcs.files.quantities import JOINT_LIMIT
+from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.model.robots import RobotFile
+
+MAX_BYTES = 1024**3
+"""Most bytes of a recording: a day at 100 samples a second."""
 
 LIMIT_SLACK = 2e-3
 """Tolerance of joint limits [rad or m]: a few times the resolution of a coarse encoder."""
@@ -108,6 +114,8 @@ def _first_bad(
     """Return which samples are invalid; raise for the first one unless they may be dropped."""
     limits = robot.joint_limits()
     low, high = (np.array([limits[name][side] for name in names]) for side in (0, 1))
+    # A continuous joint has no limits, but its angle has a range.
+    low, high = np.maximum(low, JOINT_LIMIT.low), np.minimum(high, JOINT_LIMIT.high)
     finite = np.isfinite(values)
     inside = (values >= low - LIMIT_SLACK) & (values <= high + LIMIT_SLACK)
     bad: BoolArray = np.asarray(~(finite & inside).all(axis=1))
@@ -137,13 +145,11 @@ def read_csv(path: Path, robot: RobotFile, *, drop_bad: bool = False) -> Recordi
         DataFileError: If the file cannot be read, or is not a recording of the robot.
     """
     where = f"recording '{path}'"
+    text = read_text(path, where, DataFileError, limit=MAX_BYTES)
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            rows = [row for row in csv.reader(stream) if row]
-    except OSError as error:
-        raise DataFileError(f"{where} cannot be read: {error.strerror}.") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise DataFileError(f"{where} is not a CSV file in UTF-8.") from None
+        rows = [row for row in csv.reader(io.StringIO(text, newline="")) if row]
+    except csv.Error as error:
+        raise DataFileError(f"{where} is not a CSV file: {error}.") from None
     if not rows:
         raise DataFileError(f"{where} is empty; its first row must name the joints.")
     names = [name.strip() for name in rows[0]]

@@ -15,9 +15,12 @@ from tcs.capability.merge import TaskMap
 from tcs.capability.reach import Reach
 from tcs.capability.visibility import CORRECTED, visibility
 from tcs.errors import DataFileError
+from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import BoolArray, FloatArray
 
+MAX_BYTES = 1024**3
+"""Most bytes of a text file: some ten million base poses."""
 _COLUMNS = 13
 """Columns of a text file: score x y z R11 R12 R13 R21 R22 R23 R31 R32 R33."""
 _POSITION_TOLERANCE = 1e-3
@@ -119,13 +122,8 @@ def import_text(
 
 
 def _numbers(path: Path) -> FloatArray:
-    try:
-        with path.open(encoding="utf-8") as stream:
-            rows = [line.split() for line in stream if line.strip()]
-    except OSError as error:
-        raise DataFileError(f"text file '{path}' cannot be read: {error.strerror}.") from None
-    except UnicodeDecodeError:
-        raise DataFileError(f"text file '{path}' is not UTF-8 text.") from None
+    text = read_text(path, f"text file '{path}'", DataFileError, limit=MAX_BYTES)
+    rows = [line.split() for line in text.splitlines() if line.strip()]
     if not rows:
         raise DataFileError(
             f"text file '{path}' is empty; each line must be: score x y z R11..R33."

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,20 @@ MAX_BYTES = 2 * 1024**3
 """Greatest size of a decompressed array [bytes]: several times that of any array of `tcs`, and less
 than the memory of a common machine."""
 
+MAX_RATIO = 200
+"""Most bytes that a byte of a file may decompress to on average, beyond FREE_BYTES. Numbers of
+a real file decompress to three or four; a file made to fill the memory to a thousand."""
+FREE_BYTES = 32 * 1024**2
+"""Bytes that any file may decompress to: small files of equal numbers compress without limit."""
+
 _TYPES = ("u1", "u2", "u4", "u8", "f4", "f8")
+
+
+@dataclass(frozen=True, slots=True)
+class AtMost:
+    """A length of an array that may be anything up to a greatest one."""
+
+    length: int
 
 
 def compress(array: NDArray[Any]) -> dict[str, Any]:
@@ -41,8 +56,56 @@ def smallest_unsigned(values: NDArray[np.int64]) -> NDArray[Any]:
     return values.astype(np.min_scalar_type(int(values.max(initial=0))))
 
 
+def check_claims(content: object, exempt: Container[str] = ()) -> None:
+    """Refuse a file whose arrays claim far more bytes than it has, before any is decompressed.
+
+    Args:
+        content: The containers of the file.
+        exempt: Names of arrays whose size follows from others, e.g. one number for each pair of
+            configuration and goal: `decompress` checks their exact shape.
+
+    Raises:
+        StoreFormatError: If they claim more than `FREE_BYTES` and `MAX_RATIO` times the file's.
+    """
+    claimed, stored = 0, 0
+    waiting: list[tuple[str, object]] = [("", content)]
+    # A list may contain another one many times over; it is read once.
+    seen: set[int] = set()
+    while waiting:
+        name, value = waiting.pop()
+        if id(value) in seen:
+            continue
+        seen.add(id(value))
+        if isinstance(value, dict):
+            data = value.get("bytes")
+            if isinstance(data, np.ndarray):
+                stored += data.nbytes
+                if name not in exempt:
+                    claimed += _claimed(value)
+                continue
+            waiting.extend((str(key), item) for key, item in value.items())
+        elif isinstance(value, list | tuple):
+            waiting.extend((name, item) for item in value)
+    most = FREE_BYTES + MAX_RATIO * stored
+    if claimed > most:
+        raise StoreFormatError(
+            f"claims arrays of {claimed:,} bytes in {stored:,} bytes of the file; at most {most:,} "
+            "are possible"
+        )
+
+
+def _claimed(encoded: Mapping[str, Any]) -> int:
+    """Return the number of bytes that an encoded array claims; 0 if that cannot be read."""
+    element, shape = encoded.get("type"), encoded.get("shape")
+    if element not in _TYPES or not isinstance(shape, list):
+        return 0
+    if not all(type(n) is int and n >= 0 for n in shape):
+        return 0
+    return math.prod(shape) * int(element[1])
+
+
 def decompress(
-    encoded: dict[str, Any], name: str, element: str, shape: tuple[int | None, ...]
+    encoded: dict[str, Any], name: str, element: str, shape: tuple[int | AtMost | None, ...]
 ) -> NDArray[Any]:
     """Return the array stored under a name, decompressed and checked.
 
@@ -50,7 +113,7 @@ def decompress(
         encoded: Containers with the arrays, by name.
         name: Name of the array.
         element: Required element type, "u" for any unsigned one.
-        shape: Required shape, None for an arbitrary length.
+        shape: Required shape: None for an arbitrary length, `AtMost` for one up to a bound.
 
     Raises:
         StoreFormatError: If the array is missing, damaged, or of another type or shape.
@@ -72,7 +135,7 @@ def decompress(
     if (
         not fits
         or len(stated) != len(shape)
-        or any(n is not None and n != m for n, m in zip(shape, stated, strict=True))
+        or not all(_fits(n, m) for n, m in zip(shape, stated, strict=True))
     ):
         raise StoreFormatError(
             f"has an array '{name}' of type {found} and shape {stated}, which does not belong there"
@@ -83,6 +146,13 @@ def decompress(
     )
     values = np.ascontiguousarray(planes.reshape(dtype.itemsize, -1).T).view(dtype)
     return values.reshape(stated).astype(dtype.newbyteorder("="), copy=False)
+
+
+def _fits(length: int | AtMost | None, stated: int) -> bool:
+    """Return whether the stated length of an array is the one it must have."""
+    if isinstance(length, AtMost):
+        return stated <= length.length
+    return length is None or length == stated
 
 
 def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:

@@ -10,16 +10,42 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
-from tcs.errors import DataFileError, UnknownNameError
+from tcs.errors import DataFileError, UnknownNameError, one_line
+from tcs.files import quantities
+from tcs.files.quantities import Quantity
+from tcs.files.reading import read_text
+
+
+def _within(quantity: Quantity) -> AfterValidator:
+    """Return a validator that refuses numbers out of the range of a quantity."""
+
+    def check(value: float) -> float:
+        fault = quantity.fault(value)
+        if fault is not None:
+            raise PydanticCustomError("out_of_range", "{fault}", {"fault": fault})
+        return value
+
+    return AfterValidator(check)
+
 
 # Strict: in YAML `yes` is true, and true must not count as 1, nor the text '1' as a number.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-PositiveNumber = Annotated[Number, Field(gt=0)]
-Length = Annotated[Number, Field(ge=0)]
-Vector = tuple[Number, Number, Number]
+"""A finite number that is no physical quantity; one that is has a type below."""
+Position = Annotated[Number, _within(quantities.POSITION)]
+Size = Annotated[Number, _within(quantities.SIZE)]
+Clearance = Annotated[Number, _within(quantities.CLEARANCE)]
+Deviation = Annotated[Number, _within(quantities.DEVIATION)]
+DeviationDeg = Annotated[Number, _within(quantities.DEVIATION_DEG)]
+AngleDeg = Annotated[Number, _within(quantities.ANGLE_DEG)]
+JointPosition = Annotated[Number, _within(quantities.JOINT_POSITION)]
+FieldOfViewDeg = Annotated[Number, _within(quantities.FIELD_OF_VIEW_DEG)]
+
+MAX_ENTRIES = int(quantities.ENTRIES.high)
+Entries = Field(max_length=MAX_ENTRIES)
+"""Limits the length of a list or mapping of a document."""
 
 
 class Document(BaseModel):
@@ -31,13 +57,13 @@ class Document(BaseModel):
 class Placed(Document):
     """An entry with a pose in a frame that the entry or its context names."""
 
-    xyz: Vector = (0.0, 0.0, 0.0)
+    xyz: tuple[Position, Position, Position] = (0.0, 0.0, 0.0)
     """Position of its origin in that frame [m]."""
-    rpy_deg: Vector = (0.0, 0.0, 0.0)
+    rpy_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw about that frame's fixed axes [deg]."""
 
     @property
-    def rpy(self) -> Vector:
+    def rpy(self) -> tuple[float, float, float]:
         """Roll, pitch, yaw about that frame's fixed axes [rad]."""
         roll, pitch, yaw = (math.radians(angle) for angle in self.rpy_deg)
         return roll, pitch, yaw
@@ -80,17 +106,11 @@ def read_mapping(
         DataFileError: As `error`, if the file cannot be read, is not YAML, contains a key twice, or
             is not a mapping.
     """
+    text = read_text(path, where, error, limit=MAX_BYTES)
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), _Loader)
-    except OSError as reason:
-        raise error(f"{where} cannot be read: {reason.strerror}.") from reason
-    except UnicodeDecodeError as reason:
-        raise error(f"{where} is not a text file in UTF-8.") from reason
+        content = yaml.load(text, _Loader)
     except yaml.YAMLError as reason:
         raise error(f"{where} is not valid YAML: {_yaml_fault(reason)}.") from reason
-    except ValueError as reason:
-        # The YAML grammar accepts such values: a month 13, an integer of 5000 digits.
-        raise error(f"{where} contains an invalid value: {reason}.") from reason
     if not isinstance(content, dict):
         raise error(f"{where} must contain keys and values: {', '.join(known)}.")
     return content
@@ -127,6 +147,13 @@ def checked(
         raise UnknownNameError(reason.what, reason.name, reason.known, where=located) from None
 
 
+MAX_BYTES = 10 * 1024**2
+"""Most bytes of a YAML file: a hundred times the largest that ships."""
+MAX_LEVELS = 50
+"""Most lists and mappings inside each other; the files that ship have six."""
+MAX_VALUES = 1_000_000
+"""Most values of a YAML file after its aliases are expanded."""
+
 _KEY_TAGS = ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge")
 
 # Messages have one line and quote the value, so a long list is abbreviated.
@@ -135,7 +162,49 @@ _SHORT.maxstring = _SHORT.maxother = 60
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader, except that duplicate keys are rejected and 1e-3 is a number."""
+    """PyYAML's safe loader, except that duplicate keys are rejected and 1e-3 is a number.
+
+    Impossible values (a month 13, an integer of 5000 digits) are errors with a line number, and so
+    are aliases that contain each other: they expand a hundred bytes to a billion values.
+    """
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._level = 0
+
+    def get_single_node(self) -> yaml.Node | None:
+        """Return the document; refuse one whose aliases expand to too many values."""
+        node = super().get_single_node()
+        if node is not None:
+            _count(node, {})
+        return node
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Return the next node; refuse too many levels: each takes some of the stack."""
+        self._level += 1
+        try:
+            if self._level > MAX_LEVELS:
+                raise yaml.composer.ComposerError(
+                    problem=f"more than {MAX_LEVELS} levels of lists or mappings",
+                    problem_mark=self.get_mark(),
+                )
+            return super().compose_node(parent, index)
+        finally:
+            self._level -= 1
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        """Return the value of a node; refuse what its tag does not allow."""
+        try:
+            return super().construct_object(node, deep=deep)
+        except yaml.YAMLError:
+            raise
+        except Exception as reason:
+            # PyYAML's constructors raise errors of many classes for a value that its tag forbids.
+            shown = f" {_SHORT.repr(node.value)}" if isinstance(node, yaml.ScalarNode) else ""
+            why = f": {reason}" if type(reason) is ValueError else ""
+            raise yaml.constructor.ConstructorError(
+                problem=f"impossible value{shown}{why}", problem_mark=node.start_mark
+            ) from None
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Return a mapping; raise for a duplicate key, of which PyYAML would drop the first."""
@@ -160,6 +229,29 @@ _Loader.add_implicit_resolver(
     re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
 )
+
+
+def _count(node: yaml.Node, counted: dict[int, int]) -> int:
+    """Return the number of values of a node, its aliases expanded; refuse more than MAX_VALUES."""
+    if id(node) in counted:
+        return counted[id(node)]
+    # Until it is counted, a node that contains itself is one value too many.
+    counted[id(node)] = MAX_VALUES + 1
+    inside: list[yaml.Node] = []
+    if isinstance(node, yaml.MappingNode):
+        inside = [part for pair in node.value for part in pair]
+    elif isinstance(node, yaml.SequenceNode):
+        inside = node.value
+    total = 1
+    for part in inside:
+        total += _count(part, counted)
+        if total > MAX_VALUES:
+            raise yaml.constructor.ConstructorError(
+                problem=f"more than {MAX_VALUES:,} values; aliases must not contain each other",
+                problem_mark=node.start_mark,
+            )
+    counted[id(node)] = total
+    return total
 
 
 def _yaml_fault(error: yaml.YAMLError) -> str:
@@ -206,6 +298,8 @@ def _fault(detail: ErrorDetails) -> str:
     if detail["type"] == "missing":
         return " is missing."
     rule = detail["msg"]
+    if detail["type"] == "out_of_range":
+        return f" is {rule}."
     if rule.startswith("Value error, "):
         return f": {rule.removeprefix('Value error, ')}."
     for pattern, term in _YAML_TERMS:
@@ -217,7 +311,7 @@ def _described(where: str, location: list[int | str]) -> str:
     """Return a location in a file, e.g. "task file 'a.yaml', field 'goals[2].position'"."""
     if not location:
         return where
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    parts = (f"[{p}]" if isinstance(p, int) else f".{one_line(p)}" for p in location)
     return f"{where}, field '{''.join(parts).lstrip('.')}'"
 
 

@@ -88,8 +88,10 @@ def expanded(path: str, what: str, error: type[TcsError]) -> Path:
         error: Class of the error to raise.
 
     Raises:
-        TcsError: As `error`, if the home folder is unknown.
+        TcsError: As `error`, if the home folder is unknown, or the path holds a NUL byte.
     """
+    if "\0" in path:
+        raise error(f"{what} {path!r} contains a NUL byte. Write the path without it.")
     try:
         return Path(path).expanduser()
     except RuntimeError:
@@ -132,7 +134,7 @@ def _data_folder_of(package: Path) -> Path:
     # The data of the wheel comes first: site-packages may hold the `models/` of another package.
     candidates = (package / "_data", package.parent)
     for folder in candidates:
-        if all((folder / part).is_dir() for part in _DATA_PARTS):
+        if all(os.path.isdir(folder / part) for part in _DATA_PARTS):
             return folder
     searched = " or ".join(f"'{folder}'" for folder in candidates)
     raise DataFileError(

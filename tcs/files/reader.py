@@ -16,9 +16,7 @@ from __future__ import annotations
 
 import io
 import math
-import os
 import pickle
-import stat
 import zlib
 from collections.abc import Callable
 from enum import Enum
@@ -29,6 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreError, StoreFormatError, TcsError, UnsafeStoreError
+from tcs.files.compression import FREE_BYTES, MAX_RATIO
+from tcs.files.reading import read_bytes
 
 MAX_BYTES = 2 * 1024**3
 """Greatest size after decompression [bytes]: several times that of the largest score file, and less
@@ -252,19 +252,7 @@ def explained(
 
 def _bytes_of(path: Path, name: str, again: str) -> bytes:
     """Return the bytes of a regular file of at most MAX_BYTES."""
-    try:
-        status = os.stat(path)
-        if not stat.S_ISREG(status.st_mode):
-            raise StoreError(f"{name} is not a regular file. Name one that is.")
-        if status.st_size > MAX_BYTES:
-            raise StoreFormatError(
-                f"{name} has {status.st_size} bytes; at most {MAX_BYTES} are read."
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise StoreError(
-            f"{name} cannot be read: {error.strerror}. Check the path. {again}"
-        ) from None
+    return read_bytes(path, name, StoreError, limit=MAX_BYTES, advice=f"Check the path. {again}")
 
 
 def _decompress(name: str, data: bytes, again: str) -> bytes:
@@ -276,14 +264,16 @@ def _decompress(name: str, data: bytes, again: str) -> bytes:
         raise StoreFormatError(
             f"{name} is {'empty' if not data else 'not a joblib file of tcs'}. {again}"
         )
+    # tcs wraps its files without compressing them; joblib's own compression stays far below this.
+    most = min(MAX_BYTES, FREE_BYTES + MAX_RATIO * len(data))
     decompressor = zlib.decompressobj()
     try:
-        content = decompressor.decompress(data, MAX_BYTES + 1)
+        content = decompressor.decompress(data, most + 1)
     except (zlib.error, MemoryError) as error:
         raise StoreFormatError(f"{name} is damaged ({error}). {again}") from None
-    if len(content) > MAX_BYTES:
+    if len(content) > most:
         raise StoreFormatError(
-            f"{name} decompresses to more than {MAX_BYTES} bytes. It is damaged or meant to "
+            f"{name} decompresses to more than {most} bytes. It is damaged or meant to "
             f"fill the memory. {again}"
         )
     if not decompressor.eof or decompressor.unused_data:

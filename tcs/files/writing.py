@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from tcs.errors import OutputError
+from tcs.files.reading import path_fault, special_file
 
 _TOKEN = r"\d+-[0-9a-f]{8}"
 """Process and random number in the name of a temporary file or folder."""
@@ -50,6 +51,7 @@ def whole_file(
     Raises:
         OutputError: If the file cannot be written.
     """
+    _check_target(path, what, advice)
     remove_leftovers(path.parent)
     try:
         with _temporary_file(path) as (beside, stream):
@@ -156,6 +158,15 @@ def _token() -> str:
     return f"{os.getpid()}-{secrets.token_hex(4)}"
 
 
+def _check_target(path: Path, what: str, advice: str) -> None:
+    """Refuse to replace what is not a file: renaming would put a file in place of a device."""
+    special = special_file(path)
+    if special is not None:
+        raise OutputError(f"{what} '{path}' cannot be written: it is {special}. {advice}")
+    if "\0" in str(path):
+        raise OutputError(f"{what} {str(path)!r} cannot be written: it has a NUL byte. {advice}")
+
+
 def make_folder(
     folder: Path, what: str = "folder", *, advice: str = "Name a folder that can be created."
 ) -> None:
@@ -171,9 +182,9 @@ def make_folder(
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise OutputError(
-            f"{what} '{folder}' cannot be created: {error.strerror}. {advice}"
+            f"{what} '{folder}' cannot be created: {path_fault(error)}. {advice}"
         ) from error
 
 
@@ -183,16 +194,19 @@ def check_writable(path: Path) -> None:
     Raises:
         OutputError: If the path is a folder, or its folder is missing or not writable.
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         raise OutputError(f"'{path}' is a folder. Name a file in it.")
-    # Permissions do not reveal read-only disks and quotas; an attempt to write does.
-    remove_leftovers(path.parent)
+    special = special_file(path)
+    if special is not None:
+        raise OutputError(f"'{path}' is {special}, not a file. Name a file.")
     try:
+        # Permissions do not reveal read-only disks and quotas; an attempt to write does.
+        remove_leftovers(path.parent)
         with _temporary_file(path):
             pass
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise OutputError(
-            f"'{path}' cannot be written: {error.strerror or error}. Name a file in an existing, "
+            f"'{path}' cannot be written: {path_fault(error)}. Name a file in an existing, "
             "writable folder."
         ) from error
 

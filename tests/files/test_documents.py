@@ -11,7 +11,7 @@ from tcs.files.documents import (
     Document,
     Number,
     Placed,
-    PositiveNumber,
+    Size,
     checked,
     read_document,
     read_mapping,
@@ -19,7 +19,7 @@ from tcs.files.documents import (
 
 
 class Leg(Placed):
-    length: PositiveNumber
+    length: Size
 
 
 class Table(Document):
@@ -62,7 +62,10 @@ def test_a_sound_file_becomes_a_value(tmp_path):
         ("{name: a, feet: []}", "field 'feet' is [], but must have at least 2 items."),
         ("{name: a, foldable: 3}", "field 'foldable' is 3, but must be a valid boolean."),
         ("{name: a, legs: 4}", "field 'legs' is 4, but must be a valid list."),
-        ("{name: a, legs: [{length: 0}]}", "'legs[0].length' is 0, but must be greater than 0."),
+        (
+            "{name: a, legs: [{length: 0}]}",
+            "'legs[0].length' is 0 m, but a size must be 1e-06 to 100 m.",
+        ),
         ("{name: 1, height: a}", "but must be a valid string. (1 more after this one.)"),
     ],
 )

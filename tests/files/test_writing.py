@@ -183,3 +183,37 @@ def test_a_temporary_folder_is_removed_with_its_files(tmp_path, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         fail()
     assert list(tmp_path.iterdir()) == []
+
+
+def pipe(path):
+    os.mkfifo(path)
+
+
+def link_to_a_device(path):
+    # A link of our own: were it replaced, the device would still be there.
+    path.symlink_to("/dev/full")
+
+
+@pytest.mark.parametrize("make", [pipe, link_to_a_device])
+def test_a_device_or_pipe_is_never_replaced_by_a_file(tmp_path, make):
+    """Renaming onto a device as root removed it, for every process of the machine."""
+    path = tmp_path / "a.txt"
+    make(path)
+    before = os.lstat(path)
+    with pytest.raises(OutputError, match=r"is (a named pipe|a device)"):
+        check_writable(path)
+    with pytest.raises(OutputError, match=r"is (a named pipe|a device)"), whole_file(path, "Text"):
+        pass
+    assert os.lstat(path).st_ino == before.st_ino
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a" * 300])
+def test_a_path_that_cannot_exist_is_one_line(tmp_path, name):
+    with pytest.raises(OutputError) as caught:
+        check_writable(tmp_path / name)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(OutputError) as caught, whole_file(tmp_path / name, "Text"):
+        pass
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import GridError, UnknownNameError
+from tcs.files.quantities import ANGLE_DEG, AXIS_VALUES, POSITION, STEP
 
 UNITS = ("m", "deg")
 """Units in which an axis may be written."""
@@ -38,8 +39,8 @@ class Axis:
         """Check the fields.
 
         Raises:
-            GridError: If the unit is unknown, a number is not finite, the step is not positive,
-                or the count is less than 1.
+            GridError: If the unit is unknown, a number is not finite or out of its physical range,
+                the step is not positive, or the count is less than 1.
         """
         where = f"axis '{self.name}'"
         if self.unit not in UNITS:
@@ -59,6 +60,13 @@ class Axis:
                 f"{where}: step is {self.step:g} {self.unit}, but must be positive "
                 "(0 only where count is 1)."
             )
+        AXIS_VALUES.check(self.count, f"{where}: count", GridError)
+        quantity = POSITION if self.unit == "m" else ANGLE_DEG
+        quantity.check(float(self.start), f"{where}: start", GridError)
+        if self.count > 1:
+            STEP.check(float(self.step), f"{where}: step", GridError)
+            last = float(self.start) + (self.count - 1) * float(self.step)
+            quantity.check(last, f"{where}: the last value", GridError)
         object.__setattr__(self, "start", float(self.start))
         object.__setattr__(self, "step", float(self.step))
 

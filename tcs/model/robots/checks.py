@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from tcs.errors import RobotError, UnknownNameError
 from tcs.model.robots.primitives import Primitive
 from tcs.model.robots.robot_file import RobotFile
-from tcs.model.robots.urdf import Joint, Urdf
+from tcs.model.robots.urdf import WORLD, Joint, Urdf
 
 
 def check_robot(robot: RobotFile, where: str) -> None:
@@ -49,7 +49,7 @@ def _all_links(robot: RobotFile, model: Urdf, where: str) -> Mapping[str, str]:
     parents |= {joint.child: joint.parent for joint in model.joints.values()}
     extras = (*robot.frames, *robot.bodies)
     for extra in extras:
-        if extra.name in parents:
+        if extra.name in (*parents, WORLD):
             raise RobotError(
                 f"{where}, frame or body '{extra.name}': the name is taken. Choose another."
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import yaml
 
 from tcs.errors import OutputError, RobotError, UnknownNameError
 from tcs.files.writing import check_writable, scratch_folder, whole_file
+from tcs.files.xml_documents import read_xml
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
@@ -78,7 +78,7 @@ def draft_robot(
         RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or fewer
             than seven revolute joints lead to it.
     """
-    path = resolve_uri(str(urdf), Path()).resolve()
+    path = Path(os.path.realpath(resolve_uri(str(urdf), Path())))
     model = read_urdf(path)
     arm, arm_base, torso = _arm(model, tool, base)
     if not body_triangles(model):
@@ -153,7 +153,9 @@ def write_draft(draft: Draft, path: Path) -> Path:
     content["primitives"] = shapes.name
     if not draft.robot.urdf.startswith("package://"):
         # Relative, so that the folder of both files can be moved.
-        content["urdf"] = Path(os.path.relpath(draft.robot.urdf, path.resolve().parent)).as_posix()
+        content["urdf"] = Path(
+            os.path.relpath(draft.robot.urdf, os.path.dirname(os.path.realpath(path)))
+        ).as_posix()
     text = _HEADER.format(remarks="\n".join(f"# - {remark}" for remark in draft.remarks))
     text += yaml.safe_dump(
         content, sort_keys=False, width=95, default_flow_style=None, allow_unicode=True
@@ -219,7 +221,7 @@ def check_free(path: Path) -> Path:
         )
     shapes = path.with_name(f"{path.stem}_primitives.csv")
     for file in (path, shapes):
-        if file.exists():
+        if os.path.lexists(file):
             raise OutputError(f"'{file}' already exists. Remove it, or name another file.")
     return shapes
 
@@ -304,7 +306,7 @@ def _source(path: Path, address: str) -> str:
     licence = "no package.xml in a folder above it: look up its licence before passing it on"
     for folder in path.parents:
         package = folder / "package.xml"
-        if package.is_file():
+        if os.path.isfile(package):
             licence = f"its package is licensed {_licence(package)}; its meshes may not be"
             break
     shown = path.name if address == str(path) else address
@@ -314,7 +316,7 @@ def _source(path: Path, address: str) -> str:
 
 def _licence(package: Path) -> str:
     try:
-        found = ElementTree.parse(package).findtext("license")
-    except (OSError, ElementTree.ParseError):
+        found = read_xml(package, f"package '{package}'", RobotError).findtext("license")
+    except RobotError:
         found = None
     return f"'{' '.join(found.split())}'" if found else "in terms its package.xml does not name"

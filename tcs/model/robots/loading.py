@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -50,18 +51,18 @@ def _content(path: Path, based_on_it: tuple[Path, ...] = ()) -> dict[str, Any]:
     """
     where = f"robot file '{path}'"
     content = read_mapping(path, where, RobotError, known=(*RobotFile.model_fields, BASED_ON))
-    file = path.resolve()
+    file = Path(os.path.realpath(path))
     for key in _PATH_FIELDS:
         value = content.get(key)
         if isinstance(value, str) and not value.startswith("package://"):
             own = expanded(value, f"{where}, field '{key}'", RobotError)
-            content[key] = str((file.parent / own).resolve())
+            content[key] = os.path.realpath(file.parent / own)
     base = content.pop(BASED_ON, None)
     if base is None:
         return content
     chain = (*based_on_it, file)
     field = f"{where}, field '{BASED_ON}'"
     base_file = ROBOTS.path(str(base), beside=path.parent, where=field)
-    if base_file.resolve() in chain:
+    if Path(os.path.realpath(base_file)) in chain:
         raise RobotError(f"{field}: '{base}' is based on this file in turn. Name another one.")
     return {**_content(base_file, chain), **content}

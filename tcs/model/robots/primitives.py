@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import RobotError
+from tcs.files.quantities import POSITION, PRIMITIVES, SIZE
+from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +24,9 @@ BoolArray = NDArray[np.bool_]
 Kind = Literal["sphere", "capsule", "box"]
 SIZES: dict[str, int] = {"sphere": 1, "capsule": 2, "box": 3}
 """Length of `size` for each type of shape."""
+
+MAX_BYTES = 10 * 1024**2
+"""Most bytes of a file of primitives: a hundred times the largest that ships."""
 
 _COLUMNS = (
     "body", "kind", "size_a", "size_b", "size_c", "x", "y", "z", "qw", "qx", "qy", "qz",
@@ -35,7 +40,8 @@ class Primitive:
     """One convex shape P on a body B of the robot.
 
     Raises:
-        RobotError: If `kind` is unknown, a size is not positive, or the quaternion is not unit.
+        RobotError: If `kind` is unknown, a size or the centre is out of its physical range, or the
+            quaternion is not unit.
     """
 
     body: str
@@ -52,13 +58,13 @@ class Primitive:
         where = f"primitive of body '{self.body}'"
         if self.kind not in SIZES:
             raise RobotError(f"{where}: kind is '{self.kind}', but must be {', '.join(SIZES)}.")
-        if len(self.size) != SIZES[self.kind] or not all(0 < s < math.inf for s in self.size):
+        if len(self.size) != SIZES[self.kind] or not all(s > 0 for s in self.size):
             raise RobotError(
                 f"{where}: a {self.kind} needs {SIZES[self.kind]} positive size(s) [m], "
                 f"not {self.size}."
             )
-        if not all(math.isfinite(x) for x in self.xyz):
-            raise RobotError(f"{where}: its centre {self.xyz} must be finite [m].")
+        SIZE.check(self.size, f"{where}: a size", RobotError)
+        POSITION.check(self.xyz, f"{where}: a coordinate of its centre", RobotError)
         if not abs(math.hypot(*self.quaternion) - 1) <= _UNIT_TOLERANCE:
             raise RobotError(f"{where}: quaternion {self.quaternion} (wxyz) must have length 1.")
 
@@ -245,12 +251,12 @@ def read_primitives(path: Path) -> tuple[Primitive, ...]:
     Raises:
         RobotError: If the file cannot be read, or a row is not a valid primitive.
     """
+    text = read_text(path, f"primitives '{path}'", RobotError, limit=MAX_BYTES)
     try:
-        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except OSError as error:
-        raise RobotError(f"primitives '{path}' cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise RobotError(f"primitives '{path}' is not a text file in UTF-8.") from error
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise RobotError(f"primitives '{path}' is not a CSV file: {error}.") from None
+    PRIMITIVES.check(len(rows), f"primitives '{path}': its number of rows", RobotError)
     found = []
     for number, row in enumerate(rows, start=2):
         where = f"primitives '{path}', line {number}"

@@ -9,13 +9,13 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, Number, Placed, PositiveNumber, checked
+from tcs.files.documents import Document, Entries, JointPosition, Placed, Size, checked
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
-Positions = Mapping[Name, Number]
+Positions = Annotated[Mapping[Name, JointPosition], Entries]
 
 
 class _OnLink(Placed):
@@ -33,14 +33,14 @@ class BodyPrimitive(Placed):
     """One collision shape of an extra body."""
 
     kind: Literal["sphere", "capsule", "box"]
-    size: tuple[PositiveNumber, ...]
+    size: Annotated[tuple[Size, ...], Field(min_length=1, max_length=3)]
     """Sphere: radius. Capsule: radius, length between cap centres. Box: full sizes [m]."""
 
 
 class ExtraBody(_OnLink):
     """A body to add to the URDF, e.g. a tool in the hand."""
 
-    primitives: tuple[BodyPrimitive, ...]
+    primitives: Annotated[tuple[BodyPrimitive, ...], Entries]
 
 
 class DisabledGroup(Document):
@@ -65,7 +65,7 @@ class RobotFile(Document):
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
     """The seven joints of the scored arm, from A to the tool."""
-    rest: Mapping[Name, Number] = {}
+    rest: Mapping[Name, JointPosition] = {}
     """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
     nearest to 0."""
     tool_frame: Name
@@ -82,8 +82,8 @@ class RobotFile(Document):
     """Positions of the gripper joints by name of the opening [rad or m]."""
     gripper: Name | None = None
     """Name of the opening in force."""
-    frames: tuple[ExtraFrame, ...] = ()
-    bodies: tuple[ExtraBody, ...] = ()
+    frames: Annotated[tuple[ExtraFrame, ...], Entries] = ()
+    bodies: Annotated[tuple[ExtraBody, ...], Entries] = ()
     standing_bodies: tuple[Name, ...] = ()
     """Bodies that may touch the floor."""
     primitives: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -10,15 +11,16 @@ from pydantic import Field, model_validator
 
 from tcs.errors import EnvironmentFileError, GridError
 from tcs.files.documents import (
+    Clearance,
     Document,
-    Length,
-    Number,
+    Entries,
+    JointPosition,
     Placed,
-    PositiveNumber,
+    Size,
     checked,
     read_mapping,
 )
-from tcs.files.paths import DataFiles, data_folder
+from tcs.files.paths import DataFiles, data_folder, expanded
 from tcs.model.grid import Axis, Grid
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
@@ -52,7 +54,7 @@ class ModelEntry(_NamedEntry):
 class Obstacle(_NamedEntry):
     """An obstacle of the user's own: a box, or any SDFormat model, fixed to the world."""
 
-    box: tuple[PositiveNumber, PositiveNumber, PositiveNumber] | None = None
+    box: tuple[Size, Size, Size] | None = None
     """Full sizes along its own x, y, z [m]."""
     file: str | None = None
 
@@ -74,23 +76,23 @@ class EnvironmentFile(Document):
     origin: str
     """Description of the origin and the axes of W."""
     source: str
-    models: tuple[ModelEntry, ...] = ()
+    models: Annotated[tuple[ModelEntry, ...], Entries] = ()
     person: Name | None = None
     """Name of the model that is the person; without it the model named "person", if there is one.
     All other models are furniture, also those with body frames."""
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: Annotated[tuple[Obstacle, ...], Entries] = ()
     floor: bool = True
     """A floor at z = 0 that the arm must not touch; the rest of the robot stands on it."""
-    joints: Mapping[str, Number] = {}
+    joints: Annotated[Mapping[str, JointPosition], Entries] = {}
     """Joint positions that differ from 0 [m or rad]."""
-    posture: Mapping[str, Posture] = {}
+    posture: Annotated[Mapping[str, Posture], Entries] = {}
     """For each leading joint, e.g. a head rest, the positions of the joints that follow it."""
-    body_frames: Mapping[str, str] = {}
+    body_frames: Annotated[Mapping[str, str], Entries] = {}
     """Frames that goals may be fixed to, e.g. parts of the person: name and "model::link"."""
-    padding: Mapping[str, Length] = {}
+    padding: Annotated[Mapping[str, Clearance], Entries] = {}
     """Greatest distance by which the true surface may exceed the shapes of a link, by "model::link"
     [m]."""
-    contact_margin: Length = 0.001
+    contact_margin: Clearance = 0.001
     """Least clearance: shapes closer than this collide [m]."""
     grid: Mapping[str, Mapping[str, Any]]
     """Axes of the initial configurations, in the form that `Grid.from_spec` reads. An axis other
@@ -98,7 +100,7 @@ class EnvironmentFile(Document):
     observed: Mapping[str, Mapping[str, Any]] = {}
     """Axes that the robot observes but cannot choose, in the same form: the task is scored at each
     value of the joint of that name."""
-    errors: Mapping[str, ErrorDistribution] = {}
+    errors: Annotated[Mapping[str, ErrorDistribution], Entries] = {}
     """Error distribution of each joint (Table II of the TCS paper)."""
 
     @model_validator(mode="after")
@@ -248,7 +250,7 @@ def _base(name_or_path: str, path: Path, above: tuple[Path, ...]) -> Environment
     where = f"environment file '{path}', field '{BASED_ON}'"
     base = ENVIRONMENTS.path(name_or_path, beside=path.parent, where=where)
     base = base.absolute()
-    if base.resolve() in [file.resolve() for file in chain]:
+    if os.path.realpath(base) in [os.path.realpath(file) for file in chain]:
         raise EnvironmentFileError(
             f"{where}: '{name_or_path}' is based on this file in turn. Name another one."
         )
@@ -259,10 +261,13 @@ def _with_files_resolved(environment: EnvironmentFile, path: Path) -> Environmen
     def resolved(entry: E, field: str) -> E:
         if entry.file is None:
             return entry
+        file = expanded(
+            entry.file, f"environment file '{path}', field '{field}.file'", EnvironmentFileError
+        )
         places = (path.parent, _folder(), data_folder())
         for place in places:
-            candidate = (place / Path(entry.file).expanduser()).resolve()
-            if candidate.is_file():
+            candidate = Path(os.path.realpath(place / file))
+            if os.path.isfile(candidate):
                 return entry.model_copy(update={"file": str(candidate)})
         looked = ", ".join(f"'{place}'" for place in places)
         raise EnvironmentFileError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import Box, ProximityProperties, SceneGraphInspector
@@ -22,6 +23,7 @@ from tcs.errors import EnvironmentFileError, UnknownNameError
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
 from tcs.model.scene.joints import EnvironmentJoints
+from tcs.model.scene.model_files import check_model_file
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Size of the floor [m]: wider than any environment, so that there is a floor at every base pose,
@@ -62,6 +64,7 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
         X_PM = RigidTransform(RollPitchYaw(entry.rpy), entry.xyz)
         here = f"{where}, '{entry.name}'"
         if isinstance(entry, Obstacle) and entry.box is not None:
+            _check_free(plant, entry.name, here)
             links[entry.name] = _add_box(plant, entry.name, entry.box, X_PM)
             continue
         instance = _add_model(plant, entry, parent, X_PM, here)
@@ -142,12 +145,14 @@ def _add_model(
     where: str,
 ) -> ModelInstanceIndex:
     """Parse the entry's file and fix its model frame M to the parent."""
+    check_model_file(Path(str(entry.file)), f"{where}: '{entry.file}'")
     parser = Parser(plant)
     # Several entries may use one file, e.g. two shelves.
     parser.SetAutoRenaming(True)
     try:
         instances = parser.AddModels(str(entry.file))
-    except RuntimeError as error:
+    except Exception as error:
+        # Drake raises errors of several classes, e.g. ValueError for a number it cannot convert.
         reason = " ".join(str(error).split())
         raise EnvironmentFileError(f"{where}: '{entry.file}' cannot be used: {reason}") from error
     if len(instances) != 1:
@@ -156,9 +161,20 @@ def _add_model(
             "Give each a file of its own."
         )
     (instance,) = instances
+    if plant.GetModelInstanceName(instance) != entry.name:
+        _check_free(plant, entry.name, where)
     plant.RenameModelInstance(instance, entry.name)
     _fix(plant, instance, parent, X_PM, where)
     return instance
+
+
+def _check_free(plant: MultibodyPlant, name: str, where: str) -> None:
+    """Refuse a name that another part of the scene has, such as the robot's own."""
+    if plant.HasModelInstanceNamed(name):
+        raise EnvironmentFileError(
+            f"{where}: the name '{name}' is taken in the scene, by the robot or by Drake. "
+            "Choose another."
+        )
 
 
 def _fix(

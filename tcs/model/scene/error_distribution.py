@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from tcs.files.documents import Document, Length
+from tcs.files.documents import Deviation, DeviationDeg, Document
 
 _WIDTHS = {"normal": ("std", "std_deg"), "uniform": ("half_width", "half_width_deg")}
 """Key of the width of each distribution, for prismatic [m] and for revolute joints [deg]."""
@@ -19,13 +19,13 @@ class ErrorDistribution(Document):
     """The distribution of one joint's error, with mean zero."""
 
     distribution: Literal["normal", "uniform"]
-    std: Length | None = None
+    std: Deviation | None = None
     """Standard deviation of a prismatic joint's normal error [m]."""
-    std_deg: Length | None = None
+    std_deg: DeviationDeg | None = None
     """Standard deviation of a revolute joint's normal error [deg]."""
-    half_width: Length | None = None
+    half_width: Deviation | None = None
     """Largest magnitude of a prismatic joint's uniform error [m]."""
-    half_width_deg: Length | None = None
+    half_width_deg: DeviationDeg | None = None
     """Largest magnitude of a revolute joint's uniform error [deg]."""
 
     @model_validator(mode="after")

@@ -30,7 +30,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from tcs.errors import RobotError
+from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
@@ -111,6 +111,7 @@ def build_plant(
     )
     for part in parts:
         shape_of(inspector, part)
+    _check_names(parts, environment.name)
     where = f"environment '{environment.name}', allowed contacts"
     rule = ContactRule.of(parts, robot.disabled_pairs, allowed_contacts, where=where)
     apply_rule(scene_graph, parts, rule)
@@ -135,6 +136,17 @@ def build_plant(
         parts=parts,
         rule=rule,
     )
+
+
+def _check_names(parts: Iterable[Part], environment: str) -> None:
+    """Refuse a body of the environment with a name of the robot's: contacts are told by name."""
+    of_robot = {part.name for part in parts if part.group is not Group.ENVIRONMENT}
+    for part in parts:
+        if part.group is Group.ENVIRONMENT and part.name in of_robot:
+            raise EnvironmentFileError(
+                f"environment '{environment}': '{part.name}' is also a body of the robot. Choose "
+                "another name for the one in the environment."
+            )
 
 
 def _add_base(plant: MultibodyPlant, root: RigidBody) -> tuple[Joint, ...]:

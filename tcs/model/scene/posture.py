@@ -10,9 +10,11 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from tcs.files.documents import Document, Number
+from tcs.files.documents import MAX_ENTRIES, AngleDeg, Document, JointPosition, Position
 
-Knots = Annotated[tuple[Number, ...], Field(min_length=2)]
+MIN_SPACING = 1e-6
+"""Least distance of neighbouring knots [m or deg]; below it the slope between them is undefined."""
+Enough = Field(min_length=2, max_length=MAX_ENTRIES)
 
 
 class Posture(Document):
@@ -26,11 +28,11 @@ class Posture(Document):
     -0.375
     """
 
-    knots: Knots | None = None
+    knots: Annotated[tuple[Position, ...], Enough] | None = None
     """Positions of a prismatic leading joint, ascending [m]."""
-    knots_deg: Knots | None = None
+    knots_deg: Annotated[tuple[AngleDeg, ...], Enough] | None = None
     """Positions of a revolute leading joint, ascending [deg]."""
-    joints: Annotated[Mapping[str, tuple[Number, ...]], Field(min_length=1)]
+    joints: Annotated[Mapping[str, tuple[JointPosition, ...]], Field(min_length=1)]
     """Position of each following joint at each knot [m or rad]."""
 
     @model_validator(mode="after")
@@ -38,8 +40,11 @@ class Posture(Document):
         if (self.knots is None) == (self.knots_deg is None):
             raise ValueError("give either 'knots' [m] or 'knots_deg' [deg]")
         knots = self.knots or self.knots_deg or ()
-        if any(after <= before for before, after in itertools.pairwise(knots)):
-            raise ValueError("every knot must be greater than the one before")
+        if any(after - before < MIN_SPACING for before, after in itertools.pairwise(knots)):
+            raise ValueError(
+                "every knot must be greater than the one before, by at least "
+                f"{MIN_SPACING:g} m or deg"
+            )
         for name, positions in self.joints.items():
             if len(positions) != len(knots):
                 raise ValueError(

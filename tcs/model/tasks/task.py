@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TaskError, UnknownNameError
+from tcs.files.quantities import GOALS, WEIGHT
 
 UNIT_TOLERANCE = 1e-5
 """Tolerance of a quaternion's length: six printed digits round by less than this."""
@@ -37,8 +38,8 @@ class Goal:
         """Check each value, normalise the quaternion, and make the arrays read-only.
 
         Raises:
-            TaskError: If a value is not finite, has a wrong shape or unit, or is not positive where
-                it must be.
+            TaskError: If a value is not finite, has a wrong shape or unit, or is out of its
+                physical range.
         """
         if not self.body_frame:
             raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
@@ -56,8 +57,7 @@ class Goal:
                 f"field 'quaternion_wxyz' has length {length:.6g}, but must be a unit quaternion "
                 f"(1 within {UNIT_TOLERANCE:g})."
             )
-        if not (np.isfinite(self.weight) and self.weight > 0):
-            raise TaskError(f"field 'weight' is {self.weight}, but must be a positive number.")
+        WEIGHT.check(self.weight, "field 'weight'", TaskError)
         quaternion = quaternion / length
         for array in (position, quaternion):
             array.flags.writeable = False
@@ -111,6 +111,7 @@ class Task:
         for key, what in (("goals", "goal"), ("environments", "environment")):
             if not getattr(self, key):
                 raise TaskError(f"field '{key}' is empty. A task needs at least one {what}.")
+        GOALS.check(len(self.goals), "field 'goals': its number of goals", TaskError)
         for name in self.environments:
             if self.environments.count(name) > 1:
                 raise TaskError(f"field 'environments': '{name}' is repeated. Remove one of them.")

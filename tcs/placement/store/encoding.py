@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import StoreFormatError
-from tcs.files.compression import compress, decompress, smallest_unsigned
+from tcs.files.compression import check_claims, compress, decompress, smallest_unsigned
 from tcs.files.joblib_file import check_header, header
 from tcs.files.reader import explained
+from tcs.model.grid import Grid
 from tcs.placement.store.score_file import (
     DESCRIPTIONS,
     ScoreFile,
@@ -24,6 +25,9 @@ from tcs.placement.tables import Reason, ScoreTable, SetTable
 
 FORMAT = "tcs scores"
 """Name of the format."""
+
+_PER_PAIR = ("reason", "pair_plus_one")
+"""Arrays with a number for each configuration and goal, often all equal."""
 
 FORMAT_VERSION = 4
 """Version of the format; files of other versions are refused."""
@@ -60,28 +64,33 @@ def decode(content: object, path: Path | None = None) -> ScoreFile:
         TcsError: If its content is inconsistent.
     """
     content = check_header(content, FORMAT, FORMAT_VERSION)
+    check_claims(content, exempt=_PER_PAIR)
+    descriptions = {name: _dict(content.get(name), name) for name in DESCRIPTIONS}
+    size = Grid.from_dict(descriptions["grid"]).size
     return ScoreFile(
-        **{name: _dict(content.get(name), name) for name in DESCRIPTIONS},
+        **descriptions,
         observed=_list(content, "observed"),
         tables=tuple(
-            _decode_table(_dict(table, "table"), path) for table in _list(content, "tables")
+            _decode_table(_dict(table, "table"), size, path) for table in _list(content, "tables")
         ),
     )
 
 
-def _decode_table(encoded: dict[str, Any], path: Path | None) -> StateTables:
+def _decode_table(encoded: dict[str, Any], size: int, path: Path | None) -> StateTables:
     """Return the tables of one state, whose scores are decoded on first access."""
-    sets = decode_sets(_dict(encoded.get("sets"), "sets"))
+    sets = decode_sets(_dict(encoded.get("sets"), "sets"), size)
     scores = _dict(encoded.get("scores"), "scores")
     success = decode_success(encoded.get("success"))
-    return StateTables(sets, partial(_read_scores, scores, sets, path), success)
+    return StateTables(sets, partial(_read_scores, scores, sets, size, path), success)
 
 
-def _read_scores(encoded: dict[str, Any], sets: SetTable, path: Path | None) -> ScoreTable:
+def _read_scores(
+    encoded: dict[str, Any], sets: SetTable, size: int, path: Path | None
+) -> ScoreTable:
     """Return decoded scores that belong to the sets; errors name the file."""
 
     def read() -> ScoreTable:
-        scores = _decode_scores(encoded, sets)
+        scores = _decode_scores(encoded, sets, size)
         check_sets_of(scores, sets)
         return scores
 
@@ -101,10 +110,9 @@ def _encode_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
     }
 
 
-def _decode_scores(encoded: dict[str, Any], sets: SetTable) -> ScoreTable:
-    goals = sets.weights.size
-    reason = decompress(encoded, "reason", "u1", (None, goals))
-    if len(sets.candidates) and sets.candidates[-1] >= len(reason):
+def _decode_scores(encoded: dict[str, Any], sets: SetTable, size: int) -> ScoreTable:
+    reason = decompress(encoded, "reason", "u1", (size, sets.weights.size))
+    if len(sets.candidates) and sets.candidates[-1] >= size:
         raise StoreFormatError("has sets of more configurations than scores")
     dexterity = np.zeros(reason.shape, dtype=np.float32)
     dexterity[sets.candidates] = sets.dexterity
@@ -125,7 +133,9 @@ def _decode_scores(encoded: dict[str, Any], sets: SetTable) -> ScoreTable:
         reason=reason,
         pair=pair.astype(np.int32),
         pair_names=tuple((first, second) for first, second in names),
-        arm_joints=decompress(encoded, "arm_joints", "f4", (None, 7)),
+        arm_joints=decompress(
+            encoded, "arm_joints", "f4", (int(np.count_nonzero(reason == Reason.REACHED)), 7)
+        ),
         weights=sets.weights,
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tcs.errors import StoreFormatError
 from tcs.files.compression import (
     MAX_BYTES,
+    AtMost,
     ascending_from,
     compress,
     decompress,
@@ -18,6 +19,7 @@ from tcs.files.compression import (
     smallest_unsigned,
 )
 from tcs.files.joblib_file import check_types
+from tcs.files.quantities import GOALS
 from tcs.placement.tables import BaseLattice, SetTable
 from tcs.placement.tables.base_lattice import MOVES
 from tcs.placement.tables.groups import BOUNDS, Groups
@@ -71,25 +73,30 @@ def encode_sets(sets: SetTable) -> dict[str, Any]:
     }
 
 
-def decode_sets(encoded: dict[str, Any]) -> SetTable:
+def decode_sets(encoded: dict[str, Any], configurations: int) -> SetTable:
     """Return the encoded sets.
+
+    Args:
+        encoded: What `encode_sets` returned.
+        configurations: Number of configurations of the grid.
 
     Raises:
         StoreFormatError: If something is missing or out of range.
         TcsError: If the sets contradict themselves.
     """
     check_types(encoded, _PLAIN)
-    weights = decompress(encoded, "weights", "f8", (None,))
-    # A table has at most 20 million configurations: see `tcs.model.grid.MAX_CONFIGURATIONS`.
+    weights = decompress(encoded, "weights", "f8", (AtMost(int(GOALS.high)),))
     candidates = ascending_from(
-        decompress(encoded, "candidate_step", "u", (None,)), 2**31, "candidates"
+        decompress(encoded, "candidate_step", "u", (AtMost(configurations),)),
+        configurations,
+        "candidates",
     )
     reached = decompress(encoded, "reached", "u1", (candidates.size, weights.size)) != 0
     dexterity = np.zeros(reached.shape, dtype=np.float32)
     dexterity[reached] = decompress(encoded, "dexterity", "f4", (int(np.count_nonzero(reached)),))
-    cell_xy = decompress(encoded, "cell_xy", "f8", (None, 2))
+    cell_xy = decompress(encoded, "cell_xy", "f8", (AtMost(candidates.size), 2))
     values = decompress(encoded, "reachability_values", "f8", (None,))
-    step = decompress(encoded, "pair_step", "u", (None,))
+    step = decompress(encoded, "pair_step", "u", (AtMost(len(cell_xy) ** 2),))
     kept = (step.size,)
     numbers = ascending_from(step, len(cell_xy) ** 2 + 1, "pairs of cells")
     code = decompress(encoded, "reachability_code", "u", kept).astype(np.int64)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tcs.errors import DataFileError, OutputError
+from tcs.files.reading import read_bytes
 from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.runs.run import ARRAYS, IntArray, Run
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMATS = (".csv", ".parquet")
+MAX_BYTES = 1024**3
+"""Most bytes of a run file: some hours at 100 samples a second."""
 VERSION = 2
 """Version of the columns and of the keys of the metadata."""
 _VERSION_KEY = "run_format"
@@ -101,10 +104,7 @@ def _read(path: Path, where: str) -> pd.DataFrame:
         raise DataFileError(
             f"{where} needs a library that is not installed: pip install 'tcs[parquet]'."
         )
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataFileError(f"{where} cannot be read: {error.strerror}.") from None
+    content = read_bytes(path, where, DataFileError, limit=MAX_BYTES)
     try:
         if path.suffix == ".parquet":
             return pd.read_parquet(io.BytesIO(content), engine="pyarrow")

@@ -8,14 +8,15 @@ from hypothesis import strategies as st
 from tcs.errors import GridError, UnknownNameError
 from tcs.model.grid import Axis
 
-finite = st.floats(-1e6, 1e6)
-
 
 @st.composite
 def axes(draw):
-    count = draw(st.integers(1, 500))
-    step = draw(st.floats(1e-6, 1e3)) if count > 1 else draw(st.floats(0, 1e3))
-    return Axis("any", draw(st.sampled_from(["m", "deg"])), draw(finite), step, count)
+    count, unit = draw(st.integers(1, 500)), draw(st.sampled_from(["m", "deg"]))
+    # 500 values stay within the physical range of either unit.
+    low, high = (-40.0, 0.0) if unit == "m" else (-720.0, 200.0)
+    greatest = 0.08 if unit == "m" else 1.04
+    step = draw(st.floats(1e-6, greatest)) if count > 1 else draw(st.floats(0, 1e3))
+    return Axis("any", unit, draw(st.floats(low, high)), step, count)
 
 
 @given(axes())

@@ -128,7 +128,7 @@ def test_axis_by_name():
     [
         (changed("base_x", count=0), "axis 'base_x': count is 0, so the grid would be empty"),
         (
-            changed("base_x", count=1_000_000),
+            changed("base_x", step=2e-5, count=1_000_000),
             "would be 1,464,000,000 configurations (1000000 x 61 x 8 x 3), "
             "but at most 20,000,000 are allowed",
         ),
@@ -156,10 +156,14 @@ def test_a_full_turn_of_any_step_is_allowed():
 
 def test_the_largest_grid_is_allowed_and_one_more_is_not():
     one = {name: {**spec, "count": 1} for name, spec in WHEELCHAIR.items()}
-    full = {**one, "base_x": {**WHEELCHAIR["base_x"], "count": MAX_CONFIGURATIONS}}
+    full = {
+        **one,
+        "base_x": {**WHEELCHAIR["base_x"], "step": 1e-4, "count": MAX_CONFIGURATIONS // 100},
+        "base_y": {**WHEELCHAIR["base_y"], "step": 0.01, "count": 100},
+    }
     assert Grid.from_spec(full).size == MAX_CONFIGURATIONS
     full["base_x"]["count"] += 1
-    with pytest.raises(GridError, match="would be 20,000,001 configurations"):
+    with pytest.raises(GridError, match="would be 20,000,100 configurations"):
         Grid.from_spec(full)
 
 
@@ -206,6 +210,8 @@ def test_changes_that_make_an_invalid_grid_are_reported_with_their_source():
     ):
         grid.overridden({"base_z": {"count": 2}}, where="task 'a'")
     with pytest.raises(GridError, match=r"^task 'a': grid: would be [\d,]+ configurations"):
+        grid.overridden({"torso": {"step": 1e-5, "count": 10**6}}, where="task 'a'")
+    with pytest.raises(GridError, match=r"^task 'a': axis 'torso': count is 1000000000, but a num"):
         grid.overridden({"torso": {"count": 10**9}}, where="task 'a'")
 
 

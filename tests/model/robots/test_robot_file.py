@@ -272,3 +272,22 @@ def test_held_tool_brings_its_own_frame_and_shapes(content, tmp_path):
     assert razor.body == "razor"
     # Turned by 90 degrees about y, the capsule's z axis lies along x.
     np.testing.assert_allclose(razor.rotation[:, 2], [1, 0, 0], atol=1e-15)
+
+
+@pytest.mark.parametrize("field", ["frames", "bodies"])
+def test_an_added_body_named_world_is_refused(content, tmp_path, field):
+    """Drake has a body of that name; before, building the scene ended in a traceback."""
+    shapes = {"primitives": [{"kind": "sphere", "size": [0.1]}]} if field == "bodies" else {}
+    content.setdefault(field, []).append({"name": "world", "parent": "base_link", **shapes})
+    with pytest.raises(RobotError, match="frame or body 'world': the name is taken"):
+        load_robot(write(tmp_path, content))
+
+
+@pytest.mark.parametrize("size", [1e15, 1e308, 1000.0, 1e-9, 0.0, -1.0])
+def test_a_size_that_no_tool_has_is_refused(content, tmp_path, size):
+    shapes = [{"kind": "sphere", "size": [size]}]
+    content.setdefault("bodies", []).append(
+        {"name": "tool", "parent": "base_link", "primitives": shapes}
+    )
+    with pytest.raises(RobotError, match=r"primitives\[0\].size\[0\]' is .* m, but a size must be"):
+        load_robot(write(tmp_path, content))

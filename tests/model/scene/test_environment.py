@@ -102,7 +102,7 @@ def test_unknown_name_gets_the_nearest():
         ),
         (
             {"obstacles": [{"name": "a", "box": [1, 0, 1]}]},
-            r"obstacles\[0\]\.box\[1\]' is 0, but must be greater than 0",
+            r"obstacles\[0\]\.box\[1\]' is 0 m, but a size must be 1e-06 to 100 m",
         ),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1]}] * 2},
@@ -111,7 +111,7 @@ def test_unknown_name_gets_the_nearest():
         ({"obstacles": [{"name": "floor", "box": [1, 1, 1]}]}, r"'floor' is used twice or reserv"),
         ({"person": "anna"}, "person: no model is named 'anna'; there are none"),
         ({"models": [{"name": "a", "file": "nowhere.sdf"}]}, r"models\[0\]\.file.*nowhere\.sdf"),
-        ({"padding": {"a::b": -0.1}}, r"padding\.a::b.*greater than or equal to 0"),
+        ({"padding": {"a::b": -0.1}}, r"padding\.a::b.*a clearance must be 0 to 1 m"),
         ({"contact_margin": float("nan")}, r"contact_margin"),
         ({"joints": {"a": True}}, r"field 'joints\.a' is True, but must be a valid number"),
         ({"title": 5, "name": 5}, r"field 'name' is 5, .* \(1 more after this one\.\)"),

@@ -391,4 +391,4 @@ def test_each_observed_state_has_a_table(path):
     with pytest.raises(StoreError, match="2 tables for 3 observed states"):
         score_file(observed=[SHIFT], tables=2)
     with pytest.raises(StoreError, match="more than 1000 states"):
-        score_file(observed=[SHIFT | {"count": 10**9}], tables=1)
+        score_file(observed=[SHIFT | {"step": 1e-6, "count": 10**7}], tables=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +13,21 @@ from numpy.typing import NDArray
 
 from tcs.errors import RobotError
 from tcs.files.paths import CACHE_ADVICE, cache_folder
+from tcs.files.quantities import SIZE
+from tcs.files.reading import read_bytes
 from tcs.files.writing import whole_file
 
 if TYPE_CHECKING:
     import trimesh
 
 FloatArray = NDArray[np.float64]
+
+MAX_BYTES = 500 * 1024**2
+"""Most bytes of a mesh file: fifty times the largest of the robots that ship."""
+MAX_TRIANGLES = 5_000_000
+"""Most triangles of a mesh: ten times as many as a whole robot in the packages in use."""
+MAX_COORDINATE = SIZE.high * 1e4
+"""Greatest coordinate in the unit of a mesh: the greatest size in tenths of a millimetre."""
 
 _VERSION = b"1"
 """Part of the cache key: increase it when the conversion changes."""
@@ -40,7 +50,7 @@ def as_obj(mesh: Path) -> Path:
         return mesh
     key = hashlib.sha256(_VERSION + mesh.suffix.lower().encode() + _content(mesh)).hexdigest()
     target = cache_folder("meshes") / f"{mesh.stem}_{key[:16]}.obj"
-    if not target.is_file():
+    if not os.path.isfile(target):
         text = _obj_text(mesh)
         # Two processes may convert the same mesh.
         with whole_file(target, "Converted mesh", advice=CACHE_ADVICE) as stream:
@@ -64,10 +74,7 @@ def mesh_triangles(mesh: Path) -> FloatArray:
 
 
 def _content(mesh: Path) -> bytes:
-    try:
-        return mesh.read_bytes()
-    except OSError as error:
-        raise RobotError(f"mesh '{mesh}' cannot be read: {error.strerror}.") from error
+    return read_bytes(mesh, f"mesh '{mesh}'", RobotError, limit=MAX_BYTES)
 
 
 def _obj_text(mesh: Path) -> str:
@@ -84,7 +91,27 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     try:
         loaded = trimesh.load(mesh, force="mesh", process=False)
     except Exception as error:  # its readers raise errors of many classes
-        raise RobotError(f"mesh '{mesh}' cannot be used: {error}.") from error
+        text = " ".join(str(error).split()) or type(error).__name__
+        raise RobotError(f"mesh '{mesh}' cannot be used: {text}.") from error
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
         raise RobotError(f"mesh '{mesh}' contains no triangles.")
+    _check(mesh, loaded)
     return loaded
+
+
+def _check(mesh: Path, loaded: trimesh.Trimesh) -> None:
+    """Refuse too many triangles, unknown vertices, and coordinates that are no lengths."""
+    faces, vertices = np.asarray(loaded.faces), np.asarray(loaded.vertices, dtype=np.float64)
+    if len(faces) > MAX_TRIANGLES:
+        raise RobotError(
+            f"mesh '{mesh}' has {len(faces):,} triangles; at most {MAX_TRIANGLES:,} are read. "
+            "Decimate it."
+        )
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise RobotError(f"mesh '{mesh}' is damaged: a triangle names a vertex that is not there.")
+    # In the unit of the mesh: `geometry_triangles` checks the metres.
+    if not np.all(np.abs(vertices) <= MAX_COORDINATE):
+        raise RobotError(
+            f"mesh '{mesh}' has a coordinate that is not a number from {-MAX_COORDINATE:g} to "
+            f"{MAX_COORDINATE:g}."
+        )

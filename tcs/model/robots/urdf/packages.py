@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -30,8 +31,8 @@ def resolve_uri(uri: str, beside: Path) -> Path:
     else:
         # An absolute path replaces `beside`.
         path = beside / expanded(uri.removeprefix("file://"), "file", RobotError)
-    if not path.is_file():
-        raise RobotError(f"'{uri}': there is no file '{path}'.")
+    if not os.path.isfile(path):
+        raise RobotError(f"'{uri}': there is no file '{path}', or not a regular one.")
     return path
 
 

@@ -9,8 +9,16 @@ from functools import cache
 from pathlib import Path
 
 from tcs.errors import RobotError, UnknownNameError
+from tcs.files.quantities import ANGLE, ENTRIES, EXTENT, JOINT_LIMIT, MESH_SCALE, POSITION
+from tcs.files.xml_documents import read_xml
 from tcs.model.robots.urdf.model import MOVABLE, Geometry, Joint, Mimic, Urdf, Vector
 from tcs.model.robots.urdf.packages import resolve_uri
+
+AXIS_LENGTHS = (1e-3, 1e3)
+"""Least and greatest length of the axis of a movable joint: rounded, but a direction."""
+
+WORLD = "world"
+"""Name that Drake gives to the body that does not move: no link can have it."""
 
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 """XML namespace of the macros from which a URDF is generated."""
@@ -27,12 +35,7 @@ def read_urdf(path: Path) -> Urdf:
         RobotError: If the file cannot be read, is not a URDF, names a missing mesh, or its joints
             do not form one tree.
     """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except OSError as error:
-        raise RobotError(f"URDF '{path}' cannot be read: {error.strerror}.") from error
-    except ElementTree.ParseError as error:
-        raise RobotError(f"URDF '{path}' is not valid XML: {error}.") from error
+    root = read_xml(path, f"URDF '{path}'", RobotError)
     if root.tag != "robot":
         raise RobotError(f"URDF '{path}': the root element is '{root.tag}', but must be 'robot'.")
     if any(element.tag.startswith(_XACRO) for element in root.iter()):
@@ -48,6 +51,8 @@ def read_urdf(path: Path) -> Urdf:
     def geometry(element: ElementTree.Element) -> Geometry | None:
         return _geometry(element, colours, path)
 
+    for tag in ("link", "joint"):
+        ENTRIES.check(len(root.findall(tag)), f"URDF '{path}': its number of {tag}s", RobotError)
     links: dict[str, tuple[Geometry, ...]] = {}
     for link in root.findall("link"):
         elements = (*link.findall("visual"), *link.findall("collision"))
@@ -61,7 +66,12 @@ def read_urdf(path: Path) -> Urdf:
 
 
 def _check_tree(model: Urdf) -> None:
-    """Raise an error if joints name unknown links or do not form one tree."""
+    """Raise an error if joints name unknown links, do not form one tree, or carry the world."""
+    if WORLD in model.links:
+        raise RobotError(
+            f"URDF '{model.path}': a link is named '{WORLD}', which stands for the environment. "
+            "Rename it, or remove it with the joint that fixes the robot to it."
+        )
     for joint in model.joints.values():
         for link in (joint.parent, joint.child):
             if link not in model.links:
@@ -114,7 +124,6 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
         ends[end] = _attribute(found, "link", path)
     hard = _hard_limits(element, joint_type, where)
     xyz, rpy = _origin(element, where)
-    axis = element.find("axis")
     return Joint(
         name=name,
         type=joint_type,
@@ -122,12 +131,24 @@ def _joint(element: ElementTree.Element, path: Path) -> Joint:
         child=ends["child"],
         xyz=xyz,
         rpy=rpy,
-        axis=_vector(axis, "xyz", (1.0, 0.0, 0.0), where),
+        axis=_axis(element, joint_type, where),
         hard=hard,
         soft=_soft_limits(element, hard, where),
         mimic=_mimic(element, where),
         velocity=_velocity(element, where),
     )
+
+
+def _axis(element: ElementTree.Element, joint_type: str, where: str) -> Vector:
+    """Return the axis of a joint; refuse one of a movable joint that has no direction."""
+    axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), where)
+    shortest, longest = AXIS_LENGTHS
+    if joint_type in MOVABLE and not shortest <= math.hypot(*axis) <= longest:
+        raise RobotError(
+            f"{where}: its axis has length {math.hypot(*axis):.6g}, but must have a direction: "
+            f"write a vector of length 1 ({shortest:g} to {longest:,.0f} is accepted)."
+        )
+    return axis
 
 
 def _hard_limits(element: ElementTree.Element, joint_type: str, where: str) -> tuple[float, float]:
@@ -142,6 +163,8 @@ def _hard_limits(element: ElementTree.Element, joint_type: str, where: str) -> t
     lower, upper = (_numbers(limit.get(key, "0"), 1, where)[0] for key in ("lower", "upper"))
     if lower > upper:
         raise RobotError(f"{where}: its lower limit {lower} is above its upper limit {upper}.")
+    quantity = POSITION if joint_type == "prismatic" else JOINT_LIMIT
+    quantity.check((lower, upper), f"{where}: a limit", RobotError)
     return lower, upper
 
 
@@ -174,11 +197,12 @@ def _mimic(element: ElementTree.Element, where: str) -> Mimic | None:
     mimic = element.find("mimic")
     if mimic is None:
         return None
-    return Mimic(
-        leader=mimic.get("joint", ""),
-        multiplier=_numbers(mimic.get("multiplier", "1"), 1, where)[0],
-        offset=_numbers(mimic.get("offset", "0"), 1, where)[0],
+    multiplier, offset = (
+        _numbers(mimic.get(key, default), 1, where)[0]
+        for key, default in (("multiplier", "1"), ("offset", "0"))
     )
+    JOINT_LIMIT.check((multiplier, offset), f"{where}: a number of its 'mimic'", RobotError)
+    return Mimic(leader=mimic.get("joint", ""), multiplier=multiplier, offset=offset)
 
 
 def _geometry(
@@ -203,6 +227,10 @@ def _geometry(
         raise RobotError(
             f"{where}: geometry is '{shape.tag}', but must be mesh, box, cylinder or sphere."
         )
+    quantity = MESH_SCALE if shape.tag == "mesh" else EXTENT
+    quantity.check(size, f"{where}: a number of a '{shape.tag}'", RobotError)
+    if shape.tag == "mesh" and not all(size):
+        raise RobotError(f"{where}: a mesh has the scale {size}, but 0 would flatten it.")
     xyz, rpy = _origin(element, where)
     material = element.find("material")
     rgba = None
@@ -227,7 +255,10 @@ def _colour(material: ElementTree.Element, path: Path) -> tuple[float, ...] | No
 def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
     origin = element.find("origin")
     zero = (0.0, 0.0, 0.0)
-    return _vector(origin, "xyz", zero, where), _vector(origin, "rpy", zero, where)
+    xyz, rpy = _vector(origin, "xyz", zero, where), _vector(origin, "rpy", zero, where)
+    POSITION.check(xyz, f"{where}: a coordinate of an 'origin'", RobotError)
+    ANGLE.check(rpy, f"{where}: an angle of an 'origin'", RobotError)
+    return xyz, rpy
 
 
 def _vector(element: ElementTree.Element | None, key: str, default: Vector, where: str) -> Vector:

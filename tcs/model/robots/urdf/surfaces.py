@@ -9,6 +9,8 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tcs.errors import RobotError
+from tcs.files.quantities import SIZE
 from tcs.model.robots.urdf.meshes import mesh_triangles
 from tcs.model.robots.urdf.model import Geometry, Urdf, Vector
 
@@ -61,7 +63,14 @@ def geometry_triangles(geometry: Geometry) -> FloatArray:
     triangles encloses the round geometry as well.
     """
     if geometry.mesh is not None:
-        return np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
+        triangles = np.asarray(mesh_triangles(geometry.mesh) * np.array(geometry.size))
+        farthest = float(np.abs(triangles).max())
+        if farthest > SIZE.high:
+            raise RobotError(
+                f"mesh '{geometry.mesh}' reaches {farthest:,.0f} m from its origin; at most "
+                f"{SIZE.high:g} m. Give it the scale of its unit, e.g. 0.001 for millimetres."
+            )
+        return triangles
     if geometry.shape == "box":
         solid = trimesh.creation.box(geometry.size)
     elif geometry.shape == "cylinder":

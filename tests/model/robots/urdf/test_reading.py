@@ -14,8 +14,8 @@ TWO_LINKS = """<robot name="two">
     <visual><geometry>{geometry}</geometry></visual>
   </link>
   <joint name="hinge" type="{type}">
-    <parent link="{parent}"/><child link="b"/><axis xyz="0 0 1"/>
-    <limit lower="-1" upper="2" effort="1" velocity="1"/>
+    <parent link="{parent}"/><child link="b"/><axis xyz="{axis}"/>
+    <limit lower="-1" upper="{upper}" effort="1" velocity="1"/>
     {more}
   </joint>
 </robot>"""
@@ -23,6 +23,7 @@ TWO_LINKS = """<robot name="two">
 
 def two_links(folder, **changes):
     parts = {"geometry": '<sphere radius="1"/>', "type": "revolute", "parent": "a", "more": ""}
+    parts |= {"axis": "0 0 1", "upper": "2"}
     path = folder / "two.urdf"
     path.write_text(TWO_LINKS.format(**(parts | changes)))
     return path
@@ -51,6 +52,19 @@ def test_without_safety_controller_hard_limits_hold(tmp_path):
         ({"geometry": '<sphere radius="wide"/>'}, "'wide' must be 1 finite number"),
         ({"more": '<mimic joint="hinge"/>'}, "'hinge' must be another, movable joint"),
         ({"more": '<mimic joint="lever"/>'}, "unknown joint 'lever'"),
+        ({"parent": "world"}, "unknown link 'world'"),
+        ({"more": '<origin xyz="0 0 1e15"/>'}, "is 1e\\+15 m, but a position must be -40 to 40 m"),
+        ({"more": '<origin xyz="0 0 41"/>'}, "is 41 m, but a position must be"),
+        ({"more": '<origin rpy="0 0 1e308"/>'}, "is 1e\\+308 rad, but an angle must be"),
+        ({"more": '<origin xyz="0 nan 0"/>'}, "'0 nan 0' must be 3 finite number"),
+        ({"axis": "0 0 0"}, "its axis has length 0, but must have a direction"),
+        ({"axis": "0 1e308 0"}, "its axis has length 1e\\+308, but must have a direction"),
+        ({"axis": "inf 0 0"}, "must be 3 finite number"),
+        ({"upper": "1e16"}, "a limit is 1e\\+16 m or rad, but a joint limit must be -1,000 to"),
+        ({"type": "prismatic", "upper": "41"}, "a limit is 41 m, but a position must be"),
+        ({"geometry": '<sphere radius="1e15"/>'}, "is 1e\\+15 m, but an extent must be 0 to 100 m"),
+        ({"geometry": '<box size="1 -1 1"/>'}, "is -1 m, but an extent must be"),
+        ({"more": '<mimic joint="hinge" multiplier="1e9"/>'}, "a number of its 'mimic' is 1e\\+09"),
         (
             {"more": '<safety_controller soft_lower_limit="3" soft_upper_limit="4"/>'},
             "do not overlap",
@@ -124,3 +138,39 @@ def test_a_package_may_be_a_folder_above(tmp_path):
     mesh.touch()
     urdf_folder = tmp_path / "my_robot" / "urdf"
     assert resolve_uri("package://my_robot/meshes/arm.stl", urdf_folder) == mesh
+
+
+def test_a_link_named_world_is_refused(tmp_path):
+    """Drake's own body of that name does not move; before, building the scene failed."""
+    path = two_links(tmp_path)
+    path.write_text(path.read_text().replace('"a"', '"world"'))
+    with pytest.raises(RobotError, match="a link is named 'world'"):
+        read_urdf(path)
+
+
+def test_a_fixed_joint_needs_no_axis(tmp_path):
+    assert not read_urdf(two_links(tmp_path, type="fixed", axis="0 0 0")).joints["hinge"].is_movable
+
+
+def test_too_many_links_are_refused(tmp_path):
+    path = tmp_path / "many.urdf"
+    links = "".join(f"<link name='l{i}'/>" for i in range(1001))
+    path.write_text(f"<robot>{links}</robot>")
+    with pytest.raises(RobotError, match="number of links is 1001"):
+        read_urdf(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b'<?xml version="1.0" encoding="utf-16"?><robot/>', "declares an encoding|not valid XML"),
+        (b"\xff<robot/>", "is not a text file in UTF-8"),
+        (b"<robot>", "is not valid XML"),
+    ],
+)
+def test_what_is_no_xml_is_one_line(tmp_path, content, words):
+    path = tmp_path / "broken.urdf"
+    path.write_bytes(content)
+    with pytest.raises(RobotError, match=words) as caught:
+        read_urdf(path)
+    assert "\n" not in str(caught.value)
