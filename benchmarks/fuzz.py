@@ -1,0 +1,236 @@
+"""Hand thousands of mutated files of every type to tcs, and count what becomes of them.
+
+A mutant is refused in one line, or accepted; anything else is a defect: a traceback, a process
+that ends, a hang, or a false answer. Accepted tasks, environments, models and robots are scored on
+a small grid, one in `--score-every`, and Drake re-checks some of the answers.
+
+    python benchmarks/fuzz.py --mutants 5000 --save
+    python benchmarks/fuzz.py --mutants 1 --only URDF --first 1234    # one mutant again
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import resource
+import select
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import table
+from fuzz_files import FILE_TYPES, FileType, prepare
+from fuzz_mutations import damaged
+
+SECONDS = 10.0
+"""Longest time for one mutant [s]; scoring one takes a tenth of a second."""
+START_SECONDS = 300.0
+"""Longest time for a worker to start, which may have to compile the kernel [s]."""
+MEMORY = 2 * 1024**3
+"""Most memory that a mutant may take beyond that of a started worker [bytes]."""
+DAMAGED = 0.2
+"""Fraction of the mutants that are damaged byte by byte rather than in their structure."""
+MAX_CONFIGURATIONS = 2_000
+"""Largest grid of an accepted environment that is scored."""
+PAIRS = 12
+"""Reached pairs that Drake re-checks for a mutant that is scored."""
+
+OUTCOMES = ("refused", "accepted", "scored", "traceback", "abort", "hang", "false answer")
+DEFECTS = ("traceback", "abort", "hang", "false answer")
+
+
+def mutant(file_type: FileType, original: bytes, seed: int, number: int) -> bytes:
+    """Return a mutant; the same arguments give the same bytes."""
+    rng = np.random.default_rng([seed, zlib.crc32(file_type.name.encode()), number])
+    if rng.random() < DAMAGED:
+        return damaged(original, rng)
+    return file_type.mutate(original, rng)
+
+
+def judged(file_type: FileType, path: Path, number: int, score: bool) -> tuple[str, str]:
+    """Return what becomes of the file at a path: one of OUTCOMES, and the message or traceback."""
+    from tcs.errors import TcsError
+
+    try:
+        three = file_type.use(path, number)
+        if three is None or not score:
+            return "accepted", ""
+        return _scored(*three)
+    except TcsError as error:
+        text = str(error)
+        if not text or "\n" in text or len(text) > 20_000:
+            return "traceback", f"not one line: {text[:500]!r}"
+        return "refused", text
+    except BaseException:
+        return "traceback", traceback.format_exc()[-3000:]
+
+
+def _scored(task: Path, environment: Path, robot: Path) -> tuple[str, str]:
+    """Score an accepted file and let Drake re-check some of the answers."""
+    import tcs
+    from tcs.placement.scoring.job import load_job
+
+    job = load_job(task, environment, robot)
+    if job.scored_grid.size > MAX_CONFIGURATIONS:
+        return "accepted", ""
+    scores = tcs.score(task, environment, robot)
+    found = tcs.verify(scores, pairs=PAIRS, dense=0)
+    if not found.is_sound:
+        return "false answer", json.dumps(found.to_json())
+    return "scored", ""
+
+
+def work(name: str, folder: Path, seed: int, score_every: int) -> None:
+    """Judge the mutants whose numbers arrive on stdin; print one line of JSON for each."""
+    (file_type,) = (one for one in FILE_TYPES if one.name == name)
+    answers = os.fdopen(os.dup(1), "w")
+    # Drake and its libraries print warnings.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.dup2(1, 2)
+    path = folder / file_type.file
+    original = path.read_bytes()
+    # Compile or load whatever is slow the first time.
+    outcome, text = judged(file_type, path, 0, score=True)
+    assert outcome in ("accepted", "scored"), text
+    virtual = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (virtual + MEMORY, virtual + MEMORY))
+    print("ready", file=answers, flush=True)
+    for line in sys.stdin:
+        number = int(line)
+        path.write_bytes(mutant(file_type, original, seed, number))
+        begun = time.perf_counter()
+        outcome, text = judged(file_type, path, number, score=number % score_every == 0)
+        answer = {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
+        print(json.dumps(answer), file=answers, flush=True)
+
+
+class Worker:
+    """A process that judges mutants of one type, started again when it ends or hangs."""
+
+    def __init__(self, name: str, master: Path, seed: int, score_every: int) -> None:
+        """Set the arguments of the process, which the first mutant starts."""
+        self._arguments = (name, str(seed), str(score_every))
+        self._master = master
+        self._process: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def judge(self, number: int) -> dict[str, Any]:
+        """Return outcome, text and seconds of a mutant."""
+        if self._process is None:
+            self._start()
+        assert self._process is not None
+        assert self._process.stdin is not None
+        begun = time.perf_counter()
+        self._process.stdin.write(f"{number}\n".encode())
+        self._process.stdin.flush()
+        line = self._line(SECONDS)
+        if line:
+            answer: dict[str, Any] = json.loads(line)
+            return answer
+        outcome, text = "hang", f"no answer within {SECONDS:g} s"
+        if line is not None:
+            outcome, text = "abort", f"the process ended with code {self._process.wait()}"
+        self.close()
+        return {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
+
+    def _start(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="tcs-fuzz-")
+        for file in self._master.iterdir():
+            (Path(self._folder.name) / file.name).write_bytes(file.read_bytes())
+        name, seed, score_every = self._arguments
+        words = ["--worker", self._folder.name, "--only", name, "--seed", seed]
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, *words, "--score-every", score_every],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        if self._line(START_SECONDS) != b"ready\n":
+            raise SystemExit(f"the worker for '{name}' does not start")
+
+    def _line(self, seconds: float) -> bytes | None:
+        """Return the next line of the worker, b"" if it ended, None if there is none in time."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], seconds)
+        return self._process.stdout.readline() if ready else None
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            for stream in (self._process.stdin, self._process.stdout):
+                # What a dead process has not read is lost.
+                with contextlib.suppress(BrokenPipeError):
+                    if stream is not None:
+                        stream.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+        self._process = self._folder = None
+
+
+def run(
+    names: list[str], numbers: range, seed: int, score_every: int, folder: Path
+) -> Iterator[tuple[str, int, dict[str, Any]]]:
+    """Yield type, number and answer of every mutant."""
+    for name in names:
+        worker = Worker(name, folder, seed, score_every)
+        try:
+            for number in numbers:
+                yield name, number, worker.judge(number)
+        finally:
+            worker.close()
+
+
+def main() -> None:
+    """Fuzz every type and print a table."""
+    options = table.parser(__doc__ or "")
+    options.add_argument("--mutants", type=int, default=300, help="mutants of each type")
+    options.add_argument("--first", type=int, default=0, help="number of the first mutant")
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--score-every", type=int, default=25, help="score one mutant in so many")
+    options.add_argument("--only", nargs="*", help="types of files, by default all")
+    options.add_argument("--show", type=int, default=3, help="defects of a type to print in full")
+    options.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
+    given = options.parse_args()
+    if given.worker is not None:
+        work(given.only[0], given.worker, given.seed, given.score_every)
+        return
+    table.header()
+    names = given.only or [one.name for one in FILE_TYPES]
+    counts: dict[str, Counter[str]] = {name: Counter() for name in names}
+    slowest = dict.fromkeys(names, 0.0)
+    with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
+        prepare(Path(folder))
+        numbers = range(given.first, given.first + given.mutants)
+        for name, number, answer in run(
+            names, numbers, given.seed, given.score_every, Path(folder)
+        ):
+            outcome = answer["outcome"]
+            counts[name][outcome] += 1
+            slowest[name] = max(slowest[name], answer["seconds"])
+            if outcome in DEFECTS and counts[name][outcome] <= given.show:
+                print(f"--- {outcome}: {name}, mutant {number}\n{answer['text']}", flush=True)
+            if number == numbers[-1]:
+                shown = ", ".join(f"{counts[name][o]} {o}" for o in OUTCOMES if counts[name][o])
+                table.row(name, f"{shown}; slowest {slowest[name]:.1f} s")
+    for name, count in counts.items():
+        count["accepted"] += count["scored"]
+        for outcome in OUTCOMES:
+            table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
+        table.cell("fuzz", name, "slowest [s]", f"{slowest[name]:.1f}")
+    table.save(given)
+
+
+if __name__ == "__main__":
+    main()
