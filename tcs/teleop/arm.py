@@ -11,6 +11,7 @@ import numpy as np
 
 from tcs.errors import GridError, TcsError
 from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.kinematics import jacobian, tool_pose
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 
@@ -51,20 +52,17 @@ class Arm:
     velocity: FloatArray
     torso_height: float
     frames: FloatArray = field(repr=False)
-    _parts: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
+    _chain: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
+    """Rotations and translations of `frames`, for the kernel."""
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only, and split the frames into factors of 1, cos(q) and sin(q)."""
-        turning = self.frames[:JOINTS]
-        x, y = turning[:, :, 0], turning[:, :, 1]
-        still, cosine, sine = np.zeros_like(turning), np.zeros_like(turning), np.zeros_like(turning)
-        still[:, :, 2:] = turning[:, :, 2:]
-        # F Rz(q) mixes the first two columns.
-        cosine[:, :, 0], cosine[:, :, 1] = x, y
-        sine[:, :, 0], sine[:, :, 1] = y, -x
-        object.__setattr__(self, "_parts", (still, cosine, sine))
-        for array in (self.lower, self.upper, self.velocity, self.frames, still, cosine, sine):
+        """Make the arrays read-only."""
+        for array in (self.lower, self.upper, self.velocity, self.frames):
             array.flags.writeable = False
+        # Writable copies: numba compiles anew for read-only arrays, which are another type.
+        R, p = self.frames[:, :3, :3], self.frames[:, :3, 3]
+        chain = np.array(R, order="C"), np.array(p, order="C")
+        object.__setattr__(self, "_chain", chain)
 
     @property
     def name(self) -> str:
@@ -87,14 +85,13 @@ class Arm:
         Args:
             joints: Joint positions [rad], shape (7,).
         """
-        still, cosine, sine = self._parts
-        angles = joints.reshape(JOINTS, 1, 1)
-        steps = still + cosine * np.cos(angles) + sine * np.sin(angles)
-        poses = np.empty((JOINTS + 1, 4, 4))
-        X = poses[0] = steps[0]
-        for i in range(1, JOINTS):
-            X = np.matmul(X, steps[i], out=poses[i])
-        np.matmul(X, self.frames[JOINTS], out=poses[JOINTS])
+        link_R, link_p = np.empty((JOINTS + 1, 3, 3)), np.empty((JOINTS + 1, 3))
+        poses = np.zeros((JOINTS + 1, 4, 4))
+        R, p = np.empty((3, 3)), np.empty(3)
+        tool_pose(*self._chain, _writable(joints), link_R, link_p, R, p)
+        poses[:JOINTS, :3, :3], poses[:JOINTS, :3, 3] = link_R[1:], link_p[1:]
+        poses[JOINTS, :3, :3], poses[JOINTS, :3, 3] = R, p
+        poses[:, 3, 3] = 1.0
         return poses
 
     def kinematics(self, joints: FloatArray) -> Kinematics:
@@ -103,17 +100,12 @@ class Arm:
         Args:
             joints: Joint positions [rad], shape (7,).
         """
-        poses = self.link_poses(joints)
-        axes = poses[:JOINTS, :3, 2].T
-        p = poses[JOINTS, :3, 3]
-        arms = p[:, None] - poses[:JOINTS, :3, 3].T
-        jacobian = np.empty((6, JOINTS))
-        jacobian[:3] = axes
-        # The cross product axis x arm by rows: numpy's costs more than the rest together.
-        jacobian[3] = axes[1] * arms[2] - axes[2] * arms[1]
-        jacobian[4] = axes[2] * arms[0] - axes[0] * arms[2]
-        jacobian[5] = axes[0] * arms[1] - axes[1] * arms[0]
-        return Kinematics(poses[JOINTS, :3, :3], p, jacobian)
+        q = _writable(joints)
+        link_R, link_p = np.empty((JOINTS + 1, 3, 3)), np.empty((JOINTS + 1, 3))
+        R, p, J = np.empty((3, 3)), np.empty(3), np.empty((6, JOINTS))
+        tool_pose(*self._chain, q, link_R, link_p, R, p)
+        jacobian(*self._chain, q, J)
+        return Kinematics(R, p, J)
 
     def checked(self, joints: object, where: str = "joints") -> FloatArray:
         """Return seven joint positions as a new array.
@@ -155,6 +147,11 @@ class Arm:
         lower = np.where(self.bounded, self.lower, -np.pi)
         upper = np.where(self.bounded, self.upper, np.pi)
         return rng.uniform(lower, upper, size=(count, JOINTS))
+
+
+def _writable(joints: FloatArray) -> FloatArray:
+    """Return a writable copy: numba compiles anew for read-only arrays, which are another type."""
+    return np.array(joints, dtype=np.float64)
 
 
 def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm:
