@@ -217,14 +217,17 @@ class _Hand:
 
     def _move(self) -> None:
         """Move towards the target for one period, at the hand's speed."""
-        way = self._target - self.pose
+        difference = self._target - self.pose
         motion = self._motion
-        seconds = max(math.hypot(way[0], way[1]) / motion.speed, abs(way[2]) / motion.angular_speed)
+        seconds = max(
+            math.hypot(difference[0], difference[1]) / motion.speed,
+            abs(difference[2]) / motion.angular_speed,
+        )
         if seconds <= PERIOD:
             self.pose[:] = self._target
             self._target, self._mode = self._draw(), Mode.END_EFFECTOR
         else:
-            self.pose += (PERIOD / seconds) * way
+            self.pose += (PERIOD / seconds) * difference
 
     def _draw(self) -> FloatArray:
         motion = self._motion

@@ -51,9 +51,9 @@ def assisted(command: Command, state: ControlState) -> RateCommand:
     settings = state.settings
     twist = commanded_twist(command)
     back = settings.gain * state.error
-    turn = math.sqrt(back[:3] @ back[:3])
-    if turn > _CORRECTION:
-        back[:3] *= _CORRECTION / turn
+    rotation_rate = math.sqrt(back[:3] @ back[:3])
+    if rotation_rate > _CORRECTION:
+        back[:3] *= _CORRECTION / rotation_rate
     wanted = twist + back
     J = state.jacobian.copy()
     J[:3] *= _ORIENTATION

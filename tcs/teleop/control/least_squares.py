@@ -73,8 +73,8 @@ def _one_by_one(
             held = np.flatnonzero(side)
             rest = slope[free] - hessian[np.ix_(free, held)] @ x[held]
             goal = np.asarray(np.linalg.solve(hessian[np.ix_(free, free)], rest), dtype=np.float64)
-            share, first, at = _first_bound(x[free], goal, lower[free], upper[free])
-            x[free] += share * (goal - x[free])
+            fraction, first, at = _first_bound(x[free], goal, lower[free], upper[free])
+            x[free] += fraction * (goal - x[free])
             if first >= 0:
                 joint = free[first]
                 x[joint] = (lower, upper)[at][joint]
@@ -100,13 +100,13 @@ def _first_bound(
         The fraction, in [0, 1]; the variable that meets its bound first, -1 if none does; and the
         bound, 0 for lower and 1 for upper.
     """
-    share, first, side = 1.0, -1, 0
+    fraction, first, side = 1.0, -1, 0
     for i in range(len(x)):
-        way = goal[i] - x[i]
+        step = goal[i] - x[i]
         for at, bound in ((0, lower[i]), (1, upper[i])):
             over = goal[i] < bound if at == 0 else goal[i] > bound
             if over:
-                part = max((bound - x[i]) / way, 0.0)
-                if part < share:
-                    share, first, side = part, i, at
-    return float(share), first, side
+                part = max((bound - x[i]) / step, 0.0)
+                if part < fraction:
+                    fraction, first, side = part, i, at
+    return float(fraction), first, side

@@ -43,22 +43,22 @@ def null_space(command: Command, state: ControlState) -> RateCommand:
         return RateCommand(back)
     group = settings.groups[command.group]
     lead = group[0]
-    way = float(np.sign(state.speed or command.sign))
-    rates, held, slip = _turning(jacobian, group, way, state)
+    sense = float(np.sign(state.speed or command.sign))
+    rates, held, slip = _turning(jacobian, group, sense, state)
     if slip > _SLIP or abs(rates[lead]) < STILL * settings.group_rate:
         return RateCommand(
             back, f"{limit_message(held)}: its motion ends there." if held else _stuck(lead)
         )
     ease = _ease(rates, lead)
-    full = ease * way * rates
+    full = ease * sense * rates
     speed = _next_speed(command.sign, full, state)
-    if ease < _EDGE and speed * way > 0.0 and _gets_worse(group, way, rates, state):
+    if ease < _EDGE and speed * sense > 0.0 and _gets_worse(group, sense, rates, state):
         return RateCommand(back, _stuck(lead))
-    share, joint = slow_down_together(speed * full + back, state)
+    fraction, joint = slow_down_together(speed * full + back, state)
     if joint >= 0:
         return RateCommand(back, f"{limit_message([joint])}: its motion ends there.")
     # The reduced speed is the new one: a group that slowed down for a limit reverses from it.
-    return RateCommand(share * (speed * full + back), "", share * speed, full)
+    return RateCommand(fraction * (speed * full + back), "", fraction * speed, full)
 
 
 def pose(command: Command, state: ControlState) -> RateCommand:
@@ -71,10 +71,10 @@ def pose(command: Command, state: ControlState) -> RateCommand:
         return RateCommand(back, "the arm is singular: its self-motion is not unique.")
     direction = state.elbow_sign * settings.group_rate * elbow_direction(state.jacobian)
     speed = _next_speed(command.sign, direction, state)
-    share, joint = slow_down_together(speed * direction + back, state)
+    fraction, joint = slow_down_together(speed * direction + back, state)
     if joint >= 0:
         return RateCommand(back, f"{limit_message([joint])}: the elbow's motion ends there.")
-    return RateCommand(share * (speed * direction + back), "", share * speed, direction)
+    return RateCommand(fraction * (speed * direction + back), "", fraction * speed, direction)
 
 
 def elbow_sign(jacobian: FloatArray) -> float:
@@ -135,7 +135,7 @@ def _next_speed(sign: float, full: FloatArray, state: ControlState) -> float:
 
 
 def _turning(
-    jacobian: FloatArray, group: tuple[int, ...], way: float, state: ControlState
+    jacobian: FloatArray, group: tuple[int, ...], sense: float, state: ControlState
 ) -> tuple[FloatArray, list[int], float]:
     """Return the joint rates of a group at full speed in one direction, the tool held.
 
@@ -144,14 +144,14 @@ def _turning(
         velocity of the tool [m/s].
     """
     settings, arm = state.settings, state.arm
-    motion = group_motion(jacobian, group, way * settings.group_rate)
+    motion = group_motion(jacobian, group, sense * settings.group_rate)
     if settings.limits == "paper" or motion.slip > _SLIP:
         return motion.rates, [], motion.slip
     lower = np.where(state.joints - arm.lower <= _AT_LIMIT, 0.0, -np.inf)
     upper = np.where(arm.upper - state.joints <= _AT_LIMIT, 0.0, np.inf)
     if ((motion.rates >= lower) & (motion.rates <= upper)).all():
         return motion.rates, [], motion.slip
-    rates, held = bounded_group_motion(jacobian, group, way * settings.group_rate, lower, upper)
+    rates, held = bounded_group_motion(jacobian, group, sense * settings.group_rate, lower, upper)
     return rates, np.flatnonzero(held).tolist(), float(np.linalg.norm(jacobian @ rates))
 
 
@@ -166,14 +166,16 @@ def _ease(rates: FloatArray, lead: int) -> float:
     return float(1.0 / math.sqrt(1.0 + faster**4))
 
 
-def _gets_worse(group: tuple[int, ...], way: float, rates: FloatArray, state: ControlState) -> bool:
+def _gets_worse(
+    group: tuple[int, ...], sense: float, rates: FloatArray, state: ControlState
+) -> bool:
     """Return whether a group's motion leads towards the end of its lead joint's range."""
     # Larger than rounding, and small enough not to pass the end of the range [rad].
     ahead = state.joints + (1e-4 / float(np.abs(rates).max())) * rates
     ease = []
     for joints in (state.joints, ahead):
         jacobian = state.arm.kinematics(joints).jacobian[3:]
-        ease.append(_ease(_turning(jacobian, group, way, state)[0], group[0]))
+        ease.append(_ease(_turning(jacobian, group, sense, state)[0], group[0]))
     return ease[1] < ease[0]
 
 

@@ -83,8 +83,10 @@ def slow_down_together(rates: FloatArray, state: ControlState) -> tuple[float, i
     if in_time and (size <= velocity).all():
         return 1.0, -1
     lower, upper = rate_bounds(state.arm, state.joints, settings.period, braking)
-    share, joint = scale_to_bounds(rates, np.maximum(lower, -velocity), np.minimum(upper, velocity))
-    return share, joint if share < STILL else -1
+    fraction, joint = scale_to_bounds(
+        rates, np.maximum(lower, -velocity), np.minimum(upper, velocity)
+    )
+    return fraction, joint if fraction < STILL else -1
 
 
 def commanded_twist(command: Command) -> FloatArray:

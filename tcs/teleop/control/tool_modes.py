@@ -45,12 +45,12 @@ def end_effector(command: Command, state: ControlState) -> RateCommand:
     if settings.limits == "paper":
         return _until_invalid(rates, smallest, state)
     # A command that exceeds the joint velocities is followed in the same direction, but slower.
-    share, _ = scale_to_bounds(rates, -state.arm.velocity, state.arm.velocity)
-    if ((share * rates >= state.lower) & (share * rates <= state.upper)).all():
-        return RateCommand(share * rates)
+    fraction, _ = scale_to_bounds(rates, -state.arm.velocity, state.arm.velocity)
+    if ((fraction * rates >= state.lower) & (fraction * rates <= state.upper)).all():
+        return RateCommand(fraction * rates)
     rates, held = clamped_rates(
         state.jacobian,
-        share * wanted,
+        fraction * wanted,
         state.lower,
         state.upper,
         length=settings.length,
@@ -72,10 +72,10 @@ def _until_invalid(rates: FloatArray, smallest: float, state: ControlState) -> R
         # they would otherwise pass through it before they could stop.
         most = _NEAR_RATE * (nearness - _BEYOND) / (_NEAR - _BEYOND)
         rates = rates * min(1.0, most / float(np.abs(rates).max()))
-    share, joint = slow_down_together(rates, state)
+    fraction, joint = slow_down_together(rates, state)
     if joint >= 0:
         return RateCommand(np.zeros(JOINTS), f"{limit_message([joint])}: motion ends there.")
-    return RateCommand(rates * share)
+    return RateCommand(rates * fraction)
 
 
 def _gets_more_singular(rates: FloatArray, state: ControlState) -> bool:

@@ -97,7 +97,7 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
     Raises:
         TcsError: If no line is found.
     """
-    walk = _Walk(arm, settings or Settings())
+    kinematic_arm = _KinematicArm(arm, settings or Settings())
     rng = np.random.default_rng(seed)
     reach = Reach(arm.robot, torso_height=arm.torso_height)
     lower = np.where(arm.bounded, arm.lower, -math.pi)
@@ -109,11 +109,11 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
         heading = math.pi + rng.uniform(-_HEADING, _HEADING)
         start = arm.link_poses(joints)[JOINTS, :3, 3]
         ahead = start - base
-        way = np.array([math.cos(heading), math.sin(heading), 0.0])
-        beside = abs(ahead[0] * way[1] - ahead[1] * way[0])
+        direction = np.array([math.cos(heading), math.sin(heading), 0.0])
+        beside = abs(ahead[0] * direction[1] - ahead[1] * direction[0])
         if ahead[0] < _AHEAD * reach.length or beside < _OFF_AXIS:
             continue
-        found = _course(walk, reach, joints, way, rng)
+        found = _course(kinematic_arm, reach, joints, direction, rng)
         if found is not None:
             return found
     raise TcsError(
@@ -124,33 +124,37 @@ def find_course(arm: Arm, seed: int = 0, settings: Settings | None = None) -> Co
 
 
 def _course(
-    walk: _Walk, reach: Reach, joints: FloatArray, way: FloatArray, rng: np.random.Generator
+    kinematic_arm: _KinematicArm,
+    reach: Reach,
+    joints: FloatArray,
+    direction: FloatArray,
+    rng: np.random.Generator,
 ) -> Course | None:
     """Return the line from a start posture in a direction, None if it fails a condition."""
-    arm = walk.arm
+    arm = kinematic_arm.arm
     start = arm.link_poses(joints)[JOINTS, :3, 3]
-    ahead = Line(_triple(start), _triple(start + _LONGEST * way))
-    straight, joint = walk.follow(joints, ahead)
+    ahead = Line(_triple(start), _triple(start + _LONGEST * direction))
+    straight, joint = kinematic_arm.follow(joints, ahead)
     blocked = straight[-1]
     done = float(ahead.fraction_at(arm.link_poses(blocked)[JOINTS, :3, 3])) * ahead.length
     if joint not in BLOCKING or done < _SHORTEST:
         return None
-    line = Line(_triple(start), _triple(start + done / BLOCKED_AFTER * way))
+    line = Line(_triple(start), _triple(start + done / BLOCKED_AFTER * direction))
     if arm.robot.torso_joint is None and line.end[0] > arm.frames[0, 0, 3]:
         return None
-    turns = walk.opening_turns(blocked, line)
+    turns = kinematic_arm.opening_turns(blocked, line)
     if not turns:
         return None
-    turned = walk.turn(blocked, turns[len(turns) // 2])
+    turned = kinematic_arm.turn(blocked, turns[len(turns) // 2])
     if not len(turned):
         return None
-    rest, joint_after = walk.follow(turned[-1], line)
+    rest, joint_after = kinematic_arm.follow(turned[-1], line)
     if (
         joint_after >= 0
         or not reach.free(np.concatenate([straight, turned, rest]), reach.level).all()
     ):
         return None
-    if not walk.has_detour(blocked, line, rng):
+    if not kinematic_arm.has_detour(blocked, line, rng):
         return None
     return Course(line, joints, joint, turns)
 
@@ -161,7 +165,7 @@ def _triple(point: FloatArray) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Walk:
+class _KinematicArm:
     """Kinematic simulation of an arm, without dynamics and noise: its path, and what stops it."""
 
     arm: Arm
@@ -228,28 +232,30 @@ class _Walk:
     def has_detour(self, blocked: FloatArray, line: Line, rng: np.random.Generator) -> bool:
         """Return whether some hand motion unblocks the line."""
         for _ in range(_DETOURS):
-            turn, way = rng.standard_normal((2, 3))
+            rotation, translation = rng.standard_normal((2, 3))
             length = rng.uniform(0.0, _FARTHEST)
-            way *= length / np.linalg.norm(way)
-            turn *= length * _TURN_PER_METRE / np.linalg.norm(turn)
-            joints = self._shift(blocked, turn, way)
+            translation *= length / np.linalg.norm(translation)
+            rotation *= length * _TURN_PER_METRE / np.linalg.norm(rotation)
+            joints = self._shift(blocked, rotation, translation)
             if joints is not None and self.follow(joints, line)[1] < 0:
                 return True
         return False
 
-    def _shift(self, joints: FloatArray, turn: FloatArray, way: FloatArray) -> FloatArray | None:
+    def _shift(
+        self, joints: FloatArray, rotation: FloatArray, translation: FloatArray
+    ) -> FloatArray | None:
         """Return the posture after a hand motion, None if a limit ends the motion.
 
         Args:
             joints: Start posture [rad], shape (7,).
-            turn: Rotation vector of the motion [rad], shape (3,).
-            way: Translation of the motion [m], shape (3,).
+            rotation: Rotation vector of the motion [rad], shape (3,).
+            translation: Translation of the motion [m], shape (3,).
         """
         start = self.arm.kinematics(joints)
-        steps = max(1, math.ceil(np.linalg.norm(way) / _STEP))
+        steps = max(1, math.ceil(np.linalg.norm(translation) / _STEP))
         for i in range(1, steps + 1):
-            R = rotated(start.R, turn, i / steps)
-            joints, joint = self._move(joints, R, start.p + way * (i / steps))
+            R = rotated(start.R, rotation, i / steps)
+            joints, joint = self._move(joints, R, start.p + translation * (i / steps))
             if joint >= 0:
                 return None
         return joints

@@ -72,10 +72,10 @@ def trajectory_accuracy(
     0.02
     """
     points = np.asarray(position, dtype=np.float64)
-    shares = np.linspace(0.0, 1.0, planes)
+    fractions = np.linspace(0.0, 1.0, planes)
     along = line.fraction_at(points) * line.length
     # Rounding must not exclude a sample at the margin.
-    inside = np.abs(along[:, None] - shares * line.length) <= margin + 1e-12
+    inside = np.abs(along[:, None] - fractions * line.length) <= margin + 1e-12
     count = inside.sum(axis=0)
     if not count.any():
         raise DataFileError(
@@ -85,7 +85,7 @@ def trajectory_accuracy(
     met = count > 0
     barycentre = np.full((planes, 3), np.nan)
     barycentre[met] = (inside.T[met] @ points) / count[met, None]
-    off = np.linalg.norm(barycentre - line.at(shares), axis=1)
+    off = np.linalg.norm(barycentre - line.at(fractions), axis=1)
     return Accuracy(float(np.nanmax(off)), barycentre, int(met.sum()))
 
 
@@ -130,8 +130,8 @@ def effort(time: FloatArray, hand: FloatArray, *, mass: float = DEVICE_MASS) -> 
     steps = np.diff(np.asarray(hand, dtype=np.float64), axis=0)
     dt = np.diff(time)[:, None]
     force = mass * np.diff(steps / dt, axis=0) / (0.5 * (dt[1:] + dt[:-1]))
-    way = 0.5 * (steps[1:] + steps[:-1])
-    return float(np.abs((force * way).sum(axis=1)).mean())
+    displacement = 0.5 * (steps[1:] + steps[:-1])
+    return float(np.abs((force * displacement).sum(axis=1)).mean())
 
 
 def steering_angle(roll_pitch_yaw: FloatArray) -> float:

@@ -189,12 +189,12 @@ class ScriptedOperator:
         aim, spin = np.zeros(3), np.zeros(3)
         if self._phase is _Phase.FOLLOW:
             place = seen.p + self._misjudged.value
-            share = float(self._line.fraction_at(place))
+            fraction = float(self._line.fraction_at(place))
             if stopped:
-                self._stop(seen, share)
+                self._stop(seen, fraction)
             else:
-                self._learn(share)
-                aim = self._pursue(place, share)
+                self._learn(fraction)
+                aim = self._pursue(place, fraction)
         elif self._phase is _Phase.TRY:
             spin, aim = self._motion[:3] / self._lasts, self._motion[3:] / self._lasts
             if over or stopped:
@@ -209,9 +209,9 @@ class ScriptedOperator:
     def _commanded(self, aim: FloatArray, spin: FloatArray) -> Command:
         """Return the command: the intended motion after muscle dynamics and tremor."""
         traits = self._traits
-        share = self._settings.period / (traits.muscle + self._settings.period)
-        self._velocity = self._velocity + share * (aim - self._velocity)
-        self._spin = self._spin + share * (spin - self._spin)
+        fraction = self._settings.period / (traits.muscle + self._settings.period)
+        self._velocity = self._velocity + fraction * (aim - self._velocity)
+        self._spin = self._spin + fraction * (spin - self._spin)
         if self._phase in (_Phase.TO_GROUP, _Phase.TO_TOOL):
             return Command(clutch=True)
         if self._phase is _Phase.TURN:
@@ -223,27 +223,27 @@ class ScriptedOperator:
     def _begin(self, phase: _Phase, lasts: float = math.inf) -> None:
         self._phase, self._began, self._lasts = phase, self._time, lasts
 
-    def _pursue(self, place: FloatArray, share: float) -> FloatArray:
+    def _pursue(self, place: FloatArray, fraction: float) -> FloatArray:
         """Return the velocity towards a point ahead on the line [m/s]."""
         traits, line = self._traits, self._line
-        ahead = line.at(min(1.0, max(0.0, share) + traits.lookahead / line.length)) - place
+        ahead = line.at(min(1.0, max(0.0, fraction) + traits.lookahead / line.length)) - place
         distance = float(np.linalg.norm(ahead))
         # Within `speed` x 1 s of the aim, the speed decreases in proportion to the distance.
         return np.asarray(ahead * (min(traits.speed, distance) / max(distance, 1e-9)))
 
-    def _stop(self, seen: Step, share: float) -> None:
+    def _stop(self, seen: Step, fraction: float) -> None:
         """Record a stop of the arm, at the same obstacle as before or at the next one."""
-        if share > self._farthest + _PAST:
+        if fraction > self._farthest + _PAST:
             self._obstacle += 1
             self._tries = 0
             self._where = seen
             self._turn, self._turned = 0.0, 0.0
-        self._farthest = max(self._farthest, share)
+        self._farthest = max(self._farthest, fraction)
         self._begin(_Phase.THINK, self._traits.thinking)
 
-    def _learn(self, share: float) -> None:
+    def _learn(self, fraction: float) -> None:
         """Remember a successful recovery, once the obstacle is passed."""
-        if self._tries and share > self._farthest + _PAST:
+        if self._tries and fraction > self._farthest + _PAST:
             if self._approach is Recovery.GROUP:
                 self._habits.turns[self._obstacle] = self._turned
             else:
@@ -259,9 +259,11 @@ class ScriptedOperator:
                 self._begin(_Phase.TO_GROUP, self._traits.pointing)
             else:
                 self._motion = self._next_motion()
-                turn, way = (float(np.linalg.norm(part)) for part in np.split(self._motion, 2))
+                rotation, distance = (
+                    float(np.linalg.norm(part)) for part in np.split(self._motion, 2)
+                )
                 pace = self._traits.speed
-                lasts = max(way / pace, turn / (pace * self._traits.turn_per_metre))
+                lasts = max(distance / pace, rotation / (pace * self._traits.turn_per_metre))
                 # A remembered motion may be tiny, but takes some time.
                 self._begin(_Phase.TRY, max(lasts, self._traits.muscle))
         elif self._phase is _Phase.TO_GROUP:
@@ -274,10 +276,12 @@ class ScriptedOperator:
         if self._tries == 1 and self._obstacle in self._habits.motions:
             return self._habits.motions[self._obstacle]
         traits = self._traits
-        way = min(_FARTHEST_TRY, traits.first_try * traits.growth ** (self._tries - 1))
+        distance = min(_FARTHEST_TRY, traits.first_try * traits.growth ** (self._tries - 1))
         directions = self._rng.standard_normal((2, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        return np.concatenate([way * traits.turn_per_metre * directions[0], way * directions[1]])
+        return np.concatenate(
+            [distance * traits.turn_per_metre * directions[0], distance * directions[1]]
+        )
 
     def _next_turn(self) -> float:
         """Return the next rotation of group 1 [rad]."""
@@ -288,8 +292,10 @@ class ScriptedOperator:
         if self._turn and abs(self._turned) + more <= math.pi:
             return math.copysign(more, self._turn)
         # Reverse at the first try, if the direction is blocked, or if half a turn does not help.
-        way = -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
-        return float(way * (abs(self._turned) + more))
+        direction = (
+            -math.copysign(1.0, self._turned) if self._turned else self._rng.choice([-1.0, 1.0])
+        )
+        return float(direction * (abs(self._turned) + more))
 
     def _end_try(self, now: Step, *, stopped: bool) -> None:
         """Resume the line after a recovery; think again if the arm stopped during it."""
