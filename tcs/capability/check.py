@@ -130,8 +130,8 @@ def check_file(
     capability = load_map(path)
     if capability.map_type == ITCM or "measure" not in capability.metadata:
         raise StoreError(
-            f"Capability map '{path}' was recorded or imported, so it need not hold every pose "
-            "that inverse kinematics reaches. Check a map made by `tcs capability from-ik`."
+            f"Capability map '{path}' was recorded or imported, so poses that inverse kinematics "
+            "reaches may be missing from it. Check a map made by `tcs capability from-ik`."
         )
     name = robot_reference(path, capability, robot)
     grid = capability.grid

@@ -96,7 +96,7 @@ def finished_map(
     Raises:
         RobotError: If the map type includes visibility and the robot has no head file.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more torso heights than a map holds.
+        GridError: If there are more torso heights than a map can have.
     """
     order = np.argsort(grid.keys(cells))
     view = camera_view(reach, grid, map_type, view_rule)
@@ -133,14 +133,14 @@ def camera_view(reach: Reach, grid: MapGrid, map_type: str, view_rule: str) -> V
     Raises:
         RobotError: If a head file is needed and there is none.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more torso heights than a map holds.
+        GridError: If there are more torso heights than a map can have.
     """
     if view_rule not in VISIBILITIES:
         raise UnknownNameError("visibility", view_rule, VISIBILITIES)
     if len(reach.torso_heights) > MAX_TORSO_HEIGHTS:
         raise GridError(
-            f"the torso has {len(reach.torso_heights)} heights {grid.step:g} m apart; a map holds "
-            f"{MAX_TORSO_HEIGHTS} at most. Use a larger step."
+            f"the torso has {len(reach.torso_heights)} heights {grid.step:g} m apart; a map can "
+            f"have at most {MAX_TORSO_HEIGHTS}. Use a larger step."
         )
     if map_type == ICM and reach.head is None and reach.robot.name not in head_names():
         return None

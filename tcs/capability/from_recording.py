@@ -78,7 +78,7 @@ def map_from_recording(
         DataFileError: If the height is not finite, or no sample is left.
         RobotError: If the robot has no head file.
         UnknownNameError: If there is no such rule.
-        GridError: If there are more torso heights than a map holds.
+        GridError: If there are more torso heights than a map can have.
 
     Source:
         ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). The sample of a cell is

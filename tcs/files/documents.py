@@ -142,7 +142,7 @@ def checked(
     except ValidationError as reason:
         raise _first_fault(reason, model, where, error, tuple(also_known)) from None
     except UnknownNameError as reason:
-        # Raised by a validator of the model, which knows the field but not the file.
+        # A validator of the model raises it, with the field but without the file.
         located = f"{where}, {reason.where}" if reason.where else where
         raise UnknownNameError(reason.what, reason.name, reason.known, where=located) from None
 

@@ -135,7 +135,7 @@ def test_invalid_arguments_are_refused_before_any_computation(tiago, monkeypatch
 
     monkeypatch.setattr(Reach, "solve", solve)
     fine = Reach(tiago, torso_height=0.15, step=0.01)
-    with pytest.raises(GridError, match=r"36 heights 0\.01 m apart; a map holds 32"):
+    with pytest.raises(GridError, match=r"36 heights 0\.01 m apart; a map can have at most 32"):
         map_from_ik(fine, MapGrid.of(0.01, 16, "side"))
     with pytest.raises(UnknownNameError, match="unknown visibility 'best'"):
         map_from_ik(Reach(tiago), MapGrid.of(), view_rule="best")

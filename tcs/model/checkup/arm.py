@@ -19,8 +19,9 @@ from tcs.kernel.numeric.solutions import numeric_solutions
 from tcs.model.scene import Scene, arm_chain
 
 RECOVERED = 1e-4
-"""Largest joint error of a recovered posture [rad]. Rounded figures of a URDF let axes miss each
-other by up to a nanometre; where two solutions coincide, the joint error grows with its root."""
+"""Largest joint error of a recovered posture [rad]. With the rounded numbers of a URDF, axes that
+should meet are up to a nanometre apart; where two solutions coincide, the joint error grows with
+the square root of that."""
 ON_GOAL = 1e-6
 """Largest pose error of a solution [m or rad]: a branch without a solution returns the nearest
 pose, which does not count."""

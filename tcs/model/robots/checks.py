@@ -98,7 +98,7 @@ def _primitives(robot: RobotFile, where: str) -> tuple[Primitive, ...]:
 
 
 def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Refuse an arm that is not a chain of seven revolute joints from arm base to tool."""
+    """Check that the arm is a chain of seven revolute joints from arm base to tool."""
     at = f"{where}, field 'arm_joints'"
     for name in robot.arm_joints:
         joint = model.joint(name, at)
@@ -121,7 +121,7 @@ def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
 def _check_positions(
     robot: RobotFile, model: Urdf, positions: Mapping[str, float], where: str
 ) -> None:
-    """Refuse positions of unknown, scored or fixed joints, or outside hard limits."""
+    """Check that positions are of known, movable, not scored joints, and within hard limits."""
     for name, value in positions.items():
         joint = model.joint(name, where)
         if name in robot.arm_joints or name == robot.torso_joint:
@@ -134,7 +134,7 @@ def _check_positions(
 
 
 def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Refuse a rest posture with a joint outside the arm, or outside hard limits."""
+    """Check that a rest posture has only joints of the arm, within hard limits."""
     for name, value in robot.rest.items():
         if name not in robot.arm_joints:
             raise UnknownNameError("joint of the arm", name, robot.arm_joints, where=where)

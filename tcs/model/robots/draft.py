@@ -302,7 +302,7 @@ def _standing(
 
 
 def _source(path: Path, address: str) -> str:
-    """Return the origin of the figures, and what is known about their licence."""
+    """Return the source of the numbers, and what is known about their licence."""
     licence = "no package.xml in a folder above it: look up its licence before passing it on"
     for folder in path.parents:
         package = folder / "package.xml"

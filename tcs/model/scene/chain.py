@@ -10,8 +10,8 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.lines import closest_points
 
 AXES_MEET = 1e-6
-"""Axes closer than this intersect [m]: far above the rounding of a URDF's figures (1e-9), far below
-any relevant motion of the tool."""
+"""Axes closer than this intersect [m]: far above the rounding of numbers in a URDF (1e-9), far
+below any relevant motion of the tool."""
 
 _PARALLEL = 1e-9
 """Squared sine of the angle below which two axes count as parallel: their intersection is

@@ -55,8 +55,8 @@ class ContactRule:
     """Which pairs of shapes count as collision.
 
     Checked: the arm against itself, the rest of the robot and the environment; the rest of the
-    robot against the environment, except the floor it stands on. The rest of the robot keeps its
-    posture and the environment is static, so neither is checked against itself.
+    robot against the environment, except the floor. The rest of the robot keeps its posture and the
+    environment is static, so neither is checked against itself.
 
     Attributes:
         disabled_pairs: Pairs of robot bodies that are never checked, from the robot file.

@@ -82,7 +82,7 @@ class EnvironmentFile(Document):
     All other models are furniture, also those with body frames."""
     obstacles: Annotated[tuple[Obstacle, ...], Entries] = ()
     floor: bool = True
-    """A floor at z = 0 that the arm must not touch; the rest of the robot stands on it."""
+    """Whether there is a floor at z = 0; the arm must not touch it, the rest of the robot may."""
     joints: Annotated[Mapping[str, JointPosition], Entries] = {}
     """Joint positions that differ from 0 [m or rad]."""
     posture: Annotated[Mapping[str, Posture], Entries] = {}
@@ -234,7 +234,7 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
 
 
 def _check_observed(environment: EnvironmentFile, where: str) -> None:
-    """Raise for invalid observed axes, and for those that are also in the grid."""
+    """Check that observed axes are valid, and that none is also in the grid."""
     for name, plain in environment.observed.items():
         Axis.from_dict({**plain, "name": name}, where=where)
         if name in environment.grid:

@@ -218,7 +218,7 @@ def _fix(
 def _check_names(
     environment: EnvironmentFile, links: Iterable[str], joints: EnvironmentJoints, where: str
 ) -> None:
-    """Raise for names in the environment file that its models do not have."""
+    """Check that the models have every name in the environment file."""
     for link in environment.padding:
         if link not in links:
             raise UnknownNameError("link", link, links, where=f"{where}, field 'padding'")

@@ -147,7 +147,7 @@ class EnvironmentJoints:
     def _check_free(
         self, name: str, where: str, error: type[TcsError], *, noun: str = "joint"
     ) -> None:
-        """Raise for a joint that does not exist or that follows another one."""
+        """Check that a joint exists and does not follow another one."""
         for leader, posture in self.posture.items():
             if name in posture.joints:
                 raise error(
@@ -160,7 +160,7 @@ class EnvironmentJoints:
     def _check_position(
         self, name: str, position: float, where: str, error: type[TcsError]
     ) -> None:
-        """Raise for a position beyond a joint's limits."""
+        """Check that a position is within the limits of a joint."""
         lower, upper = self.limits(name)
         # In this form the comparison is false for nan as well.
         if lower - _ROUNDING <= position <= upper + _ROUNDING:

@@ -163,7 +163,7 @@ def check_course(arm: Arm, course: Course) -> None:
     if off > GOAL_RADIUS:
         raise TcsError(
             f"start posture: the tool is {off:.3f} m from the line's start; it must be within "
-            f"{GOAL_RADIUS:g} m. Give a posture that holds the tool there."
+            f"{GOAL_RADIUS:g} m. Give a posture with the tool at the start."
         )
     shoulder = arm.frames[0, :3, 3]
     length = float(np.linalg.norm(arm.frames[1:, :3, 3], axis=1).sum())
