@@ -7,9 +7,9 @@ Usage: python scripts/figures.py [--check]
 - What stands between `<!-- figure: SCRIPT/TABLE | ROW | COLUMN -->` and `<!-- -->` in a sentence
   becomes that cell.
 
-Machine, versions and command stand after the last table of a script in a section, and after the
-last output in a page. With `--check` nothing is written; the exit code is 1 when a page differs
-from the saved figures.
+What has not been saved yet keeps what the page holds. Machine, versions and command stand after the
+last table of a script in a section, and after the last output in a page. With `--check` nothing is
+written; the exit code is 1 when a page differs from the saved figures.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from tcs.files.writing import whole_file
 CHECKOUT = Path(__file__).resolve().parents[1]
 FIGURES = CHECKOUT / "benchmarks" / "figures"
 END = "<!-- end of figures -->"
+UNSAVED = "\n*Not saved yet: run `make benchmark-save`.*\n\n"
+"""Content of an empty block whose table has not been saved."""
 BLOCK = re.compile(rf"(<!-- figures: (\w+)/(\w+) -->\n)(.*?)({re.escape(END)})", flags=re.S)
 CELL = re.compile(r"(<!-- figure: (\w+)/(\w+) \| ([^|\n]+) \| ([^|\n]+) -->)(.*?)(<!-- -->)")
 _FENCE = re.compile(r"^ *(```+|~~~+).*?^ *\1 *$", flags=re.S | re.M)
@@ -66,12 +68,13 @@ def rewritten(text: str) -> str:
     """Return a page with every block and every cell made anew from the saved figures.
 
     Raises:
-        KeyError: If a block or cell names what was not saved.
-        OSError: If it names a script without saved figures.
+        KeyError: If a cell names a row or column that was not saved.
     """
 
     def block(match: re.Match[str]) -> str:
-        opening, script, table, _, end = match.groups()
+        opening, script, table, held, end = match.groups()
+        if not is_saved(script, table):
+            return f"{opening}{held if held.strip() else UNSAVED}{end}"
         saved = saved_figures(script)
         following = text[match.end() :]
         if "text" not in saved["tables"][table]:
@@ -81,9 +84,23 @@ def rewritten(text: str) -> str:
 
     def cell(match: re.Match[str]) -> str:
         opening, script, table, row, column, _, end = match.groups()
+        if not is_saved(script, table):
+            return match[0]
         return opening + cell_of(saved_figures(script), table, row, column) + end
 
     return CELL.sub(cell, BLOCK.sub(block, text))
+
+
+def is_saved(script: str, table: str) -> bool:
+    """Return whether a benchmark saved a table of this name."""
+    path = FIGURES / f"{script}.json"
+    return path.exists() and table in saved_figures(script)["tables"]
+
+
+def unsaved(text: str) -> set[str]:
+    """Return the blocks and cells of a page that no benchmark has saved, as SCRIPT/TABLE."""
+    named = [match[1:3] for pattern in (BLOCK, CELL) for match in pattern.findall(text)]
+    return {f"{script}/{table}" for script, table in named if not is_saved(script, table)}
 
 
 def saved_figures(script: str) -> dict[str, Any]:
@@ -139,17 +156,15 @@ def typed_figures(text: str) -> list[tuple[int, str]]:
     Blocks, cells, fences, code and comments do not count.
 
     Returns:
-        Line number, counted from 1, and the line, for each line with such a number.
+        Line number, counted from 1, and number with unit, for each.
     """
-    prose = text
     for pattern in (BLOCK, CELL, _FENCE, _CODE):
         # Line numbers stay as they are.
-        prose = pattern.sub(lambda match: "\n" * match[0].count("\n"), prose)
-    lines = zip(text.splitlines(), prose.splitlines(), strict=True)
+        text = pattern.sub(lambda match: "\n" * match[0].count("\n"), text)
     return [
-        (number, line.strip())
-        for number, (line, left) in enumerate(lines, start=1)
-        if MEASURED.search(left)
+        (number, found)
+        for number, line in enumerate(text.splitlines(), start=1)
+        for found in MEASURED.findall(line)
     ]
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 SAVED = sorted((CHECKOUT / "benchmarks" / "figures").glob("*.json"))
@@ -74,6 +75,20 @@ def test_saved_figures_state_machine_and_versions(path):
     assert saved["tables"]
 
 
+def test_every_block_and_cell_is_saved(figures):
+    pages = (page.read_text(encoding="utf-8") for page in figures.pages())
+    assert set().union(*map(figures.unsaved, pages)) == set(), "run `make benchmark-save`"
+
+
+def test_one_command_saves_every_block_and_cell(figures, monkeypatch):
+    monkeypatch.syspath_prepend(str(CHECKOUT / "benchmarks"))
+    parts = importlib.import_module("save_all").PARTS
+    for page in figures.pages():
+        text = page.read_text(encoding="utf-8")
+        for pattern in (figures.BLOCK, figures.CELL):
+            assert {match[1] for match in pattern.findall(text)} <= set(parts), page
+
+
 PAGE = """# Measured
 It takes <!-- figure: made/times | step | median [ms] -->9<!-- --> ms.
 
@@ -113,6 +128,16 @@ def test_cells_tables_and_outputs_are_inserted_and_the_source_once(made):
     assert made.rewritten(text) == text
 
 
+def test_what_is_not_saved_keeps_what_the_page_holds(made):
+    held = PAGE.replace("made/", "other/").replace("<!-- end", "| 1 |\n<!-- end", 1)
+    text = made.rewritten(held)
+    assert made.unsaved(held) == {"other/times", "other/output"}
+    assert "median [ms] -->9<!-- --> ms." in text
+    assert "-->\n| 1 |\n<!-- end" in text
+    assert text.count("make benchmark-save") == 2
+    assert made.rewritten(text) == text
+
+
 @pytest.mark.parametrize("wrong", ["step | mean [ms]", "stop | median [ms]"])
 def test_a_cell_that_was_not_saved_is_an_error(made, wrong):
     with pytest.raises(KeyError):
@@ -121,7 +146,30 @@ def test_a_cell_that_was_not_saved_is_an_error(made, wrong):
 
 def test_typed_figures_are_found_outside_blocks_only(made):
     page = made.rewritten(PAGE) + "\nA step takes 0.4 ms at 3 m/s, with 2 % slip.\n"
-    (found,) = made.typed_figures(page)
-    assert found == (len(page.splitlines()), page.splitlines()[-1])
-    assert made.MEASURED.findall(found[1]) == ["0.4 ms", "2 %"]
+    last = len(page.splitlines())
+    assert made.typed_figures(page) == [(last, "0.4 ms"), (last, "2 %")]
     assert made.typed_figures("It weighs 3 kg, is 5 m long and waits for `0.5 s`.") == []
+
+
+GIVEN = yaml.safe_load((Path(__file__).parent / "given_figures.yaml").read_text(encoding="utf-8"))
+"""By page, figures that are typed because they were not measured, each with the reason."""
+
+
+def test_no_measured_figure_is_typed(figures):
+    # scripts/gallery.py writes the gallery, and a test compares the two.
+    pages = {page.stem: page for page in figures.pages() if page.stem != "gallery"}
+    typed = {name: figures.typed_figures(page.read_text("utf-8")) for name, page in pages.items()}
+    unknown = [
+        f"{name}, line {line}: {figure}"
+        for name, found in typed.items()
+        for line, figure in found
+        if figure not in GIVEN.get(name, {})
+    ]
+    assert unknown == [], "save it with a benchmark, or give the reason in given_figures.yaml"
+    stale = {
+        (name, figure)
+        for name, given in GIVEN.items()
+        for figure in given
+        if figure not in {figure for _, figure in typed[name]}
+    }
+    assert not stale
