@@ -69,6 +69,8 @@ benchmark-peers: $(STAMP)  ## Measure the kernel beside other solvers on the sam
 	$(BIN)/python benchmarks/peers.py
 
 benchmark-save: $(STAMP)  ## Run every benchmark that a page shows, save and rewrite the pages; continues where it was
+	@$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[benchmarks]' || \
+	  echo "Not every peer could be installed; what is absent is left out with a line." >&2
 	$(BIN)/python benchmarks/save_all.py
 	$(BIN)/python scripts/figures.py
 
