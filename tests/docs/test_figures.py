@@ -38,6 +38,8 @@ def test_every_block_and_cell_is_read(figures):
         text = page.read_text(encoding="utf-8")
         found = len(figures.BLOCK.findall(text)) + len(figures.CELL.findall(text))
         assert found == len(re.findall(r"<!--\s*figures?\b", text)), page
+        # A comment at the start of a line would end the paragraph.
+        assert not re.search(r"^ *<!-- figure:", text, flags=re.M), page
 
 
 def test_an_edited_figure_is_noticed(figures):
