@@ -130,6 +130,13 @@ class FileType:
 
 def prepare(folder: Path) -> None:
     """Write a valid example of every file into a folder."""
+    write_texts(folder)
+    _write_results(folder)
+
+
+def write_texts(folder: Path) -> None:
+    """Write the examples that a person could have written, and a mesh."""
+    import trimesh
     import yaml
 
     texts = {
@@ -155,13 +162,11 @@ def prepare(folder: Path) -> None:
     texts["head.yaml"] = head.read_text(encoding="utf-8")
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    _write_results(folder)
+    trimesh.creation.box((0.05, 0.1, 0.2)).export(folder / "mesh.stl")
 
 
 def _write_results(folder: Path) -> None:
-    """Write the files that `tcs` makes itself: mesh, scores, run, recording and map."""
-    import trimesh
-
+    """Write the files that `tcs` makes itself: scores, run, recording and map."""
     import tcs
     from tcs.capability import MapGrid, Reach, map_from_recording, save_map, write_csv
     from tcs.model.robots import load_robot
@@ -169,7 +174,6 @@ def _write_results(folder: Path) -> None:
     from tcs.teleop.runs.run import Run
     from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
-    trimesh.creation.box((0.05, 0.1, 0.2)).export(folder / "mesh.stl")
     scores = tcs.score(folder / "task.yaml", folder / "room.yaml", folder / "iiwa7.yaml")
     tcs.save(folder / "scores.tcs", scores)
     reach = Reach.load("pr2", step=0.1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tcs.capability.files import load_map, robot_reference
+from tcs.capability.files import load_map, robot_reference, stored_name
 from tcs.capability.grid import GRASPS, SIDE, TOP, MapGrid, yaw_rotation
 from tcs.capability.map import ITCM, CapabilityMap
 from tcs.capability.reach import Reach
@@ -136,7 +136,7 @@ def check_file(
     name = robot_reference(path, capability, robot)
     grid = capability.grid
     reach = Reach.load(
-        name, tool=str(capability.metadata["tool"]), torso_height=capability.torso_height,
+        name, tool=stored_name(capability, "tool"), torso_height=capability.torso_height,
         step=grid.step, measure=str(capability.metadata["measure"]),
     )  # fmt: skip
     if capability.metadata.get("scene_digest") != reach.lowered.digest():

@@ -106,6 +106,18 @@ def _decode(content: object) -> CapabilityMap:
         raise StoreFormatError(str(error)) from None
 
 
+def stored_name(capability: CapabilityMap, key: str) -> str:
+    """Return the name of a map's robot or tool, which only its metadata hold.
+
+    Raises:
+        StoreError: If the map has none.
+    """
+    name = capability.metadata.get(key)
+    if not isinstance(name, str) or not name:
+        raise StoreError(f"{WHAT}: its metadata do not name its {key}. {AGAIN}")
+    return name
+
+
 def robot_reference(
     path: str | os.PathLike[str], capability: CapabilityMap, robot: str | None = None
 ) -> str:
@@ -119,7 +131,7 @@ def robot_reference(
     Raises:
         StoreError: If the stored file is missing.
     """
-    stored = str(capability.metadata["robot"]) if robot is None else robot
+    stored = stored_name(capability, "robot") if robot is None else robot
     if robot is not None or stored in robot_names() or os.path.isfile(stored):
         return stored
     raise StoreError(

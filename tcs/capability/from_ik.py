@@ -14,6 +14,7 @@ from tcs.capability.map import ICM, IHCM, MAX_TORSO_HEIGHTS, CapabilityMap
 from tcs.capability.reach import OnProgress, Reach
 from tcs.capability.visibility import CORRECTED, VISIBILITIES, visibility
 from tcs.errors import GridError, UnknownNameError
+from tcs.files.quantities import RADIUS
 from tcs.kernel.arrays import FloatArray
 
 MAX_CELLS = 60_000_000
@@ -167,6 +168,7 @@ def cells_around(grid: MapGrid, shoulder: FloatArray, radius: float) -> CellArra
     Raises:
         GridError: If there are no cells, or too many.
     """
+    RADIUS.check(radius, "the radius of the map", GridError)
     count = 4.0 / 3.0 * np.pi * (radius / grid.step) ** 3 * grid.yaw_bins * len(grid.tilts)
     if not 1.0 <= count <= MAX_CELLS:
         raise GridError(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import GridError, UnknownNameError
+from tcs.files.quantities import MAP_STEP
 from tcs.kernel.arrays import FloatArray
 
 CellArray = NDArray[np.int32]
@@ -54,6 +55,15 @@ class NearestCells:
         return angle_of(self.R_CT)
 
 
+def _check_yaw_bins(yaw_bins: int) -> None:
+    """Raise for a number of yaw bins that a map cannot have."""
+    if yaw_bins % 4 or not 4 <= yaw_bins < 1 << _BITS[YAW]:
+        raise GridError(
+            f"the map has {yaw_bins} yaw bins; must be a multiple of 4 from 4 to "
+            f"{(1 << _BITS[YAW]) - 4}, e.g. 16 for 22.5 deg."
+        )
+
+
 @dataclass(frozen=True)
 class MapGrid:
     """Discretisation of base poses and tool tilts.
@@ -75,13 +85,9 @@ class MapGrid:
         Raises:
             GridError: If a number is out of range or a tilt comes twice.
         """
-        if not (math.isfinite(self.step) and 0.001 <= self.step <= 1.0):
-            raise GridError(f"the step of the map is {self.step!r} m; must be 0.001 to 1.")
-        if self.yaw_bins % 4 or not 4 <= self.yaw_bins < 1 << _BITS[YAW]:
-            raise GridError(
-                f"the map has {self.yaw_bins} yaw bins; must be a multiple of 4 from 4 to "
-                f"{(1 << _BITS[YAW]) - 4}, e.g. 16 for 22.5 deg."
-            )
+        if not MAP_STEP.admits(self.step):
+            raise GridError(f"the step of the map is {self.step!r} m; must be {MAP_STEP.span}.")
+        _check_yaw_bins(self.yaw_bins)
         if not self.tilts or len(set(self.tilts)) < len(self.tilts):
             raise GridError("the map has no tilt of the tool, or a tilt twice.")
         if len(self.tilts) >= 1 << _BITS[TILT]:
@@ -104,6 +110,8 @@ class MapGrid:
         """
         if grasps not in GRASPS:
             raise UnknownNameError("set of grasps", grasps, GRASPS)
+        # Before the tilts are listed: there are as many as the square of the bins.
+        _check_yaw_bins(yaw_bins)
         quarter = yaw_bins // 4
         if grasps == "all":
             # Circles of latitude of the vertical in the tool frame; at the poles roll equals yaw.

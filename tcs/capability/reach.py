@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import GridError, UnknownNameError
 from tcs.files.paths import data_reference
+from tcs.files.quantities import MAP_STEP
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.contacts import new_workspace
 from tcs.kernel.postures import free_postures, measures, tool_poses
@@ -79,8 +79,7 @@ class Reach:
         """Name or path of the head file; None is the robot's name."""
         self.robot_reference = robot.name if robot_reference is None else robot_reference
         """Name of the robot, or path of its file."""
-        if not (math.isfinite(step) and step > 0.0):
-            raise GridError(f"the step of the torso heights is {step!r} m; must be positive.")
+        MAP_STEP.check(step, "the step of the torso heights", GridError)
         self.scene = Scene(SceneSpec(robot, _empty_floor()))
         low, high = self.scene.built.torso_limits
         self.torso_height = 0.5 * (low + high) if torso_height is None else torso_height

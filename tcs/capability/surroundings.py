@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from tcs.capability.files import robot_reference
+from tcs.capability.files import robot_reference, stored_name
 from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import BasePose, TaskMap
 from tcs.capability.tasks import GraspTask
-from tcs.errors import SelectionError
+from tcs.errors import SelectionError, TaskError
+from tcs.files.quantities import ANGLE, POSITION
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import BODY_BLOCKED, REACHED, Scores
@@ -60,7 +61,10 @@ class Surroundings:
         Raises:
             RobotError: If the model of the robot cannot be used.
             EnvironmentFileError: If a model of the environment cannot be used.
+            TaskError: If the pose is out of its physical range.
         """
+        POSITION.check(task_pose[:2], "the task: a coordinate of its frame", TaskError)
+        ANGLE.check(task_pose[2], "the task: the heading of its frame", TaskError)
         self._scene = Scene(SceneSpec(robot, environment))
         self._task_pose = task_pose
 
@@ -88,7 +92,7 @@ class Surroundings:
             UnknownNameError: If there is no such environment or robot.
         """
         file = load_robot(robot_reference(path, capability, robot))
-        file = file.model_copy(update={"tool_frame": str(capability.metadata["tool"])})
+        file = file.model_copy(update={"tool_frame": stored_name(capability, "tool")})
         return cls(file, load_environment(environment), task_pose)
 
     def feasibility(self, task: GraspTask, base: BasePose) -> Feasibility:

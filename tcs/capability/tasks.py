@@ -15,6 +15,7 @@ import numpy as np
 
 from tcs.capability.grid import SIDE, TOP
 from tcs.errors import TaskError, UnknownNameError
+from tcs.files.quantities import ANGLE, POSITION
 from tcs.kernel.arrays import FloatArray
 
 FRONT_AND_SIDES = (0.0, math.pi / 2, -math.pi / 2)
@@ -98,6 +99,8 @@ class GraspTask:
                 numbers = (position.x, position.y, position.height, grasp.heading, *angles)
                 if not np.all(np.isfinite([*numbers, *grasp.pre_grasps])):
                     raise TaskError(f"{where} has a number that is not finite.")
+                ANGLE.check((grasp.heading, *angles), f"{where}: an angle of a grasp", TaskError)
+                POSITION.check(grasp.pre_grasps, f"{where}: a distance of a pre-grasp", TaskError)
             if max(abs(position.x), abs(position.y), abs(position.height)) > FARTHEST:
                 raise TaskError(
                     f"{where} is more than {FARTHEST:g} m from the task's origin. Write metres."

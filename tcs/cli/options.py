@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli.values import axis_values, observed_settings, state_if_given
+from tcs.files.quantities import JOBS, QUERIES
 
 if TYPE_CHECKING:
     from tcs.model.grid import Axis, InitialConfiguration
@@ -18,7 +19,15 @@ if TYPE_CHECKING:
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Robot = Annotated[str, typer.Option(help="Name or YAML file of a robot.")]
-Jobs = Annotated[int, typer.Option(min=1, help="Number of threads; does not change the results.")]
+Jobs = Annotated[
+    int,
+    typer.Option(
+        min=int(JOBS.low),
+        max=int(JOBS.high),
+        help="Number of threads; does not change the results.",
+    ),
+]
+MOST_QUERIES = int(QUERIES.high)
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 HERE = typer.Option(
     "--here",
@@ -156,9 +165,12 @@ class ShownOptions:
 class CheckOptions:
     """How many pairs are verified."""
 
-    pairs: Annotated[int, typer.Option(min=0, help="Reached pairs to re-check with Drake.")] = 500
+    pairs: Annotated[
+        int, typer.Option(min=0, max=MOST_QUERIES, help="Reached pairs to re-check with Drake.")
+    ] = 500
     dense: Annotated[
-        int, typer.Option(min=0, help="Unreached and reached pairs to scan densely.")
+        int,
+        typer.Option(min=0, max=MOST_QUERIES, help="Unreached and reached pairs to scan densely."),
     ] = 200
     seed: Seed = 0
 

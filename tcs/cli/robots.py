@@ -44,7 +44,8 @@ def new(
 def check(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Name or YAML file of a robot.")],
     samples: Annotated[
-        int, typer.Option(min=1, help="Random postures of the IK round trip.")
+        int,
+        typer.Option(min=1, max=options.MOST_QUERIES, help="Random postures of the IK round trip."),
     ] = 1000,
     seed: options.Seed = 0,
     as_json: options.Json = False,

@@ -225,7 +225,8 @@ def experiment(
         bool, typer.Option("--maps", help="Also write a capability map of each controller.")
     ] = False,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; does not change the results.")
+        int,
+        typer.Option(min=1, max=1024, help="Number of processes; does not change the results."),
     ] = 2,
     as_json: options.Json = False,
 ) -> None:

@@ -146,6 +146,24 @@ AXIS_VALUES = Quantity(
     "`count` of an axis",
     "as many configurations as a whole grid may have",
 )
+MAP_STEP = Quantity(
+    *("step of a map", "m", 0.001, 1.0),
+    "`--step` of capability maps, of positions and of torso heights",
+    "from a millimetre, below any positioning, to about the length of an arm",
+)
+RADIUS = Quantity(
+    *("radius", "m", 0.001, 20.0),
+    "`--radius` of capability maps",
+    "ten times the reach of the longest arm that ships",
+)
+JOBS = Quantity(
+    *("number of jobs", "", 1, 1024), "`--jobs`", "more threads than any machine in use has cores"
+)
+QUERIES = Quantity(
+    *("number of samples", "", 0, 10_000_000),
+    "`--pairs`, `--dense`, `--queries`, `--samples` of checks",
+    "more take hours and change no digit that is shown",
+)
 MESH_SCALE = Quantity(
     *("mesh scale", "", -1e4, 1e4),
     "`scale` of a mesh of a URDF or an SDFormat file",
@@ -167,7 +185,7 @@ PRIMITIVES = Quantity(
 
 QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
-    JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, EXTENT, MESH_SCALE, WEIGHT, AXIS_VALUES, GOALS, ENTRIES,
-    PRIMITIVES,
+    JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT, JOBS,
+    QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

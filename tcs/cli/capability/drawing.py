@@ -61,7 +61,10 @@ def map_check(
     ] = None,
     radius: Radius = None,
     queries: Annotated[
-        int, typer.Option(min=1, help="Random tool poses for each set of grasps.")
+        int,
+        typer.Option(
+            min=1, max=options.MOST_QUERIES, help="Random tool poses for each set of grasps."
+        ),
     ] = 20_000,
     seed: options.Seed = 0,
     jobs: options.Jobs = 2,

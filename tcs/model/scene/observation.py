@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
 from tcs.errors import SelectionError, UnknownNameError
+from tcs.files.quantities import POSITION
 from tcs.kernel.arrays import FloatArray
 from tcs.model.scene.scene import Scene
 
@@ -214,6 +215,8 @@ def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | 
             f"Observed frame '{name}' is {list(at)!r}; must be three finite numbers (x y z, m) or "
             "seven (x y z qw qx qy qz)."
         )
+    where = f"Observed frame '{name}': a coordinate"
+    POSITION.check(numbers[:3].tolist(), where, SelectionError)
     if numbers.size == 3:
         return numbers, None
     length = float(np.linalg.norm(numbers[3:]))

@@ -141,6 +141,11 @@ class ScoreFile:
             if not isinstance(self.metadata.get(key), expected):
                 raise StoreError(f"metadata needs '{key}', of type {expected.__name__}.")
         self._check_tables()
+        records = self.metadata.get("robustness")
+        if records is not None and (
+            not isinstance(records, list) or len(records) != len(self.tables)
+        ):
+            raise StoreError("metadata 'robustness' must be a list with an entry for each table.")
 
     def _check_tables(self) -> None:
         """Check that there are tables for each observed state, with sets of this grid."""

@@ -2,6 +2,7 @@ import dataclasses
 import errno
 import os
 import resource
+import tracemalloc
 import zlib
 
 import joblib
@@ -392,3 +393,52 @@ def test_each_observed_state_has_a_table(path):
         score_file(observed=[SHIFT], tables=2)
     with pytest.raises(StoreError, match="more than 1000 states"):
         score_file(observed=[SHIFT | {"step": 1e-6, "count": 10**7}], tables=1)
+
+
+def claim(content, name, shape, zeros):
+    """Make an array of the sets claim a shape, with so many zeros compressed to a thousandth."""
+    array = content["tables"][0]["sets"][name]
+    array["shape"] = shape
+    array["bytes"] = np.frombuffer(zlib.compress(bytes(zeros), 1), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("weights", [2**28]),
+        ("weights", [1001]),
+        ("candidate_step", [2**31]),
+        ("cell_xy", [2**27, 2]),
+    ],
+)
+def test_a_claim_beyond_what_the_file_holds_allocates_nothing(path, file, name, shape):
+    """Before, 2 GiB of weights in a file of 2 MB took 4.1 GB and 21 s to refuse."""
+    content = encode(file)
+    claim(content, name, shape, 2 * 1024**2)
+    joblib.dump(content, path)
+    size = path.stat().st_size
+    tracemalloc.start()
+    try:
+        with pytest.raises(StoreFormatError, match=r"claims arrays of|does not belong there"):
+            load_scores(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # The file, its unpickled bytes, and what the sound parts decompress to.
+    assert peak < 4 * size + 16 * 1024**2
+
+
+def test_a_large_file_of_equal_reasons_is_no_bomb(path):
+    """Nothing reached anywhere: a byte for each configuration and goal, compressed to nothing."""
+    quiet = score_file(grid=small_grid(nx=60, ny=60, bed=2), share=0.0)
+    save_scores(path, quiet)
+    assert_same(quiet, load_scores(path))
+
+
+@pytest.mark.parametrize("records", ["x", [], [None, None], {"a": 1}])
+def test_records_of_robustness_that_do_not_fit_are_refused(path, file, records):
+    content = encode(file)
+    content["metadata"] = {**content["metadata"], "robustness": records}
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match="'robustness' must be a list"):
+        load_scores(path)

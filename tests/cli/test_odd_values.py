@@ -1,0 +1,118 @@
+"""Options with values that no measurement has end in one line, not in a traceback or a hang."""
+
+from __future__ import annotations
+
+import pytest
+from typer.main import get_command
+
+from tcs.capability import save_map
+from tcs.cli.app import app
+from tcs.teleop.runs.files import save_run
+from tests.capability.test_map import small_map
+from tests.teleop.runs.test_files import made
+
+NUMBERS = ("nan", "-inf", "-1", "0", "1e150", "1e-300", "")
+INTEGERS = ("-1", "0", "9" * 23, "2147483648", "nan", "")
+TEXTS = ("", "nonsense", "a" * 5000, "=", "=1", "x=nan", "head=nan,0,0", "~nobody-here/x", "a/b/c")
+
+
+@pytest.fixture
+def base(tmp_path, monkeypatch, small_file):
+    """For each quick command, words with which it runs; every path lies in a temporary folder."""
+    monkeypatch.chdir(tmp_path)
+    save_map(
+        tmp_path / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.25], [1, 1])
+    )
+    save_run(tmp_path / "run.csv", made())
+    return {
+        "select": [small_file, "--here", "1", "0.3", "180"],
+        "explain": [small_file, "--goal", "0"],
+        "export": [small_file, "--out", "out.csv"],
+        "map": [small_file, "--out", "map.png"],
+        "capability show": ["map.tcm", "--out", "layer.png"],
+        "capability merge": ["map.tcm", "--task", "pick-and-place", "--height", "0.4"],
+        "teleop replay": ["run.csv", "--robot", "nonsense", "--export", "page.html"],
+    }
+
+
+def command(name):
+    found = get_command(app)
+    for word in name.split():
+        found = found.commands[word]
+    return found
+
+
+def odd_words(parameter):
+    """Yield the words that give one parameter an odd value."""
+    annotation = str(parameter.type_descriptor.annotation)
+    values = NUMBERS if "float" in annotation else INTEGERS if "int" in annotation else TEXTS
+    many = max(parameter.nargs, 1)
+    for value in values:
+        yield [parameter.opts[0], *[value] * many]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["select", "explain", "export", "map", "capability show", "capability merge", "teleop replay"],
+)
+def test_odd_values_of_every_option_are_one_line(tcs_command, base, name):
+    calls = 0
+    for parameter in command(name).params:
+        if parameter.param_type_name != "option" or parameter.is_flag or parameter.name == "help":
+            continue
+        for words in odd_words(parameter):
+            # The later one of two options counts. An exception other than an exit is raised here.
+            ran = tcs_command(*name.split(), *base[name], *words)
+            assert ran.code in (0, 1, 2), words
+            if ran.code == 1:
+                assert len(ran.err.strip().splitlines()) == 1, (words, ran.err)
+            calls += 1
+    assert calls >= 5
+
+
+@pytest.mark.parametrize("name", ["evaluate", "robustify"])
+@pytest.mark.parametrize("option", ["--samples", "--sets", "--seed", "--jobs"])
+def test_odd_counts_are_refused_before_the_scene_is_built(tcs_command, small_file, name, option):
+    if (name, option) == ("evaluate", "--sets"):
+        pytest.skip("has no such option")
+    for value in ("-1", "9" * 23, "nan", ""):
+        ran = tcs_command(name, small_file, option, value)
+        assert ran.code in (1, 2), value
+        assert ran.code == 2 or len(ran.err.strip().splitlines()) == 1, ran.err
+
+
+@pytest.mark.parametrize("jobs", ["1025", "9" * 23])
+def test_more_jobs_than_any_machine_has_are_misuse(tcs_command, small_file, jobs):
+    """Before, joblib raised ValueError for the literal."""
+    ran = tcs_command("robustify", small_file, "--jobs", jobs)
+    assert ran.code == 2
+    assert "1024" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--radius", "1e150"), "radius"),
+        (("--radius", "nan"), "radius"),
+        (("--step", "1e-300"), "step"),
+        (("--yaw-bins", "2147483648"), "yaw bins"),
+    ],
+)
+def test_a_map_of_impossible_size_is_refused_before_the_memory_is_full(
+    tcs_command, tmp_path, words, said
+):
+    ran = tcs_command(
+        "capability", "from-ik", "--robot", "iiwa7", "--type", "ICM", "--grasps", "all",
+        "--out", tmp_path / "map.tcm", *words,
+    )  # fmt: skip
+    assert ran.code == 1
+    assert said in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+def test_an_unknown_home_folder_of_the_cache_is_one_line(process, tmp_path):
+    ran = process(
+        "score", "nothing.yaml", before="import os; os.environ['TCS_CACHE_DIR'] = '~nobody-here/x'"
+    )
+    assert "Traceback" not in ran.err
+    assert ran.code == 1
