@@ -8,6 +8,9 @@ from pathlib import Path
 
 from tcs.errors import TcsError
 
+_SMALL = 65_536
+"""Bytes that are read of a file that claims fewer, as those of `/proc` do."""
+
 
 def read_bytes(
     path: Path, where: str, error: type[TcsError], *, limit: int, advice: str = ""
@@ -42,15 +45,17 @@ def read_bytes(
             )
         if status.st_size > limit:
             raise error(f"{where} has {status.st_size:,} bytes; at most {limit:,} are read.")
+        # Python reserves what it is asked for, so no more than the file has is asked for, and one
+        # byte: the file may grow between the two calls.
+        expected = min(limit, max(status.st_size, _SMALL))
         with open(opened, "rb", closefd=False) as stream:
-            # One byte beyond the limit: a file may grow between the two calls.
-            content = stream.read(limit + 1)
+            content = stream.read(expected + 1)
     except OSError as reason:
         raise error(f"{where} cannot be read: {path_fault(reason)}.{what_next}") from None
     finally:
         os.close(opened)
-    if len(content) > limit:
-        raise error(f"{where} has more than {limit:,} bytes; at most {limit:,} are read.")
+    if len(content) > expected:
+        raise error(f"{where} has more than the expected {expected:,} bytes. Is it being written?")
     return content
 
 

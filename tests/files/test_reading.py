@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def test_a_file_that_grows_is_read_to_the_limit(tmp_path, monkeypatch):
     path.write_bytes(bytes(11))
     small = os.stat_result((0o100600, 0, 0, 1, 0, 0, 3, 0, 0, 0))
     monkeypatch.setattr("tcs.files.reading.os.fstat", lambda _: small)
-    with pytest.raises(DataFileError, match="has more than 10 bytes"):
+    with pytest.raises(DataFileError, match="has more than the expected 10 bytes"):
         read_bytes(path, "it", DataFileError, limit=10)
 
 
@@ -99,3 +100,15 @@ def test_no_file_stays_open(tmp_path):
         with pytest.raises(DataFileError):
             read_bytes(path, "it", DataFileError, limit=10)
     assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_the_memory_taken_is_that_of_the_file_and_not_of_the_limit(tmp_path):
+    path = tmp_path / "small"
+    path.write_bytes(bytes(1000))
+    tracemalloc.start()
+    try:
+        assert read_bytes(path, "it", DataFileError, limit=2**31) == bytes(1000)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 10**6
