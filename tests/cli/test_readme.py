@@ -61,5 +61,10 @@ def test_python_runs(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("target", re.findall(r"\]\(([^)]+)\)", README))
 def test_link_leads_somewhere(target):
-    if not target.startswith("https://"):
-        assert (CHECKOUT / target).is_file()
+    if target.startswith("https://"):
+        return
+    path, _, anchor = target.partition("#")
+    assert (CHECKOUT / path).is_file()
+    if anchor:
+        headings = re.findall(r"^#+ (.*)$", (CHECKOUT / path).read_text("utf-8"), flags=re.M)
+        assert anchor in [re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") for text in headings]
