@@ -18,6 +18,7 @@ class _ChangeCosts(options.TravelCosts):
     """Costs of changes of the configuration, with the defaults of `fix_weights`."""
 
     turn_weight: options.TurnWeight = 0.3
+    torso_weight: options.TorsoWeight = 1.0
     axis_weight: Annotated[list[str] | None, options.axis_weight("2 per metre, 1 per radian")] = (
         None
     )

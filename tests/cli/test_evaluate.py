@@ -76,7 +76,7 @@ def test_the_text_shows_the_mean_and_the_errors(tcs_command, stored):
     # Lines may break anywhere between words.
     text = " ".join(ran.out.split())
     assert "person_yaw standard deviation 5 deg" in text
-    assert "the base is not checked, as in the paper" in text
+    assert "collisions of the robot's body count, except those of the base" in text
 
 
 def test_an_error_file_takes_the_place_of_the_environments(tcs_command, stored, tmp_path):
