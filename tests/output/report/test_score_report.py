@@ -279,7 +279,7 @@ def test_a_file_without_reached_goals_has_a_page(tmp_path):
     assert found.is_sound
     wording = as_markdown(make_score_page(found, command="c"))
     assert "No configuration of the grid reaches any of the 8 goals" in wording
-    assert wording.count("Those that passed the most checks failed with: too far for the arm.") == 2
+    assert wording.count("that passed the most checks: too far for the arm.") == 2
     assert "Nothing was re-checked with Drake." in wording
     # No claim about answers that nothing was checked for.
     assert "every answer holds" not in wording
