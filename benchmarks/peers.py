@@ -165,7 +165,13 @@ def show_answers(records: dict[str, Record], reachable: NDArray[np.bool_]) -> No
         ]
         counts.append(f"{np.mean(record.solutions[reachable]):.1f}")
         _cells(f"  {label}", *counts)
-        headings = ("reachable: at goal", "free", "unreachable: at goal", "free ", "solutions")
+        headings = (
+            "reachable: at goal",
+            "reachable: free",
+            "unreachable: at goal",
+            "unreachable: free",
+            "solutions",
+        )
         for heading, text in zip(headings, counts, strict=True):
             cell("answers", label, heading, text)
 
