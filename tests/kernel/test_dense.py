@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
-from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification import dense, reference_pairs
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian
 from tests.kernel.judge import chain_of
@@ -42,6 +43,29 @@ def test_the_scan_finds_what_the_search_found_or_better(lowered, seed, rng):
         shortfalls.append(value - scores.dexterity[h, g])
     # Refinement compensates the finer scan, except where the scan finds another peak.
     assert np.median(shortfalls) < 5e-4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_branch_is_solved_where_the_elbow_does_not_span_the_distance(lowered, seed, rng):
+    # The scan leaves out what this tells apart: so it must never leave out a solution.
+    scene, grid = scene_of(seed, lowered)
+    arm, spans_any = build_problem(scene, grid).arm, dense._elbow_spans_any.py_func
+    angles = np.linspace(-np.pi, np.pi, 512)
+    table = np.stack([angles, np.cos(angles), np.sin(angles)])
+    slack, measure = np.empty(512), np.empty(512)
+    left_out = solved = 0
+    for _ in range(400):
+        axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        goal = np.stack([rng.uniform(-0.9, 0.9, 3), axes[2], axes[0], rng.uniform(-0.1, 0.1, 3)])
+        is_spanned = spans_any(arm, goal, table, 0, 512)
+        left_out += not is_spanned
+        for branch in arm.branches:
+            solve_samples(arm, goal, branch, table[1], table[2], 512, slack, measure)
+            assert is_spanned or np.all(slack < 0.0)
+            solved += np.any(slack >= 0.0)
+    # Both cases occur.
+    assert left_out > 20
+    assert solved > 5
 
 
 @pytest.mark.parametrize("outside", [False, True], ids=["analytic", "numeric"])

@@ -9,7 +9,7 @@ from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.search import MAX_SAMPLES, Search, fill_samples, new_search
-from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, jit
@@ -87,11 +87,25 @@ def _dense_scans(
     joints: FloatArray,
 ) -> None:
     problem, work, search = unowned(owned_problem), unowned(owned_work), unowned(owned_search)
-    angles = np.empty(samples * len(problem.arm.branches))
+    arm = problem.arm
+    first, last = arm.lower[arm.free], arm.upper[arm.free]
+    if not np.isfinite(first):
+        first, last = -np.pi, np.pi
+    step = (last - first) / (samples - 1)
+    # The samples of all pairs are the same: angle, cosine, sine.
+    table = np.empty((3, samples))
+    for start in range(0, samples, MAX_SAMPLES):
+        count = min(MAX_SAMPLES, samples - start)
+        stop = start + max(count, 2) - 1
+        fill_samples(search, first + start * step, first + stop * step, stop - start + 1)
+        for i in range(count):
+            table[0, start + i] = search.angle[i]
+            table[1, start + i], table[2, start + i] = search.cosine[i], search.sine[i]
+    angles = np.empty(samples * len(arm.branches))
     measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     for n in range(len(pairs)):
         values[n] = _scan(
-            problem, work, search, pairs[n, 0], pairs[n, 1], samples,
+            problem, work, search, pairs[n, 0], pairs[n, 1], table,
             angles, measures, branches, joints[n],
         )  # fmt: skip
 
@@ -103,31 +117,34 @@ def _scan(
     search: Search,
     configuration: int,
     goal: int,
-    samples: int,
+    table: FloatArray,
     angles: FloatArray,
     measures: FloatArray,
     branches: IntArray,
     joints: FloatArray,
 ) -> float:
+    """Return the dexterity of the best collision-free sample of a pair, -1 if none is free."""
     arm = problem.arm
     torso = configuration % problem.torso_levels
     state = place_base(problem, work, configuration // problem.torso_levels)
     goal_in_arm_base(problem, work, state, torso, goal)
     wrist_goal(arm, work.R_AG, work.p_AG, search.goal)
+    samples, found, environment_placed = table.shape[1], 0, False
     body_A = problem.body_A[torso]
-    if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
-        return -1.0
-    environment_in_arm_base(problem, work, torso)
-    first, last = arm.lower[arm.free], arm.upper[arm.free]
-    if not np.isfinite(first):
-        first, last = -np.pi, np.pi
-    step = (last - first) / (samples - 1)
-    found = 0
-    for b in range(len(arm.branches)):
-        for start in range(0, samples, MAX_SAMPLES):
-            count = min(MAX_SAMPLES, samples - start)
-            stop = start + max(count, 2) - 1
-            fill_samples(search, first + start * step, first + stop * step, stop - start + 1)
+    for start in range(0, samples, MAX_SAMPLES):
+        count = min(MAX_SAMPLES, samples - start)
+        # Most pairs are out of reach of the elbow at most samples, and no branch is within reach.
+        if not _elbow_spans_any(arm, search.goal, table, start, start + count):
+            continue
+        if not environment_placed:
+            if gripper_body_contact(problem, work, body_A) != NO_CONTACT:
+                return -1.0
+            environment_in_arm_base(problem, work, torso)
+            environment_placed = True
+        search.angle[:count] = table[0, start : start + count]
+        search.cosine[:count] = table[1, start : start + count]
+        search.sine[:count] = table[2, start : start + count]
+        for b in range(len(arm.branches)):
             solve_samples(
                 arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
                 search.slack, search.measure,
@@ -146,3 +163,23 @@ def _scan(
             joints[:] = search.q
             return measure_at(problem, joints)
     return -1.0
+
+
+@inner
+def _elbow_spans_any(
+    arm: ArmSolver, goal: FloatArray, table: FloatArray, start: int, stop: int
+) -> bool:
+    """Return whether the elbow spans the distance from shoulder to wrist at any sample.
+
+    The formula is that of `solve_samples`, whose slack is negative at every other sample.
+    """
+    wx, wy, dz = goal[0, 0], goal[0, 1], goal[0, 2] - arm.p[1, 2]
+    sx, sy, reach0, reach1 = arm.p[1, 0], arm.p[1, 1], arm.reach[0], arm.reach[1]
+    spanned = 0
+    for i in range(start, stop):
+        c, s = table[1, i], table[2, i]
+        dx, dy = c * wx + s * wy - sx, -s * wx + c * wy - sy
+        k = (dx * dx + dy * dy + dz * dz - reach0) / reach1
+        # Counted, not returned early: so the loop is vectorised.
+        spanned += 1.0 - k * k >= 0.0
+    return spanned > 0
