@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 import zlib
 from collections import Counter
 from collections.abc import Iterator
@@ -97,6 +98,8 @@ def work(name: str, folder: Path, seed: int, score_every: int) -> None:
     # Drake and its libraries print warnings.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     os.dup2(1, 2)
+    # Beside the one line a user would see the warning.
+    warnings.simplefilter("error", RuntimeWarning)
     path = folder / file_type.file
     original = path.read_bytes()
     # Compile or load whatever is slow the first time.

@@ -11,7 +11,7 @@ import pytest
 from tcs.errors import TcsError
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
-MUTANTS = 150
+MUTANTS = 60
 """Mutants of each type that are read; building what they describe is left to the benchmark."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -44,14 +45,15 @@ class Goal:
         if not self.body_frame:
             raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
         position = _finite("position", self.position, ("x", "y", "z"))
-        distance = float(np.linalg.norm(position))
+        # Unlike numpy's norm, this does not overflow, for which numpy would print a warning.
+        distance = math.hypot(*position)
         if distance > MAX_DISTANCE:
             raise TaskError(
                 f"field 'position' is {distance:.6g} m from frame '{self.body_frame}', "
                 f"but a goal on the body is at most {MAX_DISTANCE:g} m away. Write metres."
             )
         quaternion = _finite("quaternion_wxyz", self.quaternion, ("w", "x", "y", "z"))
-        length = float(np.linalg.norm(quaternion))
+        length = math.hypot(*quaternion)
         if abs(length - 1.0) > UNIT_TOLERANCE:
             raise TaskError(
                 f"field 'quaternion_wxyz' has length {length:.6g}, but must be a unit quaternion "
