@@ -31,7 +31,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "teleop": (),
     "peers": (),
     "live": (),
-    "robots": ("--limit", "2000"),
+    "robots": ("--limit", "2000", "--finished", "out/robots.jsonl"),
     "numeric_arms": (),
     "primitives": (),
     "null_space": (),
@@ -39,6 +39,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "robustness": ("--scores", SCORES),
     "experiment": (),
     "lines": (),
+    "faults": (),
 }
 """Arguments of each script; those with times come first."""
 
