@@ -44,9 +44,13 @@ def test_every_block_and_cell_is_read(figures):
 
 def test_an_edited_figure_is_noticed(figures):
     # A block that has not been saved yet keeps its text.
-    texts = (page.read_text(encoding="utf-8") for page in figures.pages())
-    text = next(t for t in texts if figures.BLOCK.search(t) and not figures.unsaved(t))
-    end = text.index(figures.END)
+    texts = [page.read_text(encoding="utf-8") for page in figures.pages()]
+    text, end = next(
+        (text, match.end() - len(figures.END))
+        for text in texts
+        for match in figures.BLOCK.finditer(text)
+        if figures.is_saved(match[2], match[3])
+    )
     forged = text[:end] + "| forged | 1 |\n" + text[end:]
     assert figures.rewritten(forged) == text
 
