@@ -85,8 +85,8 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
 
     The sweep itself runs on altered data: without goals only the base is checked; with an elbow
     that spans no distance the reach test excludes every goal; with no shape of the arm to check
-    there is no collision. The differences are the parts. Inverse kinematics and the measure share
-    a loop: `sample_costs` separates them.
+    there is no collision. The differences are the parts. `sample_costs` separates inverse
+    kinematics from the measure.
     """
     problem = bench.problem
     no_goals = {"goal_R": problem.goal_R[:, :0].copy(), "goal_p": problem.goal_p[:, :0].copy()}
@@ -107,11 +107,8 @@ def part_costs(bench: Bench, pairs: tuple[Pair, ...], repeats: int) -> None:
     _part("base check", base / whole)
     _part("prefilter: too far", (reach - base) / whole)
     shares = np.array(measure_fractions(problem.arm, pairs, repeats))
-    if shares.size:
-        _part("inverse kinematics", (solved - reach) / whole * (1.0 - shares))
-        _part("measure", (solved - reach) / whole * shares)
-    else:
-        _part("inverse kinematics, measure", (solved - reach) / whole)
+    _part("inverse kinematics", (solved - reach) / whole * (1.0 - shares))
+    _part("measure", (solved - reach) / whole * shares)
     _part("collision of arm and gripper", (whole - solved) / whole)
 
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 from peer_problems import Answer, Bench, Pair
 
-from tcs.kernel.analytic.search import Search, new_search
+from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.contacts import Workspace, new_workspace

@@ -14,7 +14,7 @@ from typing import Any
 from numba.extending import overload
 
 from tcs.kernel.analytic import pairs as analytic
-from tcs.kernel.analytic.search import Search, new_search
+from tcs.kernel.analytic.scratch import Search, new_search
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.contacts import Workspace

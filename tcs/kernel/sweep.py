@@ -24,6 +24,7 @@ from tcs.kernel.scores import (
     GRIPPER_BLOCKED_BY_ENVIRONMENT,
     GRIPPER_BLOCKED_BY_ROBOT,
     REACHED,
+    TOO_FAR,
     Scores,
 )
 from tcs.kernel.solvers import Solver, new_solver, out_of_reach, score_pair
@@ -106,13 +107,16 @@ def _score_slice(
                 continue
             goal_in_arm_base(problem, work, state, torso, g)
             reason = out_of_reach(problem, work, solver)
-            if reason != REACHED:
+            if reason == TOO_FAR:
                 scores.reason[row, g] = reason
                 continue
             code = gripper_body_contact(problem, work, body_A)
             if code != NO_CONTACT:
                 scores.reason[row, g] = GRIPPER_BLOCKED_BY_ROBOT
                 scores.contact[row, g] = code
+                continue
+            if reason != REACHED:
+                scores.reason[row, g] = reason
                 continue
             if not environment_placed:
                 environment_in_arm_base(problem, work, torso)

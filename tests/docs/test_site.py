@@ -9,7 +9,7 @@ import pytest
 
 import tcs
 from tcs.kernel.analytic.pairs import score_pair
-from tcs.kernel.analytic.samples import solve_samples
+from tcs.kernel.analytic.samples import measure_samples
 from tcs.kernel.dexterity.measures import isotropy_at, limit_penalty
 from tcs.placement.selection import select, shortest_tour, utility
 from tcs.placement.tables import tc_manipulability, tc_reachability
@@ -52,10 +52,10 @@ def test_equations_are_set(site):
 EQUATIONS = [
     isotropy_at,
     limit_penalty,
+    measure_samples,
     score_pair,
     select,
     shortest_tour,
-    solve_samples,
     tc_manipulability,
     tc_reachability,
     utility,

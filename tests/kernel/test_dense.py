@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import outside_solver
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED
@@ -13,6 +12,7 @@ from tcs.kernel.verification import dense, reference_pairs
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan, dense_scans
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian
 from tests.kernel.judge import chain_of
+from tests.kernel.sampled import slack_and_measure
 from tests.kernel.toy import scores_of, toy_grid, toy_scene
 
 SEEDS = range(10)
@@ -52,7 +52,6 @@ def test_no_branch_is_solved_where_the_elbow_does_not_span_the_distance(lowered,
     arm, spans_any = build_problem(scene, grid).arm, dense._elbow_spans_any.py_func
     angles = np.linspace(-np.pi, np.pi, 512)
     table = np.stack([angles, np.cos(angles), np.sin(angles)])
-    slack, measure = np.empty(512), np.empty(512)
     left_out = solved = 0
     for _ in range(400):
         axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -60,7 +59,7 @@ def test_no_branch_is_solved_where_the_elbow_does_not_span_the_distance(lowered,
         is_spanned = spans_any(arm, goal, table, 0, 512)
         left_out += not is_spanned
         for branch in arm.branches:
-            solve_samples(arm, goal, branch, table[1], table[2], 512, slack, measure)
+            slack, _ = slack_and_measure(arm, goal, branch, angles)
             assert is_spanned or np.all(slack < 0.0)
             solved += np.any(slack >= 0.0)
     # Both cases occur.

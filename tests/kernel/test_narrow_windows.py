@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tcs.kernel.problem import build_problem
-from tcs.kernel.scores import REACHED, Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.scores import REACHED
+from tcs.kernel.verification.constructed import score_one as scores_of
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.placement.scoring import load_job
+from tests.kernel.judge import is_true
 
 # Configuration and goal of scratching the right thigh. The PR2's shoulder lift leaves its lower
 # limit just before the wrist flex meets its own: windows of 4e-4 to 2.5e-3 rad.
@@ -23,6 +24,12 @@ NEXT_TO_A_LIMIT = [
 ]  # fmt: skip
 # Of shaving, with TIAGo. The wrist is nearly straight, and joints 5 and 7 rotate by half a turn.
 STRAIGHT_WRIST = [(50114, 6), (51599, 6), (64780, 5), (69101, 5), (81542, 4)]
+# Joints 5 and 7 move 2.8 rad while joint 1 all but rests.
+RESTING_JOINT = [(53000, 6), (57313, 6), (72059, 5)]
+# Windows that limits leave, narrower than the samples are apart.
+THIN = [(70622, 7), (76574, 7)]
+# Of shaving, with the iiwa 7. The arm is all but stretched, 0.33 rad from its limits.
+STRETCHED = [(24248, 5)]
 
 
 def problem_of(task, environment, robot="pr2"):
@@ -39,6 +46,11 @@ def scratching():
 @pytest.fixture(scope="module")
 def feeding():
     return problem_of("feeding", "wheelchair")
+
+
+@pytest.fixture(scope="module")
+def shaving_with_iiwa7():
+    return problem_of("shaving", "wheelchair", "iiwa7")
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +73,29 @@ def test_a_window_at_a_straight_wrist_is_found(shaving_with_tiago, h, g):
     check(shaving_with_tiago, h, g)
 
 
+@pytest.mark.parametrize(("h", "g"), RESTING_JOINT, ids=str)
+def test_a_window_in_which_joints_run_fast_is_found(shaving_with_tiago, h, g):
+    check(shaving_with_tiago, h, g)
+
+
+@pytest.mark.parametrize(("h", "g"), THIN, ids=str)
+def test_a_window_narrower_than_the_dense_scan_is_found(shaving_with_tiago, h, g):
+    scores = scores_of(shaving_with_tiago, h)
+    assert scores.reason[0, g] == REACHED
+    # The dense scan may step over it; the reference judges the solution itself.
+    job = load_job("shaving", "wheelchair", "tiago")
+    lowered = job.lowered(job.scene())
+    assert is_true(lowered.arrays, lowered.grid, h, g, scores.joints[0, g])
+
+
+@pytest.mark.parametrize(("h", "g"), STRETCHED, ids=str)
+def test_a_window_of_the_stretched_arm_is_found(shaving_with_iiwa7, h, g):
+    check(shaving_with_iiwa7, h, g)
+
+
 def check(problem, h, g):
     """Score one pair, and compare it with the dense scan."""
-    goals = problem.goal_p.shape[1]
-    scores = Scores(
-        reason=np.empty((1, goals), np.uint8),
-        contact=np.empty((1, goals), np.int32),
-        dexterity=np.zeros((1, goals), np.float32),
-        joints=np.zeros((1, goals, 7), np.float32),
-    )
-    score_slice(problem, gripper_contacts(problem), h, h + 1, scores)
+    scores = scores_of(problem, h)
     q = np.empty(7)
     best = dense_scan(problem, h, g, DENSE_SAMPLES, q)
     assert best > 0.0

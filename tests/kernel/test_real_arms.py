@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
-from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.dexterity.measures import isotropy_at
 from tcs.kernel.verification.reference import free_joint, link_poses, solutions
 from tests.kernel.arms import drake_arm
+from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import around, random_joints
 
 # A dozen products of rotations over an arm of about 1 m.
@@ -27,10 +27,9 @@ def kernel_solutions(chain, X_AG, angle):
     """Return joints, slack and isotropy of every branch at an angle of the free joint."""
     solver, goal = arm_solver(chain), np.full((4, 3), np.nan)
     wrist_goal(solver, X_AG[0], X_AG[1], goal)
-    slack, measure, found = np.empty(1), np.empty(1), []
-    cosine, sine = np.cos([angle]), np.sin([angle])
+    found = []
     for branch in solver.branches:
-        solve_samples(solver, goal, branch, cosine, sine, 1, slack, measure)
+        slack, measure = slack_and_measure(solver, goal, branch, angle)
         q = np.full(7, np.nan)
         sample_joints(solver, goal, branch, angle, q)
         found.append((q, slack[0], max(measure[0], 0.0) ** (1 / 6)))

@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tcs.kernel.scores import REACHED
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
+from tcs.kernel.verification.constructed import score_one
 from tcs.placement.scoring import sweep
 from tcs.placement.tables import Reason
 from tests.kernel.judge import compare, is_true, stratified
@@ -76,3 +78,11 @@ def test_reached_pairs_are_true_for_the_reference(real, rng):
     for h, g in reached[rng.choice(len(reached), 4, replace=False)]:
         q = np.asarray(scores.joints_of(int(h), int(g)))
         assert is_true(small.arrays, small.grid, h, g, q)
+
+
+@pytest.mark.parametrize(("h", "g"), [(54470, 6), (54470, 7), (55934, 6)], ids=str)
+def test_gripper_against_robot_is_reported_before_joint_limits(lowered, h, g):
+    # Joint 1 would have to pass its limits, and the gripper at the goal touches the robot.
+    scores = score_one(build_problem(lowered.arrays, lowered.grid), h)
+    assert scores.reason[0, g] == GRIPPER_BLOCKED_BY_ROBOT
+    assert scores.contact[0, g] >= 0

@@ -16,6 +16,10 @@ INSET = 1e-9
 """Distance of the ends of the arcs from the limits of free joint and elbow [rad]. The slack there
 is about 1e-9, so that rounding does not decide whether the outermost sample is feasible."""
 
+REACH_ROUNDING = 1e-13
+"""What rounding may add to |SW|^2 [m^2], a hundred times its 1e-15: at full stretch, or folded all
+the way, goals that the arm just reaches must not count as too far. The tool misses by 1e-13 m."""
+
 IN_REACH, OUT_OF_REACH, OUT_OF_LIMITS = 0, 1, 2
 """Result of `elbow_arcs`."""
 
@@ -45,6 +49,10 @@ def elbow_arcs(arm: ArmSolver, goal: FloatArray, arcs: FloatArray) -> tuple[int,
     swing = 2.0 * np.hypot(cosine, sine)
     centre = np.arctan2(sine, cosine)
     inner, outer = 0.0, np.pi
+    if 0.0 < steady - swing - far < REACH_ROUNDING:
+        far = steady - swing + REACH_ROUNDING
+    if 0.0 < near - steady - swing < REACH_ROUNDING:
+        near = steady + swing - REACH_ROUNDING
     # |SW|^2 = steady - swing cos(q1 - centre) must lie in [near, far].
     if steady - swing > far or steady + swing < near:
         return 0, OUT_OF_REACH

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.kernel.analytic.samples import LEAST_BEND
 from tcs.kernel.analytic.solver import LAST, ArmSolver
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
@@ -74,7 +75,8 @@ def sample_joints(
         v[i] -= arm.p[1, i]
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     _inverse_rotate(R[1], v)
-    k = min(max((square - arm.reach[0]) / arm.reach[1], -1.0), 1.0)
+    k = (square - arm.reach[0]) / arm.reach[1]
+    k = min(max(k, LEAST_BEND - 1.0), 1.0 - LEAST_BEND)
     q[3] = arm.reach[2] + np.arctan2(branch[0] * np.sqrt(1.0 - k * k), k)
     c4, s4 = np.cos(q[3]), np.sin(q[3])
     ux = arm.u0[0] + arm.uc[0] * c4 + arm.us[0] * s4

@@ -13,11 +13,37 @@ from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import jit
 
+MAX_SAMPLES = 512
+"""Most samples that are solved at once."""
+_ROW = np.uint64(MAX_SAMPLES)
+# Unsigned: numba then adds no test for indices counted from the end, which would keep the compiler
+# from vectorising. Rows at constant distances of one array need no test for overlaps either.
+C2, S2, C3, S3, C4, S4 = (np.uint64(k) * _ROW for k in range(6))
+C5, S5, C6, S6, C7, S7 = (np.uint64(k) * _ROW for k in range(6, 12))
+"""Offsets of cos(q2), sin(q2) .. sin(q7) in the rows. Out of reach, the nearest angle is used, so
+that all of them vary continuously with q1."""
+AIM, WRIST = np.uint64(12) * _ROW, np.uint64(13) * _ROW
+"""How far aim [m] and wrist [1] are out of reach; <= 0 where they exist."""
+STRAIGHTNESS = np.uint64(14) * _ROW
+"""Minus the squared sine of joint 6 from the straight wrist, in [-1, 0]."""
+A7X, A7Y, A7Z = (np.uint64(k) * _ROW for k in range(15, 18))
+"""Axis 7 in L3."""
+TOOL_X, TOOL_Y, TOOL_Z = (np.uint64(k) * _ROW for k in range(18, 21))
+"""From the wrist centre to the tool, in L3 [m]."""
+ROWS = 21
 TINY = 1e-300
 """Avoids 0/0 at a singularity; such samples are infeasible."""
-SHARP = 1e14
+SHARP = 1e24
 """A direction is along an axis where the squared sine of their angle is below 1 / SHARP. An angle
-of 1e-7 rad still determines the joint to 1e-9 rad."""
+of 1e-12 rad still determines the joint to 1e-4 rad; the joints that follow compensate for that
+error, so that the pose is exact."""
+LEAST_BEND = 5e-13
+"""How far the cosine of the elbow stays from 1 and -1: the elbow keeps an angle of 1e-6 rad, so
+that the joints next to it stay determined. The tool moves by less than 1e-12 m for that."""
+ELBOW_ROUNDING = 1e-11
+"""What rounding may take from 1 - cos^2 of the elbow at full stretch: twice the rounding of |SW|^2
+that counts as reached (`arcs.REACH_ROUNDING`) over twice the product of the lengths of upper arm
+and forearm, which is above 0.02 m^2."""
 
 
 @jit
@@ -28,10 +54,10 @@ def solve_samples(
     cosines: FloatArray,
     sines: FloatArray,
     count: int,
+    rows: FloatArray,
     slack: FloatArray,
-    measure: FloatArray,
 ) -> None:
-    """Fill slack and isotropy of each sample.
+    """Fill the joints of each sample, and its slack.
 
     Args:
         arm: The arm.
@@ -40,18 +66,10 @@ def solve_samples(
         cosines: cos(q1) for the values of the free joint, shape (>= count,).
         sines: sin(q1) for the same values, shape (>= count,).
         count: Number of samples.
+        rows: Filled from `C2` to `TOOL_Z`, shape (ROWS * MAX_SAMPLES,).
         slack: Filled, shape (>= count,): >= 0 where the branch exists and every joint is within its
             limits. It measures the worst condition, as a difference of cosines, and varies
             continuously with q1.
-        measure: Filled, shape (>= count,): kinematic isotropy to the sixth power where slack >= 0;
-            elsewhere minus the squared sine of joint 6 from the straight wrist, in [-1, 0].
-
-    Source:
-        Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
-        det(J J^T) does not depend on the point whose velocity J describes, so it is taken at the
-        wrist centre, where joints 5 to 7 move nothing. By Cauchy and Binet it is the sum of the
-        squared 6x6 minors, which are products of 3x3 determinants there. The trace is taken at
-        the tool.
     """
     R, p = arm.R, arm.p
     a00, a01, a02 = R[1, 0, 0], R[1, 0, 1], R[1, 0, 2]
@@ -73,7 +91,6 @@ def solve_samples(
     f01, f11, f21 = R[6, 0, 1], R[6, 1, 1], R[6, 2, 1]
     f02, f12, f22 = R[6, 0, 2], R[6, 1, 2], R[6, 2, 2]
     sx, sy, sz = p[1, 0], p[1, 1], p[1, 2]
-    ex, ey, ez = p[3, 0], p[3, 1], p[3, 2]
     u0x, u0y, u0z = arm.u0[0], arm.u0[1], arm.u0[2]
     ucx, ucy, ucz = arm.uc[0], arm.uc[1], arm.uc[2]
     usx, usy, usz = arm.us[0], arm.us[1], arm.us[2]
@@ -108,9 +125,9 @@ def solve_samples(
         v2z = a02 * vx + a12 * vy + a22 * vz
         # Joint 4 from the distance between shoulder and wrist.
         k = (square - reach0) / reach1
-        elbow_left = 1.0 - k * k
-        k = min(max(k, -1.0), 1.0)
-        s = elbow * np.sqrt(max(elbow_left, 0.0))
+        elbow_left = 1.0 - k * k + ELBOW_ROUNDING
+        k = min(max(k, LEAST_BEND - 1.0), 1.0 - LEAST_BEND)
+        s = elbow * np.sqrt(1.0 - k * k)
         c4, s4 = k * cphase - s * sphase, k * sphase + s * cphase
         ux = u0x + ucx * c4 + usx * s4
         uy = u0y + ucy * c4 + usy * s4
@@ -122,6 +139,7 @@ def solve_samples(
         aim_left = N - m * m
         # Out of reach, the nearest angle is used, so that slack remains continuous.
         root = np.sqrt(N)
+        aim_excess = abs(m) - root
         m = min(max(m, -root), root)
         h = aim * np.sqrt(max(aim_left, 0.0))
         c3, s3 = (P * m - Q * h) / N, (Q * m + P * h) / N
@@ -172,6 +190,7 @@ def solve_samples(
         # Joints 6, 5, 7.
         m = m7z - e22 * f22
         wrist_left = N6 - m * m
+        wrist_excess = abs(m) - root6
         m = min(max(m, -root6), root6)
         h = wrist * np.sqrt(max(wrist_left, 0.0))
         c6, s6 = (P6 * m - Q6 * h) / N6, (Q6 * m + P6 * h) / N6
@@ -204,17 +223,80 @@ def solve_samples(
         left = min(left, c6 * mc6 + s6 * ms6 - h6)
         left = min(left, c7 * mc7 + s7 * ms7 - h7)
         slack[i] = left
+        n = np.uint64(i)
+        rows[C2 + n], rows[S2 + n] = c2, s2
+        rows[C3 + n], rows[S3 + n] = c3, s3
+        rows[C4 + n], rows[S4 + n] = c4, s4
+        rows[C5 + n], rows[S5 + n] = c5, s5
+        rows[C6 + n], rows[S6 + n] = c6, s6
+        rows[C7 + n], rows[S7 + n] = c7, s7
+        rows[AIM + n], rows[WRIST + n] = aim_excess, wrist_excess
+        rows[STRAIGHTNESS + n] = -max(sine_squared, 0.0)
+        rows[A7X + n], rows[A7Y + n], rows[A7Z + n] = a7x, a7y, a7z
+        rows[TOOL_X + n], rows[TOOL_Y + n], rows[TOOL_Z + n] = ox, oy, oz
+
+
+@jit
+def measure_samples(
+    arm: ArmSolver, rows: FloatArray, slack: FloatArray, count: int, measure: FloatArray
+) -> None:
+    """Fill the isotropy of each feasible sample.
+
+    Args:
+        arm: The arm.
+        rows: From `solve_samples`.
+        slack: From `solve_samples`.
+        count: Number of samples.
+        measure: Filled, shape (>= count,): kinematic isotropy to the sixth power where slack >= 0;
+            elsewhere minus the squared sine of joint 6 from the straight wrist, in [-1, 0].
+
+    Source:
+        Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
+        det(J J^T) does not depend on the point whose velocity J describes, so it is taken at the
+        wrist centre, where joints 5 to 7 move nothing. By Cauchy and Binet it is the sum of the
+        squared 6x6 minors, which are products of 3x3 determinants there. The trace is taken at
+        the tool.
+    """
+    R, p = arm.R, arm.p
+    a20, a21, a22 = R[1, 2, 0], R[1, 2, 1], R[1, 2, 2]
+    b00, b01, b02 = R[2, 0, 0], R[2, 0, 1], R[2, 0, 2]
+    b10, b11, b12 = R[2, 1, 0], R[2, 1, 1], R[2, 1, 2]
+    b20, b21, b22 = R[2, 2, 0], R[2, 2, 1], R[2, 2, 2]
+    c00, c01, c02 = R[3, 0, 0], R[3, 0, 1], R[3, 0, 2]
+    c10, c11, c12 = R[3, 1, 0], R[3, 1, 1], R[3, 1, 2]
+    c20, c21, c22 = R[3, 2, 0], R[3, 2, 1], R[3, 2, 2]
+    d00, d01, d02 = R[4, 0, 0], R[4, 0, 1], R[4, 0, 2]
+    d10, d11, d12 = R[4, 1, 0], R[4, 1, 1], R[4, 1, 2]
+    d20, d21, d22 = R[4, 2, 0], R[4, 2, 1], R[4, 2, 2]
+    e02, e12, e22 = R[5, 0, 2], R[5, 1, 2], R[5, 2, 2]
+    sx, sy, sz = p[1, 0], p[1, 1], p[1, 2]
+    ex, ey, ez = p[3, 0], p[3, 1], p[3, 2]
+    u0x, u0y, u0z = arm.u0[0], arm.u0[1], arm.u0[2]
+    ucx, ucy, ucz = arm.uc[0], arm.uc[1], arm.uc[2]
+    usx, usy, usz = arm.us[0], arm.us[1], arm.us[2]
+    # From the shoulder S to a point of axis 1, in the frame that joint 2 turns about.
+    s2x = -(R[1, 0, 0] * sx + R[1, 1, 0] * sy + a20 * sz)
+    s2y = -(R[1, 0, 1] * sx + R[1, 1, 1] * sy + a21 * sz)
+    s2z = -(R[1, 0, 2] * sx + R[1, 1, 2] * sy + a22 * sz)
+    for i in range(count):
+        n = np.uint64(i)
+        c2, s2 = rows[C2 + n], rows[S2 + n]
+        c3, s3 = rows[C3 + n], rows[S3 + n]
+        c4, s4 = rows[C4 + n], rows[S4 + n]
+        c5, s5 = rows[C5 + n], rows[S5 + n]
+        a7x, a7y, a7z = rows[A7X + n], rows[A7Y + n], rows[A7Z + n]
+        ox, oy, oz = rows[TOOL_X + n], rows[TOOL_Y + n], rows[TOOL_Z + n]
+        ux = u0x + ucx * c4 + usx * s4
+        uy = u0y + ucy * c4 + usy * s4
+        uz = u0z + ucz * c4 + usz * s4
         # Axes 1, 2 (3 is z), 4 .. 6 in L3, and the velocity of W that each joint causes.
         px, py = c2 * a20 + s2 * a21, -s2 * a20 + c2 * a21
         gx, gy = b00 * px + b10 * py + b20 * a22, b01 * px + b11 * py + b21 * a22
         gz = b02 * px + b12 * py + b22 * a22
         a1x, a1y, a1z = c3 * gx + s3 * gy, -s3 * gx + c3 * gy, gz
-        kx = -(a00 * sx + a10 * sy + a20 * sz)
-        ky = -(a01 * sx + a11 * sy + a21 * sz)
-        kz = -(a02 * sx + a12 * sy + a22 * sz)
-        px, py = c2 * kx + s2 * ky, -s2 * kx + c2 * ky
-        gx, gy = b00 * px + b10 * py + b20 * kz, b01 * px + b11 * py + b21 * kz
-        gz = b02 * px + b12 * py + b22 * kz
+        px, py = c2 * s2x + s2 * s2y, -s2 * s2x + c2 * s2y
+        gx, gy = b00 * px + b10 * py + b20 * s2z, b01 * px + b11 * py + b21 * s2z
+        gz = b02 * px + b12 * py + b22 * s2z
         kx, ky, kz = ux - (c3 * gx + s3 * gy), uy - (-s3 * gx + c3 * gy), uz - gz
         l1x, l1y, l1z = a1y * kz - a1z * ky, a1z * kx - a1x * kz, a1x * ky - a1y * kx
         a2x, a2y, a2z = c3 * b20 + s3 * b21, -s3 * b20 + c3 * b21, b22
@@ -271,4 +353,4 @@ def solve_samples(
         scale = 6.0 / trace
         scale = scale * scale * scale
         isotropy = det * scale * scale
-        measure[i] = isotropy if left >= 0.0 else -max(sine_squared, 0.0)
+        measure[i] = isotropy if slack[i] >= 0.0 else rows[STRAIGHTNESS + n]

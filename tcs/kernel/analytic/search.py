@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from tcs.kernel.analytic.arcs import MAX_ARCS, PEAK_SLOPE, is_peak, windows_of
-from tcs.kernel.analytic.samples import solve_samples
+from tcs.kernel.analytic.arcs import PEAK_SLOPE, is_peak, windows_of
+from tcs.kernel.analytic.intervals import record_intervals, record_uncovered
+from tcs.kernel.analytic.samples import MAX_SAMPLES, STRAIGHTNESS, measure_samples
+from tcs.kernel.analytic.scratch import (
+    MAX_WINDOWS,
+    Search,
+    add_candidate,
+    best_of,
+    fill_samples,
+    measure_feasible,
+    solve,
+)
 from tcs.kernel.analytic.solver import ArmSolver
-from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 
 FIRST_SAMPLES = 48
@@ -36,134 +43,6 @@ ANYWHERE = (-np.inf, np.inf)
 STRAIGHT_REFINEMENTS = 5
 """Number of refinements about a straight wrist, each to 2/7 of the spacing: from 0.05 rad to 1e-4
 rad."""
-MAX_SAMPLES = 512
-MAX_WINDOWS = 32
-MAX_CANDIDATES = 4096
-"""Capacities of the scratch arrays."""
-
-
-class Search(NamedTuple):
-    """Scratch of the search over the free joint, reused from pair to pair."""
-
-    goal: FloatArray
-    arcs: FloatArray
-    """Arcs of the free joint (first, last) [rad], shape (MAX_ARCS, 2)."""
-    arc_count: IntArray
-    """Number of arcs, shape (1,)."""
-    windows: FloatArray
-    ends: FloatArray
-    """Samples just outside and just inside each end of a feasible interval [rad], shape
-    (MAX_WINDOWS, 2)."""
-    peaks: FloatArray
-    """Infeasible angles at which the slack has a local maximum [rad], shape (MAX_WINDOWS,)."""
-    straight: FloatArray
-    """Where the wrist is straightest: angle [rad], spacing of the samples [rad] and branch, shape
-    (MAX_WINDOWS, 3)."""
-    angle: FloatArray
-    cosine: FloatArray
-    sine: FloatArray
-    slack: FloatArray
-    measure: FloatArray
-    found_angle: FloatArray
-    """Free joint of each candidate [rad], shape (MAX_CANDIDATES,)."""
-    found_step: FloatArray
-    """Spacing of the samples among which each candidate was found [rad], shape
-    (MAX_CANDIDATES,)."""
-    found_measure: FloatArray
-    """Isotropy of each candidate to the sixth power, or its measure if another one is maximised,
-    shape (MAX_CANDIDATES,)."""
-    found_branch: IntArray
-    """Row of each candidate's branch in `arm.branches`, shape (MAX_CANDIDATES,)."""
-    key: FloatArray
-    """Sort key of each candidate, shape (MAX_CANDIDATES,)."""
-    order: IntArray
-    """Indices of the candidates by ascending key, shape (MAX_CANDIDATES,)."""
-    spare: IntArray
-    """Scratch of the merge sort, shape (MAX_CANDIDATES,)."""
-    q: FloatArray
-    """Current joint angles [rad], shape (7,)."""
-    best: FloatArray
-    """Joint angles of the best solution so far [rad], shape (7,)."""
-
-
-def new_search() -> Search:
-    """Return scratch memory for one worker."""
-    return Search(
-        np.empty((4, 3)),
-        np.empty((MAX_ARCS, 2)),
-        np.zeros(1, np.int64),
-        np.empty((MAX_WINDOWS, 2)),
-        np.empty((MAX_WINDOWS, 2)),
-        np.empty(MAX_WINDOWS),
-        np.empty((MAX_WINDOWS, 3)),
-        np.empty(MAX_SAMPLES),
-        np.empty(MAX_SAMPLES),
-        np.empty(MAX_SAMPLES),
-        np.empty(MAX_SAMPLES),
-        np.empty(MAX_SAMPLES),
-        np.empty(MAX_CANDIDATES),
-        np.empty(MAX_CANDIDATES),
-        np.empty(MAX_CANDIDATES),
-        np.empty(MAX_CANDIDATES, np.int64),
-        np.empty(MAX_CANDIDATES),
-        np.empty(MAX_CANDIDATES, np.int64),
-        np.empty(MAX_CANDIDATES, np.int64),
-        np.empty(7),
-        np.empty(7),
-    )
-
-
-@inner
-def fill_samples(search: Search, first: float, last: float, count: int) -> float:
-    """Spread `count` >= 2 samples evenly from first to last, ends included; return their spacing.
-
-    Each cosine and sine follows from the previous one by a rotation: 512 rotations lose about
-    1e-13, and the joint angles of a solution are recomputed from its angle.
-    """
-    step = (last - first) / (count - 1)
-    c, s = np.cos(first), np.sin(first)
-    dc, ds = np.cos(step), np.sin(step)
-    for i in range(count):
-        search.angle[i] = first + i * step
-        search.cosine[i], search.sine[i] = c, s
-        c, s = c * dc - s * ds, s * dc + c * ds
-    return step
-
-
-@inner
-def best_of(measure: FloatArray, count: int) -> int:
-    """Return the index of the greatest value, the first one if several are equal."""
-    best = 0
-    for i in range(1, count):
-        if measure[i] > measure[best]:
-            best = i
-    return best
-
-
-@inner
-def sort_candidates(search: Search, count: int) -> None:
-    """Fill `order` with the first `count` candidates by ascending `key`; the sort is stable.
-
-    The merge sort is written out because numpy's takes three seconds to compile.
-    """
-    key, order, spare = search.key, search.order, search.spare
-    for i in range(count):
-        order[i] = i
-    width = 1
-    while width < count:
-        for first in range(0, count, 2 * width):
-            middle, last = min(first + width, count), min(first + 2 * width, count)
-            i, j = first, middle
-            for k in range(first, last):
-                if j == last or (i < middle and key[order[i]] <= key[order[j]]):
-                    spare[k] = order[i]
-                    i += 1
-                else:
-                    spare[k] = order[j]
-                    j += 1
-        for k in range(count):
-            order[k] = spare[k]
-        width *= 2
 
 
 @jit
@@ -178,6 +57,7 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
     Returns:
         Number of candidates.
     """
+    search.interval_count[0] = 0
     length = 0.0
     for k in range(arcs):
         length += search.arcs[k, 1] - search.arcs[k, 0]
@@ -189,17 +69,15 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
         count = max(MIN_SAMPLES, int(share + 0.5))
         for b in range(len(arm.branches)):
             step = fill_samples(search, first, last, count)
-            solve_samples(
-                arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
-                search.slack, search.measure,
-            )  # fmt: skip
+            solve(arm, search, b, count)
             windows = windows_of(search.slack, count, step, search.windows, 0)
+            record_uncovered(arm, search, b, count, step, windows)
+            if found == 0:
+                straight = _record_straight(search, b, count, step, first, straight)
             for w in range(windows):
                 start = first + search.windows[w, 0] * step
                 stop = first + search.windows[w, 1] * step
                 found = _refine_window(arm, search, b, start, stop, found)
-            if found == 0:
-                straight = _record_straight(search, b, count, step, first, straight)
     if found == 0:
         for n in range(straight):
             middle, step, b = (
@@ -215,11 +93,9 @@ def find_candidates(arm: ArmSolver, search: Search, arcs: int) -> int:
 def _record_straight(
     search: Search, b: int, count: int, step: float, first: float, straight: int
 ) -> int:
-    """Append the samples at which the wrist is straighter than at both neighbouring samples.
-
-    No sample is feasible, so `measure` holds minus the squared sine of the wrist angle.
-    """
-    straightness = search.measure
+    """Append the samples at which the wrist is straighter than at both neighbouring samples."""
+    first_row = int(STRAIGHTNESS)
+    straightness = search.rows[first_row : first_row + count]
     for i in range(count):
         if straightness[i] > -STRAIGHT and straight < MAX_WINDOWS:
             left = straightness[i - 1] if i > 0 else -np.inf
@@ -239,16 +115,15 @@ def _refine_window(
     """Append the feasible angles of one window on branch b; return the number of candidates."""
     count = min(max(MIN_SAMPLES, int((last - first) / FINE_STEP) + 1), MAX_SAMPLES)
     step = fill_samples(search, first, last, count)
-    solve_samples(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
-        search.slack, search.measure,
-    )  # fmt: skip
+    solve(arm, search, b, count)
+    measure_feasible(arm, search, count)
+    record_intervals(arm, search, b, count, step)
     before = search.slack[0] >= 0.0
     ends = peaks = 0
     for i in range(count):
         inside = search.slack[i] >= 0.0
         if inside:
-            found = _add(search, b, i, step, found)
+            found = add_candidate(search, b, i, step, found)
         if inside != before and ends < MAX_WINDOWS:
             # The samples just outside and just inside an end of a feasible interval.
             search.ends[ends, 0] = search.angle[i - 1] if inside else search.angle[i]
@@ -296,14 +171,12 @@ def _refine_about(
     for _ in range(PEAK_REFINEMENTS if guide == BY_SLACK else STRAIGHT_REFINEMENTS):
         low, high = max(middle - step, ends[0]), min(middle + step, ends[1])
         step = fill_samples(search, low, high, FINE_SAMPLES)
-        solve_samples(
-            arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES,
-            search.slack, search.measure,
-        )  # fmt: skip
+        solve(arm, search, b, FINE_SAMPLES)
+        measure_samples(arm, search.rows, search.slack, FINE_SAMPLES, search.measure)
         before = found
         for i in range(FINE_SAMPLES):
             if search.slack[i] >= 0.0:
-                found = _add(search, b, i, step, found)
+                found = add_candidate(search, b, i, step, found)
         top = best_of(value, FINE_SAMPLES)
         if found > before or (guide == BY_SLACK and value[top] < -PEAK_SLOPE * step):
             break
@@ -320,23 +193,9 @@ def _refine_end(
     The best measure is often close to a joint limit, where a feasible interval ends.
     """
     step = fill_samples(search, outer, inner, FINE_SAMPLES)
-    solve_samples(
-        arm, search.goal, arm.branches[b], search.cosine, search.sine, FINE_SAMPLES - 1,
-        search.slack, search.measure,
-    )  # fmt: skip
+    solve(arm, search, b, FINE_SAMPLES - 1)
+    measure_feasible(arm, search, FINE_SAMPLES - 1)
     for i in range(1, FINE_SAMPLES - 1):
         if search.slack[i] >= 0.0:
-            found = _add(search, b, i, abs(step), found)
+            found = add_candidate(search, b, i, abs(step), found)
     return found
-
-
-@inner
-def _add(search: Search, b: int, i: int, step: float, found: int) -> int:
-    """Append sample i as a candidate on branch b; return the number of candidates."""
-    if found == MAX_CANDIDATES:
-        return found
-    search.found_angle[found] = search.angle[i]
-    search.found_step[found] = step
-    search.found_measure[found] = search.measure[i]
-    search.found_branch[found] = b
-    return found + 1

@@ -5,7 +5,7 @@ A position on the curves is the index of a point plus a fraction of the stride t
 
 from __future__ import annotations
 
-from tcs.kernel.analytic.search import best_of
+from tcs.kernel.analytic.scratch import best_of
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import (

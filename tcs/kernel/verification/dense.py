@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
-from tcs.kernel.analytic.samples import solve_samples
-from tcs.kernel.analytic.search import MAX_SAMPLES, Search, fill_samples, new_search
+from tcs.kernel.analytic.samples import AIM, C2, ELBOW_ROUNDING, MAX_SAMPLES, WRIST
+from tcs.kernel.analytic.scratch import Search, fill_samples, measure_feasible, new_search, solve
 from tcs.kernel.analytic.solver import ArmSolver, is_outside
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
-from tcs.kernel.cache import inner, jit
+from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.contacts import (
     NO_CONTACT,
     Workspace,
@@ -26,6 +26,13 @@ from tcs.kernel.problem import Problem
 from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.views import unowned
 
+COARSE = 0.005
+"""Motion of any joint between two samples [rad] above which the dense scan adds samples."""
+FINEST = 1e-14
+"""Spacing of samples [rad] close to the last digit of the free joint."""
+MOST_ADDED = 20_000
+"""Most intervals that a dense scan divides on one branch."""
+THREE = int_constant(3)
 DENSE_SAMPLES = 11_520
 """Angles of the free joint in a dense scan: one every 1/32 degree of a full turn."""
 
@@ -54,10 +61,11 @@ def dense_scans(
 ) -> NDArray[np.float64]:
     """Return the dexterity of the best collision-free sample of each pair, -1 where none is free.
 
-    With a closed form, every sample of the free joint is solved on every branch, and solutions
-    within the joint limits are checked for contacts in descending order of their measure; the best
-    one is not refined. Without a closed form, `numeric_dense_scans` is used. Contacts of base and
-    gripper with the environment are not checked. The GIL is released.
+    With a closed form, every sample of the free joint is solved on every branch, and more are added
+    where a joint moves farther than COARSE from one to the next. Solutions within the joint limits
+    are checked for contacts in descending order of their measure; the best one is not refined.
+    Without a closed form, `numeric_dense_scans` is used. Contacts of base and gripper with the
+    environment are not checked. The GIL is released.
 
     Args:
         problem: The scene, its goals and its grid.
@@ -101,7 +109,7 @@ def _dense_scans(
         for i in range(count):
             table[0, start + i] = search.angle[i]
             table[1, start + i], table[2, start + i] = search.cosine[i], search.sine[i]
-    angles = np.empty(samples * len(arm.branches))
+    angles = np.empty((samples + MOST_ADDED) * len(arm.branches))
     measures, branches = np.empty(angles.size), np.empty(angles.size, np.int64)
     for n in range(len(pairs)):
         values[n] = _scan(
@@ -130,8 +138,11 @@ def _scan(
     goal_in_arm_base(problem, work, state, torso, goal)
     wrist_goal(arm, work.R_AG, work.p_AG, search.goal)
     samples, found, environment_placed = table.shape[1], 0, False
+    step = table[0, 1] - table[0, 0]
+    fast, added = np.empty((MAX_SAMPLES, 2)), np.zeros(len(arm.branches), np.int64)
     body_A = problem.body_A[torso]
-    for start in range(0, samples, MAX_SAMPLES):
+    # Blocks share a sample, so that every two neighbours are compared.
+    for start in range(0, samples - 1, MAX_SAMPLES - 1):
         count = min(MAX_SAMPLES, samples - start)
         # Most pairs are out of reach of the elbow at most samples, and no branch is within reach.
         if not _elbow_spans_any(arm, search.goal, table, start, start + count):
@@ -141,21 +152,39 @@ def _scan(
                 return -1.0
             environment_in_arm_base(problem, work, torso)
             environment_placed = True
-        search.angle[:count] = table[0, start : start + count]
-        search.cosine[:count] = table[1, start : start + count]
-        search.sine[:count] = table[2, start : start + count]
         for b in range(len(arm.branches)):
-            solve_samples(
-                arm, search.goal, arm.branches[b], search.cosine, search.sine, count,
-                search.slack, search.measure,
-            )  # fmt: skip
+            search.angle[:count] = table[0, start : start + count]
+            search.cosine[:count] = table[1, start : start + count]
+            search.sine[:count] = table[2, start : start + count]
+            solve(arm, search, b, count)
+            measure_feasible(arm, search, count)
+            pending = 0
             for i in range(count):
-                if search.slack[i] >= 0.0:
+                if search.slack[i] >= 0.0 and (i or not start):
                     angles[found], branches[found] = search.angle[i], b
                     measures[found] = search.measure[i]
-                    if not samples_hold_measure(problem):
-                        measures[found] = measure_of(problem, search, b, search.angle[i])
                     found += 1
+                if i + 1 < count and _is_coarse(search, i, step):
+                    fast[pending, 0], fast[pending, 1] = search.angle[i], search.angle[i + 1]
+                    pending += 1
+            while pending and added[b] < MOST_ADDED:
+                pending -= 1
+                added[b] += 1
+                low, high = fast[pending, 0], fast[pending, 1]
+                half = fill_samples(search, low, high, THREE)
+                solve(arm, search, b, THREE)
+                measure_feasible(arm, search, THREE)
+                if search.slack[1] >= 0.0:
+                    angles[found], branches[found] = search.angle[1], b
+                    measures[found] = search.measure[1]
+                    found += 1
+                for i in range(2):
+                    if half > FINEST and pending < MAX_SAMPLES and _is_coarse(search, i, half):
+                        fast[pending, 0], fast[pending, 1] = search.angle[i], search.angle[i + 1]
+                        pending += 1
+    if not samples_hold_measure(problem):
+        for i in range(found):
+            measures[i] = measure_of(problem, search, branches[i], angles[i])
     for i in np.argsort(-measures[:found], kind="mergesort"):
         sample_joints(arm, search.goal, arm.branches[branches[i]], angles[i], search.q)
         contact = arm_contact(problem, work, body_A, search.q)
@@ -181,5 +210,28 @@ def _elbow_spans_any(
         dx, dy = c * wx + s * wy - sx, -s * wx + c * wy - sy
         k = (dx * dx + dy * dy + dz * dz - reach0) / reach1
         # Counted, not returned early: so the loop is vectorised.
-        spanned += 1.0 - k * k >= 0.0
+        spanned += 1.0 - k * k + ELBOW_ROUNDING >= 0.0
     return spanned > 0
+
+
+@inner
+def _is_coarse(search: Search, i: int, step: float) -> bool:
+    """Return whether a joint moves farther than COARSE from sample i to the next, and may matter.
+
+    It does not where both samples are too far from feasible for the joints to get there and back.
+    """
+    rows, motion = search.rows, 0.0
+    for k in range(6):
+        c, s = int(C2) + 2 * k * MAX_SAMPLES, int(C2) + (2 * k + 1) * MAX_SAMPLES
+        sine = rows[s + i + 1] * rows[c + i] - rows[c + i + 1] * rows[s + i]
+        cosine = rows[c + i + 1] * rows[c + i] + rows[s + i + 1] * rows[s + i]
+        motion = max(motion, abs(np.arctan2(sine, cosine)))
+    if motion <= COARSE:
+        return False
+    aim, wrist = int(AIM) + i, int(WRIST) + i
+    if rows[aim] > 0.0 and rows[aim + 1] > 0.0:
+        reach = np.sqrt(search.goal[0, 0] ** 2 + search.goal[0, 1] ** 2 + search.goal[0, 2] ** 2)
+        return rows[aim] + rows[aim + 1] <= 2.0 * reach * (step + motion)
+    if rows[wrist] > 0.0 and rows[wrist + 1] > 0.0:
+        return rows[wrist] + rows[wrist + 1] <= 4.0 * (step + motion)
+    return max(search.slack[i], search.slack[i + 1]) > -2.0 * motion

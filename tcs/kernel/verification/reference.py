@@ -17,6 +17,10 @@ import numpy as np
 from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
 from tcs.kernel.dexterity import ISOTROPY, NORMALISED, UNLIMITED, dexterity
 
+LEAST_ELBOW = 1e-6
+"""Least angle of the elbow from stretched and from folded [rad]."""
+STRETCH_ROUNDING = 1e-11
+"""What rounding may take from the squared sine of the elbow."""
 MEETING_TOLERANCE = 1e-9
 """Link origins closer than this [m] coincide, up to rounding."""
 Pose = tuple[FloatArray, FloatArray]
@@ -96,12 +100,14 @@ def measured(
 # --- inverse kinematics -----------------------------------------------------------------------
 
 
-def angles_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float, list[float]]:
+def angles_to_height(
+    R: FloatArray, v: FloatArray, height: float
+) -> tuple[float, list[float], float]:
     """Return the angles t about z for which R Rz(t) v has the z component `height`.
 
     Returns:
-        Feasibility margin (1 at the middle height, negative if no angle exists), and the two angles
-        [rad]: first that of sign +1, then that of sign -1.
+        Feasibility margin (1 at the middle height, negative if no angle exists); the two angles
+        [rad], first that of sign +1, then that of sign -1; and how far the height is out of reach.
     """
     P = R[2, 0] * v[0] + R[2, 1] * v[1]
     Q = R[2, 1] * v[0] - R[2, 0] * v[1]
@@ -109,7 +115,7 @@ def angles_to_height(R: FloatArray, v: FloatArray, height: float) -> tuple[float
     left = P * P + Q * Q - m * m
     h = math.sqrt(max(left, 0.0))
     turns = [math.atan2(Q * m + P * g, P * m - Q * g) for g in (h, -h)]
-    return left / (P * P + Q * Q), turns
+    return left / (P * P + Q * Q), turns, abs(m) - math.hypot(P, Q)
 
 
 @dataclass(frozen=True)
@@ -122,6 +128,8 @@ class Solution:
     """>= 0 if the branch exists and every joint is within its limits."""
     sine_squared: float
     """Squared sine of the wrist angle (of the shoulder, in the spherical-shoulder class)."""
+    excess: float
+    """How far aim [m] or wrist are out of reach, whichever is farther; <= 0 if both exist."""
 
 
 def has_spherical_shoulder(chain: Chain) -> bool:
@@ -154,9 +162,9 @@ def spherical_wrist_solutions(
     v = chain.R[1].T @ v
     found = {}
     for elbow_sign in (1, -1):
-        q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
+        q4 = phase + elbow_sign * elbow_angle(cosine)
         u = chain.p[3] + chain.R[3] @ rot_z(q4) @ chain.p[4]
-        aim_left, aims = angles_to_height(chain.R[2], u, v[2])
+        aim_left, aims, aim_excess = angles_to_height(chain.R[2], u, v[2])
         for aim_sign, q3 in zip((1, -1), aims, strict=True):
             k = chain.R[2] @ rot_z(q3) @ u
             q2 = math.atan2(v[1], v[0]) - math.atan2(k[1], k[0])
@@ -165,7 +173,7 @@ def spherical_wrist_solutions(
                 R = R @ chain.R[i] @ rot_z(angle)
             M = (R @ chain.R[4]).T @ R_A7
             f = chain.R[6][:, 2]
-            wrist_left, flexes = angles_to_height(chain.R[5], f, M[2, 2])
+            wrist_left, flexes, wrist_excess = angles_to_height(chain.R[5], f, M[2, 2])
             for wrist_sign, q6 in zip((1, -1), flexes, strict=True):
                 e = chain.R[5] @ rot_z(q6) @ f
                 q5 = math.atan2(M[1, 2], M[0, 2]) - math.atan2(e[1], e[0])
@@ -173,7 +181,9 @@ def spherical_wrist_solutions(
                 q7 = math.atan2(N[1, 0], N[0, 0])
                 left = min(elbow_left, aim_left, wrist_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
-                found[elbow_sign, aim_sign, wrist_sign] = limited(chain, q, left, wrist_left)
+                excess = max(aim_excess, wrist_excess)
+                solution = limited(chain, q, left, wrist_left, excess)
+                found[elbow_sign, aim_sign, wrist_sign] = solution
     return found
 
 
@@ -191,19 +201,19 @@ def spherical_shoulder_solutions(
     elbow_left, cosine, phase = elbow(chain, float(s @ s))
     found = {}
     for elbow_sign in (1, -1):
-        q4 = phase + elbow_sign * math.acos(min(max(cosine, -1.0), 1.0))
+        q4 = phase + elbow_sign * elbow_angle(cosine)
         # From W to S, in the frame about whose z axis joint 5 rotates.
         X_34 = compose((chain.R[3], chain.p[3]), (rot_z(q4), np.zeros(3)))
         X_35 = compose(X_34, (chain.R[4], chain.p[4]))
         k = inverse(X_35)[1]
-        aim_left, aims = angles_to_height(chain.R[5].T, k, s[2])
+        aim_left, aims, aim_excess = angles_to_height(chain.R[5].T, k, s[2])
         for aim_sign, q5 in zip((1, -1), (-t for t in aims), strict=True):
             n = chain.R[5].T @ rot_z(-q5) @ k
             q6 = math.atan2(n[1], n[0]) - math.atan2(s[1], s[0])
             R_36 = X_35[0] @ rot_z(q5) @ chain.R[5] @ rot_z(q6)
             M = chain.R[0].T @ X_A6[0] @ R_36.T
             f = chain.R[2][:, 2]
-            shoulder_left, shoulders = angles_to_height(chain.R[1], f, M[2, 2])
+            shoulder_left, shoulders, shoulder_excess = angles_to_height(chain.R[1], f, M[2, 2])
             for shoulder_sign, q2 in zip((1, -1), shoulders, strict=True):
                 # In the kernel's order, which affects the slack of infeasible samples.
                 R_13 = chain.R[1] @ rot_z(q2) @ chain.R[2]
@@ -212,17 +222,21 @@ def spherical_shoulder_solutions(
                 q1 = math.atan2(-N[0, 1], N[0, 0])
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
-                found[elbow_sign, aim_sign, shoulder_sign] = limited(chain, q, left, shoulder_left)
+                excess = max(aim_excess, shoulder_excess)
+                solution = limited(chain, q, left, shoulder_left, excess)
+                found[elbow_sign, aim_sign, shoulder_sign] = solution
     return found
 
 
-def limited(chain: Chain, angles: list[float], left: float, sine_squared: float) -> Solution:
+def limited(
+    chain: Chain, angles: list[float], left: float, sine_squared: float, excess: float
+) -> Solution:
     """Return the solution with joints shifted into their limits; its slack is at most `left`."""
     q = np.array(angles)
     for i in range(7):
         q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
         left = min(left, kept)
-    return Solution(q, left, max(sine_squared, 0.0))
+    return Solution(q, left, max(sine_squared, 0.0), excess)
 
 
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
@@ -235,7 +249,16 @@ def elbow(chain: Chain, square: float) -> tuple[float, float, float]:
     c = (most[0] + most[1]) / 2
     a, b = most[0] - c, least[1] - c
     cosine = (square - c) / math.hypot(a, b)
-    return 1.0 - cosine * cosine, cosine, math.atan2(b, a)
+    return 1.0 - cosine * cosine + STRETCH_ROUNDING, cosine, math.atan2(b, a)
+
+
+def elbow_angle(cosine: float) -> float:
+    """Return the angle from stretched [rad], LEAST_ELBOW from stretched and folded at least.
+
+    A straight elbow would leave the joints before and after it undetermined; so little a bend moves
+    the tool by its square.
+    """
+    return min(max(math.acos(min(max(cosine, -1.0), 1.0)), LEAST_ELBOW), math.pi - LEAST_ELBOW)
 
 
 def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]:

@@ -15,12 +15,12 @@ from tcs.kernel.analytic.arcs import (
     windows_of,
 )
 from tcs.kernel.analytic.ik import wrist_goal
-from tcs.kernel.analytic.samples import solve_samples
-from tcs.kernel.analytic.search import MAX_WINDOWS
+from tcs.kernel.analytic.scratch import MAX_WINDOWS
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification import reference_candidates
 from tcs.kernel.verification.reference import free_joint, link_poses
 from tests.kernel.arms import drake_arm
+from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import random_arm, random_joints, rotation
 
 DENSE = 2000
@@ -47,7 +47,7 @@ def distance_left(arm, chain, X_AG, angles):
         v, other = -chain.R[6].T @ chain.p[6], R_A7.T @ (chain.p[0] - p_A7)
     x = np.stack([c * v[0] + s * v[1], -s * v[0] + c * v[1], np.full_like(c, v[2])], axis=-1)
     square = np.sum((x - other) ** 2, axis=-1)
-    near, far = reference_pairs.elbow_spans(chain)
+    near, far = reference_candidates.elbow_spans(chain)
     return np.minimum(square - near, far - square)
 
 
@@ -106,12 +106,11 @@ def test_feasible_angles_lie_in_the_arcs(chain):
     rng = np.random.default_rng(2)
     arm = arm_solver(chain)
     angles = np.linspace(-np.pi, np.pi, DENSE)
-    slack, measure = np.empty(DENSE), np.empty(DENSE)
     seen = 0
     for X_AG in goals(rng, chain, 40):
         goal, arcs, reach = arcs_of(arm, X_AG)
         for branch in arm.branches:
-            solve_samples(arm, goal, branch, np.cos(angles), np.sin(angles), DENSE, slack, measure)
+            slack, _ = slack_and_measure(arm, goal, branch, angles)
             feasible = angles[slack >= 0]
             seen += len(feasible)
             assert reach == IN_REACH or len(feasible) == 0
@@ -149,7 +148,7 @@ def test_a_goal_above_the_axis_of_joint_1_leaves_the_whole_range_or_nothing(lowe
     for height in (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 2.0):
         on_axis = chain.p[0] + chain.R[0] @ np.array([0.0, 0.0, height])
         _, arcs, reach = arcs_of(arm, (np.eye(3), on_axis + tool))
-        near, far = reference_pairs.elbow_spans(chain)
+        near, far = reference_candidates.elbow_spans(chain)
         square = np.sum((np.array([0.0, 0.0, height]) - chain.p[1]) ** 2)
         if near < square < far:
             # The wrist is on the axis up to rounding, so the arcs may be cut at one point.
@@ -196,7 +195,7 @@ def test_windows_are_those_of_the_reference(seed):
     windows = np.empty((MAX_WINDOWS, 2))
     step = 0.13
     found = windows_of(slack, count, step, windows, 0)
-    expected = reference_pairs.windows_of(slack.tolist(), step)
+    expected = reference_candidates.windows_of(slack.tolist(), step)
     assert sorted(map(tuple, windows[:found])) == sorted(expected)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tcs.kernel.analytic.ik import sample_joints, within, wrist_goal
-from tcs.kernel.analytic.samples import solve_samples
 from tcs.kernel.analytic.solver import arm_solver
 from tcs.kernel.verification.reference import free_joint, isotropy, jacobian, link_poses, solutions
 from tests.kernel.arms import drake_arm
+from tests.kernel.sampled import slack_and_measure
 from tests.kernel.shapes import around, random_arm, random_joints, rotation
 
 ARMS = ["pr2", "tiago", "panda", *range(12), *(f"shoulder {i}" for i in range(12))]
@@ -33,14 +33,6 @@ def goal_of(arm, X_AG):
     return goal
 
 
-def samples_at(arm, goal, branch, angles):
-    """Return slack and measure of each angle of the free joint."""
-    angles = np.atleast_1d(angles)
-    slack, measure = np.full(len(angles), np.nan), np.full(len(angles), np.nan)
-    solve_samples(arm, goal, branch, np.cos(angles), np.sin(angles), len(angles), slack, measure)
-    return slack, measure
-
-
 def is_regular(arm, chain, q):
     """Return whether small errors stay small: neither elbow, aim nor wrist is close to straight.
 
@@ -59,7 +51,7 @@ def test_some_branch_returns_the_joints_that_made_the_goal(chain, rng):
         goal = goal_of(arm, link_poses(chain, q)[-1])
         errors = []
         for branch in arm.branches:
-            slack, _ = samples_at(arm, goal, branch, q[free])
+            slack, _ = slack_and_measure(arm, goal, branch, q[free])
             joints = np.empty(7)
             sample_joints(arm, goal, branch, q[free], joints)
             # At a limit the slack is a difference of cosines, off by some 1e-12 at most.
@@ -80,7 +72,7 @@ def test_every_feasible_sample_reaches_the_goal_within_the_limits(chain, rng):
         goal = goal_of(arm, X_AG)
         angles = rng.uniform(-np.pi, np.pi, 60)
         for branch in arm.branches:
-            slack, measure = samples_at(arm, goal, branch, angles)
+            slack, measure = slack_and_measure(arm, goal, branch, angles)
             for angle, value in zip(angles[slack >= 0], measure[slack >= 0], strict=True):
                 q = np.empty(7)
                 sample_joints(arm, goal, branch, angle, q)
@@ -104,7 +96,7 @@ def test_samples_agree_with_the_reference_branch_by_branch(chain, rng):
         for angle in rng.uniform(-np.pi, np.pi, 6):
             expected = solutions(chain, X_AG, angle)
             for branch in arm.branches:
-                slack, _ = samples_at(arm, goal, branch, angle)
+                slack, _ = slack_and_measure(arm, goal, branch, angle)
                 exact = expected[tuple(branch)]
                 # Differences of cosines, each good to some 1e-15, and the same out of reach, where
                 # the search for narrow windows follows them. Where the elbow would be stretched
@@ -133,7 +125,7 @@ def test_slack_is_negative_out_of_reach(chain, rng):
         away = rng.normal(size=3)
         goal = goal_of(arm, (rotation(rng), away / np.linalg.norm(away) * (2 * length + 0.1)))
         for branch in arm.branches:
-            slack, _ = samples_at(arm, goal, branch, rng.uniform(-3, 3, 20))
+            slack, _ = slack_and_measure(arm, goal, branch, rng.uniform(-3, 3, 20))
             assert np.all(slack < 0)
 
 
@@ -146,7 +138,7 @@ def test_the_free_joint_out_of_its_limits_is_infeasible(name, rng):
         goal = goal_of(arm, link_poses(chain, q)[-1])
         outside = np.array([chain.lower[free] - 1e-6, chain.upper[free] + 1e-6, np.pi])
         for branch in arm.branches:
-            slack, _ = samples_at(arm, goal, branch, outside)
+            slack, _ = slack_and_measure(arm, goal, branch, outside)
             assert np.all(slack < 0)
 
 

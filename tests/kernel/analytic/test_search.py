@@ -7,9 +7,10 @@ import pytest
 
 from tcs.kernel.analytic.arcs import elbow_arcs
 from tcs.kernel.analytic.ik import wrist_goal
-from tcs.kernel.analytic.search import find_candidates, new_search
+from tcs.kernel.analytic.scratch import new_search
+from tcs.kernel.analytic.search import find_candidates
 from tcs.kernel.analytic.solver import arm_solver
-from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification import reference_candidates
 from tcs.kernel.verification.reference import free_joint
 from tests.kernel.judge import chain_of
 from tests.kernel.toy import goal_in_base, size_of, toy_grid, toy_scene
@@ -25,8 +26,8 @@ def angles_of_both(chain, X_AG):
     wrist_goal(arm, X_AG[0], X_AG[1], search.goal)
     count, _ = elbow_arcs(arm, search.goal, search.arcs)
     found = find_candidates(arm, search, count)
-    arcs, _ = reference_pairs.elbow_arcs(chain, X_AG)
-    expected = reference_pairs.find_candidates(chain, X_AG, arcs)
+    arcs, _ = reference_candidates.elbow_arcs(chain, X_AG)
+    expected = reference_candidates.find_candidates(chain, X_AG, arcs)
     free = free_joint(chain)
     assert count == len(arcs)
     return np.sort(search.found_angle[:found]), np.sort(

@@ -1,0 +1,295 @@
+"""Free angles between samples of the free joint that all touch something.
+
+A pair of shapes that overlaps deeper than it moves until the next sample overlaps all the way: that
+rules most intervals out. The others are halved until they are ruled out, a free angle is found, or
+nothing moves enough to matter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.ik import sample_joints
+from tcs.kernel.analytic.scratch import (
+    MAX_STACK,
+    NO_PAIR,
+    UNCHECKED_PAIR,
+    Search,
+    add_candidate,
+    fill_samples,
+    measure_feasible,
+    solve,
+    sort_candidates,
+)
+from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
+from tcs.kernel.cache import inner, int_constant
+from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE, closer, move
+from tcs.kernel.contacts import ARM, ENVIRONMENT, NO_CONTACT, Workspace, arm_contact, at_goal
+from tcs.kernel.kinematics import link_poses
+from tcs.kernel.problem import Problem
+
+PATH = 1.25
+"""Longest way of a shape from the nearer end of an interval, over half the distance of the ends: an
+arc of 150 degrees has 1.25."""
+LEAST_MOTION = 1e-4
+"""Motion of the shapes in contact [m] below which an interval is not divided further."""
+MAX_HALVINGS = 4096
+"""Most intervals divided for one goal."""
+END_HALVINGS = 12
+"""Bisections towards the end of a feasible interval: down to FINE_STEP / 7 / 4096, 4e-7 rad."""
+SAME_STRETCH = 1.01
+"""Candidates closer than this many sample spacings have no infeasible sample between them; the
+excess over 1 allows for rounding."""
+TWO = int_constant(2)
+
+
+@inner
+def by_angle(search: Search, found: int) -> None:
+    """Sort the candidates by branch, then by angle."""
+    for n in range(found):
+        # The offset exceeds any angle of the free joint [rad].
+        search.key[n] = search.found_angle[n] + 1e4 * search.found_branch[n]
+    sort_candidates(search, found)
+
+
+@inner
+def are_neighbours(search: Search, m: int, n: int) -> bool:
+    """Return whether no infeasible sample lies between two consecutive candidates."""
+    width = search.found_angle[n] - search.found_angle[m]
+    spacing = max(search.found_step[m], search.found_step[n])
+    return search.found_branch[m] == search.found_branch[n] and width < SAME_STRETCH * spacing
+
+
+@inner
+def add_ends(problem: Problem, search: Search, found: int) -> int:
+    """Append the outermost feasible angle at each end of the feasible intervals.
+
+    Returns:
+        Updated number of candidates.
+    """
+    by_angle(search, found)
+    order, before = search.order, found
+    for rank in range(before):
+        n = order[rank]
+        for side in (-1, 1):
+            if 0 <= rank + side < before:
+                m = order[rank + side]
+                left, right = (m, n) if side < 0 else (n, m)
+                if are_neighbours(search, left, right):
+                    continue
+            found = _add_end(problem, search, n, side, found)
+    return found
+
+
+@inner
+def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) -> int:
+    """Append the end of a feasible interval, on the given side of its outermost candidate n.
+
+    Args:
+        problem: The scene.
+        search: The candidates.
+        n: Index of the candidate.
+        side: -1 towards smaller angles, 1 towards greater ones.
+        found: Number of candidates.
+
+    Returns:
+        Updated number of candidates.
+    """
+    b, angle = search.found_branch[n], search.found_angle[n]
+    inside, outside = 0.0, search.found_step[n]
+    for _ in range(END_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if is_feasible(problem, search, b, angle + side * middle):
+            inside = middle
+        else:
+            outside = middle
+    if inside == 0.0:
+        return found
+    search.angle[0] = angle + side * inside
+    return add_candidate(search, b, 0, inside, found)
+
+
+@inner
+def is_feasible(problem: Problem, search: Search, b: int, angle: float) -> bool:
+    """Return whether all joints keep their limits at an angle on branch b.
+
+    Slack and isotropy become the first entries of `slack` and `measure`.
+    """
+    fill_samples(search, angle, angle, TWO)
+    solve(problem.arm, search, b, TWO)
+    measure_feasible(problem.arm, search, TWO)
+    return search.slack[0] >= 0.0
+
+
+@inner
+def free_between(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, found: int
+) -> int:
+    """Append free angles that lie between candidates or at the ends of feasible stretches.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        search: All its candidates touch something; those checked hold joints and pair in contact.
+        found: Number of candidates.
+
+    Returns:
+        Updated number of candidates; those appended at the end, from `search.free_from` on,
+        are free.
+    """
+    found = add_ends(problem, search, found)
+    search.free_from[0] = found
+    by_angle(search, found)
+    count, halvings = found, 0
+    for rank in range(count):
+        n = search.order[rank]
+        if search.found_pair[n, 0] == UNCHECKED_PAIR and _is_free_at(
+            problem, work, body_A, search, search.found_branch[n], search.found_angle[n]
+        ):
+            search.angle[0], search.measure[0] = search.found_angle[n], search.found_measure[n]
+            found = add_candidate(search, search.found_branch[n], 0, search.found_step[n], found)
+            search.found_pair[n, 0] = NO_PAIR
+        elif search.found_pair[n, 0] == UNCHECKED_PAIR:
+            _keep(search.q, work.last, search.found_q[n], search.found_pair[n])
+        if rank == 0 or not are_neighbours(search, search.order[rank - 1], n):
+            continue
+        m, b = search.order[rank - 1], search.found_branch[n]
+        ends, end_q, end_pair = search.ends_angle, search.ends_q, search.ends_pair
+        ends[0, 0], ends[0, 1] = search.found_angle[m], search.found_angle[n]
+        _keep(search.found_q[m], search.found_pair[m], end_q[0, 0], end_pair[0, 0])
+        _keep(search.found_q[n], search.found_pair[n], end_q[0, 1], end_pair[0, 1])
+        top = 1
+        while top and halvings < MAX_HALVINGS:
+            top -= 1
+            if _stays_in_contact(problem, work, body_A, search, top):
+                continue
+            halvings += 1
+            first, last = ends[top, 0], ends[top, 1]
+            middle = 0.5 * (first + last)
+            if not first < middle < last or top + 2 > MAX_STACK:
+                continue
+            work.last[:] = end_pair[top, 0]
+            if _is_free_at(problem, work, body_A, search, b, middle):
+                search.angle[0] = middle
+                if is_feasible(problem, search, b, middle):
+                    search.angle[0] = middle
+                    found = add_candidate(search, b, 0, 0.5 * (last - first), found)
+                    break
+                work.last[0] = NO_PAIR
+            # The right half goes on top of the left one, which takes the place of the whole.
+            ends[top + 1, 0], ends[top + 1, 1] = middle, last
+            _keep(search.q, work.last, end_q[top + 1, 0], end_pair[top + 1, 0])
+            _keep(end_q[top, 1], end_pair[top, 1], end_q[top + 1, 1], end_pair[top + 1, 1])
+            ends[top, 1] = middle
+            _keep(search.q, work.last, end_q[top, 1], end_pair[top, 1])
+            top += 2
+    return found
+
+
+@inner
+def _keep(q: FloatArray, pair: IntArray, to_q: FloatArray, to_pair: IntArray) -> None:
+    """Copy joints and the pair in contact there."""
+    for k in range(7):
+        to_q[k] = q[k]
+    for k in range(3):
+        to_pair[k] = pair[k]
+
+
+@inner
+def _is_free_at(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, b: int, angle: float
+) -> bool:
+    """Return whether nothing touches at an angle on branch b; fills `q`, and `work.last` if not."""
+    sample_joints(problem.arm, search.goal, problem.arm.branches[b], angle, search.q)
+    if arm_contact(problem, work, body_A, search.q) != NO_CONTACT:
+        return False
+    if at_goal(problem, work):
+        return True
+    work.last[0] = NO_PAIR
+    return False
+
+
+@inner
+def _stays_in_contact(
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, top: int
+) -> bool:
+    """Return whether the pairs in contact at the ends of an interval keep in contact between them.
+
+    True also if they move too little for a free angle between the ends to matter.
+    """
+    q, pair = search.ends_q[top], search.ends_pair[top]
+    if pair[0, 0] == NO_PAIR or pair[1, 0] == NO_PAIR:
+        return pair[0, 0] == pair[1, 0]
+    link_poses(problem.chain_R, problem.chain_p, q[0], search.link_R, search.link_p)
+    link_poses(problem.chain_R, problem.chain_p, q[1], work.link_R, work.link_p)
+    motion = _motion(problem, work, search, pair[0])
+    other = _motion(problem, work, search, pair[1])
+    if max(motion, other) < LEAST_MOTION:
+        return True
+    return _touches(problem, search.link_R, search.link_p, work, body_A, pair[0], motion) and (
+        _touches(problem, work.link_R, work.link_p, work, body_A, pair[1], other)
+    )
+
+
+@inner
+def _motion(problem: Problem, work: Workspace, search: Search, pair: IntArray) -> float:
+    """Return how far the shapes of a pair move between two postures [m]."""
+    total = 0.0
+    for side in range(1, 3):
+        if side == 2 and pair[0] != ARM:
+            break
+        i = pair[side]
+        frame, rows = problem.link_frame[i], search.moved
+        move(search.link_R[frame], search.link_p[frame], problem.links, i, rows, 0)
+        move(work.link_R[frame], work.link_p[frame], problem.links, i, rows, 1)
+        total += np.sqrt(_square(rows, CENTRE, 1))
+        shape = int(rows[0, TYPE])
+        if shape == CAPSULE:
+            total += rows[0, SIZE + 1] * np.sqrt(_square(rows, ROTATION + 2, 3))
+        elif shape == BOX:
+            for k in range(3):
+                total += rows[0, SIZE + k] * np.sqrt(_square(rows, ROTATION + k, 3))
+    return total
+
+
+@inner
+def _square(rows: FloatArray, first: int, stride: int) -> float:
+    """Return the squared distance of two vectors in rows 0 and 1."""
+    x = rows[1, first] - rows[0, first]
+    y = rows[1, first + stride] - rows[0, first + stride]
+    z = rows[1, first + 2 * stride] - rows[0, first + 2 * stride]
+    return x * x + y * y + z * z
+
+
+@inner
+def _touches(
+    problem: Problem,
+    link_R: FloatArray,
+    link_p: FloatArray,
+    work: Workspace,
+    body_A: FloatArray,
+    pair: IntArray,
+    motion: float,
+) -> bool:
+    """Return whether a pair would be in contact even if its shapes came apart by half a motion."""
+    partner, i, j = pair[0], pair[1], pair[2]
+    frame = problem.link_frame[i]
+    move(link_R[frame], link_p[frame], problem.links, i, work.arm, i)
+    if partner == ENVIRONMENT:
+        others, gap = work.environment_A, problem.gap_environment[i, j]
+    elif partner == ARM:
+        frame = problem.link_frame[j]
+        move(link_R[frame], link_p[frame], problem.links, j, work.arm, j)
+        others, gap = work.arm, problem.gap_arm[i, j]
+    else:
+        others, gap = body_A, problem.gap_body[i, j]
+    gap -= 0.5 * PATH * motion
+    # Cores of spheres and capsules that overlap tell no depth: only their radii can be used up.
+    radii = 0.0
+    if work.arm[i, TYPE] != BOX:
+        radii += work.arm[i, SIZE]
+    if others[j, TYPE] != BOX:
+        radii += others[j, SIZE]
+    both_boxes = work.arm[i, TYPE] == BOX and others[j, TYPE] == BOX
+    return (both_boxes or radii + gap > 0.0) and closer(work.arm, i, others, j, gap)

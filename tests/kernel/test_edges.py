@@ -1,0 +1,99 @@
+"""Goals that are reachable by construction, next to singular postures and in narrow windows.
+
+benchmarks/edges.py measures the same on hundreds of goals of each type.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel.scores import REACHED, TOO_FAR
+from tcs.kernel.verification import reference_pairs
+from tcs.kernel.verification.constructed import (
+    ELBOW,
+    SHOULDER,
+    WRIST,
+    between_contacts,
+    between_limits,
+    near_singular_goals,
+    singular_angles,
+)
+from tcs.kernel.verification.reference import isotropy, jacobian
+from tcs.placement.scoring import load_job
+
+ROBOTS = ["pr2", "tiago", "iiwa7", "panda"]
+JOINTS = {"shoulder": SHOULDER, "elbow": ELBOW, "wrist": WRIST}
+AWAY = [0.1, 0.06, 0.01, 0.003, 1e-3]
+SAMPLE = 6
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def scene(request):
+    """Arrays of shaving in the wheelchair with one robot."""
+    job = load_job("shaving", "wheelchair", request.param)
+    lowered = job.lowered(job.scene())
+    return lowered.arrays, lowered.grid
+
+
+def missed(made):
+    """Return which goals are not reached, after a check that each posture reaches its goal."""
+    for g, q in enumerate(made.postures):
+        assert reference_pairs.confirms(made.scene, made.grid, made.configuration, g, q)
+    return np.flatnonzero(made.scores().reason[0] != REACHED).tolist()
+
+
+@pytest.mark.parametrize("away", AWAY)
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+def test_goals_of_nearly_singular_postures_are_reached(scene, joint, away):
+    rng = np.random.default_rng([joint, round(1e4 * away)])
+    made = near_singular_goals(rng, *scene, joint, away, SAMPLE)
+    if made is None:
+        lower, upper = scene[0].chain.lower[joint], scene[0].chain.upper[joint]
+        # The limits keep the joint from being that near to singular.
+        nearest = np.add.outer(singular_angles(scene[0].chain, joint), [away, -away])
+        assert not np.any((nearest >= lower) & (nearest <= upper))
+        return
+    assert missed(made) == []
+
+
+@pytest.mark.parametrize("width", [0.01, 0.003, 0.001])
+def test_goals_in_windows_between_limits_are_reached(scene, width):
+    check_windows(between_limits, scene, width)
+
+
+# Few tries succeed: the link must bend round the sphere fast enough to leave it a clear distance.
+@pytest.mark.parametrize("scene", ["tiago"], indirect=True)
+@pytest.mark.parametrize("width", [0.01, 0.003])
+def test_goals_in_windows_that_one_pair_leaves_are_reached(scene, width):
+    check_windows(between_contacts, scene, width)
+
+
+def check_windows(make, scene, width):
+    rng = np.random.default_rng(round(1e4 * width))
+    tries = (make(rng, *scene, width) for _ in range(120))
+    found = [made for made in tries if made is not None][:4]
+    assert found
+    assert [missed(made) for made in found] == [[]] * len(found)
+
+
+def test_the_stretched_arm_is_not_too_far():
+    job = load_job("shaving", "wheelchair", "iiwa7")
+    lowered = job.lowered(job.scene())
+    rng = np.random.default_rng(0)
+    made = near_singular_goals(rng, lowered.arrays, lowered.grid, ELBOW, 0.0, 40)
+    reasons = made.scores().reason[0]
+    # Rounding puts every other goal beyond what the arm spans, by 1e-16.
+    assert TOO_FAR not in reasons
+    assert np.all(reasons == REACHED)
+
+
+def test_the_measure_next_to_a_straight_wrist_is_that_of_the_posture_or_better(scene):
+    rng = np.random.default_rng(5)
+    made = near_singular_goals(rng, *scene, WRIST, 0.003, 12)
+    if made is None:
+        return
+    scores, chain = made.scores(), made.scene.chain
+    for g, q in enumerate(made.postures):
+        # The posture is one of many that reach the goal; 1e-3 is what sampling may lose.
+        assert scores.dexterity[0, g] >= isotropy(jacobian(chain, q)) - 1e-3
