@@ -51,8 +51,9 @@ FAR = 0.15
 """Motion of a joint between two feasible samples [rad] from which on the interval is divided:
 contacts and measure change with the joints, not with the free joint alone."""
 FAR_ENDS = 0.5
-"""The same where only one sample is feasible and the goal is reached already: the samples at the
-ends of windows suffice up to here."""
+"""The same where the goal is reached already, for intervals of the search and for those with one
+infeasible end: up to here, refinement of the best sample and the samples at the ends of windows
+suffice."""
 SLOPE = 0.5
 """Change of isotropy over the motion of the joint that moves farthest [1/rad], from above: where
 the goal is reached already, intervals that cannot hold a better solution are left out."""
@@ -207,7 +208,10 @@ def divide_intervals(arm: ArmSolver, search: Search, found: int, isotropy: float
     divisions = 0
     for k in range(search.interval_count[0]):
         interval = search.intervals[k]
-        if isotropy >= 0.0 and not _may_improve(interval[3], interval[4], interval[5], isotropy):
+        if isotropy >= 0.0 and (
+            interval[3] <= FAR_ENDS
+            or not _may_improve(interval[3], interval[4], interval[5], isotropy)
+        ):
             continue
         b = int(interval[2])
         stack[0, 0], stack[0, 1] = interval[0], interval[1]
