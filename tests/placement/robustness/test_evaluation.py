@@ -181,5 +181,5 @@ def test_a_table_without_candidates_is_refused(bed_trials):
         none.file,
         tables=(tcs.placement.store.StateTables(empty, lambda: None), none.file.tables[1]),
     )
-    with pytest.raises(SelectionError, match="no goal is reached"):
+    with pytest.raises(SelectionError, match="no initial configuration reaches a goal"):
         evaluate(dataclasses.replace(none, file=file), samples=1)

@@ -118,7 +118,7 @@ def test_observed_frames_select_the_shift(file, frames, here, index, error):
         (
             {"frames": {"head": (0.3, 0.3, 0.7)}},
             SelectionError,
-            "are 0.20 m from where",
+            "are 0.20 m from their scored positions",
         ),
         ({"frames": {"head": (0.3, 0.3)}}, SelectionError, "three finite numbers"),
         (
