@@ -42,7 +42,7 @@ def test_a_file_of_another_row_is_refused(tmp_path):
     save_scores(scores / "shaving-bed-pr2.tcs", score_file())
     done = run("--rows", "shaving/bed", cwd=tmp_path)
     assert done.returncode == 1
-    assert "is of environment 'wheelchair', not 'bed'" in done.stderr
+    assert "has environment 'wheelchair', not 'bed'" in done.stderr
     assert done.stderr.count("\n") == 1
     assert list((tmp_path / "out" / "robustness").iterdir()) == []
 

@@ -76,5 +76,5 @@ def test_points_of_a_prediction_are_those_it_ranks(study):
 def test_a_file_of_another_row_is_refused():
     path, file = Path("feeding-wheelchair-pr2.tcs"), score_file()
     check_row(path, file, "shaving", "wheelchair", "pr2")
-    with pytest.raises(StoreMismatchError, match="is of task 'shaving', not 'feeding'"):
+    with pytest.raises(StoreMismatchError, match="has task 'shaving', not 'feeding'"):
         check_row(path, file, "feeding", "wheelchair", "pr2")

@@ -123,5 +123,5 @@ def test_a_walled_position_is_unreachable():
     lattice = lattice_of(free)
     distances = distances_over(lattice)
     assert distances.from_position(0.0, 0.0)[7 * 3 + 3] == math.inf
-    with pytest.raises(SelectionError, match=r"base at \(-0.75, 2.50\) m is where"):
+    with pytest.raises(SelectionError, match=r"collision at \(-0.75, 2.50\) m"):
         distances.from_position(-0.75, 2.5)
