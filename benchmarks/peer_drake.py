@@ -169,7 +169,7 @@ class DrakeIk:
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
         arrays = lowered.arrays
         self._torso_offsets = arrays.arm_base_p - arrays.arm_base_p[0]
-        self._margin = arrays.margin
+        self._margin = max(arrays.margin, arrays.self_margin)
         self._starts = start_limits(arrays.chain.lower, arrays.chain.upper)
         self._solver = SnoptSolver()
 

@@ -166,20 +166,21 @@ class Verdict:
     at_goal: bool
     """The tool is at its goal and every joint within its limits."""
     free: bool
-    """And nothing is closer than the contact margin."""
+    """And nothing is closer than the larger of contact margin and self margin."""
 
 
 class Judge:
     """Drake's verdict on answers, with the whole robot in the whole environment.
 
-    Peers know one distance that everything has to keep, the contact margin; the paddings of some
+    Peers know one distance that everything has to keep, the larger margin; the paddings of some
     of the person's shapes, which our kernel respects as well, are not required of them.
     """
 
     def __init__(self, bench: Bench) -> None:
         """Judge answers on the scene of `bench`."""
         self._scene = bench.scene
-        self._margin = bench.job.spec.environment.contact_margin
+        spec = bench.job.spec
+        self._margin = max(spec.environment.contact_margin, spec.robot.self_margin)
         self._lower, self._upper = bench.scene.arm_limits
 
     def check(self, pair: Pair, q: NDArray[np.float64]) -> Verdict:

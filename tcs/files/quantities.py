@@ -88,7 +88,7 @@ SIZE = Quantity(
 )
 CLEARANCE = Quantity(
     *("clearance", "m", 0.0, 1.0),
-    "`contact_margin`, `padding`",
+    "`contact_margin`, `self_margin`, `padding`",
     "a metre of padding is farther than most arms reach",
 )
 DEVIATION = Quantity(

@@ -61,7 +61,8 @@ class Shapes(NamedTuple):
 class SceneArrays(NamedTuple):
     """Everything needed to score any initial configuration of one scene against its goals.
 
-    Shapes i and j collide when they come closer than `max(margin, pad_i + pad_j)`.
+    Shapes i and j collide when they come closer than `max(margin, pad_i + pad_j)`; two shapes of
+    the robot, `max(self_margin, pad_i + pad_j)`.
     """
 
     chain: Chain
@@ -84,7 +85,9 @@ class SceneArrays(NamedTuple):
     body_vs_environment: BoolArray
     """Whether each pair is checked, shape (n_body, n_environment)."""
     margin: float
-    """Least clearance [m]: shapes closer than this collide."""
+    """Least clearance [m] between a shape of the robot and one of the environment."""
+    self_margin: float
+    """Least clearance [m] between two shapes of the robot."""
     goal_R: FloatArray
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray

@@ -113,8 +113,8 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     )
     frame = scene.arm.frame[order].astype(np.int64)
     pads = scene.arm.pad[order], scene.body.pad, scene.environment.pad
-    margin = scene.margin
-    widest = max(margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
+    margin, self_margin = scene.margin, scene.self_margin
+    widest = max(margin, self_margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
     links = pack(scene.arm, order)[0]
     return Problem(
         measure=dexterity(measure),
@@ -137,8 +137,8 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         environment_bodies=_count(scene.environment),
         robot_bodies=max(_count(scene.arm), _count(scene.body)),
         gap_environment=_gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin),
-        gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], margin),
-        gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], margin),
+        gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin),
+        gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
         gap_base=_gaps(scene.body_vs_environment, pads[1], pads[2], margin),
         widest_gap=widest,
         arm_radius=_arm_radius(scene.chain, links, frame) + widest,

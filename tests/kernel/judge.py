@@ -30,6 +30,7 @@ def is_true(scene, grid, h, g, q):
     """Return whether joints q are at the goal, within limits and free by the reference."""
     eased = scene._replace(
         margin=scene.margin - ROUNDING,
+        self_margin=scene.self_margin - ROUNDING,
         environment=scene.environment._replace(
             pad=np.maximum(scene.environment.pad - ROUNDING, 0.0)
         ),

@@ -7,9 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tcs.kernel.contacts import NO_CONTACT, new_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import GRIPPER_BLOCKED_BY_ROBOT, REACHED
-from tcs.kernel.verification.constructed import score_one
+from tcs.kernel.verification.constructed import random_posture, score_one, with_goals
+from tcs.kernel.verification.free_postures import posture_contact
+from tcs.model.scene import Scene, SceneSpec, lower
 from tcs.placement.scoring import sweep
 from tcs.placement.tables import Reason
 from tests.kernel.judge import compare, is_true, stratified
@@ -78,6 +81,35 @@ def test_reached_pairs_are_true_for_the_reference(real, rng):
     for h, g in reached[rng.choice(len(reached), 4, replace=False)]:
         q = np.asarray(scores.joints_of(int(h), int(g)))
         assert is_true(small.arrays, small.grid, h, g, q)
+
+
+@pytest.mark.parametrize(("own", "outer"), [(0.0016, 0.0), (0.0003, 0.05)], ids=str)
+def test_the_kernel_agrees_with_drake_at_margins_of_its_own(spec, shaving, full_grid, own, outer):
+    scene = Scene(
+        SceneSpec(
+            spec.robot.model_copy(update={"self_margin": own}),
+            spec.environment.model_copy(update={"contact_margin": outer}),
+        )
+    )
+    # One configuration, beside the chair.
+    where = {"base_x": 0.6, "base_y": -0.9, "base_yaw": 110.0, "torso": 0.3}
+    one = full_grid.overridden({k: {"start": v, "count": 1} for k, v in where.items()})
+    lowered = lower(scene, shaving, one)
+    arrays, grid = lowered.arrays, lowered.grid
+    rng = np.random.default_rng(0)
+    postures = np.array([random_posture(rng, arrays.chain) for _ in range(300)])
+    problem = build_problem(with_goals(arrays, grid, 0, postures), grid)
+    work = new_workspace(problem)
+    scene.place_base(where["base_x"], where["base_y"], np.deg2rad(where["base_yaw"]))
+    scene.set_torso(where["torso"])
+    found = []
+    for g, q in enumerate(postures):
+        scene.set_arm(q)
+        free = posture_contact(problem, work, 0, g, q) == NO_CONTACT
+        found.append((free, not scene.violations()))
+    kernel, drake = np.array(found).T
+    assert 50 < kernel.sum() < 280
+    np.testing.assert_array_equal(kernel, drake)
 
 
 @pytest.mark.parametrize(("h", "g"), [(54470, 6), (54470, 7), (55934, 6)], ids=str)

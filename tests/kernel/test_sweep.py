@@ -306,8 +306,10 @@ def test_nothing_the_arm_can_touch_is_left_off_the_list(rng):
 
 def test_a_margin_of_zero_still_detects_overlapping_shapes(lowered):
     scene, grid = toy_scene(lowered.arrays.chain, 2, obstacles=8), toy_grid()
-    tight, loose = scores_of(scene._replace(margin=1e-9), grid), scores_of(scene, grid)
-    none = scores_of(scene._replace(margin=0.0), grid)
+    loose = scores_of(scene, grid)
+    tight, none = (
+        scores_of(scene._replace(margin=margin, self_margin=margin), grid) for margin in (1e-9, 0.0)
+    )
     np.testing.assert_array_equal(none.reason, tight.reason)
     assert np.sum(none.reason == BODY_BLOCKED) > 0.9 * np.sum(loose.reason == BODY_BLOCKED)
 

@@ -116,6 +116,7 @@ def toy_scene(chain, seed, *, obstacles=6, goals=5, states=2):
         arm_vs_environment=np.ones((len(arm.type), len(environment.type)), bool),
         body_vs_environment=np.repeat(~floor[None], len(body.type), axis=0),
         margin=0.001,
+        self_margin=0.001,
         goal_R=np.repeat(np.array([R for R, _ in targets])[None], states, axis=0),
         goal_p=np.array([[p + 0.05 * s for _, p in targets] for s in range(states)]),
     )

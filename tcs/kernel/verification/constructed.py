@@ -115,7 +115,9 @@ def with_goals(scene: SceneArrays, grid: GridArrays, h: int, postures: FloatArra
 
 def free_postures(scene: SceneArrays, grid: GridArrays, h: int, postures: FloatArray) -> FloatArray:
     """Return those postures at which arm and gripper touch nothing, MARGIN_LEFT to spare."""
-    eased = scene._replace(margin=scene.margin + MARGIN_LEFT)
+    eased = scene._replace(
+        margin=scene.margin + MARGIN_LEFT, self_margin=scene.self_margin + MARGIN_LEFT
+    )
     problem = build_problem(with_goals(eased, grid, h, postures), grid)
     work = new_workspace(problem)
     free = [posture_contact(problem, work, h, g, q) == NO_CONTACT for g, q in enumerate(postures)]

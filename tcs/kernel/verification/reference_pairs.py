@@ -74,9 +74,15 @@ class PlacedScene:
     X_AG: Pose
     clearance: float = math.inf
 
-    def touches(self, a: Placed, b: Placed) -> bool:
-        """Return whether two shapes collide, and update `clearance`."""
-        required = max(self.scene.margin, a.pad + b.pad)
+    def touches(self, a: Placed, b: Placed, margin: float) -> bool:
+        """Return whether two shapes collide, and update `clearance`.
+
+        Args:
+            a: One shape.
+            b: The other.
+            margin: Distance that they must keep without paddings [m].
+        """
+        required = max(margin, a.pad + b.pad)
         # Bounding spheres well apart make the exact distance unnecessary.
         if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + 0.01:
             return False
@@ -95,9 +101,10 @@ class PlacedScene:
         X_A7 = compose(self.X_AG, inverse((self.scene.chain.R[7], self.scene.chain.p[7])))
         others = self.body if with_body else self.environment
         checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_environment
+        margin = self.scene.self_margin if with_body else self.scene.margin
         shapes = shapes_of(self.scene.arm, 0)
         return any(
-            self.touches(shapes[i].moved(X_A7), others[j])
+            self.touches(shapes[i].moved(X_A7), others[j], margin)
             for i in range(len(shapes))
             if self.scene.arm.frame[i] == 7
             for j in range(len(others))
@@ -111,23 +118,23 @@ class PlacedScene:
         """
         arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
         pairs = [
-            (arm[i], other)
+            (arm[i], other, margin)
             for i in range(len(arm))
             if frame[i] < 7
-            for others, checked in (
-                (self.environment, scene.arm_vs_environment),
-                (self.body, scene.arm_vs_body),
+            for others, checked, margin in (
+                (self.environment, scene.arm_vs_environment, scene.margin),
+                (self.body, scene.arm_vs_body, scene.self_margin),
             )
             for j, other in enumerate(others)
             if checked[i, j]
         ]
         pairs += [
-            (arm[i], arm[j])
+            (arm[i], arm[j], scene.self_margin)
             for i in range(len(arm))
             for j in range(i)
             if scene.arm_vs_arm[i, j] and min(frame[i], frame[j]) < 7
         ]
-        return any(self.touches(a, b) for a, b in pairs)
+        return any(self.touches(a, b, margin) for a, b, margin in pairs)
 
 
 def placed_scene(
@@ -153,7 +160,7 @@ def placed_scene(
         X_AG=compose(X_AW, (scene.goal_R[state, goal], scene.goal_p[state, goal])),
     )
     blocked = any(
-        placed.touches(placed.body[i], placed.environment[j])
+        placed.touches(placed.body[i], placed.environment[j], scene.margin)
         for i in range(len(placed.body))
         for j in range(len(placed.environment))
         if scene.body_vs_environment[i, j]

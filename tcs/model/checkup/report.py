@@ -66,7 +66,7 @@ class RobotCheck:
         limits: Limits of the joints of the arm, and of the torso last, if there is one.
         bodies: Enclosure of each body with a surface.
         rest: Rest posture of the arm, by joint [rad], in which self-collision was checked.
-        margin: Distance below which bodies are in contact [m].
+        margin: Distance below which bodies of the robot are in contact [m].
         lowest: Height above the root of the lowest point of any surface, the arm at rest [m].
         contacts: Pairs that scoring checks and that are in contact at rest.
         trip: Result of the IK round trip.
@@ -221,7 +221,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         limits=_limits(robot),
         bodies=enclosure(robot),
         rest=rest,
-        margin=EMPTY_ENVIRONMENT.contact_margin,
+        margin=robot.self_margin,
         lowest=_lowest(robot, positions),
         contacts=contacts,
         trip=round_trip(scene, arm.solver, samples, seed),

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tcs.errors import RobotError, UnknownNameError
-from tcs.files.documents import Document, Entries, JointPosition, Placed, Size, checked
+from tcs.files.documents import Clearance, Document, Entries, JointPosition, Placed, Size, checked
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
@@ -88,6 +88,8 @@ class RobotFile(Document):
     """Bodies that may touch the floor."""
     primitives: str
     """Path of the CSV file of the collision primitives."""
+    self_margin: Clearance = 0.001
+    """Least clearance between two bodies of the robot: closer ones collide [m]."""
     disabled_groups: tuple[DisabledGroup, ...] = ()
     source: str
 

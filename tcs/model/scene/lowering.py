@@ -82,6 +82,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         arm_vs_environment=_checked(rule, arm, environment_parts),
         body_vs_environment=_checked(rule, body, environment_parts),
         margin=scene.spec.environment.contact_margin,
+        self_margin=scene.spec.robot.self_margin,
         goal_R=_rotations(goal_matrices),
         goal_p=_origins(goal_matrices),
     )

@@ -59,9 +59,14 @@ class Scene:
         self._arm_positions = np.array([joint.position_start() for joint in joints])
         self._arm_velocities = np.array([joint.velocity_start() for joint in joints])
         self._pads: dict[str, float] = {}
+        self._of_environment: set[str] = set()
+        self._self_margin = spec.robot.self_margin
+        self._contact_margin = spec.environment.contact_margin
         for part in self.built.parts:
             # The shapes of one link share its padding.
             self._pads[part.name] = max(part.pad, self._pads.get(part.name, 0.0))
+            if part.group is Group.ENVIRONMENT:
+                self._of_environment.add(part.name)
         self.set_torso(0.0)
 
     @property
@@ -202,7 +207,8 @@ class Scene:
     def required_clearance(self, first: str, second: str) -> float:
         """Return the distance that two bodies must keep [m].
 
-        It is the contact margin, or the sum of the paddings of the two bodies if that is larger.
+        It is the robot's self margin if both are bodies of the robot, else the environment's
+        contact margin; or the sum of the paddings of the two bodies if that is larger.
 
         Raises:
             UnknownNameError: If there is no collision shape of a name.
@@ -211,12 +217,14 @@ class Scene:
             if name not in self._pads:
                 raise UnknownNameError("body", name, self._pads)
         paddings = self._pads[first] + self._pads[second]
-        return max(self.spec.environment.contact_margin, paddings)
+        is_self = self._of_environment.isdisjoint((first, second))
+        margin = self._self_margin if is_self else self._contact_margin
+        return max(margin, paddings)
 
     def violations(self) -> tuple[Contact, ...]:
         """Return the checked pairs of bodies that are closer than required, closest first."""
         largest = sorted(self._pads.values())[-2:]
-        farthest = max(self.spec.environment.contact_margin, sum(largest))
+        farthest = max(self._self_margin, self._contact_margin, sum(largest))
         return tuple(
             contact
             for contact in self.clearances(farthest)

@@ -148,6 +148,7 @@ def test_names_and_paddings_belong_to_the_right_shapes(scene, lowered, wheelchai
     assert padding["floor"] == 0.0
     assert not arrays.arm.pad.any()
     assert arrays.margin == wheelchair.contact_margin
+    assert arrays.self_margin == 0.001
     # A user reads these: parts of the chair one by one, parts of the body as a whole.
     assert "wheelchair::rear wheel left" in lowered.environment_bodies
     assert sum(name.startswith("person::") for name in lowered.environment_bodies) == 17

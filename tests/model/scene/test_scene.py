@@ -161,6 +161,14 @@ def test_required_clearance_is_margin_or_padding(scene):
         scene.required_clearance("l_forearm_link", "person::head_centre")
 
 
+def test_each_margin_applies_to_its_pairs_alone(spec):
+    environment = spec.environment.model_copy(update={"contact_margin": 0.02})
+    wide = Scene(SceneSpec(spec.robot.model_copy(update={"self_margin": 0.03}), environment))
+    assert wide.required_clearance("l_forearm_link", "r_forearm_link") == 0.03
+    assert wide.required_clearance("l_forearm_link", "wheelchair::seat") == 0.02
+    assert wide.required_clearance("base_link", "person::head_center") == 0.02
+
+
 def test_violations_start_at_the_required_clearance(scene):
     # Move the base towards the chair from the front, up to the first violation.
     scene.set_arm(REACHING)

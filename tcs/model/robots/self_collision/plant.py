@@ -35,9 +35,6 @@ from tcs.model.robots.urdf.surfaces import surface_geometries, welded_top
 FloatArray = NDArray[np.float64]
 BodyPair = tuple[str, str]
 
-MARGIN = 0.001
-"""Primitives closer than this [m] touch; the default contact margin of an environment."""
-
 
 class SelfCollision:
     """A Drake plant of a robot alone that finds the pairs of bodies in contact.
@@ -67,7 +64,7 @@ class SelfCollision:
         for primitive in robot.load_primitives():
             # Extra bodies have no mesh, so their primitives are used.
             if not hulls or primitive.body not in model.links:
-                add.primitive(primitive if hulls else primitive.shrunk(-MARGIN / 2))
+                add.primitive(primitive if hulls else primitive.shrunk(-robot.self_margin / 2))
         plant.Finalize()
         self._bodies = add.bodies
         _compare_unwelded(scene_graph.collision_filter_manager(), self._bodies, robot)
@@ -83,7 +80,8 @@ class SelfCollision:
     def touching(self, positions: Mapping[str, float]) -> frozenset[BodyPair]:
         """Return the pairs of bodies that touch, each sorted by name.
 
-        Primitives touch when they come closer than `MARGIN`, hulls when they overlap.
+        Primitives touch when they come closer than the self margin of the robot, hulls when they
+        overlap.
 
         Args:
             positions: Positions by joint [rad or m]; a joint left out keeps its position.
