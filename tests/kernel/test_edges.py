@@ -5,6 +5,8 @@ benchmarks/edges.py measures the same on hundreds of goals of each type.
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -24,8 +26,15 @@ from tcs.placement.scoring import load_job
 
 ROBOTS = ["pr2", "tiago", "iiwa7", "panda"]
 JOINTS = {"shoulder": SHOULDER, "elbow": ELBOW, "wrist": WRIST}
-AWAY = [0.1, 0.06, 0.01, 0.003, 1e-3]
-SAMPLE = 6
+SAMPLE = 3
+
+
+def some_of(values, *fast):
+    """Return parameters of which those not in `fast` are slow."""
+    return [v if v in fast else pytest.param(v, marks=pytest.mark.slow) for v in values]
+
+
+AWAY = some_of([0.1, 0.06, 0.01, 0.003, 1e-3], 0.1, 1e-3)
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -57,14 +66,14 @@ def test_goals_of_nearly_singular_postures_are_reached(scene, joint, away):
     assert missed(made) == []
 
 
-@pytest.mark.parametrize("width", [0.01, 0.003, 0.001])
+@pytest.mark.parametrize("width", some_of([0.01, 0.003, 0.001], 0.003))
 def test_goals_in_windows_between_limits_are_reached(scene, width):
     check_windows(between_limits, scene, width)
 
 
 # Few tries succeed: the link must bend round the sphere fast enough to leave it a clear distance.
 @pytest.mark.parametrize("scene", ["tiago"], indirect=True)
-@pytest.mark.parametrize("width", [0.01, 0.003])
+@pytest.mark.parametrize("width", some_of([0.01, 0.003], 0.01))
 def test_goals_in_windows_that_one_pair_leaves_are_reached(scene, width):
     check_windows(between_contacts, scene, width)
 
@@ -72,7 +81,7 @@ def test_goals_in_windows_that_one_pair_leaves_are_reached(scene, width):
 def check_windows(make, scene, width):
     rng = np.random.default_rng(round(1e4 * width))
     tries = (make(rng, *scene, width) for _ in range(120))
-    found = [made for made in tries if made is not None][:4]
+    found = list(islice((made for made in tries if made is not None), 2))
     assert found
     assert [missed(made) for made in found] == [[]] * len(found)
 

@@ -354,27 +354,35 @@ def _apart(a: Placed, b: Placed) -> bool:
 
 def _edges_to_box(a: Placed, b: Placed) -> float:
     """Return the least distance from the edges of core a to core b [m]."""
-    least = math.inf
+    starts, ways = [], []
     for along in range(3):
         for signs in product((-1.0, 1.0), repeat=2):
             corner = np.insert(np.array(signs), along, -1.0) * a.half
-            start = b.R.T @ (a.R @ corner + a.p - b.p)
-            way = b.R.T @ (a.R[:, along] * 2 * a.half[along])
-            least = min(least, _segment_to_box(start, way, b.half))
-    return least
+            starts.append(b.R.T @ (a.R @ corner + a.p - b.p))
+            ways.append(b.R.T @ (a.R[:, along] * 2 * a.half[along]))
+    return _segments_to_box(np.array(starts), np.array(ways), b.half)
 
 
-def _segment_to_box(start: FloatArray, way: FloatArray, half: FloatArray) -> float:
-    """Return the least distance from start + t way, t in [0, 1], to the box [m].
+def _segments_to_box(start: FloatArray, way: FloatArray, half: FloatArray) -> float:
+    """Return the least distance from the segments start + t way, t in [0, 1], to the box [m].
 
-    The distance is convex in t: its minimum is bracketed by bisection on the sign of the slope.
+    The distance of each is convex in t: its minimum is bracketed by bisection on the sign of the
+    slope.
+
+    Args:
+        start: One end of each segment [m], shape (n, 3).
+        way: From there to the other end [m], shape (n, 3).
+        half: Half sizes of the box [m], shape (3,).
     """
-    low, high = 0.0, 1.0
+
+    def beyond(t: FloatArray) -> FloatArray:
+        point = start + t[:, None] * way
+        return point - np.minimum(np.maximum(point, -half), half)
+
+    low, high = np.zeros(len(start)), np.ones(len(start))
     for _ in range(60):
         t = (low + high) / 2
-        beyond = (point := start + t * way) - np.clip(point, -half, half)
-        low, high = (t, high) if beyond @ way < 0 else (low, t)
-    return min(
-        float(np.linalg.norm((point := start + t * way) - np.clip(point, -half, half)))
-        for t in (0.0, (low + high) / 2, 1.0)
-    )
+        nearing = np.sum(beyond(t) * way, axis=1) < 0
+        low, high = np.where(nearing, t, low), np.where(nearing, high, t)
+    tried = (np.zeros(len(start)), (low + high) / 2, np.ones(len(start)))
+    return min(float(np.linalg.norm(beyond(t), axis=1).min()) for t in tried)
