@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,9 +16,12 @@ from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
 from tcs.placement.scoring.job import Job, data_references, load_job
+from tcs.placement.scoring.self_contact import prevailing_self_contact
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.placement.scoring.sweep import sweep
 from tcs.placement.store import ScoreFile, StateTables
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,9 @@ class ScoringSetup:
     ) -> ScoreFile:
         """Score the job and return its score file.
 
+        A pair of robot bodies that refuses more goals than are reached is logged as a warning and
+        recorded in the metadata as `self_contact`.
+
         Args:
             begun: Start of the work, by `time.perf_counter` [s].
             metadata: Further entries of the file's metadata.
@@ -89,6 +96,10 @@ class ScoringSetup:
             on_progress=on_progress,
             on_compile=on_compile,
         )
+        contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
+        if contact is not None:
+            advice = contact.advice(job.spec.robot)
+            _log.warning("%s, %s: %s", job.task.name, job.spec.environment.name, advice)
         sets_begun = time.perf_counter()
         tables = tuple(
             StateTables.of(scores, build_sets(scores, job.grid, jobs=self.jobs, **self.sets))
@@ -104,6 +115,7 @@ class ScoringSetup:
                 "scene_digest": lowered.digest(),
                 "measure": self.measure,
                 "ik": swept.ik,
+                "self_contact": None if contact is None else contact.to_json(),
                 "timings": {
                     "compile_seconds": swept.compile_seconds,
                     "scoring_seconds": swept.scoring_seconds,

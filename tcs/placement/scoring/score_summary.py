@@ -42,6 +42,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "best": _set_summary(file, file.nominal.sets.best),
         "best_single": _set_summary(file, file.nominal.sets.best_single),
         "reasons": dict(reasons),
+        "self_contact": file.metadata.get("self_contact"),
         "tables": [
             {
                 "observed": state_to_json(file.observed_axes, state),
