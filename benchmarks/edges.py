@@ -86,11 +86,11 @@ def strata(
                 for _ in range(0, options.goals, BATCH)
             )
             yield f"{name}, {away:g} rad", batches
-    for kind, make in (("limits", between_limits), ("contacts", between_contacts)):
+    for border, make in (("limits", between_limits), ("contacts", between_contacts)):
         for width in WIDTHS:
             rng = np.random.default_rng([options.seed, round(1e4 * width)])
             tries = (make(rng, scene, grid, width) for _ in range(20 * options.windows))
-            yield f"window of {width:g} rad between {kind}", first(tries, options.windows)
+            yield f"window of {width:g} rad between {border}", first(tries, options.windows)
 
 
 def first(tries: Iterator[Constructed | None], count: int) -> Iterator[Constructed]:

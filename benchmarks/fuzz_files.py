@@ -19,19 +19,19 @@ TASK = """\
 name: fetch
 title: Fetch a cup from the shelf
 source: made up
-environments: [room]
+environments: [kitchen]
 allowed_contacts: []
 goals:
   - {body_frame: top, position: [0.0, 0.0, 0.25], quaternion_wxyz: [1, 0, 0, 0], weight: 2}
   - {body_frame: top, position: [-0.1, 0.1, 0.3], quaternion_wxyz: [0.7071068, 0, 0.7071068, 0]}
   - {body_frame: lid, position: [0.0, -0.1, 0.3], quaternion_wxyz: [0, 0, 0, 1]}
 grids:
-  room:
+  kitchen:
     base_x: {start: -0.6, step: 0.3, count: 2}
 """
 
 ENVIRONMENT = """\
-name: room
+name: kitchen
 title: A table with a lid, a box and a lamp
 origin: on the floor below the middle of the table
 source: made up
@@ -141,7 +141,7 @@ def write_texts(folder: Path) -> None:
 
     texts = {
         "task.yaml": TASK,
-        "room.yaml": ENVIRONMENT,
+        "kitchen.yaml": ENVIRONMENT,
         "table.sdf": TABLE,
         "lamp.sdf": LAMP,
         "errors.yaml": ERRORS,
@@ -174,7 +174,7 @@ def _write_results(folder: Path) -> None:
     from tcs.teleop.runs.run import Run
     from tcs.teleop.simulated_recording import HandMotion, simulate_recording
 
-    scores = tcs.score(folder / "task.yaml", folder / "room.yaml", folder / "iiwa7.yaml")
+    scores = tcs.score(folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml")
     tcs.save(folder / "scores.tcs", scores)
     reach = Reach.load("pr2", step=0.1)
     recording = simulate_recording(reach, HandMotion(seconds=2.0), seed=0).recording
@@ -206,7 +206,7 @@ def _write_results(folder: Path) -> None:
 
 
 def _three(folder: Path) -> Scored:
-    return folder / "task.yaml", folder / "room.yaml", folder / "iiwa7.yaml"
+    return folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml"
 
 
 def _read_task(path: Path) -> Any:
@@ -295,9 +295,9 @@ def _scene(path: Path, _: int) -> Scored:
     """Build the scene of the robot in the environment, whichever of the files was changed."""
     from tcs.model.scene import Scene, SceneSpec
 
-    task, room, iiwa = _three(path.parent)
-    Scene(SceneSpec(_read_robot(iiwa), _read_environment(room)))
-    return task, room, iiwa
+    task, kitchen, iiwa = _three(path.parent)
+    Scene(SceneSpec(_read_robot(iiwa), _read_environment(kitchen)))
+    return task, kitchen, iiwa
 
 
 def _urdf(path: Path, number: int) -> Scored:
@@ -323,12 +323,12 @@ def _mesh(path: Path, number: int) -> None:
 
 
 @cache
-def _room(folder: Path) -> Any:
+def _unchanged_scene(folder: Path) -> Any:
     """Return the scene of the unchanged files."""
     from tcs.model.scene import Scene, SceneSpec
 
-    _, room, iiwa = _three(folder)
-    return Scene(SceneSpec(_read_robot(iiwa), _read_environment(room)))
+    _, kitchen, iiwa = _three(folder)
+    return Scene(SceneSpec(_read_robot(iiwa), _read_environment(kitchen)))
 
 
 @cache
@@ -341,7 +341,7 @@ def _reach() -> Any:
 def _errors(path: Path, _: int) -> None:
     from tcs.placement.robustness.error_model import ErrorModel
 
-    drawn = ErrorModel.of(_room(path.parent), path).draw(16, 0)
+    drawn = ErrorModel.of(_unchanged_scene(path.parent), path).draw(16, 0)
     assert all(np.all(np.isfinite(values)) for values in drawn.values())
 
 
@@ -389,7 +389,7 @@ def _recording(path: Path, _: int) -> None:
 
 FILE_TYPES = (
     FileType("task", "task.yaml", mutations.yaml_mutated, _read_task, _task),
-    FileType("environment", "room.yaml", mutations.yaml_mutated, _read_environment, _scene),
+    FileType("environment", "kitchen.yaml", mutations.yaml_mutated, _read_environment, _scene),
     FileType("SDFormat model", "table.sdf", mutations.xml_mutated, _read_model, _scene),
     FileType("robot file", "iiwa7.yaml", mutations.yaml_mutated, _read_robot, _scene),
     FileType(

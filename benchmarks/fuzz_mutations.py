@@ -31,7 +31,7 @@ TEXTS = (
         "é\u2028",
         "../../../../etc/passwd",
         "/dev/zero",
-        "~nobody/x",
+        "~unknown-user/x",
         "x" * 5000,
         "1 2",
         "::",
@@ -64,7 +64,7 @@ def plausible(value: float, rng: np.random.Generator) -> float:
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Return bytes with a few changed, removed, repeated or cut off."""
+    """Return bytes with a few changed, removed, repeated or truncated."""
     data = bytearray(content)
     for _ in range(int(rng.integers(1, 5))):
         if not data:

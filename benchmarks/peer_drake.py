@@ -44,7 +44,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, Shapes
 from tcs.model.scene import LoweredScene
 
 INSIDE_POSITION, INSIDE_ROTATION = 5e-4, 5e-3
-"""Half the tolerances of the judge [m, rad], which leaves room for the corners of the box and for
+"""Half the tolerances of the judge [m, rad], a margin for the corners of the box and for
 the tolerance of SNOPT."""
 INFLUENCE = 0.01
 """Distance beyond the margin from which on Drake ignores a pair [m]. On a dozen reachable pairs and

@@ -142,7 +142,7 @@ def finding(work: Work, options: argparse.Namespace) -> dict[str, Any]:
     }
     if options.finished is not None:
         with options.finished.open("a") as stream:
-            # The line before may have been cut off by the end of an earlier run.
+            # The line before is incomplete if an earlier run was killed.
             stream.write("\n" + json.dumps({"key": key, "text": text, "found": found}))
     return found
 
