@@ -131,6 +131,16 @@ WEIGHT = Quantity(
     "`weight` of a goal",
     "relative to the other goals: beyond it the smaller weight is rounded away",
 )
+UTILITY_WEIGHT = Quantity(
+    *("utility weight", "", 0.0, 1e9),
+    "weights of the utility of a set and of the travel cost",
+    "with a greater weight, rounding of its term would exceed every other term",
+)
+HEADING = Quantity(
+    *("heading", "rad", -1000.0, 1000.0),
+    "current heading of the base, current angles of the environment's axes",
+    "160 turns: odometry counts full turns",
+)
 EXTENT = Quantity(
     *("extent", "m", 0.0, 100.0),
     "sizes, radii and lengths of the boxes, cylinders and spheres of a URDF; 0 marks a frame",
@@ -185,7 +195,7 @@ PRIMITIVES = Quantity(
 
 QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
-    JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT, JOBS,
-    QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
+    JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT,
+    UTILITY_WEIGHT, HEADING, JOBS, QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

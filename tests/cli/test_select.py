@@ -92,7 +92,7 @@ def test_misuse_exits_with_2(tcs_command, small_file, words):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        pytest.param((*HERE, "--gamma", "-1"), "Weight gamma (travel) is -1.0", id="negative"),
+        pytest.param((*HERE, "--gamma", "-1"), "Weight gamma (travel) is -1,", id="negative"),
         pytest.param(
             (*HERE, "--max-members", "3"),
             "holds sets of 1 and 2 only. Score the task again: tcs score ... --max-members 3.",

@@ -5,36 +5,32 @@ from __future__ import annotations
 import math
 
 from tcs.errors import SelectionError
+from tcs.files.quantities import HEADING, POSITION, UTILITY_WEIGHT
 from tcs.model.grid import Axis
-
-MAX_WEIGHT = 1e9
-"""With a greater weight, rounding of its term would exceed every other term of the utility."""
-
-MAX_COORDINATE = 1e6
-"""A position beyond 1000 km, or an angle beyond 1e6 rad, is a mistake; its square may overflow."""
 
 
 def check_weight(name: str, value: float) -> None:
     """Refuse a weight that is negative, not finite or too large.
 
     Raises:
-        SelectionError: If it is not a number in [0, 1e9].
+        SelectionError: If it is not a number in the range of `UTILITY_WEIGHT`.
     """
-    if not (_is_number(value) and 0.0 <= value <= MAX_WEIGHT):
-        raise SelectionError(f"Weight {name} is {value!r}; must be a number from 0 to 1e9.")
+    UTILITY_WEIGHT.check((value,), f"Weight {name}", SelectionError)
 
 
-def check_coordinate(name: str, value: float) -> None:
+def check_coordinate(name: str, value: float, unit: str) -> None:
     """Refuse a coordinate of the current state that is not finite or too large.
 
+    Args:
+        name: Name of its axis.
+        value: Current value [unit].
+        unit: "m" or "rad".
+
     Raises:
-        SelectionError: If it is not a number in [-1e6, 1e6].
+        SelectionError: If it is not a number in the range of `POSITION` or `HEADING`.
     """
-    if not (_is_number(value) and abs(value) <= MAX_COORDINATE):
-        raise SelectionError(
-            f"Current state: {name} is {value!r}; must be a number from -1e6 to 1e6 (metres or "
-            "radians in the environment frame)."
-        )
+    quantity = POSITION if unit == "m" else HEADING
+    quantity.check((value,), f"Current state: {name}", SelectionError)
 
 
 def check_within_axis(axis: Axis, value: float, *, lowest: float | None = None) -> None:
@@ -67,10 +63,3 @@ def check_within_axis(axis: Axis, value: float, *, lowest: float | None = None) 
         f"Current state: {axis.name} is {shown} {axis.unit}, out of range: the scores cover "
         f"{begin} to {end} {axis.unit}. Give the present value, at most half a step beyond."
     )
-
-
-def _is_number(value: object) -> bool:
-    # numpy's float64 is a float; float32 and integers count too, booleans and text do not.
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        return False
-    return math.isfinite(float(value))

@@ -213,7 +213,8 @@ def current_values(
 
     Raises:
         UnknownNameError: If an environment axis has no such name.
-        SelectionError: If a value is not finite or in another unit, or an axis is missing.
+        SelectionError: If a value is out of its physical range or in another unit, or an axis is
+            missing.
     """
     values = {
         "base_x": here.base_x,
@@ -230,8 +231,9 @@ def current_values(
                 f"Current state: '{name}' is given in '{unit}'; must be in '{known[name]}'."
             )
         values[name] = value
+    units = {"base_yaw": "rad", **known}
     for name, value in values.items():
-        check_coordinate(name, value)
+        check_coordinate(name, value, units.get(name, "m"))
     # Full rotations have no effect, and would reduce the accuracy of differences of headings.
     values["base_yaw"] = math.remainder(here.base_yaw, 2.0 * math.pi)
     missing = [name for name in names if name not in values]

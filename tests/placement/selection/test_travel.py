@@ -90,7 +90,7 @@ def test_a_tie_keeps_the_first_order():
     assert shortest_tour([1.0, 1.0], np.array([[0.0, 2.0], [2.0, 0.0]])) == (3.0, (0, 1))
 
 
-@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf, 1e10, "1", None, True])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf, 1e10, "1", "", None, True])
 @pytest.mark.parametrize("name", ["metre", "turn", "torso"])
 def test_impossible_weights_are_refused(name, value):
     with pytest.raises(SelectionError, match=f"Weight of travel per {name} is"):

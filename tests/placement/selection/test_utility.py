@@ -19,7 +19,7 @@ def test_by_default_a_metre_costs_five_percent_of_a_task():
     assert (weights.reachability, weights.manipulability, weights.travel) == (1.0, 1.0, 0.05)
 
 
-@pytest.mark.parametrize("value", [-1e-9, math.nan, math.inf, 2e9, "1", None, True])
+@pytest.mark.parametrize("value", [-1e-9, math.nan, math.inf, 2e9, "1", "", None, True])
 @pytest.mark.parametrize(
     ("name", "greek"),
     [("reachability", "alpha"), ("manipulability", "beta"), ("travel", "gamma")],
