@@ -11,12 +11,9 @@ a small grid, one in `--score-every`, and Drake re-checks some of the answers.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
 import resource
-import select
-import subprocess
 import sys
 import tempfile
 import time
@@ -32,11 +29,10 @@ import numpy as np
 import table
 from fuzz_files import FILE_TYPES, FileType, prepare
 from fuzz_mutations import damaged
+from worker import Worker
 
 SECONDS = 10.0
 """Longest time for one mutant [s]; scoring one takes a tenth of a second."""
-START_SECONDS = 300.0
-"""Longest time for a worker to start, which may have to compile the kernel [s]."""
 MEMORY = 2 * 1024**3
 """Most memory that a mutant may take beyond that of a started worker [bytes]."""
 DAMAGED = 0.2
@@ -109,7 +105,7 @@ def work(name: str, folder: Path, seed: int, score_every: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (virtual + MEMORY, virtual + MEMORY))
     print("ready", file=answers, flush=True)
     for line in sys.stdin:
-        number = int(line)
+        number = json.loads(line)
         path.write_bytes(mutant(file_type, original, seed, number))
         begun = time.perf_counter()
         outcome, text = judged(file_type, path, number, score=number % score_every == 0)
@@ -117,77 +113,13 @@ def work(name: str, folder: Path, seed: int, score_every: int) -> None:
         print(json.dumps(answer), file=answers, flush=True)
 
 
-class Worker:
-    """A process that judges mutants of one type, started again when it ends or hangs."""
-
-    def __init__(self, name: str, master: Path, seed: int, score_every: int) -> None:
-        """Set the arguments of the process, which the first mutant starts."""
-        self._arguments = (name, str(seed), str(score_every))
-        self._master = master
-        self._process: subprocess.Popen[bytes] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-
-    def judge(self, number: int) -> dict[str, Any]:
-        """Return outcome, text and seconds of a mutant."""
-        if self._process is None:
-            self._start()
-        assert self._process is not None
-        assert self._process.stdin is not None
-        begun = time.perf_counter()
-        self._process.stdin.write(f"{number}\n".encode())
-        self._process.stdin.flush()
-        line = self._line(SECONDS)
-        if line:
-            answer: dict[str, Any] = json.loads(line)
-            return answer
-        outcome, text = "hang", f"no answer within {SECONDS:g} s"
-        if line is not None:
-            outcome, text = "abort", f"the process ended with code {self._process.wait()}"
-        self.close()
-        return {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
-
-    def _start(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="tcs-fuzz-")
-        for file in self._master.iterdir():
-            (Path(self._folder.name) / file.name).write_bytes(file.read_bytes())
-        name, seed, score_every = self._arguments
-        words = ["--worker", self._folder.name, "--only", name, "--seed", seed]
-        self._process = subprocess.Popen(
-            [sys.executable, __file__, *words, "--score-every", score_every],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        )
-        if self._line(START_SECONDS) != b"ready\n":
-            raise SystemExit(f"the worker for '{name}' does not start")
-
-    def _line(self, seconds: float) -> bytes | None:
-        """Return the next line of the worker, b"" if it ended, None if there is none in time."""
-        assert self._process is not None
-        assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], seconds)
-        return self._process.stdout.readline() if ready else None
-
-    def close(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            for stream in (self._process.stdin, self._process.stdout):
-                # What a dead process has not read is lost.
-                with contextlib.suppress(BrokenPipeError):
-                    if stream is not None:
-                        stream.close()
-        if self._folder is not None:
-            self._folder.cleanup()
-        self._process = self._folder = None
-
-
 def run(
     names: list[str], numbers: range, seed: int, score_every: int, folder: Path
 ) -> Iterator[tuple[str, int, dict[str, Any]]]:
     """Yield type, number and answer of every mutant."""
     for name in names:
-        worker = Worker(name, folder, seed, score_every)
+        words = ["--only", name, "--seed", str(seed), "--score-every", str(score_every)]
+        worker = Worker(Path(__file__), words, folder, SECONDS)
         try:
             for number in numbers:
                 yield name, number, worker.judge(number)
@@ -197,32 +129,36 @@ def run(
 
 def main() -> None:
     """Fuzz every type and print a table."""
-    options = table.parser(__doc__ or "")
-    options.add_argument("--mutants", type=int, default=300, help="mutants of each type")
-    options.add_argument("--first", type=int, default=0, help="number of the first mutant")
-    options.add_argument("--seed", type=int, default=0)
-    options.add_argument("--score-every", type=int, default=25, help="score one mutant in so many")
-    options.add_argument("--only", nargs="*", help="types of files, by default all")
-    options.add_argument("--show", type=int, default=3, help="defects of a type to print in full")
-    options.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
-    given = options.parse_args()
-    if given.worker is not None:
-        work(given.only[0], given.worker, given.seed, given.score_every)
+    command_line = table.parser(__doc__ or "")
+    command_line.add_argument("--mutants", type=int, default=300, help="mutants of each type")
+    command_line.add_argument("--first", type=int, default=0, help="number of the first mutant")
+    command_line.add_argument("--seed", type=int, default=0)
+    command_line.add_argument(
+        "--score-every", type=int, default=25, help="score one mutant in so many"
+    )
+    command_line.add_argument("--only", nargs="*", help="types of files, by default all")
+    command_line.add_argument(
+        "--show", type=int, default=3, help="defects of a type to print in full"
+    )
+    command_line.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
+    options = command_line.parse_args()
+    if options.worker is not None:
+        work(options.only[0], options.worker, options.seed, options.score_every)
         return
     table.header()
-    names = given.only or [one.name for one in FILE_TYPES]
+    names = options.only or [one.name for one in FILE_TYPES]
     counts: dict[str, Counter[str]] = {name: Counter() for name in names}
     slowest = dict.fromkeys(names, 0.0)
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
         prepare(Path(folder))
-        numbers = range(given.first, given.first + given.mutants)
+        numbers = range(options.first, options.first + options.mutants)
         for name, number, answer in run(
-            names, numbers, given.seed, given.score_every, Path(folder)
+            names, numbers, options.seed, options.score_every, Path(folder)
         ):
             outcome = answer["outcome"]
             counts[name][outcome] += 1
             slowest[name] = max(slowest[name], answer["seconds"])
-            if outcome in DEFECTS and counts[name][outcome] <= given.show:
+            if outcome in DEFECTS and counts[name][outcome] <= options.show:
                 print(f"--- {outcome}: {name}, mutant {number}\n{answer['text']}", flush=True)
             if number == numbers[-1]:
                 shown = ", ".join(f"{counts[name][o]} {o}" for o in OUTCOMES if counts[name][o])
@@ -232,7 +168,7 @@ def main() -> None:
         for outcome in OUTCOMES:
             table.cell("fuzz", name, outcome, f"{count[outcome]:,}")
         table.cell("fuzz", name, "slowest [s]", f"{slowest[name]:.1f}")
-    table.save(given)
+    table.save(options)
 
 
 if __name__ == "__main__":

@@ -22,12 +22,12 @@ source: made up
 environments: [kitchen]
 allowed_contacts: []
 goals:
-  - {body_frame: top, position: [0.0, 0.0, 0.25], quaternion_wxyz: [1, 0, 0, 0], weight: 2}
-  - {body_frame: top, position: [-0.1, 0.1, 0.3], quaternion_wxyz: [0.7071068, 0, 0.7071068, 0]}
-  - {body_frame: lid, position: [0.0, -0.1, 0.3], quaternion_wxyz: [0, 0, 0, 1]}
+  - {body_frame: top, position: [0.2, 0.3, 0.1], quaternion_wxyz: [1, 0, 0, 0], weight: 2}
+  - {body_frame: top, position: [-0.1, 0.1, 0.2], quaternion_wxyz: [0.7071068, 0, 0.7071068, 0]}
+  - {body_frame: lid, position: [0.0, -0.1, 0.2], quaternion_wxyz: [0.7071068, 0, 0, 0.7071068]}
 grids:
   kitchen:
-    base_x: {start: -0.6, step: 0.3, count: 2}
+    base_x: {start: -0.75, step: 0.15, count: 2}
 """
 
 ENVIRONMENT = """\
@@ -154,8 +154,8 @@ def write_texts(folder: Path) -> None:
         texts[name] = (robots / name).read_text(encoding="utf-8")
     robot = yaml.safe_load((robots / "iiwa7.yaml").read_text(encoding="utf-8"))
     robot["frames"].append({"name": "tip", "parent": "spoon", "xyz": [0.1, 0, 0]})
-    shapes = [{"kind": "capsule", "size": [0.01, 0.08], "rpy_deg": [0, 90, 0]}]
-    robot["bodies"] = [{"name": "spoon", "parent": "flange", "primitives": shapes}]
+    spoon = "{kind: capsule, size: [0.01, 0.08], xyz: [0.09, 0, 0], rpy_deg: [0, 90, 0]}"
+    robot["bodies"] = [{"name": "spoon", "parent": "flange", "primitives": [yaml.safe_load(spoon)]}]
     robot["rest"] = {"iiwa_joint_4": -1.0}
     texts["iiwa7.yaml"] = yaml.safe_dump(robot, sort_keys=False)
     head = data_folder() / "models" / "heads" / "pr2.yaml"

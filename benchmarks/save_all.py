@@ -40,6 +40,8 @@ PARTS: dict[str, tuple[str, ...]] = {
     "experiment": (),
     "lines": (),
     "faults": (),
+    "fuzz": ("--mutants", "5000"),
+    "fuzz_options": (),
 }
 """Arguments of each script; those with times come first."""
 

@@ -1,8 +1,7 @@
-"""A short run of `benchmarks/fuzz.py`: a mutant of any file is refused in one line or used."""
+"""A short run of `benchmarks/fuzz.py`, and what `benchmarks/fuzz_options.py` counts as a defect."""
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -22,9 +21,10 @@ def scripts():
     try:
         import fuzz
         import fuzz_files
+        import fuzz_options
     finally:
         sys.path.remove(str(FOLDER))
-    return fuzz, fuzz_files
+    return fuzz, fuzz_files, fuzz_options
 
 
 @pytest.fixture(scope="session")
@@ -51,7 +51,7 @@ def folder(scripts, tmp_path_factory):
 
 @pytest.mark.parametrize("number", range(14))
 def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
-    fuzz, fuzz_files = scripts
+    fuzz, fuzz_files, _ = scripts
     file_type = fuzz_files.FILE_TYPES[number]
     path = folder / file_type.file
     original = path.read_bytes()
@@ -78,7 +78,7 @@ def test_every_type_has_its_entry(scripts):
 
 
 def test_a_mutant_is_the_same_in_every_run(scripts, folder):
-    fuzz, fuzz_files = scripts
+    fuzz, fuzz_files, _ = scripts
     for file_type in fuzz_files.FILE_TYPES:
         original = (folder / file_type.file).read_bytes()
         one, two = (fuzz.mutant(file_type, original, 7, 3) for _ in range(2))
@@ -86,9 +86,9 @@ def test_a_mutant_is_the_same_in_every_run(scripts, folder):
         assert any(fuzz.mutant(file_type, original, 7, k) != one for k in range(4, 8))
 
 
-def test_defects_are_told_apart(scripts, folder):
+def test_defects_differ(scripts, folder):
     """The judge of a mutant reports a traceback and more than one line as what they are."""
-    fuzz, fuzz_files = scripts
+    fuzz, fuzz_files, _ = scripts
 
     def judged(error):
         def use(path, number):
@@ -104,21 +104,52 @@ def test_defects_are_told_apart(scripts, folder):
 
 
 @pytest.mark.parametrize(
-    ("action", "outcome"), [(os.abort, "abort"), (None, "hang")], ids=["abort", "hang"]
+    ("action", "outcome"),
+    [("os.abort()", "abort"), ("time.sleep(60)", "hang")],
+    ids=["abort", "hang"],
 )
-def test_a_dead_or_silent_worker_is_told_and_replaced(scripts, monkeypatch, action, outcome):
-    fuzz, _ = scripts
-    code = "import os, sys, time\nprint('ready', flush=True)\nsys.stdin.readline()\n"
-    code += "os.abort()" if action else "time.sleep(60)"
-    worker = fuzz.Worker("task", FOLDER / "figures", 0, 25)
-    popen = fuzz.subprocess.Popen
-    monkeypatch.setattr(
-        fuzz.subprocess, "Popen", lambda _, **rest: popen([sys.executable, "-c", code], **rest)
-    )
+def test_a_dead_or_silent_worker_is_reported_and_replaced(scripts, tmp_path, action, outcome):
+    script = tmp_path / "script.py"
+    code = f"import os, sys, time\nprint('ready', flush=True)\nsys.stdin.readline()\n{action}"
+    script.write_text(code)
     # Long enough for a process to die, short enough for a test.
-    monkeypatch.setattr(fuzz, "SECONDS", 5.0 if action else 0.2)
+    seconds = 5.0 if outcome == "abort" else 0.2
+    worker = scripts[0].Worker(script, (), FOLDER / "figures", seconds)
     try:
         assert worker.judge(0)["outcome"] == outcome
-        assert worker._process is None
+        assert not worker.runs
     finally:
         worker.close()
+
+
+def test_every_command_and_option_gets_odd_values(scripts):
+    options = scripts[2]
+    names = options.command_names()
+    assert {command.name for command in options.COMMANDS} == set(names)
+    for name in names:
+        calls = [
+            call for one in options.COMMANDS if one.name == name for call in options.calls(one)
+        ]
+        given = {word for call in calls for word in call.words}
+        parameters = [p for p in options.click_command(name).params if p.name != "help"]
+        assert {p.opts[0] for p in parameters if p.param_type_name == "option"} <= given, name
+
+
+@pytest.mark.parametrize(
+    ("code", "err", "changes", "outcome"),
+    [
+        (0, "", ["out.csv"], "done"),
+        (0, "", [".out.csv.1-2.part"], "file left"),
+        (1, "tcs: no such file.\n", [], "refused"),
+        (1, "tcs: no such file.\n", ["out.csv"], "file left"),
+        (1, "tcs: no such\nfile.\n", [], "not one line"),
+        (1, "", [], "not one line"),
+        (2, "Usage: tcs\n\u2502 Missing option. \u2502\n", [], "misuse"),
+        (2, "", [], "not one line"),
+        (3, "tcs: no such file.\n", [], "other exit code"),
+        (1, "Traceback (most recent call last):\n", [], "traceback"),
+        (0, "RuntimeWarning: overflow\n", [], "traceback"),
+    ],
+)
+def test_outcomes_of_calls_differ(scripts, code, err, changes, outcome):
+    assert scripts[2].outcome_of(code, err, changes)[0] == outcome

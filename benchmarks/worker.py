@@ -1,0 +1,95 @@
+"""A process that judges one input after the other, and is replaced when it ends or hangs."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+START_SECONDS = 300.0
+"""Longest time for a worker to start, which may have to compile the kernel [s]."""
+
+
+class Worker:
+    """A process with a folder of its own that answers each input with one line of JSON."""
+
+    def __init__(self, script: Path, words: Sequence[str], master: Path, seconds: float) -> None:
+        """Set what the process runs; the first input starts it.
+
+        Args:
+            script: Script that prints "ready" and answers the lines on stdin when it is started
+                with `--worker FOLDER` and the words.
+            words: Further arguments of the script.
+            master: Folder whose files are copied into that of each process.
+            seconds: Longest time for one answer [s].
+        """
+        self._script = script
+        self._words = words
+        self._master = master
+        self._seconds = seconds
+        self._process: subprocess.Popen[bytes] | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def judge(self, question: object) -> dict[str, Any]:
+        """Return outcome, text and seconds of an input, which is sent as JSON."""
+        if self._process is None:
+            self._start()
+        assert self._process is not None
+        assert self._process.stdin is not None
+        begun = time.perf_counter()
+        self._process.stdin.write(json.dumps(question).encode() + b"\n")
+        self._process.stdin.flush()
+        line = self._line(self._seconds)
+        if line:
+            answer: dict[str, Any] = json.loads(line)
+            return answer
+        outcome, text = "hang", f"no answer within {self._seconds:g} s"
+        if line is not None:
+            outcome, text = "abort", f"the process ended with code {self._process.wait()}"
+        self.close()
+        return {"outcome": outcome, "text": text, "seconds": time.perf_counter() - begun}
+
+    @property
+    def runs(self) -> bool:
+        """Whether there is a process."""
+        return self._process is not None
+
+    def _start(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="tcs-fuzz-")
+        for file in self._master.iterdir():
+            (Path(self._folder.name) / file.name).write_bytes(file.read_bytes())
+        self._process = subprocess.Popen(
+            [sys.executable, str(self._script), "--worker", self._folder.name, *self._words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        if self._line(START_SECONDS) != b"ready\n":
+            raise SystemExit(f"the worker '{' '.join(self._words)}' does not start")
+
+    def _line(self, seconds: float) -> bytes | None:
+        """Return the next line of the worker, b"" if it ended, None if there is none in time."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], seconds)
+        return self._process.stdout.readline() if ready else None
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            for stream in (self._process.stdin, self._process.stdout):
+                # What a dead process has not read is lost.
+                with contextlib.suppress(BrokenPipeError):
+                    if stream is not None:
+                        stream.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+        self._process = self._folder = None
