@@ -27,7 +27,13 @@ if TYPE_CHECKING:
         summary,
         verify,
     )
-    from tcs.placement.selection import Choice, TravelWeights, UtilityWeights, select
+    from tcs.placement.selection import (
+        Choice,
+        Constraints,
+        TravelWeights,
+        UtilityWeights,
+        select,
+    )
     from tcs.placement.store import ScoreFile
     from tcs.placement.store import load_scores as load
     from tcs.placement.store import save_scores as save
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Choice",
+    "Constraints",
     "Evaluation",
     "Explanation",
     "InitialConfiguration",
@@ -61,6 +68,7 @@ __all__ = [
 
 _HOMES = {
     "Choice": ("tcs.placement.selection", "Choice"),
+    "Constraints": ("tcs.placement.selection", "Constraints"),
     "Evaluation": ("tcs.placement.robustness", "Evaluation"),
     "Explanation": ("tcs.placement.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.model.grid", "InitialConfiguration"),

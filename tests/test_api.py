@@ -10,6 +10,7 @@ from tests.placement.store.example import score_file
 
 PROMISED = [
     "Choice",
+    "Constraints",
     "Evaluation",
     "Explanation",
     "InitialConfiguration",

@@ -14,7 +14,7 @@ from tcs.files.quantities import JOBS, QUERIES
 
 if TYPE_CHECKING:
     from tcs.model.grid import Axis, InitialConfiguration
-    from tcs.placement.selection import TravelWeights
+    from tcs.placement.selection import Constraints, TravelWeights
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -57,6 +57,14 @@ Members = Annotated[
         max=3,
         help="Greatest number of base poses in the set: 1, 2 or 3.",
         show_default="that of the file",
+    ),
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="CONDITION",
+        help="Condition on an axis of the grid: 'head_rest >= 35 deg', 'bed_height = 20 cm', "
+        "'base_x = -1..0.5 m'.",
     ),
 ]
 MetreWeight = Annotated[float, typer.Option(help="Cost of a metre of driving.")]
@@ -123,6 +131,29 @@ class TravelCosts:
             environment=self.axes,
             route=self.travel,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstraintOptions:
+    """Constraints on what may be selected."""
+
+    only: Only = None
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS", help="Axis that stays as it is now, e.g. bed_height (see --at)."
+        ),
+    ] = None
+
+    def constraints(self) -> Constraints:
+        """Return the constraints.
+
+        Raises:
+            TcsError: If one is not of its form.
+        """
+        from tcs.placement.selection import Constraints
+
+        return Constraints(only=tuple(self.only or ()), keep=tuple(self.keep or ()))
 
 
 @dataclass(frozen=True, kw_only=True)

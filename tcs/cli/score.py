@@ -62,6 +62,7 @@ def score(
             min=1, max=3, help="Greatest number of members of a set; with 3 it takes longer."
         ),
     ] = 2,
+    only: options.Only = None,
     observed: Annotated[
         list[str] | None,
         typer.Option(
@@ -92,17 +93,18 @@ def score(
 
     from tcs.placement.scoring import default_path, files
 
-    options_of_sets: dict[str, Any] = {
+    scoring_options: dict[str, Any] = {
         "measure": measure,
         "rule": rules,
         "same_environment": same_environment,
         "max_members": max_members,
+        "only": tuple(only or ()),
         "jobs": jobs,
         "on_compile": terminal.note_compiling,
     }
     if task is None:
         rows = files.score_all_to_files(
-            environment, robot, out or Path(), progress=_progress, **options_of_sets
+            environment, robot, out or Path(), progress=_progress, **scoring_options
         )
         terminal.print_result({"rows": rows}, tables.report_rows, as_json=as_json)
         return
@@ -111,7 +113,7 @@ def score(
     if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(
-                task, environment, robot, path, on_progress=on_progress, **options_of_sets
+                task, environment, robot, path, on_progress=on_progress, **scoring_options
             )
         terminal.print_result(result, tables.report_scores, as_json=as_json)
         return
@@ -129,7 +131,7 @@ def score(
         setting=settings(at or (), "--at"),
     )
     result = files.score_observed_to_file(
-        task, environment, robot, path, observation, **options_of_sets
+        task, environment, robot, path, observation, **scoring_options
     )
     terminal.print_result(result, tables.report_observed, as_json=as_json)
 

@@ -37,6 +37,7 @@ def select(
     gamma: Annotated[float, typer.Option(help="Weight of the travel cost.")] = 0.05,
     delta: robustness.Delta = 0.0,
     costs: options.TravelCosts,
+    wanted: options.ConstraintOptions,
     max_members: options.Members = None,
     observed: options.Observed = None,
     frames: Annotated[
@@ -60,10 +61,13 @@ def select(
             reachability=alpha, manipulability=beta, travel=gamma, success=delta
         ),
         travel=costs.weights(),
+        constraints=wanted.constraints(),
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
+    for warning in choice.warnings:
+        terminal.note(warning)
     result = choice.to_json(loaded.metadata["measure"])
     terminal.print_result(result, tables.report_choice, as_json=as_json)
 

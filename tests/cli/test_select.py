@@ -260,3 +260,20 @@ def test_sets_of_three(tcs_command, tmp_path):
     words = ("select", path, *HERE, "--gamma", 0, "--json")
     assert len(tcs_command(*words).json["members"]) == 3
     assert len(tcs_command(*words, "--max-members", 2).json["members"]) == 2
+
+
+def test_constraints_reach_the_selection(tcs_command, small_file):
+    words = ("--only", "base_x <= 0", "--keep", "bed_height", "--at", "bed_height=0.1")
+    ran = tcs_command("select", small_file, *HERE, *words, "--json")
+    assert all(m["base_x"] <= 0 and m["bed_height"] == 0.1 for m in ran.json["members"])
+    names = [entry["constraint"] for entry in ran.json["constraints"]]
+    assert names == ["only base_x <= 0", "keep bed_height"]
+    assert "warnings" not in ran.json
+    assert "keep bed_height: " in tcs_command("select", small_file, *HERE, *words).out
+
+
+def test_warnings_are_part_of_the_result_and_printed_once(tcs_command, small_file):
+    ran = tcs_command("select", small_file, *HERE, "--only", "bed_height <= 1", "--json")
+    (warning,) = ran.json["warnings"]
+    assert "excludes nothing" in warning
+    assert ran.err.count("excludes nothing") == 1

@@ -7,6 +7,7 @@ along the axes.
 from __future__ import annotations
 
 from tcs.model.grid.axis import Axis
+from tcs.model.grid.condition import AxisCondition, restricted
 from tcs.model.grid.configuration import ENVIRONMENT_UNITS, InitialConfiguration
 from tcs.model.grid.grid import MAX_CONFIGURATIONS, ROBOT_AXES, Grid
 
@@ -15,6 +16,8 @@ __all__ = [
     "MAX_CONFIGURATIONS",
     "ROBOT_AXES",
     "Axis",
+    "AxisCondition",
     "Grid",
     "InitialConfiguration",
+    "restricted",
 ]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import GridError, UnknownNameError
-from tcs.model.grid import InitialConfiguration
 from tcs.model.grid.axis import Axis
+from tcs.model.grid.configuration import InitialConfiguration
 
 ROBOT_AXES = {"base_x": "m", "base_y": "m", "base_yaw": "deg", "torso": "m"}
 """The last axes of every grid, in flat order, and the unit of each."""

@@ -124,6 +124,10 @@ def report_choice(result: Mapping[str, Any]) -> None:
             f"under error {result['success']:.1%} of the goals (95 % between {low:.1%} and "
             f"{high:.1%})"
         )
+    for constraint in result.get("constraints", ()):
+        out.print(
+            f"{constraint['constraint']}: {constraint['configurations']:,} configurations left"
+        )
     if result["unreachable"]:
         out.print(
             f"unreachable from here: {result['unreachable']:,} configurations, not considered"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from tcs.errors import TaskError
 from tcs.files.paths import data_reference
-from tcs.model.grid import Axis, Grid
+from tcs.model.grid import Axis, Grid, restricted
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import (
     EnvironmentFile,
@@ -61,6 +62,8 @@ def load_job(
     task: str | Path | Task,
     environment: str | Path | EnvironmentFile,
     robot: str | Path | RobotFile,
+    *,
+    only: Sequence[str] = (),
 ) -> Job:
     """Load a task, an environment and a robot, check them against each other and return their job.
 
@@ -68,11 +71,13 @@ def load_job(
         task: Name of a task, path of a task file, or a task.
         environment: Name of an environment, path of its file, or an environment.
         robot: Name of a robot, path of its file, or a robot.
+        only: Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not
+            scored.
 
     Raises:
-        UnknownNameError: If a task, environment or robot of that name does not exist.
+        UnknownNameError: If a task, environment, robot or axis of that name does not exist.
         DataFileError: If a file cannot be used, or the task is not for that environment.
-        GridError: If the grid is empty or enormous.
+        GridError: If the grid is empty or enormous, or a condition is invalid.
     """
     task = task if isinstance(task, Task) else load_task(task)
     if not isinstance(environment, EnvironmentFile):
@@ -92,6 +97,7 @@ def load_job(
     if robot.torso_joint is None:
         # Without a torso joint all torso levels are the same configuration.
         grid = grid.overridden({"torso": {"start": 0.0, "count": 1}}, where=f"robot '{robot.name}'")
+    grid = restricted(grid, only)
     return Job(task, SceneSpec(robot, environment), grid, environment.observed_axes)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -41,6 +41,7 @@ class LiveScorer:
         measure: str = DEFAULT_MEASURE,
         jobs: int = 2,
         on_compile: Callable[[], None] | None = None,
+        only: Sequence[str] = (),
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -53,13 +54,14 @@ class LiveScorer:
             measure: Dexterity measure.
             jobs: Number of threads.
             on_compile: Called before the kernel compiles, if it has to.
+            only: Conditions on axes of the grid.
             **sets: Options of the kept sets.
 
         Raises:
             TcsError: The errors of `tcs.score`.
         """
         self._setup = ScoringSetup.load(
-            task, environment, robot, measure=measure, jobs=jobs, sets=sets
+            task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only
         )
         lowered = self._job_at({}).lowered(self._setup.scene)
         warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)

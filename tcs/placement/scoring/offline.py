@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -39,6 +39,8 @@ class ScoringSetup:
     """Name of the dexterity measure."""
     jobs: int
     """Number of threads; the result does not depend on it."""
+    only: tuple[str, ...]
+    """Conditions to which the grid was restricted."""
 
     @classmethod
     def load(
@@ -50,6 +52,7 @@ class ScoringSetup:
         measure: str,
         jobs: int,
         sets: SetOptions,
+        only: Sequence[str] = (),
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -62,9 +65,9 @@ class ScoringSetup:
         """
         dexterity(measure)
         options = checked_options(**sets)
-        job = load_job(task, environment, robot)
+        job = load_job(task, environment, robot, only=only)
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs)
+        return cls(job, job.scene(), references, options, measure, jobs, tuple(only))
 
     def score(
         self,
@@ -112,6 +115,7 @@ class ScoringSetup:
                 "created": datetime.now(UTC).isoformat(timespec="seconds"),
                 **self.references,
                 **(metadata or {}),
+                **({"only": list(self.only)} if self.only else {}),
                 "scene_digest": lowered.digest(),
                 "measure": self.measure,
                 "ik": swept.ik,
@@ -142,6 +146,7 @@ def score(
     jobs: int = 2,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
+    only: Sequence[str] = (),
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -156,6 +161,8 @@ def score(
         jobs: Number of threads; the result does not depend on it.
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called before the kernel compiles, if it has to.
+        only: Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not
+            scored, and the sets are built from what remains.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -166,11 +173,13 @@ def score(
         UnknownNameError: If a task, environment, robot, frame or measure of that name does not
             exist.
         DataFileError: If a file cannot be used.
-        GridError: If the grid is empty or enormous.
+        GridError: If the grid is empty or enormous, or a condition is invalid.
         TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
-    setup = ScoringSetup.load(task, environment, robot, measure=measure, jobs=jobs, sets=sets)
+    setup = ScoringSetup.load(
+        task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only
+    )
     return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
 
 

@@ -21,7 +21,10 @@ def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene,
         DataFileError: If a file that it names cannot be used.
         StoreMismatchError: If the models differ from those the file was made from.
     """
-    job = load_job(*(file.metadata[key] for key in ("task", "environment", "robot")))
+    job = load_job(
+        *(file.metadata[key] for key in ("task", "environment", "robot")),
+        only=file.metadata.get("only", ()),
+    )
     # A file that was scored live has an observed state of its own.
     job = dataclasses.replace(job, observed=file.observed_axes)
     scene = job.scene(meshes=meshes)

@@ -6,13 +6,16 @@ stored set with the greatest utility, in milliseconds, without Drake or a compil
 
 from __future__ import annotations
 
-from tcs.placement.selection.choice import Choice, SelectionTables, select
+from tcs.placement.selection.best import select
+from tcs.placement.selection.choice import Choice, SelectionTables
+from tcs.placement.selection.constraints import Constraints
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 
 __all__ = [
     "Choice",
+    "Constraints",
     "Match",
     "SelectionTables",
     "TravelWeights",

@@ -35,6 +35,8 @@ class Bounds:
     """Travel costs from the current state."""
     weights: UtilityWeights
     """alpha, beta, gamma."""
+    admitted: NDArray[np.bool_] | None = None
+    """Whether a candidate satisfies the constraints, shape (C,); None without constraints."""
 
     @property
     def travel(self) -> float:
@@ -43,7 +45,10 @@ class Bounds:
 
     @cached_property
     def groups(self) -> FloatArray:
-        """Bound on the utility of each group, shape (K,); -inf where a cell is unreachable."""
+        """Bound on the utility of each group, shape (K,).
+
+        It is -inf where a cell is unreachable or has no admitted candidate.
+        """
         index, legs = self.index, self.legs
         bounds = self._group_gain - self.travel * self._driving
         if index.members > 2:
@@ -136,8 +141,14 @@ class Bounds:
 
     @cached_property
     def _net_gain(self) -> FloatArray:
-        """Bound on the gain of the sets of each candidate minus that cost, shape (C,)."""
-        return self._member_gain - self._levels
+        """Bound on the gain of the sets of each candidate minus that cost, shape (C,).
+
+        It is -inf for candidates that violate a constraint.
+        """
+        net = self._member_gain - self._levels
+        if self.admitted is not None:
+            net[~self.admitted] = -np.inf
+        return net
 
     @cached_property
     def _slack(self) -> FloatArray:

@@ -18,6 +18,7 @@ def best_estimated(
     legs: Legs,
     weights: UtilityWeights,
     max_members: int,
+    admitted: NDArray[np.bool_],
 ) -> tuple[int, ...]:
     """Return the set with an estimate that has the greatest utility, the first among equals.
 
@@ -27,12 +28,13 @@ def best_estimated(
         legs: Travel costs from the current state.
         weights: alpha, beta, gamma, delta.
         max_members: Greatest number of members of a set.
+        admitted: Whether a candidate may be selected, shape (C,).
 
     Returns:
         Candidate numbers of its members, ascending.
 
     Raises:
-        SelectionError: If no set has an estimate, or none with an estimate is reachable.
+        SelectionError: If no set has an estimate, or none with an estimate is admitted.
     """
     if success is None:
         raise SelectionError(
@@ -44,7 +46,7 @@ def best_estimated(
     for size in range(1, max_members + 1):
         rows = success.of_size(size)
         members = np.searchsorted(sets.candidates, success.members[rows, :size])
-        feasible = np.all(legs.reachable[sets.cell[members]], axis=1)
+        feasible = np.all(admitted[members], axis=1)
         rows, members = rows[feasible], members[feasible]
         if not rows.size:
             continue
@@ -56,9 +58,9 @@ def best_estimated(
             best = tuple(int(i) for i in members[first])
     if best is None:
         raise SelectionError(
-            "No set whose success under error was estimated is reachable from here with at most "
-            f"{max_members} members. Use --delta 0, or estimate more sets: tcs robustify FILE "
-            "--sets."
+            "No set whose success under error was estimated is reachable from here and satisfies "
+            f"the constraints with at most {max_members} members. Use --delta 0, or estimate more "
+            "sets: tcs robustify FILE --sets."
         )
     return best
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.index import GroupIndex
 from tcs.placement.selection.travel import Legs
-from tcs.placement.selection.utility import UtilityWeights, utility
+from tcs.placement.selection.utility import utility
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -49,21 +49,16 @@ class Found:
         return self.members < other.members
 
 
-def best_set(
-    index: GroupIndex, legs: Legs, weights: UtilityWeights, to_beat: float
-) -> Found | None:
+def best_set(bounds: Bounds, to_beat: float) -> Found | None:
     """Return the kept set with the greatest utility, the first among equals.
 
     Args:
-        index: The groups of sets.
-        legs: Travel costs from the current state.
-        weights: alpha, beta, gamma.
+        bounds: Bounds on the utility of the sets.
         to_beat: Utility of the best smaller set; only a greater utility counts.
 
     Returns:
         The set, or None when no set is better than `to_beat`.
     """
-    bounds = Bounds(index, legs, weights)
     remaining = np.flatnonzero(bounds.groups > to_beat)
     search = _Search(bounds, to_beat)
     budget = FIRST_CANDIDATES

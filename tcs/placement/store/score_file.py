@@ -140,6 +140,9 @@ class ScoreFile:
         for key, expected in REQUIRED_METADATA.items():
             if not isinstance(self.metadata.get(key), expected):
                 raise StoreError(f"metadata needs '{key}', of type {expected.__name__}.")
+        only = self.metadata.get("only", [])
+        if not isinstance(only, list) or not all(isinstance(text, str) for text in only):
+            raise StoreError("metadata 'only' must be a list of conditions.")
         self._check_tables()
         records = self.metadata.get("robustness")
         if records is not None and (

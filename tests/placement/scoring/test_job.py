@@ -34,6 +34,13 @@ def test_scores_do_not_depend_on_the_number_of_threads(small_job):
     assert one.pair_names == two.pair_names
 
 
+def test_conditions_restrict_the_grid():
+    job = load_job("shaving", "bed", only=("head_rest >= 35 deg", "base_x = 0..1 m"), robot="pr2")
+    assert job.grid.axis("head_rest").count == 2
+    assert job.grid.axis("base_x").count == 11
+    assert job.grid.axis("base_y") == load_job("shaving", "bed", "pr2").grid.axis("base_y")
+
+
 @pytest.mark.parametrize("jobs", [0, -1])
 def test_no_threads_are_refused(small_job, jobs):
     lowered = small_job.lowered(small_job.scene())

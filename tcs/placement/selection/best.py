@@ -1,0 +1,218 @@
+"""Selection of the stored set with the greatest utility from the current state."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError
+from tcs.model.grid import InitialConfiguration
+from tcs.placement.selection.bounds import Bounds
+from tcs.placement.selection.choice import Choice, SelectionTables
+from tcs.placement.selection.constraints import Admitted, Constraints, admitted_candidates
+from tcs.placement.selection.estimated import best_estimated, check_estimated
+from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.search import best_set
+from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
+from tcs.placement.selection.utility import UtilityWeights, utility
+from tcs.placement.store import ScoreFile
+from tcs.placement.tables.sets import MOST_MEMBERS
+
+_DEFAULT_WEIGHTS = UtilityWeights()
+_DEFAULT_TRAVEL = TravelWeights()
+_NO_CONSTRAINTS = Constraints()
+
+
+def select(
+    scores: ScoreFile | SelectionTables,
+    here: InitialConfiguration,
+    *,
+    weights: UtilityWeights = _DEFAULT_WEIGHTS,
+    travel: TravelWeights = _DEFAULT_TRAVEL,
+    constraints: Constraints = _NO_CONSTRAINTS,
+    max_members: int | None = None,
+    observed: Mapping[str, float] | None = None,
+    frames: Mapping[str, Sequence[float]] | None = None,
+) -> Choice:
+    """Return the stored set with the greatest utility from the current state.
+
+    The result equals an exhaustive search of all stored sets; if delta is above 0, of all sets
+    whose success under error was estimated (`tcs.placement.robustness`). Ties go to the first set:
+    singles by configuration index, then pairs and then triples in lexicographic order.
+
+    Args:
+        scores: A loaded score file; or its tables, which is faster for repeated selection.
+        here: The current state of robot and environment, h_0, in the environment frame. The base
+            may be anywhere; torso and environment axes must be within their scored range, with
+            half a step to spare.
+        weights: alpha, beta, gamma, delta.
+        travel: Cost of each type of motion.
+        constraints: What every member of the set must satisfy. The stored sets that satisfy them
+            are compared; no set is added for those that are excluded.
+        max_members: 1 to select a single configuration, 2 to allow a pair, 3 a triple; by default
+            the greatest stored size.
+        observed: Observed state of the person: values of the file's observed axes [m or rad]. The
+            table scored for the nearest values is used; an axis that is not given counts as zero.
+        frames: Positions of body frames in W [m], by name, in place of `observed`.
+
+    Raises:
+        SelectionError: If no configuration reaches a goal, the current state is not finite, is out
+            of range or lacks an axis with a weight, `max_members` is not stored, no set is
+            reachable around the furniture or satisfies the constraints, or delta is above 0 and no
+            set has an estimate, or no triple although `max_members` is 3.
+        UnknownNameError: If an axis has no such name.
+        GridError: If a condition of the constraints has the unit of another axis, or excludes
+            every value of its axis.
+
+    Source:
+        TCS eq. (5). The paper leaves D open; here it is the shortest tour through the members.
+    """
+    start = time.perf_counter()
+    match, tables = _tables_of(scores, here, observed, frames)
+    sets = tables.sets
+    if max_members is None:
+        max_members = sets.max_members
+    elif weights.success > 0.0:
+        check_estimated(sets, tables.success, max_members)
+    _check_members(max_members, sets.max_members)
+    if not len(sets.candidates):
+        raise SelectionError(
+            "Nothing to select: no initial configuration reaches a goal. See the reasons with "
+            "`tcs explain`, then change the task, the grid or the environment."
+        )
+    legs = legs_from(
+        here, tables.grid, sets.candidates, sets.cell, tables.index.distances[travel.route], travel
+    )
+    if not np.any(legs.reachable):
+        raise SelectionError(
+            f"From ({here.base_x:.2f}, {here.base_y:.2f}) m no path around the furniture leads to "
+            "any candidate base pose. Check the position, or use straight lines."
+        )
+    found = None
+    if constraints:
+        found = admitted_candidates(constraints, here, tables.grid, sets.candidates)
+    query = _Query(tables, legs, weights, max_members, found)
+    return query.choice(query.best(), start, match)
+
+
+def _tables_of(
+    scores: ScoreFile | SelectionTables,
+    here: InitialConfiguration,
+    observed: Mapping[str, float] | None,
+    frames: Mapping[str, Sequence[float]] | None,
+) -> tuple[Match | None, SelectionTables]:
+    """Return the tables to select from, and their match with the observation for a file."""
+    if isinstance(scores, ScoreFile):
+        match = nearest_table(scores, here, observed, frames)
+        return match, SelectionTables.of(scores, match.index)
+    if observed or frames:
+        raise SelectionError(
+            "Observations select among the tables of a score file, but a single table is given. "
+            "Give the file."
+        )
+    return None, scores
+
+
+def _check_members(requested: int, stored: int) -> None:
+    """Refuse a number of members below 1, or greater than the table holds."""
+    if requested < 1:
+        raise SelectionError(f"max_members is {requested}; must be 1 or more.")
+    if requested > stored:
+        sizes = " and ".join(str(n) for n in range(1, stored + 1))
+        raise SelectionError(
+            f"max_members is {requested}, but the table holds sets of {sizes} only. "
+            + (
+                f"Score the task again: tcs score ... --max-members {requested}."
+                if requested <= MOST_MEMBERS
+                else f"No set has more than {MOST_MEMBERS}."
+            )
+        )
+
+
+@dataclass(frozen=True)
+class _Query:
+    """One selection: the sets, the state and what is asked for."""
+
+    tables: SelectionTables
+    legs: Legs
+    weights: UtilityWeights
+    max_members: int
+    """Greatest number of members of a set."""
+    found: Admitted | None
+    """The candidates that satisfy the constraints; None without constraints."""
+
+    def best(self) -> tuple[int, ...]:
+        """Return the candidate numbers of the best set, the first among equals."""
+        sets, legs, weights = self.tables.sets, self.legs, self.weights
+        admitted = self._reachable
+        if weights.success > 0.0:
+            return best_estimated(
+                sets, self.tables.success, legs, weights, self.max_members, admitted
+            )
+        singles = utility(
+            sets.single_reachability, sets.single_manipulability, legs.from_here, weights
+        )
+        singles[~admitted] = -np.inf
+        single = int(np.argmax(singles))
+        rows: tuple[int, ...] = (single,)
+        best = float(singles[single])
+        only = None if self.found is None else self.found.candidates
+        for groups in self.tables.index.groups[: self.max_members - 1]:
+            found = best_set(Bounds(groups, legs, weights, only), best)
+            if found is not None:
+                rows, best = found.members, found.utility
+        return rows
+
+    @property
+    def _reachable(self) -> NDArray[np.bool_]:
+        """Whether a candidate is reachable and satisfies the constraints, shape (C,).
+
+        Raises:
+            SelectionError: If none is.
+        """
+        reachable = self.legs.reachable[self.tables.sets.cell]
+        if self.found is None:
+            return reachable
+        both = reachable & self.found.candidates
+        if not np.any(both):
+            raise SelectionError(
+                "No path around the furniture leads to any of the "
+                f"{np.count_nonzero(self.found.candidates):,} configurations that the constraints "
+                "leave. Relax a constraint, or use straight lines."
+            )
+        return np.asarray(both)
+
+    def choice(self, rows: tuple[int, ...], start: float, match: Match | None) -> Choice:
+        """Return the choice of the set of candidates `rows`; `start` is when selection began."""
+        tables, legs = self.tables, self.legs
+        member = np.array(rows)
+        between = legs.between(member[:, None], member[None, :])
+        cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
+        indices = tuple(int(h) for h in tables.sets.candidates[member])
+        reachability, manipulability = tables.sets.scores_of(indices)
+        row = tables.success.row_of(indices) if tables.success is not None else None
+        success, interval, low = None, None, None
+        if tables.success is not None and row is not None:
+            success = float(tables.success.success[row])
+            interval = (float(tables.success.low[row]), float(tables.success.high[row]))
+            low = interval[0]
+        return Choice(
+            members=tuple(tables.grid.configuration(h) for h in indices),
+            indices=indices,
+            order=order,
+            reachability=reachability,
+            manipulability=manipulability,
+            cost=cost,
+            utility=utility(reachability, manipulability, cost, self.weights, low),
+            success=success,
+            success_ci95=interval,
+            unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
+            match=match,
+            constraints=self.found.left if self.found is not None else (),
+            warnings=self.found.warnings if self.found is not None else (),
+            seconds=time.perf_counter() - start,
+        )
