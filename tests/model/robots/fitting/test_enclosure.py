@@ -68,7 +68,7 @@ def test_no_primitive_could_be_a_millimetre_smaller(surfaces):
 def test_inside_of_closed_surfaces_is_enclosed_too(surfaces):
     """A hollow between primitives would hide what lies inside the robot."""
     for body, (_, shapes, surface) in surfaces.items():
-        pitch = float(np.ptp(surface.reshape(-1, 3), axis=0).max()) / 25
+        pitch = float(np.ptp(surface.reshape(-1, 3), axis=0).max()) / 15
         mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(surface))
         voxels = mesh.voxelized(pitch)
         shell = np.pad(voxels.matrix, 1)
