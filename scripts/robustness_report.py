@@ -17,10 +17,10 @@ from pathlib import Path
 import tcs
 from tcs.errors import UnknownNameError
 from tcs.files.writing import make_folder
+from tcs.model.random_streams import check_draws
 from tcs.output import terminal
 from tcs.output.report import draw_rows, load_paper, write_report
 from tcs.placement.robustness import StudyPlan, check_row, robustify, study_rows
-from tcs.placement.robustness.error_model import check_draws
 from tcs.placement.scoring import default_path
 
 ROBOT = "pr2"

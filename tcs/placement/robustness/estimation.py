@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import TcsError
 from tcs.model.grid import Grid
-from tcs.placement.robustness.error_model import check_draws
+from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.successive_halving import Estimates, round_sizes, successive_halving
 from tcs.placement.robustness.trials import Errors, Progress, Trials

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError, UnknownNameError
-from tcs.placement.robustness.error_model import ErrorModel, Offsets, check_draws
+from tcs.model.random_streams import check_draws
+from tcs.placement.robustness.error_model import ErrorModel, Offsets
 from tcs.placement.robustness.pairs import uniform_sets
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError
-from tcs.placement.robustness.error_model import check_draws, named_generator
+from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.robustness.evaluation import Evaluation, evaluate
 from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, Pairs, kept_pairs
 from tcs.placement.robustness.statistics import CONFIDENCE, Difference, signed_rank

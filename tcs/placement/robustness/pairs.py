@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, TcsError
-from tcs.placement.robustness.error_model import named_generator
+from tcs.model.random_streams import named_generator
 from tcs.placement.tables import SetTable
 from tcs.placement.tables.rules import FRACTION_TOLERANCE
 

@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 from tcs.errors import DataFileError, EnvironmentFileError, TcsError, UnknownNameError
+from tcs.model.random_streams import named_generator
 from tcs.model.scene import ErrorDistribution
 from tcs.placement.robustness import ErrorModel
-from tcs.placement.robustness.error_model import named_generator
 
 NORMAL = ErrorDistribution(distribution="normal", std=0.05)
 TILT = ErrorDistribution(distribution="normal", std_deg=5.0)
