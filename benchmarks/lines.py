@@ -89,8 +89,7 @@ def medians(line: str, experiment: Experiment) -> None:
 def maps(experiment: Experiment) -> None:
     """Print and record the capability map of each controller."""
     found = controller_maps(experiment)
-    text, table = maps_blocks(experiment, found)
-    print(text)
+    _, table = maps_blocks(experiment, found)
     assert isinstance(table, Table)
     for cells in table.texts():
         print("  ".join(cells))

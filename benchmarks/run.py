@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from table import cell, header, parser, row, save, spread
+from table import cell, header, parser, row, save, spread, verification_text
 
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification import reference_pairs
@@ -148,9 +148,7 @@ def verification(path: Path, options: argparse.Namespace) -> bool:
     """Re-check answers with Drake and the dense scan; return whether all are true."""
     begun = time.perf_counter()
     found = verify(load_scores(path), pairs=options.pairs, dense=options.dense, seed=options.seed)
-    for name, value in found.to_json().items():
-        measured(f"verify: {name}", f"{value}")
-    row("verify took", f"{time.perf_counter() - begun:.1f} s")
+    measured("verify", verification_text(found, time.perf_counter() - begun))
     return found.is_sound
 
 
