@@ -16,6 +16,8 @@ PROMISED = [
     "InitialConfiguration",
     "LiveScorer",
     "Observation",
+    "Obstacle",
+    "Region",
     "ScoreFile",
     "TcsError",
     "TravelWeights",

@@ -145,15 +145,41 @@ class ConstraintOptions:
         ),
     ] = None
 
+    forbid: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="REGION",
+            help="Polygon on which the robot must not stand: 'X1 Y1, X2 Y2, X3 Y3, ...' in the "
+            "environment frame (m), or a YAML file with the key polygon.",
+        ),
+    ] = None
+    blocked: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="BOX",
+            help="Obstacle seen just now, which neither body nor arm may touch: 'X Y WIDTH DEPTH "
+            "[YAW_DEG] [Z_LOW Z_HIGH]' in the environment frame (m, deg).",
+        ),
+    ] = None
+
     def constraints(self) -> Constraints:
         """Return the constraints.
 
         Raises:
             TcsError: If one is not of its form.
         """
-        from tcs.placement.selection import Constraints
+        from tcs.placement.selection import Constraints, Obstacle, Region
 
-        return Constraints(only=tuple(self.only or ()), keep=tuple(self.keep or ()))
+        regions = []
+        for given in self.forbid or ():
+            is_file = Path(given).suffix in (".yaml", ".yml")
+            regions.append(Region.read(Path(given)) if is_file else Region.parse(given))
+        return Constraints(
+            only=tuple(self.only or ()),
+            keep=tuple(self.keep or ()),
+            forbid=tuple(regions),
+            blocked=tuple(Obstacle.parse(given) for given in self.blocked or ()),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

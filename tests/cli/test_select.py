@@ -277,3 +277,18 @@ def test_warnings_are_part_of_the_result_and_printed_once(tcs_command, small_fil
     (warning,) = ran.json["warnings"]
     assert "excludes nothing" in warning
     assert ran.err.count("excludes nothing") == 1
+
+
+def test_regions_reach_the_selection(tcs_command, small_file, tmp_path):
+    path = tmp_path / "left.yaml"
+    path.write_text("polygon: [[-9, -9], [-0.75, -9], [-0.75, 9], [-9, 9]]")
+    ran = tcs_command("select", small_file, *HERE, "--forbid", path, "--json")
+    assert all(member["base_x"] > -0.25 for member in ran.json["members"])
+    assert ran.json["footprint"] == {"type": "circle", "radius": 0.5}
+    assert "score the task again" in ran.err.lower()
+
+
+def test_an_obstacle_needs_shapes(tcs_command, small_file):
+    ran = tcs_command("select", small_file, *HERE, "--blocked", "1 1 0.5 0.5")
+    assert (ran.code, ran.out) == (1, "")
+    assert "does not hold the robot's shapes" in ran.err

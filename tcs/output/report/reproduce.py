@@ -35,6 +35,8 @@ def score_command(report: ScoreReport) -> str:
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
         words.append("--same-environment")
+    for condition in file.metadata.get("only", ()):
+        words += ["--only", condition]
     if "observation" in file.metadata:
         words += _observed(report)
     line = shlex.join([*words, "--out", str(report.path)])

@@ -125,9 +125,10 @@ def report_choice(result: Mapping[str, Any]) -> None:
             f"{high:.1%})"
         )
     for constraint in result.get("constraints", ()):
-        out.print(
-            f"{constraint['constraint']}: {constraint['configurations']:,} configurations left"
-        )
+        left = f"{constraint['configurations']:,} configurations"
+        if "solutions" in constraint:
+            left += f" with {constraint['solutions']:,} solutions"
+        out.print(f"{constraint['constraint']}: {left} left")
     if result["unreachable"]:
         out.print(
             f"unreachable from here: {result['unreachable']:,} configurations, not considered"

@@ -16,6 +16,7 @@ from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
 from tcs.placement.scoring.job import Job, data_references, load_job
+from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.placement.scoring.sweep import sweep
@@ -108,6 +109,7 @@ class ScoringSetup:
             StateTables.of(scores, build_sets(scores, job.grid, jobs=self.jobs, **self.sets))
             for scores in swept.tables
         )
+        shapes = robot_shapes(lowered.arrays)
         done = time.perf_counter()
         return ScoreFile(
             metadata={
@@ -116,6 +118,7 @@ class ScoringSetup:
                 **self.references,
                 **(metadata or {}),
                 **({"only": list(self.only)} if self.only else {}),
+                **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
                 "scene_digest": lowered.digest(),
                 "measure": self.measure,
                 "ik": swept.ik,

@@ -10,6 +10,8 @@ from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.constraints import Constraints
 from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.obstacles import Obstacle
+from tcs.placement.selection.regions import Region
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 
@@ -17,6 +19,8 @@ __all__ = [
     "Choice",
     "Constraints",
     "Match",
+    "Obstacle",
+    "Region",
     "SelectionTables",
     "TravelWeights",
     "UtilityWeights",

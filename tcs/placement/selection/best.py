@@ -14,12 +14,13 @@ from tcs.model.grid import InitialConfiguration
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.constraints import Admitted, Constraints, admitted_candidates
-from tcs.placement.selection.estimated import best_estimated, check_estimated
+from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.store import ScoreFile
+from tcs.placement.tables import tc_manipulability, tc_reachability
 from tcs.placement.tables.sets import MOST_MEMBERS
 
 _DEFAULT_WEIGHTS = UtilityWeights()
@@ -94,7 +95,7 @@ def select(
         )
     found = None
     if constraints:
-        found = admitted_candidates(constraints, here, tables.grid, sets.candidates)
+        found = admitted_candidates(constraints, here, tables)
     query = _Query(tables, legs, weights, max_members, found)
     return query.choice(query.best(), start, match)
 
@@ -150,22 +151,31 @@ class _Query:
         sets, legs, weights = self.tables.sets, self.legs, self.weights
         admitted = self._reachable
         if weights.success > 0.0:
+            candidates = Candidates(admitted, *self._scores)
             return best_estimated(
-                sets, self.tables.success, legs, weights, self.max_members, admitted
+                sets, self.tables.success, legs, weights, self.max_members, candidates
             )
-        singles = utility(
-            sets.single_reachability, sets.single_manipulability, legs.from_here, weights
-        )
+        reachability, manipulability = sets.single_reachability, sets.single_manipulability
+        if self.found is not None and self.found.has_fewer_solutions:
+            reachability = tc_reachability(self.found.reached, sets.weights)
+            manipulability = tc_manipulability(self.found.dexterity, sets.weights)
+        singles = utility(reachability, manipulability, legs.from_here, weights)
         singles[~admitted] = -np.inf
         single = int(np.argmax(singles))
         rows: tuple[int, ...] = (single,)
         best = float(singles[single])
-        only = None if self.found is None else self.found.candidates
         for groups in self.tables.index.groups[: self.max_members - 1]:
-            found = best_set(Bounds(groups, legs, weights, only), best)
+            found = best_set(Bounds(groups, legs, weights, self.found), best)
             if found is not None:
                 rows, best = found.members, found.utility
         return rows
+
+    @property
+    def _scores(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+        """What the candidates reach by solutions that are not blocked, and their dexterity."""
+        if self.found is None:
+            return self.tables.sets.reached, self.tables.sets.dexterity
+        return self.found.reached, self.found.dexterity
 
     @property
     def _reachable(self) -> NDArray[np.bool_]:
@@ -193,7 +203,10 @@ class _Query:
         between = legs.between(member[:, None], member[None, :])
         cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
         indices = tuple(int(h) for h in tables.sets.candidates[member])
-        reachability, manipulability = tables.sets.scores_of(indices)
+        reached, dexterity = (of_all[member] for of_all in self._scores)
+        weights_of_goals = tables.sets.weights
+        reachability = float(tc_reachability(np.any(reached, axis=0), weights_of_goals))
+        manipulability = float(tc_manipulability(np.max(dexterity, axis=0), weights_of_goals))
         row = tables.success.row_of(indices) if tables.success is not None else None
         success, interval, low = None, None, None
         if tables.success is not None and row is not None:
@@ -213,6 +226,7 @@ class _Query:
             unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
             match=match,
             constraints=self.found.left if self.found is not None else (),
+            footprint=self.found.footprint if self.found is not None else None,
             warnings=self.found.warnings if self.found is not None else (),
             seconds=time.perf_counter() - start,
         )

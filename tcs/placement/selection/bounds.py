@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.placement.selection.constraints import Admitted
 from tcs.placement.selection.index import GroupIndex
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights
@@ -35,8 +36,9 @@ class Bounds:
     """Travel costs from the current state."""
     weights: UtilityWeights
     """alpha, beta, gamma."""
-    admitted: NDArray[np.bool_] | None = None
-    """Whether a candidate satisfies the constraints, shape (C,); None without constraints."""
+    admitted: Admitted | None = None
+    """The candidates that satisfy the constraints; None without constraints. Their scores without
+    blocked solutions are not greater than the stored ones, so the bounds hold for both."""
 
     @property
     def travel(self) -> float:
@@ -147,7 +149,7 @@ class Bounds:
         """
         net = self._member_gain - self._levels
         if self.admitted is not None:
-            net[~self.admitted] = -np.inf
+            net[~self.admitted.candidates] = -np.inf
         return net
 
     @cached_property

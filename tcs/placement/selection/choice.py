@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
+from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.selection.constraints import Left
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
+from tcs.placement.selection.postures import Postures
+from tcs.placement.selection.regions import Footprint
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import SetTable, SuccessTable
+from tcs.placement.store.robot_shapes import RobotShapes
+from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
 
 
 @dataclass(frozen=True)
@@ -27,12 +33,41 @@ class SelectionTables:
     """The grid of initial configurations."""
     success: SuccessTable | None = None
     """Estimated success under error of some of the sets, if any."""
+    read_shapes: Callable[[], RobotShapes | None] | None = None
+    """Returns the robot's shapes, if they are known."""
+    read_scores: Callable[[], ScoreTable] | None = None
+    """Returns the stored solutions."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
         """Return one of the tables of a loaded score file, the nominal one by default."""
         chosen = file.nominal if table is None else file.tables[table]
-        return cls(chosen.sets, Grid.from_dict(file.grid), chosen.success)
+        return cls(
+            chosen.sets,
+            Grid.from_dict(file.grid),
+            chosen.success,
+            partial(getattr, file, "robot_shapes"),
+            partial(getattr, chosen, "scores"),
+        )
+
+    @cached_property
+    def shapes(self) -> RobotShapes | None:
+        """The robot's shapes, None if they are not known."""
+        return None if self.read_shapes is None else self.read_shapes()
+
+    @cached_property
+    def postures(self) -> Postures:
+        """Where the robot's shapes are, prepared for obstacles.
+
+        Raises:
+            SelectionError: If the robot's shapes are not known.
+        """
+        if self.shapes is None or self.read_scores is None:
+            raise SelectionError(
+                "The score file does not hold the robot's shapes, so nothing is known about "
+                "contact with an obstacle. Score the task again, or forbid the region instead."
+            )
+        return Postures(self.shapes, self.sets, self.grid, self.read_scores())
 
     @cached_property
     def index(self) -> SetIndex:
@@ -69,8 +104,10 @@ class Choice:
     """Duration of the selection [s]."""
     match: Match | None = None
     """The table of the file that was used, and its distance from the observation."""
-    constraints: tuple[tuple[str, int], ...] = ()
-    """Each constraint, and the number of candidates that it and those before it leave."""
+    constraints: tuple[Left, ...] = ()
+    """Each constraint, and what it and those before it leave."""
+    footprint: Footprint | None = None
+    """The floor that the robot covers, for forbidden regions; None without any."""
     warnings: tuple[str, ...] = ()
     """What the user should know about the choice, one sentence each."""
 
@@ -100,9 +137,9 @@ class Choice:
         if self.match is not None and self.match.state:
             plain |= self.match.to_json()
         if self.constraints:
-            plain["constraints"] = [
-                {"constraint": name, "configurations": count} for name, count in self.constraints
-            ]
+            plain["constraints"] = [left.to_json() for left in self.constraints]
+        if self.footprint is not None:
+            plain["footprint"] = self.footprint.to_json()
         if self.warnings:
             plain["warnings"] = list(self.warnings)
         return plain

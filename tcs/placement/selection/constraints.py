@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,13 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, AxisCondition, Grid, InitialConfiguration
 from tcs.model.grid.condition import axis_named, values_text
+from tcs.placement.selection.blocking import blocked_bodies, blocked_solutions
+from tcs.placement.selection.obstacles import Obstacle
+from tcs.placement.selection.regions import Footprint, Region
 from tcs.placement.selection.travel import current_values
+
+if TYPE_CHECKING:
+    from tcs.placement.selection.choice import SelectionTables
 
 BoolArray = NDArray[np.bool_]
 
@@ -28,12 +35,16 @@ class Constraints:
     """Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; see `AxisCondition`."""
     keep: tuple[str, ...] = ()
     """Axes that stay as they are now, e.g. "bed_height"."""
+    forbid: tuple[Region, ...] = ()
+    """Regions of the floor on which the robot must not stand."""
+    blocked: tuple[Obstacle, ...] = ()
+    """Obstacles that neither the robot's body nor its arm may touch."""
 
     def __post_init__(self) -> None:
-        """Turn lists into tuples, and check the form of the conditions.
+        """Turn lists into tuples, and check the form of the constraints.
 
         Raises:
-            SelectionError: If a field is a single text.
+            SelectionError: If a field is a single text, or holds another type than it should.
             GridError: If a condition is not of the form of `AxisCondition`.
             UnknownNameError: If a condition has an unknown unit.
         """
@@ -44,6 +55,17 @@ class Constraints:
                     f"Constraint {field.name} is the text '{value}'; must be a tuple of them."
                 )
             object.__setattr__(self, field.name, tuple(value))
+        for name, type_ in (
+            ("only", str),
+            ("keep", str),
+            ("forbid", Region),
+            ("blocked", Obstacle),
+        ):
+            for value in getattr(self, name):
+                if not isinstance(value, type_):
+                    raise SelectionError(
+                        f"Constraint {name} holds {value!r}; must be of type {type_.__name__}."
+                    )
         for text in self.only:
             AxisCondition.parse(text)
 
@@ -53,45 +75,111 @@ class Constraints:
 
 
 @dataclass(frozen=True, slots=True)
+class Left:
+    """What a constraint and those before it leave."""
+
+    constraint: str
+    """The constraint, e.g. "keep bed_height"."""
+    configurations: int
+    """Number of candidates."""
+    solutions: int | None = None
+    """Number of their stored solutions, for obstacles."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers as plain containers."""
+        plain: dict[str, Any] = {
+            "constraint": self.constraint,
+            "configurations": self.configurations,
+        }
+        return plain if self.solutions is None else {**plain, "solutions": self.solutions}
+
+
+@dataclass(frozen=True, slots=True)
 class Admitted:
-    """The candidates that satisfy all constraints."""
+    """The candidates that satisfy all constraints, and what they still reach."""
 
     candidates: BoolArray
     """Whether a candidate satisfies them, shape (C,)."""
-    left: tuple[tuple[str, int], ...]
-    """Each constraint, and the number of candidates that remain after it and those before it."""
+    reached: BoolArray
+    """Whether a candidate reaches a goal by a solution that no obstacle blocks, shape (C, G)."""
+    dexterity: NDArray[np.float32]
+    """Its dexterity there, 0 where not reached, shape (C, G)."""
+    left: tuple[Left, ...]
+    """What each constraint leaves."""
     warnings: tuple[str, ...]
     """What the user should know about the constraints."""
+    footprint: Footprint | None
+    """The floor that the robot covers; None without forbidden regions."""
+
+    @property
+    def has_fewer_solutions(self) -> bool:
+        """Whether obstacles were given, so that `reached` may differ from the scores."""
+        return any(left.solutions is not None for left in self.left)
 
 
 def admitted_candidates(
-    constraints: Constraints, here: InitialConfiguration, grid: Grid, candidates: NDArray[np.int32]
+    constraints: Constraints, here: InitialConfiguration, tables: SelectionTables
 ) -> Admitted:
     """Return the candidates that satisfy all constraints.
 
     Args:
         constraints: The constraints.
         here: The current state, for `keep`.
-        grid: Grid of the candidates.
-        candidates: Flat indices of the candidates, shape (C,).
+        tables: The candidates.
 
     Raises:
         UnknownNameError: If the grid has no such axis.
         GridError: If a condition has another unit than its axis, or excludes all its values.
         SelectionError: If the current state lacks an axis to keep or is beyond the scored values,
-            or no candidate is left.
+            an obstacle is given and the robot's shapes are not known, or no candidate is left.
     """
-    remaining = np.ones(len(candidates), dtype=np.bool_)
-    left: list[tuple[str, int]] = []
+    sets, grid = tables.sets, tables.grid
+    remaining = np.ones(len(sets.candidates), dtype=np.bool_)
+    reached, dexterity = sets.reached, sets.dexterity
+    left: list[Left] = []
     warnings: list[str] = []
-    along = grid.indices(candidates)
+    along = grid.indices(sets.candidates)
     for name, axis, admitted, warning in _axis_constraints(constraints, here, grid):
         remaining &= admitted[along[:, grid.axes.index(axis)]]
-        left.append((name, int(np.count_nonzero(remaining))))
-        if warning:
-            warnings.append(warning)
-        _check_left(left, len(candidates))
-    return Admitted(remaining, tuple(left), tuple(warnings))
+        warnings += [warning] if warning else []
+        _note(left, Left(name, _count(remaining)), remaining.size)
+    footprint = Footprint.of(tables.shapes) if constraints.forbid else None
+    if footprint is not None:
+        base, which = _bases(grid, sets.candidates)
+        for region in constraints.forbid:
+            remaining &= ~footprint.overlaps(region, base)[which]
+            _note(left, Left(f"forbid {region.name}", _count(remaining)), remaining.size)
+        if footprint.radius:
+            warnings.append(
+                "forbid: the robot's shapes are not stored, so it counts as a circle of "
+                f"{footprint.radius:g} m about its base. Score the task again for its footprint."
+            )
+    for obstacle in constraints.blocked:
+        remaining &= ~blocked_bodies(obstacle, tables.postures)
+        hit = blocked_solutions(obstacle, tables.postures, remaining)
+        candidate, goal = (index[hit] for index in tables.postures.pairs)
+        reached, dexterity = reached.copy(), dexterity.copy()
+        reached[candidate, goal], dexterity[candidate, goal] = False, 0.0
+        remaining &= reached.any(axis=1)
+        found = Left(f"blocked {obstacle.name}", _count(remaining), _count(reached[remaining]))
+        _note(left, found, remaining.size)
+    return Admitted(remaining, reached, dexterity, tuple(left), tuple(warnings), footprint)
+
+
+def _bases(
+    grid: Grid, candidates: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the distinct base poses (U, 3) [m, m, rad], and the pose of each candidate (C,)."""
+    size = int(np.prod(grid.shape[-4:]))
+    # Neither the environment's state nor the torso level, the fastest axis, moves the base.
+    pose = candidates.astype(np.int64) % size // grid.shape[-1]
+    _, first, which = np.unique(pose, return_index=True, return_inverse=True)
+    at = grid.values(candidates[first])
+    return np.stack([at[name] for name in ("base_x", "base_y", "base_yaw")], axis=1), which
+
+
+def _count(remaining: BoolArray) -> int:
+    return int(np.count_nonzero(remaining))
 
 
 def _axis_constraints(
@@ -149,14 +237,14 @@ def _shown(axis: Axis, value: float) -> str:
     return f"{math.degrees(value) if axis.unit == 'deg' else value:g} {axis.unit}"
 
 
-def _check_left(left: list[tuple[str, int]], candidates: int) -> None:
-    """Refuse constraints that leave no candidate; the message names the last one."""
-    name, count = left[-1]
-    if count:
-        return
-    before = f"the {left[-2][1]:,} that '{left[-2][0]}' leaves" if len(left) > 1 else ""
-    among = before or f"the {candidates:,} that reach a goal"
-    raise SelectionError(
-        f"No initial configuration is left: '{name}' excludes all of {among}. Relax a constraint, "
-        "or score a grid that covers it."
-    )
+def _note(left: list[Left], found: Left, candidates: int) -> None:
+    """Record what a constraint leaves; refuse one that leaves no candidate."""
+    before = f"the {candidates:,} that reach a goal"
+    if left:
+        before = f"the {left[-1].configurations:,} that '{left[-1].constraint}' leaves"
+    left.append(found)
+    if not found.configurations:
+        raise SelectionError(
+            f"No initial configuration is left: '{found.constraint}' excludes all of {before}. "
+            "Relax a constraint, or score a grid that covers it."
+        )

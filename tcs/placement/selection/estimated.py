@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +14,24 @@ from tcs.placement.selection.utility import UtilityWeights, utility
 from tcs.placement.tables import SetTable, SuccessTable, tc_manipulability, tc_reachability
 
 
+class Candidates(NamedTuple):
+    """Which candidates may be selected, and what they reach."""
+
+    admitted: NDArray[np.bool_]
+    """Whether a candidate may be selected, shape (C,)."""
+    reached: NDArray[np.bool_]
+    """Whether it reaches a goal, shape (C, G)."""
+    dexterity: NDArray[np.float32]
+    """Its dexterity there, shape (C, G)."""
+
+
 def best_estimated(
     sets: SetTable,
     success: SuccessTable | None,
     legs: Legs,
     weights: UtilityWeights,
     max_members: int,
-    admitted: NDArray[np.bool_],
+    candidates: Candidates,
 ) -> tuple[int, ...]:
     """Return the set with an estimate that has the greatest utility, the first among equals.
 
@@ -28,7 +41,7 @@ def best_estimated(
         legs: Travel costs from the current state.
         weights: alpha, beta, gamma, delta.
         max_members: Greatest number of members of a set.
-        admitted: Whether a candidate may be selected, shape (C,).
+        candidates: Which candidates may be selected, and what they reach.
 
     Returns:
         Candidate numbers of its members, ascending.
@@ -46,11 +59,11 @@ def best_estimated(
     for size in range(1, max_members + 1):
         rows = success.of_size(size)
         members = np.searchsorted(sets.candidates, success.members[rows, :size])
-        feasible = np.all(admitted[members], axis=1)
+        feasible = np.all(candidates.admitted[members], axis=1)
         rows, members = rows[feasible], members[feasible]
         if not rows.size:
             continue
-        found = _utilities(sets, success.low[rows], legs, weights, members)
+        found = _utilities(sets.weights, candidates, success.low[rows], legs, weights, members)
         first = int(np.argmax(found))
         # The table is sorted in the order that breaks ties.
         if found[first] > most:
@@ -81,19 +94,20 @@ def check_estimated(sets: SetTable, success: SuccessTable | None, max_members: i
 
 
 def _utilities(
-    sets: SetTable,
+    of_goals: NDArray[np.float64],
+    candidates: Candidates,
     success: NDArray[np.float64],
     legs: Legs,
     weights: UtilityWeights,
     members: NDArray[np.intp],
 ) -> NDArray[np.float64]:
-    """Return the utility of sets of one size, given their candidates of shape (n, size)."""
+    """Return the utility of sets of one size, given their candidate numbers (n, size)."""
     columns = tuple(np.ascontiguousarray(column) for column in members.T)
-    reached = np.logical_or.reduce([sets.reached[column] for column in columns], axis=0)
-    dexterity = np.maximum.reduce([sets.dexterity[column] for column in columns], axis=0)
+    reached = np.logical_or.reduce([candidates.reached[column] for column in columns], axis=0)
+    dexterity = np.maximum.reduce([candidates.dexterity[column] for column in columns], axis=0)
     return utility(
-        tc_reachability(reached, sets.weights),
-        tc_manipulability(dexterity, sets.weights),
+        tc_reachability(reached, of_goals),
+        tc_manipulability(dexterity, of_goals),
         tour_costs(legs, columns),
         weights,
         success,

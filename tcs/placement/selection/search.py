@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,28 +193,46 @@ def _best_of(
     # The exact travel cost rejects most sets before their scores, which take longer.
     feasible = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
     members, cost = tuple(member[feasible] for member in members), cost[feasible]
-    every, sets = bounds.index.all, bounds.index.all.sets
-    manipulability = np.zeros(cost.size)
-    for dexterity, weight in zip(every.dexterity, sets.weights, strict=True):
-        most = dexterity[members[0]]
-        for member in members[1:]:
-            most = np.maximum(most, dexterity[member])
-        manipulability += float(weight) * most
-    reachability = np.zeros(cost.size)
-    for reached, weight in zip(every.reached, sets.weights, strict=True):
-        some = reached[members[0]]
-        for member in members[1:]:
-            some = some | reached[member]
-        reachability += float(weight) * some
-    kept = np.flatnonzero(_is_kept(bounds.index, members, reachability, manipulability))
+    every = bounds.index.all
+    scores = _scores(every.dexterity, every.reached, every.sets.weights, members)
+    kept = np.flatnonzero(_is_kept(bounds.index, members, *scores))
     if not kept.size:
         return None
     members = tuple(member[kept] for member in members)
-    utilities = utility(reachability[kept], manipulability[kept], cost[kept], bounds.weights)
+    reachability, manipulability = scores[0][kept], scores[1][kept]
+    admitted = bounds.admitted
+    if admitted is not None and admitted.has_fewer_solutions:
+        # Stored sets are compared, so the rule applies to their stored scores.
+        reachability, manipulability = _scores(
+            admitted.dexterity.T, admitted.reached.T, every.sets.weights, members
+        )
+    utilities = utility(reachability, manipulability, cost[kept], bounds.weights)
     best = utilities.max()
     ties = np.flatnonzero(utilities == best)
     first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]
     return Found(float(best), tuple(int(member[first]) for member in members))
+
+
+def _scores(
+    dexterity: NDArray[np.floating[Any]],
+    reached: NDArray[np.bool_],
+    weights: FloatArray,
+    members: tuple[IntArray, ...],
+) -> tuple[FloatArray, FloatArray]:
+    """Return P_R and P_M of sets, given their members (n,) and arrays of shape (G, C)."""
+    manipulability = np.zeros(members[0].size)
+    for of_goal, weight in zip(dexterity, weights, strict=True):
+        most = of_goal[members[0]]
+        for member in members[1:]:
+            most = np.maximum(most, of_goal[member])
+        manipulability += float(weight) * most.astype(np.float64, copy=False)
+    reachability = np.zeros(members[0].size)
+    for at_goal, weight in zip(reached, weights, strict=True):
+        some = at_goal[members[0]]
+        for member in members[1:]:
+            some = some | at_goal[member]
+        reachability += float(weight) * some
+    return reachability, manipulability
 
 
 def _is_kept(

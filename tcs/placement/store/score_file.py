@@ -14,6 +14,7 @@ import numpy as np
 from tcs.errors import StoreError, StoreMismatchError
 from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
+from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
 from tcs.placement.tables.rules import candidates_of
 from tcs.placement.tables.sets import DISTANCE_TOLERANCE
@@ -194,6 +195,16 @@ class ScoreFile:
         names = [axis.name for axis in self.observed_axes]
         states = itertools.product(*(axis.values.tolist() for axis in self.observed_axes))
         return tuple(dict(zip(names, state, strict=True)) for state in states)
+
+    @cached_property
+    def robot_shapes(self) -> RobotShapes | None:
+        """The robot's collision shapes, None in files without them.
+
+        Raises:
+            StoreError: If they are malformed.
+        """
+        stored = self.metadata.get("robot_shapes")
+        return None if stored is None else RobotShapes.from_dict(stored)
 
     @property
     def nominal(self) -> StateTables:

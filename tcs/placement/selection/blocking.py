@@ -1,0 +1,139 @@
+"""What an obstacle blocks: body poses that touch it, and stored solutions whose arm touches it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.selection.contact import in_contact, point_distance
+from tcs.placement.selection.obstacles import Obstacle
+from tcs.placement.selection.postures import ROUNDING, Postures
+from tcs.placement.store.robot_shapes import Primitives
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def blocked_bodies(obstacle: Obstacle, postures: Postures) -> BoolArray:
+    """Return which candidates' bodies touch an obstacle, shape (C,).
+
+    Args:
+        obstacle: The obstacle.
+        postures: The robot at the candidates.
+    """
+    shapes, body = postures.shapes, postures.shapes.body
+    first, inverse = postures.body_poses
+    bound = body.bound + body.pad
+    reach = float(np.max(np.linalg.norm(body.p[:, :2], axis=1) + bound, initial=0.0))
+    frames = _Frames(obstacle, postures.base[first])
+    reach += shapes.margin + ROUNDING
+    near = np.flatnonzero(point_distance(obstacle.half[:2], frames.base[:, :2]) <= reach)
+    lift = shapes.lift[postures.level[first[near]]]
+    p_B = body.p + (body.frame == 1)[:, None] * lift[:, None]
+    p_O = frames.to_obstacle(near, p_B)
+    clearance = np.maximum(shapes.margin, body.pad) + ROUNDING
+    blocked = np.zeros(len(first), dtype=np.bool_)
+    distance = point_distance(obstacle.half, p_O)
+    # A shape whose centre is in the obstacle needs no closer test, nor do others of that pose.
+    inside = np.any(distance == 0.0, axis=1)
+    blocked[near[inside]] = True
+    pose, shape = np.nonzero((distance <= body.bound + clearance) & ~inside[:, None])
+    R_OB = frames.rotation(near[pose])
+    touching = _touching(obstacle, body, shape, R_OB @ body.R[shape], p_O[pose, shape], clearance)
+    blocked[near[pose[touching]]] = True
+    return np.asarray(blocked[inverse])
+
+
+def blocked_solutions(obstacle: Obstacle, postures: Postures, admitted: BoolArray) -> BoolArray:
+    """Return which stored solutions' arms touch an obstacle, shape (R,).
+
+    Args:
+        obstacle: The obstacle.
+        postures: The arm in the stored solutions.
+        admitted: Candidates to examine, shape (C,); solutions of others count as free.
+    """
+    shapes, arm = postures.shapes, postures.shapes.arm
+    candidate, _ = postures.pairs
+    middle, radius = postures.spheres
+    frames = _Frames(obstacle, postures.base)
+    examined = np.flatnonzero(admitted[candidate])
+    at = frames.to_obstacle(candidate[examined], middle[examined, None])[:, 0]
+    near = examined[point_distance(obstacle.half, at) <= radius[examined] + shapes.margin]
+    p_O = frames.to_obstacle(candidate[near], postures.centres[near].astype(np.float64))
+    clearance = np.maximum(shapes.margin, arm.pad) + ROUNDING
+    distance = point_distance(obstacle.half, p_O)
+    blocked = np.zeros(len(candidate), dtype=np.bool_)
+    inside = np.any(distance == 0.0, axis=1)
+    blocked[near[inside]] = True
+    close = (distance <= arm.bound + clearance + ROUNDING) & ~inside[:, None]
+    row, shape = np.nonzero(close)
+    some, index = np.unique(row, return_inverse=True)
+    links_R, links_p = postures.links(near[some])
+    link = arm.frame[shape] - 1
+    R_BL = links_R[index, link]
+    p_B = links_p[index, link] + np.einsum("nij,nj->ni", R_BL, arm.p[shape])
+    of_pair = candidate[near[row]]
+    touching = _touching(
+        obstacle,
+        arm,
+        shape,
+        frames.rotation(of_pair) @ R_BL @ arm.R[shape],
+        frames.to_obstacle(of_pair, p_B[:, None])[:, 0],
+        clearance,
+    )
+    blocked[near[row[touching]]] = True
+    return blocked
+
+
+def _touching(
+    obstacle: Obstacle,
+    primitives: Primitives,
+    shape: IntArray,
+    R: FloatArray,
+    p: FloatArray,
+    clearance: FloatArray,
+) -> BoolArray:
+    """Return which shapes, posed in the obstacle's frame, are too close to it, shape (n,)."""
+    return in_contact(
+        obstacle.half, primitives.type[shape], primitives.size[shape], R, p, clearance[shape]
+    )
+
+
+class _Frames:
+    """Base poses in the frame of an obstacle, which is parallel to the floor."""
+
+    def __init__(self, obstacle: Obstacle, base: FloatArray) -> None:
+        """Express base poses (n, 3) [m, m, rad] in the obstacle's frame."""
+        cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+        dx, dy = base[:, 0] - obstacle.x, base[:, 1] - obstacle.y
+        self.base = np.stack(
+            [cos * dx + sin * dy, cos * dy - sin * dx, np.full(len(base), -obstacle.centre[2])],
+            axis=1,
+        )
+        """Origin of each base in the obstacle's frame [m], shape (n, 3)."""
+        self._cos = np.cos(base[:, 2] - obstacle.yaw)
+        self._sin = np.sin(base[:, 2] - obstacle.yaw)
+
+    def to_obstacle(self, which: IntArray, p_B: FloatArray) -> FloatArray:
+        """Return points (m, k, 3) of bases `which` (m,) in the obstacle's frame."""
+        cos, sin = self._cos[which, None], self._sin[which, None]
+        x, y, z = p_B[..., 0], p_B[..., 1], p_B[..., 2]
+        base = self.base[which, None]
+        return np.stack(
+            [
+                base[..., 0] + cos * x - sin * y,
+                base[..., 1] + sin * x + cos * y,
+                base[..., 2] + z,
+            ],
+            axis=-1,
+        )
+
+    def rotation(self, which: IntArray) -> FloatArray:
+        """Return the orientations of bases `which` in the obstacle's frame, shape (m, 3, 3)."""
+        R = np.zeros((len(which), 3, 3))
+        R[:, 0, 0] = R[:, 1, 1] = self._cos[which]
+        R[:, 1, 0] = self._sin[which]
+        R[:, 0, 1] = -R[:, 1, 0]
+        R[:, 2, 2] = 1.0
+        return R

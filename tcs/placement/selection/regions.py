@@ -1,0 +1,190 @@
+"""Forbidden regions: polygons on the floor on which the robot must not stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError, one_line
+from tcs.files.quantities import POSITION
+from tcs.placement.selection.contact import segment_distance
+from tcs.placement.store.robot_shapes import BOX, RobotShapes
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+RADIUS = 0.5
+"""Radius [m] of the circle about the base that stands for the robot if its shapes are unknown: the
+base of a PR2, 0.67 m square, fits into 0.48 m."""
+
+MAX_VERTICES = 1000
+"""Most vertices of a region."""
+
+ROUNDING = 1e-9
+"""Added to footprints [m], so that rounding does not decide whether a touched edge is forbidden."""
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A polygon on the floor, its edge included, in the environment frame W."""
+
+    vertices: tuple[tuple[float, float], ...]
+    """x and y of its corners in order [m]; the last is joined with the first."""
+
+    def __post_init__(self) -> None:
+        """Check the vertices.
+
+        Raises:
+            SelectionError: If there are fewer than three, more than `MAX_VERTICES`, or one is not
+                two numbers in range.
+        """
+        try:
+            vertices = tuple((float(x), float(y)) for x, y in self.vertices)
+        except (TypeError, ValueError):
+            raise SelectionError("Region: each vertex must be two numbers, x and y [m].") from None
+        if not 3 <= len(set(vertices)) <= len(vertices) <= MAX_VERTICES:
+            raise SelectionError(
+                f"Region: has {len(set(vertices))} different vertices; must have 3 to "
+                f"{MAX_VERTICES}."
+            )
+        for vertex in vertices:
+            POSITION.check(vertex, "Region: a coordinate", SelectionError)
+        object.__setattr__(self, "vertices", vertices)
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the region of a text "X1 Y1, X2 Y2, X3 Y3, ..." [m].
+
+        Raises:
+            SelectionError: If the text is not of that form.
+
+        >>> Region.parse("0 0, 1 0, 1 1").vertices
+        ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+        """
+        try:
+            vertices = [[float(number) for number in part.split()] for part in text.split(",")]
+        except ValueError:
+            vertices = []
+        if not vertices or any(len(vertex) != 2 for vertex in vertices):
+            raise SelectionError(
+                f"Region '{one_line(text)}' must be X1 Y1, X2 Y2, X3 Y3, ... in metres, or a "
+                ".yaml file with the key 'polygon', a list of [x, y]."
+            )
+        return cls(tuple((x, y) for x, y in vertices))
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Return the region of a YAML file with the key `polygon`, a list of [x, y] [m].
+
+        Raises:
+            SelectionError: If the file cannot be read or used.
+        """
+        from tcs.errors import DataFileError
+        from tcs.files.documents import read_mapping
+
+        where = f"region file '{path}'"
+        try:
+            content = read_mapping(path, where, DataFileError, known=("polygon",))
+        except DataFileError as error:
+            raise SelectionError(str(error)) from None
+        polygon = content.get("polygon")
+        if set(content) != {"polygon"} or not isinstance(polygon, list):
+            raise SelectionError(f"{where} must have the one key 'polygon', a list of [x, y].")
+        return cls(tuple(tuple(vertex) for vertex in polygon if _is_pair(vertex, where)))
+
+    @property
+    def name(self) -> str:
+        """The region in the form that `parse` takes."""
+        return ", ".join(f"{x:g} {y:g}" for x, y in self.vertices)
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The floor that the robot covers: a rectangle in B, widened by a radius all around."""
+
+    low: tuple[float, float]
+    """Least x and y in the base frame B [m]."""
+    high: tuple[float, float]
+    """Greatest x and y in B [m]."""
+    radius: float
+    """Distance [m] by which it extends beyond the rectangle."""
+
+    @classmethod
+    def of(cls, shapes: RobotShapes | None) -> Self:
+        """Return the vertical projection of the shapes fixed to the base, as a rectangle.
+
+        Without shapes it is a circle of `RADIUS` about the base.
+        """
+        fixed = None if shapes is None else np.flatnonzero(shapes.body.frame == 0)
+        if shapes is None or fixed is None or not fixed.size:
+            return cls((0.0, 0.0), (0.0, 0.0), RADIUS)
+        body = shapes.body
+        size, R = body.size[fixed], body.R[fixed]
+        box = np.einsum("nij,nj->ni", np.abs(R), size)
+        capsule = np.abs(R[:, :, 2]) * size[:, 1:2] + size[:, :1]
+        half = np.where((body.type[fixed] == BOX)[:, None], box, capsule) + body.pad[fixed, None]
+        low, high = (body.p[fixed] - half).min(axis=0), (body.p[fixed] + half).max(axis=0)
+        return cls((float(low[0]), float(low[1])), (float(high[0]), float(high[1])), 0.0)
+
+    def overlaps(self, region: Region, base: FloatArray) -> BoolArray:
+        """Return whether the robot would stand on a region, shape (n,).
+
+        Args:
+            region: The region.
+            base: x, y [m] and heading [rad] of the base in W, shape (n, 3).
+        """
+        low, high = np.array(self.low), np.array(self.high)
+        corner = np.array(region.vertices)[None] - base[:, None, :2]
+        cos, sin = np.cos(base[:, 2:]), np.sin(base[:, 2:])
+        x = cos * corner[..., 0] + sin * corner[..., 1]
+        y = cos * corner[..., 1] - sin * corner[..., 0]
+        # Vertices in the frame of the rectangle's middle, with a third coordinate of zero.
+        middle = (low + high) / 2.0
+        at = np.stack([x - middle[0], y - middle[1], np.zeros_like(x)], axis=-1)
+        following = np.roll(at, -1, axis=1)
+        half = np.append((high - low) / 2.0, 1.0)
+        distance = segment_distance(half, at.reshape(-1, 3), following.reshape(-1, 3))
+        close = distance.reshape(x.shape) <= self.radius + ROUNDING
+        # A rectangle that no edge meets is inside or outside as a whole.
+        return np.asarray(np.any(close, axis=1) | _surrounded(at, following))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the footprint as plain containers [m]."""
+        if self.radius:
+            return {"type": "circle", "radius": self.radius}
+        return {
+            "type": "rectangle",
+            "x": [round(self.low[0], 4), round(self.high[0], 4)],
+            "y": [round(self.low[1], 4), round(self.high[1], 4)],
+        }
+
+
+def _surrounded(vertex: FloatArray, following: FloatArray) -> BoolArray:
+    """Return whether polygons with these edges (n, k, 3) wind around the origin, shape (n,).
+
+    Where a polygon crosses itself, both windings count as inside.
+    """
+    upward = (vertex[..., 1] <= 0.0) & (following[..., 1] > 0.0)
+    downward = (vertex[..., 1] > 0.0) & (following[..., 1] <= 0.0)
+    side = vertex[..., 0] * following[..., 1] - vertex[..., 1] * following[..., 0]
+    winding = np.sum(upward & (side > 0.0), axis=1) - np.sum(downward & (side < 0.0), axis=1)
+    return np.asarray(winding != 0)
+
+
+def _is_pair(vertex: object, where: str) -> bool:
+    """Return True for two numbers.
+
+    Raises:
+        SelectionError: For anything else.
+    """
+    if (
+        not isinstance(vertex, list)
+        or len(vertex) != 2
+        or any(isinstance(v, bool) or not isinstance(v, int | float) for v in vertex)
+    ):
+        raise SelectionError(f"{where}: vertex {one_line(repr(vertex))} must be [x, y] [m].")
+    return True

@@ -1,0 +1,148 @@
+"""The robot's collision shapes as stored with its scores: enough to test an obstacle seen later."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import StoreError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SPHERE, CAPSULE, BOX = 0, 1, 2
+"""Shape types, as in the kernel. `size` holds: sphere (radius, 0, 0); capsule along its own z
+(radius, half length between cap centres, 0); box (three half sizes) [m]."""
+
+ARM_JOINTS = 7
+
+_WHERE = "metadata 'robot_shapes'"
+
+
+@dataclass(frozen=True, slots=True)
+class Primitives:
+    """n spheres, capsules and boxes, each in the frame of the part that carries it."""
+
+    type: IntArray
+    """SPHERE, CAPSULE or BOX, shape (n,)."""
+    size: FloatArray
+    """Sizes [m], shape (n, 3)."""
+    pad: FloatArray
+    """Greatest distance by which the true surface may exceed the shape [m], shape (n,)."""
+    frame: IntArray
+    """Part that carries the shape, shape (n,). Arm: number of the link, 1 to 7. Body: 0 fixed to
+    the base, 1 mounted on the torso."""
+    R: FloatArray
+    """Orientations, shape (n, 3, 3)."""
+    p: FloatArray
+    """Centres [m], shape (n, 3)."""
+
+    @property
+    def bound(self) -> FloatArray:
+        """Radius of the bounding sphere about each centre [m], shape (n,)."""
+        capsule = self.size[:, 0] + self.size[:, 1]
+        return np.where(self.type == BOX, np.linalg.norm(self.size, axis=1), capsule)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotShapes:
+    """The robot at torso level 0, as lowered from the Drake plant that was scored.
+
+    Link frames are those of the kernel's chain: X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1]
+    Rz(qi), with A the arm's base.
+    """
+
+    chain_R: FloatArray
+    """Rotations of F, shape (8, 3, 3)."""
+    chain_p: FloatArray
+    """Translations of F [m], shape (8, 3)."""
+    arm_base_R: FloatArray
+    """Orientation of A in the base frame B, shape (3, 3)."""
+    arm_base_p: FloatArray
+    """Origin of A in B [m], shape (3,)."""
+    lift: FloatArray
+    """Displacement of the torso at each of its levels from level 0, in B [m], shape (levels, 3)."""
+    arm: Primitives
+    """The shapes of the scored arm, in link frames."""
+    body: Primitives
+    """All other shapes, in B."""
+    margin: float
+    """Least clearance [m]: shapes closer than this collide."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the shapes as plain containers, for the metadata of a score file."""
+        return {
+            **{name: getattr(self, name).ravel().tolist() for name in _ARRAYS},
+            **{
+                part: {
+                    name: getattr(getattr(self, part), name).ravel().tolist() for name in _COLUMNS
+                }
+                for part in ("arm", "body")
+            },
+            "margin": self.margin,
+        }
+
+    @classmethod
+    def from_dict(cls, plain: object) -> Self:
+        """Return the shapes that `to_dict` wrote.
+
+        Raises:
+            StoreError: If they are not of that form.
+        """
+        if not isinstance(plain, dict):
+            raise StoreError(f"{_WHERE} must be a mapping.")
+        margin = plain.get("margin")
+        if not isinstance(margin, float) or not 0.0 <= margin < math.inf:
+            raise StoreError(f"{_WHERE}: margin must be a number >= 0.")
+        arrays = {name: _array(plain, name, shape) for name, shape in _ARRAYS.items()}
+        arm, body = (_primitives(plain.get(part)) for part in ("arm", "body"))
+        if np.any((arm.frame < 1) | (arm.frame > ARM_JOINTS)) or np.any(body.frame >> 1):
+            raise StoreError(f"{_WHERE}: a shape is on a part that the robot does not have.")
+        return cls(**arrays, arm=arm, body=body, margin=margin)
+
+
+_ARRAYS = {
+    "chain_R": (ARM_JOINTS + 1, 3, 3),
+    "chain_p": (ARM_JOINTS + 1, 3),
+    "arm_base_R": (3, 3),
+    "arm_base_p": (3,),
+    "lift": (-1, 3),
+}
+_COLUMNS = {"type": (-1,), "size": (-1, 3), "pad": (-1,), "frame": (-1,), "R": (-1, 3, 3)} | {
+    "p": (-1, 3)
+}
+_WHOLE = ("type", "frame")
+
+
+def _primitives(plain: object) -> Primitives:
+    """Return shapes of the form of `RobotShapes.to_dict`."""
+    if not isinstance(plain, dict):
+        raise StoreError(f"{_WHERE} must have 'arm' and 'body'.")
+    columns: dict[str, Any] = {name: _array(plain, name, shape) for name, shape in _COLUMNS.items()}
+    if len({len(column) for column in columns.values()}) != 1:
+        raise StoreError(f"{_WHERE}: the columns of the shapes differ in length.")
+    if np.any(columns["size"] < 0.0) or np.any(columns["pad"] < 0.0):
+        raise StoreError(f"{_WHERE}: a size is negative.")
+    for name in _WHOLE:
+        columns[name] = columns[name].astype(np.int64)
+    if np.any((columns["type"] < SPHERE) | (columns["type"] > BOX)):
+        raise StoreError(f"{_WHERE}: a shape has an unknown type.")
+    return Primitives(**columns)
+
+
+def _array(plain: Mapping[str, object], name: str, shape: tuple[int, ...]) -> FloatArray:
+    """Return an array of finite numbers from a flat list; -1 stands for any length."""
+    values = plain.get(name)
+    row = abs(math.prod(shape))
+    if (
+        not isinstance(values, list)
+        or not all(isinstance(v, int | float) and math.isfinite(v) for v in values)
+        or (len(values) % row if shape[0] == -1 else len(values) != row)
+    ):
+        raise StoreError(f"{_WHERE}: '{name}' must be a list of finite numbers of shape {shape}.")
+    return np.array(values, dtype=np.float64).reshape(shape)

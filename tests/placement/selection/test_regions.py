@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from tcs.errors import SelectionError
+from tcs.placement.selection import Obstacle, Region
+from tcs.placement.selection.regions import RADIUS, Footprint
+
+RECTANGLE = Footprint((-0.2, -0.3), (0.4, 0.3), 0.0)
+
+
+def is_common(base, triangle):
+    """Whether the rectangle at a base pose and a triangle have a point in common."""
+    x, y, yaw = base
+    R = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    low, high = np.array(RECTANGLE.low), np.array(RECTANGLE.high)
+    # R^T (p - base) within the rectangle; p on the inner side of each edge.
+    A, b = [*R.T, *-R.T], [*(high + R.T @ (x, y)), *(-low - R.T @ (x, y))]
+    for i in range(3):
+        p, q, r = (triangle[(i + k) % 3] for k in range(3))
+        normal = np.array([q[1] - p[1], p[0] - q[0]])
+        normal *= 1.0 if normal @ (r - p) <= 0.0 else -1.0
+        A.append(normal)
+        b.append(normal @ p)
+    return linprog(np.zeros(2), A_ub=np.array(A), b_ub=np.array(b), bounds=(None, None)).status == 0
+
+
+def test_a_base_stands_on_a_region_if_they_have_a_point_in_common():
+    rng = np.random.default_rng(3)
+    base = np.column_stack([rng.uniform(-1, 1, (40, 2)), rng.uniform(-4, 4, 40)])
+    found = []
+    for triangle in rng.uniform(-1.5, 1.5, (6, 3, 2)):
+        stands = RECTANGLE.overlaps(Region(tuple(map(tuple, triangle))), base)
+        assert stands.tolist() == [is_common(pose, triangle) for pose in base]
+        found += stands.tolist()
+    assert 0.1 < np.mean(found) < 0.9
+
+
+@pytest.mark.parametrize(
+    ("polygon", "expected"),
+    [
+        ("-9 -9, 9 -9, 9 9, -9 9", True),
+        ("0.1 0.1, 0.12 0.1, 0.11 0.12", True),
+        ("0.4 -1, 2 -1, 2 1, 0.4 1", True),
+        ("0.401 -1, 2 -1, 2 1, 0.401 1", False),
+        # A ring around the robot, open at one side.
+        ("-2 -2, 2 -2, 2 2, -2 2, -2 1, 1 1, 1 -1, -2 -1", False),
+        # A region that crosses itself forbids both of its parts.
+        ("-3 -1, 1 -1, 1 1, -1 1, -1 -2, 2 -2, 2 2, -3 2", True),
+    ],
+    ids=["around", "within", "touching", "beside", "ring", "crossing"],
+)
+def test_regions_of_other_forms(polygon, expected):
+    assert RECTANGLE.overlaps(Region.parse(polygon), np.zeros((1, 3))).tolist() == [expected]
+
+
+def test_a_circle_keeps_its_radius():
+    base = np.array([[RADIUS - 1e-6, 0.0, 0.0], [RADIUS + 1e-6, 0.0, 0.0]])
+    region = Region.parse("0 -1, 0 1, -1 0")
+    assert Footprint.of(None).overlaps(region, base).tolist() == [True, False]
+
+
+def test_a_region_is_read_from_a_file(tmp_path):
+    path = tmp_path / "door.yaml"
+    path.write_text("polygon: [[0, 0], [1, 0], [1, 1.5]]")
+    assert Region.read(path) == Region.parse("0 0, 1 0, 1 1.5")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("polygon: 5", "must have the one key 'polygon'"),
+        ("corners: [[0, 0]]", "must have the one key 'polygon'"),
+        ("polygon: [[0, 0], [1], [1, 1]]", "must be .x, y."),
+        ("polygon: [[0, 0], [1, yes], [1, 1]]", "must be .x, y."),
+        ("polygon: [[0, 0], [1, 1]]", "has 2 different vertices; must have 3 to 1000"),
+        ("5", "must contain keys and values: polygon"),
+    ],
+)
+def test_region_files_that_cannot_be_used(tmp_path, text, message):
+    path = tmp_path / "door.yaml"
+    path.write_text(text)
+    with pytest.raises(SelectionError, match=message):
+        Region.read(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "text", "message"),
+    [
+        (Region.parse, "1 2 3 4 5 6", "must be X1 Y1, X2 Y2"),
+        (Region.parse, "0 0, 1 0, north", "must be X1 Y1, X2 Y2"),
+        (Region.parse, "0 0, 1 0, 0 0", "has 2 different vertices"),
+        (Region.parse, "0 0, 1 0, 1 1e9", "must be -40 to 40 m"),
+        (Region.parse, "0 0, 1 0, 1 nan", "must be -40 to 40 m"),
+        (Obstacle.parse, "1 1 1", "four to seven numbers"),
+        (Obstacle.parse, "1 1 1 chair", "four to seven numbers"),
+        (Obstacle.parse, "1 1 -1 1", "a size must be"),
+        (Obstacle.parse, "1 1 1 1 0 1 0.5", "must be above z_low, 1 m"),
+        (Obstacle.parse, "1 1 1 1 9999", "an angle must be"),
+    ],
+)
+def test_texts_that_cannot_be_used(make, text, message):
+    with pytest.raises(SelectionError, match=message):
+        make(text)
+
+
+@pytest.mark.parametrize("text", ["1 -0.5 0.4 0.6", "1 2 0.4 0.6 30", "1 2 0.4 0.6 30 0.1 0.9"])
+def test_the_name_of_an_obstacle_is_its_text(text):
+    assert Obstacle.parse(text).name == text
+    assert Obstacle.parse("1 2 0.4 0.6 0.1 0.9").z_high == 0.9

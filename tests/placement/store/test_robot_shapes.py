@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from tcs.errors import StoreError
+from tcs.placement.store.robot_shapes import RobotShapes
+from tests.placement.selection.test_constraints import made_up_robot
+from tests.placement.store.example import METADATA, score_file
+
+
+def test_round_trip_through_the_metadata():
+    robot = made_up_robot()
+    file = score_file(metadata={**METADATA, "robot_shapes": robot.to_dict()})
+    again = file.robot_shapes
+    for name in ("chain_R", "chain_p", "arm_base_R", "arm_base_p", "lift", "margin"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
+    for part in ("arm", "body"):
+        for name in ("type", "size", "pad", "frame", "R", "p"):
+            found, expected = (getattr(getattr(r, part), name) for r in (again, robot))
+            np.testing.assert_array_equal(found, expected)
+    assert score_file().robot_shapes is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"margin": -1.0}, "margin must be a number"),
+        ({"chain_R": [0.0] * 71}, "'chain_R' must be a list of finite numbers"),
+        ({"lift": [0.0, float("nan"), 0.0]}, "'lift' must be"),
+        ({"lift": [0.0] * 4}, "'lift' must be"),
+        ({"arm": None}, "must have 'arm' and 'body'"),
+        ({"body": {"type": [1]}}, "'size' must be"),
+    ],
+)
+def test_malformed_shapes_are_refused(changes, message):
+    with pytest.raises(StoreError, match=message):
+        RobotShapes.from_dict({**made_up_robot().to_dict(), **changes})
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        ("type", [0, 3], "unknown type"),
+        ("type", [0], "differ in length"),
+        ("frame", [1, 8], "a part that the robot does not have"),
+        ("size", [-1.0] * 6, "a size is negative"),
+    ],
+)
+def test_malformed_columns_are_refused(column, values, message):
+    plain = made_up_robot().to_dict()
+    plain["arm"][column] = values
+    with pytest.raises(StoreError, match=message):
+        RobotShapes.from_dict(plain)
