@@ -104,7 +104,7 @@ COMMANDS = (
     Command("picture", ("scores.tcs",), ("--out", "out.png")),
     Command("report", ("scores.tcs",), ("--out", "out.html", "--pairs", "2", "--dense", "0")),
     Command("map-check", ("map.tcm",), ("--queries", "5", "--jobs", "1")),
-    Command("robot new", ("iiwa7.urdf",), ("--tool", "iiwa_link_ee", "--out", "out.yaml")),
+    Command("robot new", ("iiwa7.urdf",), ("--tool", "iiwa_link_ee_kuka", "--out", "out.yaml")),
     Command("robot check", ("iiwa7.yaml",), ("--samples", "2")),
     Command(
         "capability from-ik",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tcs.cli.values import axis_values, observed_settings, state_if_given
-from tcs.files.quantities import JOBS, QUERIES
+from tcs.files.quantities import DURATION, JOBS, QUERIES
 
 if TYPE_CHECKING:
     from tcs.model.grid import Axis, InitialConfiguration
@@ -248,7 +248,12 @@ class WindowOptions:
     browser: Annotated[bool, typer.Option(help="Whether to open a browser.")] = True
     duration: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Close after this many seconds.", show_default="at Ctrl-C"),
+        typer.Option(
+            min=DURATION.low,
+            max=DURATION.high,
+            help="Close after this many seconds.",
+            show_default="at Ctrl-C",
+        ),
     ] = None
 
 

@@ -194,7 +194,7 @@ def export(
     import tcs
     from tcs.files.writing import check_writable
 
-    check_writable(out)
+    check_writable(out, [file])
     loaded = tcs.load(file)
 
     from tcs.placement.store.frame import score_frame, write_csv

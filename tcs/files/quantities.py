@@ -166,6 +166,11 @@ RADIUS = Quantity(
     "`--radius` of capability maps",
     "ten times the reach of the longest arm that ships",
 )
+DURATION = Quantity(
+    *("duration", "s", 0.0, 604_800.0),
+    "`--duration` of viewers and live pages",
+    "a week; without the option they run until Ctrl-C",
+)
 JOBS = Quantity(
     *("number of jobs", "", 1, 1024), "`--jobs`", "more threads than any machine in use has cores"
 )
@@ -196,6 +201,6 @@ PRIMITIVES = Quantity(
 QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
     JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT,
-    UTILITY_WEIGHT, HEADING, JOBS, QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
+    UTILITY_WEIGHT, HEADING, DURATION, JOBS, QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

@@ -14,7 +14,7 @@ import re
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import BinaryIO
@@ -188,12 +188,20 @@ def make_folder(
         ) from error
 
 
-def check_writable(path: Path) -> None:
+def check_writable(path: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Check that a file can be written, before the computation of its content.
 
+    Args:
+        path: The file.
+        inputs: Paths of files that the computation reads, which must not be replaced; what is no
+            path of a file, such as the name of a task, is skipped.
+
     Raises:
-        OutputError: If the path is a folder, or its folder is missing or not writable.
+        OutputError: If the path is a folder or one of the inputs, or its folder is missing or not
+            writable.
     """
+    if any(_is_same_file(path, given) for given in inputs):
+        raise OutputError(f"'{path}' is also read, and would be replaced. Name another file.")
     if os.path.isdir(path):
         raise OutputError(f"'{path}' is a folder. Name a file in it.")
     special = special_file(path)
@@ -209,6 +217,14 @@ def check_writable(path: Path) -> None:
             f"'{path}' cannot be written: {path_fault(error)}. Name a file in an existing, "
             "writable folder."
         ) from error
+
+
+def _is_same_file(first: Path, second: str | Path) -> bool:
+    try:
+        return os.path.samefile(first, second)
+    except (OSError, ValueError):
+        # One of them does not exist.
+        return False
 
 
 def check_page(path: Path) -> None:

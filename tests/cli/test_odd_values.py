@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
@@ -121,3 +122,43 @@ def test_an_unknown_home_folder_of_the_cache_is_one_line(process, tmp_path):
     )
     assert "Traceback" not in ran.err
     assert ran.code == 1
+
+
+@pytest.mark.parametrize("given", ["small.tcs", "./small.tcs", "link.tcs"])
+def test_an_output_does_not_replace_what_is_read(tcs_command, small_file, monkeypatch, given):
+    monkeypatch.chdir(small_file.parent)
+    os.link(small_file, "link.tcs")
+    before = small_file.read_bytes()
+    for words in (("export", small_file), ("score", small_file)):
+        ran = tcs_command(*words, "--out", given)
+        assert ran.code == 1
+        assert ran.err == (
+            f"tcs: '{Path(given)}' is also read, and would be replaced. Name another file.\n"
+        )
+    assert small_file.read_bytes() == before
+
+
+def test_a_map_does_not_replace_its_recording(tcs_command, tmp_path):
+    csv = tmp_path / "recording.csv"
+    csv.write_text("joint\n0\n")
+    for option in ("--out", "--text"):
+        files = {"--out": tmp_path / "map.tcm", option: csv}
+        words = [word for pair in files.items() for word in pair]
+        ran = tcs_command("capability", "record", csv, *words)
+        assert (ran.code, "would be replaced" in ran.err) == (1, True)
+
+
+@pytest.mark.parametrize("seconds", ["inf", "1e308", "nan", "-1"])
+@pytest.mark.parametrize("name", ["view", "teleop replay"])
+def test_an_endless_duration_is_misuse(tcs_command, base, small_file, name, seconds):
+    """Before, the viewer ran until Ctrl-C."""
+    file = small_file if name == "view" else "run.csv"
+    ran = tcs_command(*name.split(), file, "--no-browser", "--duration", seconds)
+    assert ran.code == 2
+    assert "--duration" in ran.err
+
+
+def test_empty_body_collisions_are_no_default(tcs_command, small_file):
+    ran = tcs_command("evaluate", small_file, "--body-collisions", "")
+    assert ran.code == 1
+    assert "unknown body collisions" in ran.err

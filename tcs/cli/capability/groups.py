@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -120,11 +121,11 @@ class FileOptions:
         ),
     ] = None
 
-    def check(self, *others: Path | None) -> None:
-        """Check that the files can be written, before the map is made."""
+    def check(self, *others: Path | None, inputs: Iterable[Path] = ()) -> None:
+        """Check that the files can be written and are no inputs, before the map is made."""
         for path in (self.out, self.text, *others):
             if path is not None:
-                check_writable(path)
+                check_writable(path, inputs)
 
     def write(self, capability: CapabilityMap) -> None:
         """Write the map."""

@@ -97,7 +97,7 @@ def record(
     """
     from tcs.capability import read_csv, write_csv
 
-    files.check(save_csv)
+    files.check(save_csv, inputs=[] if csv is None else [csv])
     reach = grid.reach(scores.robot, scores.measure, scores.head)
     if csv is not None:
         recording = read_csv(csv, reach.robot, drop_bad=samples.drop_bad)
@@ -133,7 +133,7 @@ def from_bag(
     """Make a map (ITCM) from the joint states in ROS bags; requires the extra `bags` of tcs."""
     from tcs.capability.bags import read_bags
 
-    files.check()
+    files.check(inputs=bags)
     reach = grid.reach(scores.robot, scores.measure, scores.head)
     recording = read_bags(bags, reach.robot, topic=topic, drop_bad=samples.drop_bad)
     _map_recording(reach, recording, files, scores, grid, samples, {}, as_json=as_json)

@@ -112,7 +112,7 @@ def merge_maps(
     if task.direction_deg % 90:
         raise typer.BadParameter("must be a multiple of 90.", param_hint="--direction-deg")
     if out is not None:
-        check_writable(out)
+        check_writable(out, [capability])
     check_picture(picture)
     loaded = load_map(capability)
     grasps = _shape(task).task(loaded.grid.step)

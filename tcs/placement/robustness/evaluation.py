@@ -180,7 +180,7 @@ def evaluate(
             file,
             errors=errors,
             table=table,
-            body_collisions=body_collisions or "paper",
+            body_collisions="paper" if body_collisions is None else body_collisions,
             on_compile=on_compile,
         )
         compiling = trials.compile_seconds

@@ -42,10 +42,10 @@ def score_to_file(
         **options: Further options of `tcs.score`.
 
     Raises:
-        OutputError: If the file cannot be written; reported before scoring begins.
+        OutputError: If the file cannot be written or is an input; reported before scoring begins.
         TcsError: As `tcs.score`.
     """
-    check_writable(path)
+    check_writable(path, (task, environment, robot))
     file = score(task, environment, robot, on_progress=on_progress, **options)
     save_scores(path, file)
     return saved_summary(path, file)
@@ -65,10 +65,10 @@ def score_observed_to_file(
         **options: Further options of `tcs.LiveScorer`.
 
     Raises:
-        OutputError: If the file cannot be written; reported before scoring begins.
+        OutputError: If the file cannot be written or is an input; reported before scoring begins.
         TcsError: As `tcs.LiveScorer`.
     """
-    check_writable(path)
+    check_writable(path, (task, environment, robot))
     file = LiveScorer(task, environment, robot, **options).score(observation)
     save_scores(path, file)
     return {**saved_summary(path, file), "observation": file.metadata["observation"]}
