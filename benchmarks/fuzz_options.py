@@ -83,7 +83,8 @@ class Command:
 
 
 _THREE = ("--environment", "kitchen.yaml", "--robot", "iiwa7.yaml")
-_SMALL_MAP = ("--step", "0.4", "--yaw-bins", "2", "--out", "out.tcm")
+_PICK = ("--task", "pick-and-place")
+_SMALL_MAP = ("--step", "0.4", "--yaw-bins", "4", "--out", "out.tcm")
 _WINDOW = ("--no-browser", "--duration", "0")
 COMMANDS = (
     Command("list"),
@@ -103,7 +104,7 @@ COMMANDS = (
     Command("map", ("scores.tcs",), ("--out", "out.png")),
     Command("picture", ("scores.tcs",), ("--out", "out.png")),
     Command("report", ("scores.tcs",), ("--out", "out.html", "--pairs", "2", "--dense", "0")),
-    Command("map-check", ("map.tcm",), ("--queries", "5", "--jobs", "1")),
+    Command("map-check", ("ik.tcm",), ("--queries", "5", "--jobs", "1")),
     Command("robot new", ("iiwa7.urdf",), ("--tool", "iiwa_link_ee_kuka", "--out", "out.yaml")),
     Command("robot check", ("iiwa7.yaml",), ("--samples", "2")),
     Command(
@@ -119,7 +120,19 @@ COMMANDS = (
         ("--seconds", "--scale", "--centre", "--seed", "--save-csv"),
     ),
     Command("capability from-bag", ("noise",), ("--robot", "pr2", *_SMALL_MAP)),
-    Command("capability merge", ("map.tcm",), ("--task", "pick-and-place", "--height", "0.41")),
+    Command("capability merge", ("map.tcm",), (*_PICK, "--height", "0.41")),
+    Command(
+        "capability merge",
+        ("map.tcm",),
+        ("--task", "curved", "--height", "0.41", "--length", "0.3"),
+        ("--length", "--samples", "--start-deg", "--end-deg"),
+    ),
+    Command(
+        "capability merge",
+        ("ik.tcm",),
+        (*_PICK, "--height", "1.0", "--length", "0.8", "--environment", "kitchen.yaml"),
+        ("--environment", "--task-at", "--robot"),
+    ),
     Command("capability show", ("map.tcm",), ("--out", "out.png", "--tilt", "9")),
     Command("teleop", (), _WINDOW),
     Command("teleop replay", ("run.csv",), ("--export", "out.html")),
@@ -210,6 +223,15 @@ def calls(command: Command) -> Iterator[Call]:
     if command.name in ("score", "robot check"):
         for cache in CACHES:
             yield Call(command.words, cache)
+
+
+def make_map(folder: Path) -> None:
+    """Write a coarse map made by inverse kinematics."""
+    from tcs.capability import MapGrid, Reach, map_from_ik, save_map
+
+    reach = Reach.load("iiwa7", step=0.4)
+    grid = MapGrid.of(0.4, 4, "all")
+    save_map(folder / "ik.tcm", map_from_ik(reach, grid, map_type="ICM", radius=0.8))
 
 
 def make_odd_files(folder: Path) -> None:
@@ -354,6 +376,7 @@ def main() -> int:
     slowest: dict[str, float] = {}
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
         prepare(Path(folder))
+        make_map(Path(folder))
         worker = Worker(Path(__file__), (), Path(folder), SECONDS)
         for command in COMMANDS:
             if options.only and command.name not in options.only:

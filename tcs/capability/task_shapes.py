@@ -18,6 +18,7 @@ from tcs.capability.tasks import (
     GraspTask,
 )
 from tcs.errors import TaskError, UnknownNameError
+from tcs.files.quantities import ANGLE
 
 TASK_SHAPES = ("pick-and-place", "linear", "curved")
 _SAME = 1e-9
@@ -69,6 +70,10 @@ class TaskShape:
                 f"task '{self.shape}': direction {self.direction_deg} deg; must be a multiple of "
                 "90."
             )
+        # Also of what this shape does not use: a meaningless number is a mistake.
+        ANGLE.check((self.start, self.end), f"task '{self.shape}': start or end", TaskError)
+        if self.samples < 1:
+            raise TaskError(f"task '{self.shape}': {self.samples} samples; must be at least 1.")
         if self.shape == "curved":
             return curved_task(
                 self.length, self.start, self.end, self.samples, self.height,

@@ -21,15 +21,35 @@ class Commands(TyperGroup):
     terminated by SIGTERM. Any other exception is a defect of the program and keeps its traceback.
     """
 
-    def make_context(self, *arguments: Any, **options: Any) -> Any:
+    def make_context(
+        self, info_name: str | None, args: list[str], *arguments: Any, **options: Any
+    ) -> Any:
         """Parse the command line."""
         with _ended_in_one_line():
-            return super().make_context(*arguments, **options)
+            _refuse_empty(args)
+            return super().make_context(info_name, args, *arguments, **options)
 
     def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]  # typer's own class
         """Run the command."""
         with _ended_in_one_line():
             return super().invoke(ctx)
+
+
+def _refuse_empty(words: list[str]) -> None:
+    """Refuse empty texts on the command line, such as an unset variable of a shell script.
+
+    As a path, an empty text would be the current folder, and as a name the default.
+
+    Raises:
+        typer.BadParameter: If a word, or the value of an option, is empty.
+    """
+    for before, word in zip(["", *words], words, strict=False):
+        if word.startswith("--") and word.endswith("="):
+            raise typer.BadParameter("is empty.", param_hint=word[:-1])
+        if not word and before.startswith("-"):
+            raise typer.BadParameter("is empty.", param_hint=before)
+        if not word:
+            raise typer.BadParameter("an argument is empty.")
 
 
 @contextmanager

@@ -158,7 +158,32 @@ def test_an_endless_duration_is_misuse(tcs_command, base, small_file, name, seco
     assert "--duration" in ran.err
 
 
-def test_empty_body_collisions_are_no_default(tcs_command, small_file):
-    ran = tcs_command("evaluate", small_file, "--body-collisions", "")
-    assert ran.code == 1
-    assert "unknown body collisions" in ran.err
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("explain", ""), "an argument is empty."),
+        (("explain", "small.tcs", "--goal", ""), "Invalid value for --goal: is empty."),
+        (("evaluate", "small.tcs", "--body-collisions", ""), "for --body-collisions: is empty."),
+        (("export", "small.tcs", "--out="), "Invalid value for --out: is empty."),
+    ],
+)
+def test_empty_texts_are_misuse(tcs_command, words, message):
+    """Before, they were the current folder or the default."""
+    ran = tcs_command(*words)
+    assert ran.code == 2
+    assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("--start-deg", "nan"), 1, "start or end is nan rad"),
+        (("--samples", "0"), 1, "0 samples; must be at least 1."),
+        (("--task-at", "nan", "0", "0"), 2, "requires --environment"),
+        (("--robot", "nonsense"), 2, "requires --environment"),
+    ],
+)
+def test_options_that_a_merge_does_not_use_are_checked(tcs_command, base, words, code, message):
+    ran = tcs_command("capability", "merge", *base["capability merge"], *words)
+    assert ran.code == code
+    assert message in ran.err

@@ -82,14 +82,19 @@ def merge_maps(
         ),
     ] = None,
     task_at: Annotated[
-        tuple[float, float, float],
+        tuple[float, float, float] | None,
         typer.Option(
-            metavar="X Y YAW_DEG", help="Pose of the task frame in the environment (m, m, deg)."
+            metavar="X Y YAW_DEG",
+            help="With --environment: pose of the task frame in it (m, m, deg).",
+            show_default="0 0 0",
         ),
-    ] = (0.0, 0.0, 0.0),
+    ] = None,
     robot: Annotated[
         str | None,
-        typer.Option(help="Name or YAML file of the robot.", show_default="that of the map"),
+        typer.Option(
+            help="With --environment: name or YAML file of the robot.",
+            show_default="that of the map",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -109,6 +114,9 @@ def merge_maps(
             "makes no single task map; leave out --out, --picture and --environment.",
             param_hint="--split",
         )
+    for option, value in (("--task-at", task_at), ("--robot", robot)):
+        if value is not None and environment is None:
+            raise typer.BadParameter("requires --environment.", param_hint=option)
     if task.direction_deg % 90:
         raise typer.BadParameter("must be a multiple of 90.", param_hint="--direction-deg")
     if out is not None:
@@ -131,7 +139,7 @@ def merge_maps(
 
         save_task_map(picture, task_map)
     if environment is not None:
-        x, y, yaw_deg = task_at
+        x, y, yaw_deg = task_at or (0.0, 0.0, 0.0)
         around = Surroundings.load(
             capability, loaded, environment, (x, y, math.radians(yaw_deg)), robot=robot
         )
