@@ -34,6 +34,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "robots": ("--limit", "2000", "--finished", "out/robots.jsonl"),
     "numeric_arms": (),
     "primitives": (),
+    "shapes": (),
     "null_space": (),
     "capability": (),
     "robustness": ("--scores", SCORES),

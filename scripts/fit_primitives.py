@@ -4,6 +4,7 @@
     python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry
 
 The results are deterministic. Both commands take a few minutes; pairs depend on the primitives.
+With `--pairs` the last line says how many postures the shapes block although the surfaces are free.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, write_primitives
 from tcs.model.robots.fitting import fit_robot
-from tcs.model.robots.self_collision import propose_disabled_pairs
+from tcs.model.robots.self_collision import blocked_by_shapes, propose_disabled_pairs
 
 
 def main() -> int:
@@ -56,20 +57,22 @@ def rewrite_primitives(robot: RobotFile) -> None:
 
 
 def rewrite_pairs(robot: RobotFile, path: Path) -> None:
-    """Find the pairs and write them into the YAML file."""
+    """Find the pairs, write them into the YAML file, and print what the shapes block."""
+    proposed = propose_disabled_pairs(robot)
     groups = [
         {
             "reason": group.reason,
             "limits": group.limits,
             "pairs": [list(pair) for pair in group.pairs],
         }
-        for group in propose_disabled_pairs(robot)
+        for group in proposed
     ]
     kept, _, _ = path.read_text(encoding="utf-8").partition("\ndisabled_groups:")
     entry = yaml.safe_dump(
         {"disabled_groups": groups}, sort_keys=False, width=95, default_flow_style=None
     )
     path.write_text(f"{kept.rstrip()}\n\n{entry}", encoding="utf-8")
+    print(blocked_by_shapes(robot.model_copy(update={"disabled_groups": proposed})).text())
 
 
 if __name__ == "__main__":

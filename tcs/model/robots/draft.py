@@ -18,7 +18,12 @@ from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import RobotFile
-from tcs.model.robots.self_collision import DRAWS, free_posture, propose_disabled_pairs
+from tcs.model.robots.self_collision import (
+    DRAWS,
+    blocked_by_shapes,
+    free_posture,
+    propose_disabled_pairs,
+)
 from tcs.model.robots.urdf import Joint, Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
@@ -124,10 +129,12 @@ def draft_robot(
         if rest is None:
             remarks.append(f"rest: all of {DRAWS} postures of the arm are in self-collision")
         robot = robot.model_copy(update={"rest": rest or {}})
+        blocked = blocked_by_shapes(robot)
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks += [
         f"primitives: {len(primitives)}; those of '{worst.body}' exceed its hull most, "
         f"{worst.fit.excess:.2f} times",
+        f"self-collision: {blocked.text()}",
         "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
         "check that the gripper is open and a second arm out of the way",
         f"root: '{model.root}' must be on the floor, z up, x forward",

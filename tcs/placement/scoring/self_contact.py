@@ -56,7 +56,7 @@ def prevailing_self_contact(
 
     The scores hold a contact for every goal that the arm or the gripper is refused, so counting
     them costs milliseconds. A robot that moves freely refuses few goals by self-collision: with the
-    shipped robots the most frequent pair refuses at most a hundredth of the pairs reached. A pair
+    shipped robots the most frequent pair refuses at most a fiftieth of the number reached. A pair
     whose shapes touch in every posture refuses nearly all that are within reach.
 
     Args:

@@ -198,3 +198,54 @@ def test_both_arms_have_the_same_disabled_pairs(pr2):
     right = load_robot("pr2_right")
     left = {frozenset(map(swapped, pair)) for pair in pr2.disabled_pairs}
     assert {frozenset(pair) for pair in right.disabled_pairs} == left
+
+
+def bvh(triangles):
+    """Return triangles as a model of Coal, which tests them exactly."""
+    coal = pytest.importorskip("coal")
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in corners:
+        points.append(corner)
+    for a, b, c in index.reshape(-1, 3).tolist():
+        faces.append(coal.Triangle(a, b, c))
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(points))
+    model.addSubModel(points, faces)
+    model.endModel()
+    return model
+
+
+def mesh_distances(robot, pair, postures):
+    """Return the distances of two meshes in given postures [m], at most 0 if they cross."""
+    coal = pytest.importorskip("coal")
+    model = robot.model()
+    triangles = body_triangles(model)
+    meshes = [bvh(triangles[body]) for body in pair]
+    found = []
+    for positions in postures:
+        poses = [coal.Transform3s(*pose_in_root(model, body, positions)) for body in pair]
+        placed = meshes[0], poses[0], meshes[1], poses[1]
+        found.append(coal.distance(*placed, coal.DistanceRequest(), coal.DistanceResult()))
+    return np.array(found)
+
+
+def test_baxters_upper_elbow_and_upper_forearm_do_not_meet():
+    """Their hulls overlap where the elbow is bent most."""
+    robot = load_robot("baxter")
+    pair = ("left_upper_elbow", "left_upper_forearm")
+    assert pair in robot.disabled_pairs
+    bent = robot.joint_limits()["left_e1"][1]
+    turns = np.linspace(*robot.joint_limits()["left_w0"], 24)
+    distances = mesh_distances(robot, pair, [{"left_e1": bent, "left_w0": w} for w in turns])
+    # Measured 1.95 mm over 1,500 postures.
+    assert distances.min() > 0.0015
+
+
+def test_the_pr2s_wrist_grazes_its_forearm_in_the_middle_of_its_range_only(pr2):
+    pair = ("l_forearm_link", "l_wrist_flex_link")
+    angles = np.linspace(*pr2.with_choices(limits="hard").joint_limits()["l_wrist_flex_joint"], 106)
+    distances = mesh_distances(pr2, pair, [{"l_wrist_flex_joint": q} for q in angles])
+    crossing = angles[distances <= 0.0]
+    assert len(crossing) > 10
+    assert -0.6 < crossing.min() < crossing.max() < -0.24

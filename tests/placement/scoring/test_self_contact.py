@@ -30,8 +30,13 @@ def test_a_pair_that_touches_in_every_posture_is_named(small_environment, robot,
 
 
 def test_under_other_limits_the_message_points_to_them(small_environment, robot, caplog):
+    groups = tuple(
+        group.model_copy(update={"limits": "soft"}) if "cannot meet" in group.reason else group
+        for group in robot.disabled_groups
+    )
+    unproven = robot.model_copy(update={"disabled_groups": groups, "limits": "hard"})
     with caplog.at_level(logging.WARNING):
-        file = score("shaving", small_environment, robot.with_choices(limits="hard"))
+        file = score("shaving", small_environment, unproven)
     found = file.metadata["self_contact"]
     assert found["refused"] > found["reached"]
     assert "limits: hard" in caplog.text

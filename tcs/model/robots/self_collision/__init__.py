@@ -1,19 +1,23 @@
 """Self-collision of a robot: which of its bodies touch, and which pairs need no check.
 
 In: a robot file with its primitives. Out: the pairs of bodies that touch in a posture
-(`SelfCollision`), random and collision-free postures, and pairs to disable with the reason.
+(`SelfCollision`), random and collision-free postures, pairs to disable with the reason, and the
+fraction of postures that the primitives block although the surfaces do not touch.
 """
 
 from __future__ import annotations
 
+from tcs.model.robots.self_collision.blocked import Blocked, blocked_by_shapes
 from tcs.model.robots.self_collision.disabled_pairs import propose_disabled_pairs
 from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
 from tcs.model.robots.self_collision.postures import DRAWS, free_posture, sample_positions
 
 __all__ = [
     "DRAWS",
+    "Blocked",
     "BodyPair",
     "SelfCollision",
+    "blocked_by_shapes",
     "free_posture",
     "propose_disabled_pairs",
     "sample_positions",

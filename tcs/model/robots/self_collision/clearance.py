@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
+from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision.plant import BodyPair
 from tcs.model.robots.urdf import Joint, Urdf
 from tcs.model.robots.urdf.pose import pose_in_root
-from tcs.model.robots.urdf.surfaces import welded_top
+from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 
 FloatArray = NDArray[np.float64]
 
@@ -158,6 +159,16 @@ class SurfaceDistance:
             corners = np.unique(triangles.reshape(-1, 3), axis=0)
             self._points[body] = np.concatenate([inner, corners])
         return self._points[body]
+
+
+def carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
+    """Return the surface that the primitives of each body enclose, in its frame [m].
+
+    The primitives of a base also enclose the bodies welded to it, such as a column or a torso.
+    """
+    carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
+    added = body_triangles(model)
+    return carried | {body.name: added[body.name] for body in robot.bodies}
 
 
 def joints_between(model: Urdf, first: str, second: str) -> tuple[Joint, ...]:

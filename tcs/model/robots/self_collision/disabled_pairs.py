@@ -9,20 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
 from tcs.model.robots.robot_file import DisabledGroup, RobotFile
 from tcs.model.robots.self_collision.clearance import (
     CLEAR,
     FINER,
     MEETING,
     SurfaceDistance,
+    carried_triangles,
     free_joints,
     joints_between,
 )
 from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
 from tcs.model.robots.self_collision.postures import sample_positions
-from tcs.model.robots.urdf import Urdf
-from tcs.model.robots.urdf.surfaces import body_triangles
 
 FloatArray = NDArray[np.float64]
 
@@ -41,9 +39,9 @@ def propose_disabled_pairs(
 
     - one joint of the URDF connects the bodies: they touch at the joint, and its limits keep the
       rest apart (this does not apply to an extra body, such as a tool);
-    - at most three joints lie between the bodies and their meshes never come close, so only the
-      volume that the primitives add touches. If this requires the soft limits, the group holds only
-      while they are in force;
+    - at most three joints lie between the bodies and their meshes never meet, so only the volume
+      that the primitives add touches. If this requires the soft limits, the group holds only while
+      they are in force;
     - the primitives touch in every posture, so a check would forbid all of them.
 
     Args:
@@ -54,14 +52,14 @@ def propose_disabled_pairs(
     Raises:
         RobotError: If the robot's model cannot be used.
     """
-    both = hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
+    hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
     model = model_with_extras(robot)
     built = robot.model().links.keys()
     plant = SelfCollision(robot)
     sampled = sample_positions(hard, postures, seed)
     counts = Counter(pair for posture in sampled for pair in plant.touching(posture))
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
-    triangles = _carried_triangles(robot, model)
+    triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
     fine = SurfaceDistance(model, triangles, scale=FINER, rough=surfaces)
     found = _Found()
@@ -73,21 +71,34 @@ def propose_disabled_pairs(
         if len(joints) == 1 and built >= set(pair):
             found.neighbours.append(pair)
             continue
-        near = [surfaces.closest_approach(pair, limits, seed) if few else 0.0 for limits in both]
-        if near[0] >= CLEAR:
-            found.apart_hard[pair] = near[0]
-        elif count == postures:
-            found.always.append(pair)
-        elif near[1] >= CLEAR:
-            found.apart_soft[pair] = near[1]
-        elif set(pair) <= hand:
+        if set(pair) <= hand:
             # Scoring does not check pairs within the hand.
             continue
-        elif near[0] >= MEETING and (gap := fine.closest_approach(pair, hard, seed)) >= MEETING:
-            found.apart_hard[pair] = gap
-        elif near[1] >= MEETING and (gap := fine.closest_approach(pair, soft, seed)) >= MEETING:
-            found.apart_soft[pair] = gap
+        for limits, apart in ((hard, found.apart_hard), (soft, found.apart_soft)):
+            gap = _closest_approach((surfaces, fine), pair, limits, seed) if few else 0.0
+            if gap >= MEETING:
+                apart[pair] = gap
+                break
+        else:
+            if count == postures:
+                found.always.append(pair)
     return found.groups(postures)
+
+
+def _closest_approach(
+    surfaces: tuple[SurfaceDistance, SurfaceDistance], pair: BodyPair, robot: RobotFile, seed: int
+) -> float:
+    """Return the least distance of two surfaces within the limits in force [m].
+
+    Args:
+        surfaces: The surfaces at the usual scale, and finer for parts that pass each other closely.
+        pair: Names of the bodies.
+        robot: The robot, with its limits in force.
+        seed: Seed of the draws.
+    """
+    usual, fine = surfaces
+    gap = usual.closest_approach(pair, robot, seed)
+    return fine.closest_approach(pair, robot, seed) if MEETING <= gap < CLEAR else gap
 
 
 @dataclass
@@ -121,13 +132,3 @@ class _Found:
             DisabledGroup(reason=soft, limits="soft", pairs=tuple(self.apart_soft)),
         )
         return tuple(group for group in groups if group.pairs)
-
-
-def _carried_triangles(robot: RobotFile, model: Urdf) -> dict[str, FloatArray]:
-    """Return the surface that the primitives of each body enclose, in its frame [m].
-
-    The primitives of a base also enclose the bodies welded to it, such as a column or a torso.
-    """
-    carried = {body: surface for body, (_, _, surface) in surfaces_to_enclose(robot).items()}
-    added = body_triangles(model)
-    return carried | {body.name: added[body.name] for body in robot.bodies}

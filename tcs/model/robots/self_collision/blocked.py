@@ -1,0 +1,89 @@
+"""How many postures the shapes of a robot block although its surfaces are free of contact."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.self_collision.clearance import (
+    SPACING,
+    SurfaceDistance,
+    carried_triangles,
+)
+from tcs.model.robots.self_collision.plant import BodyPair, SelfCollision
+from tcs.model.robots.self_collision.postures import sample_positions
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Postures that are free of self-collision by the surfaces, and those that shapes block.
+
+    Attributes:
+        free: Number of random postures whose surfaces are free of contact.
+        blocked: Number of these in which shapes touch.
+        pairs: The pairs of bodies whose shapes touch, and in how many of these postures, most
+            frequent first.
+    """
+
+    free: int
+    blocked: int
+    pairs: tuple[tuple[BodyPair, int], ...]
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of the free postures that shapes block, 0 without free postures."""
+        return self.blocked / self.free if self.free else 0.0
+
+    def text(self) -> str:
+        """Return the figures in one line, with the three worst pairs."""
+        worst = "; ".join(
+            f"{first} against {second} {count / self.free:.1%}"
+            for (first, second), count in self.pairs[:3]
+        )
+        found = (
+            f"of {self.free:,} random postures whose surfaces are free of self-collision, the "
+            f"shapes block {self.fraction:.1%}"
+        )
+        return f"{found}: {worst}" if worst else found
+
+
+def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -> Blocked:
+    """Return how many postures the shapes block although the surfaces are free of contact.
+
+    Arm and torso are drawn within the limits in force, everything else keeps its posture. Shapes
+    enclose the surfaces, so only pairs whose shapes touch need the distance of the surfaces, which
+    are sampled as points: a distance below their spacing counts as contact.
+
+    Args:
+        robot: The robot.
+        postures: Number of random postures.
+        seed: Seed of the draws.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    model = model_with_extras(robot)
+    triangles = carried_triangles(robot, model)
+    surfaces = SurfaceDistance(model, triangles)
+    moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    plant, others = SelfCollision(robot), robot.with_mimics(robot.joint_positions())
+    scored = [*robot.arm_joints, *([robot.torso_joint] if robot.torso_joint else [])]
+    free = blocked = 0
+    pairs = Counter[BodyPair]()
+    for sample in sample_positions(robot, postures, seed):
+        positions = others | {name: sample[name] for name in scored}
+        touching = [
+            pair
+            for pair in plant.touching(positions)
+            if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in off
+        ]
+        if any(surfaces.distance(pair, positions) < SPACING for pair in touching):
+            continue
+        free += 1
+        blocked += bool(touching)
+        pairs.update(touching)
+    ranked = sorted(pairs.items(), key=lambda item: (-item[1], item[0]))
+    return Blocked(free, blocked, tuple(ranked))
