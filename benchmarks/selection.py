@@ -21,7 +21,13 @@ from table import cell, header, parser, row, save
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.scoring import build_sets
-from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, select, utility
+from tcs.placement.selection import (
+    PAPER_WEIGHTS,
+    SelectionTables,
+    TravelWeights,
+    select,
+    utility,
+)
 from tcs.placement.selection.travel import legs_from
 from tcs.placement.store import load_scores
 from tcs.placement.tables import Reason, ScoreTable, SetTable
@@ -105,7 +111,7 @@ def measure(
         )
         begun = time.thread_time()
         try:
-            choice = select(tables, here, travel=travel, max_members=2)
+            choice = select(tables, here, weights=PAPER_WEIGHTS, travel=travel, max_members=2)
         except SelectionError:
             # No path starts inside the furniture.
             refused += 1
@@ -136,7 +142,7 @@ def best_of_all(
     tables: SelectionTables, here: InitialConfiguration, travel: TravelWeights
 ) -> tuple[int, ...]:
     """Return the best of all kept sets of one and two, the first among equals, exhaustively."""
-    sets, weights = tables.sets, UtilityWeights()
+    sets, weights = tables.sets, PAPER_WEIGHTS
     distances = tables.index.distances[travel.route]
     legs = legs_from(here, tables.grid, sets.candidates, sets.cell, distances, travel)
     singles = utility(sets.single_reachability, sets.single_manipulability, legs.from_here, weights)

@@ -20,6 +20,7 @@ PROMISED = [
     "Region",
     "ScoreFile",
     "TcsError",
+    "Top",
     "TravelWeights",
     "UtilityWeights",
     "Verification",

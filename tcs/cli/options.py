@@ -14,7 +14,7 @@ from tcs.files.quantities import DURATION, JOBS, QUERIES
 
 if TYPE_CHECKING:
     from tcs.model.grid import Axis, InitialConfiguration
-    from tcs.placement.selection import Constraints, TravelWeights
+    from tcs.placement.selection import Constraints, Top, TravelWeights
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -162,6 +162,15 @@ class ConstraintOptions:
         ),
     ] = None
 
+    prefer: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SIDE|CONDITION",
+            help="Preferred side of the person, left, right, head or foot, or a condition as of "
+            "--only; see --preference-penalty.",
+        ),
+    ] = None
+
     def constraints(self) -> Constraints:
         """Return the constraints.
 
@@ -179,7 +188,44 @@ class ConstraintOptions:
             keep=tuple(self.keep or ()),
             forbid=tuple(regions),
             blocked=tuple(Obstacle.parse(given) for given in self.blocked or ()),
+            prefer=tuple(self.prefer or ()),
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TopOptions:
+    """Alternatives to the best set, and the penalties that order the sets."""
+
+    top: Annotated[
+        int | None,
+        typer.Option(min=1, max=100, help="Number of sets to offer.", show_default="1"),
+    ] = None
+    min_apart: Annotated[
+        float,
+        typer.Option(
+            help="Distance in metres at which base positions count as different, with --top."
+        ),
+    ] = 0.5
+    place_penalty: Annotated[
+        float,
+        typer.Option(help="Fraction of the score that each further base pose costs."),
+    ] = 0.01
+    environment_penalty: Annotated[
+        float, typer.Option(help="What moving the environment from its setting (--at) costs.")
+    ] = 0.01
+    preference_penalty: Annotated[
+        float, typer.Option(help="What a set costs that violates a preference (--prefer).")
+    ] = 0.05
+
+    def sets(self) -> Top | None:
+        """Return the number of sets and their differences; None for the best set alone.
+
+        Raises:
+            SelectionError: If a number is out of range.
+        """
+        from tcs.placement.selection import Top
+
+        return None if self.top is None else Top(count=self.top, min_apart=self.min_apart)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ def select(
     delta: robustness.Delta = 0.0,
     costs: options.TravelCosts,
     wanted: options.ConstraintOptions,
+    offered: options.TopOptions,
     max_members: options.Members = None,
     observed: options.Observed = None,
     frames: Annotated[
@@ -58,10 +59,17 @@ def select(
         loaded,
         current_state(here, torso, at or ()),
         weights=tcs.UtilityWeights(
-            reachability=alpha, manipulability=beta, travel=gamma, success=delta
+            reachability=alpha,
+            manipulability=beta,
+            travel=gamma,
+            success=delta,
+            places=offered.place_penalty,
+            environment=offered.environment_penalty,
+            preference=offered.preference_penalty,
         ),
         travel=costs.weights(),
         constraints=wanted.constraints(),
+        top=offered.sets(),
         max_members=max_members,
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),

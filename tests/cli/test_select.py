@@ -25,7 +25,7 @@ def test_select_prints_the_choice(tcs_command, small_file):
     result = ran.json
     assert set(result) == {
         "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds",
-        "unreachable",
+        "unreachable", "net_utility", "moves",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
     # The order of the tour, which is not that of the indices.
@@ -292,3 +292,23 @@ def test_an_obstacle_needs_shapes(tcs_command, small_file):
     ran = tcs_command("select", small_file, *HERE, "--blocked", "1 1 0.5 0.5")
     assert (ran.code, ran.out) == (1, "")
     assert "does not hold the robot's shapes" in ran.err
+
+
+def test_alternatives_are_listed(tcs_command, small_file):
+    words = ("select", small_file, *HERE, "--top", 3, "--min-apart", 0.3)
+    result = tcs_command(*words, "--json").json
+    assert len(result["alternatives"]) == 2
+    assert set(result["alternatives"][0]["trades"]) == {
+        "reachability", "manipulability", "cost", "utility", "net_utility", "places",
+    }  # fmt: skip
+    assert "base poses" in tcs_command(*words).out
+
+
+def test_penalties_reach_the_selection(tcs_command, small_file):
+    words = ("--at", "bed_height=0.1", "--prefer", "base_x <= 0", "--environment-penalty", 5)
+    result = tcs_command("select", small_file, *HERE, *words, "--preference-penalty", 9, "--json")
+    assert all(m["bed_height"] == 0.1 and m["base_x"] <= 0 for m in result.json["members"])
+    assert result.json["moves"] == []
+    for penalty, size in ((0, 2), (0.5, 1)):
+        members = tcs_command("select", small_file, *HERE, "--place-penalty", penalty, "--json")
+        assert len(members.json["members"]) == size

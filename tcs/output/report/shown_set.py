@@ -76,6 +76,6 @@ def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int,
         return sets.best_single
     # Without a weight of travel the current state does not matter.
     anywhere = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
-    free = UtilityWeights(travel=0.0)
+    free = UtilityWeights(travel=0.0, places=0.0, environment=0.0)
     tables = SelectionTables.of(file, table)
     return select(tables, anywhere, weights=free, max_members=max_members).indices

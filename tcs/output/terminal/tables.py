@@ -13,6 +13,7 @@ from rich.table import Table
 from tcs.output.terminal.console import results_console
 from tcs.output.words import (
     REASON_TEXTS,
+    axis_name,
     axis_title,
     axis_value,
     deviation_text,
@@ -124,6 +125,10 @@ def report_choice(result: Mapping[str, Any]) -> None:
             f"under error {result['success']:.1%} of the goals (95 % between {low:.1%} and "
             f"{high:.1%})"
         )
+    if result["moves"]:
+        out.print(f"moves the environment: {', '.join(axis_name(n) for n in result['moves'])}")
+    if "alternatives" in result:
+        out.print(_alternatives_table(result))
     for constraint in result.get("constraints", ()):
         left = f"{constraint['configurations']:,} configurations"
         if "solutions" in constraint:
@@ -141,6 +146,24 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(
             f"scored for {state}" + (f"; {', '.join(errors)}" if errors else ", not observed")
         )
+
+
+def _alternatives_table(result: Mapping[str, Any]) -> Table:
+    """Return the offered sets, the best first, and what each trades against the best."""
+    table = new_table(
+        *("set", "base poses (x y heading)", ">P_R", ">P_M", ">travel", ">net utility", "moves"),
+    )
+    for number, one in enumerate((result, *result["alternatives"]), 1):
+        poses = "; ".join(
+            f"{m['base_x']:.2f} {m['base_y']:.2f} {m['base_yaw_deg']:.0f}" for m in one["members"]
+        )
+        trades = one.get("trades")
+        cells = []
+        for name in ("reachability", "manipulability", "cost", "net_utility"):
+            difference = "" if trades is None else f" ({trades[name]:+.3f})"
+            cells.append(f"{one[name]:.3f}{difference}")
+        table.add_row(str(number), poses, *cells, ", ".join(one["moves"]) or "-")
+    return table
 
 
 def report_verification(found: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ stored set with the greatest utility, in milliseconds, without Drake or a compil
 
 from __future__ import annotations
 
+from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.constraints import Constraints
@@ -13,15 +14,17 @@ from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.obstacles import Obstacle
 from tcs.placement.selection.regions import Region
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
-from tcs.placement.selection.utility import UtilityWeights, utility
+from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utility
 
 __all__ = [
+    "PAPER_WEIGHTS",
     "Choice",
     "Constraints",
     "Match",
     "Obstacle",
     "Region",
     "SelectionTables",
+    "Top",
     "TravelWeights",
     "UtilityWeights",
     "nearest_table",

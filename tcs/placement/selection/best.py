@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
+from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables
-from tcs.placement.selection.constraints import Admitted, Constraints, admitted_candidates
+from tcs.placement.selection.constraints import (
+    SAME_VALUE,
+    Admitted,
+    Constraints,
+    admitted_candidates,
+)
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
 from tcs.placement.selection.observed import Match, nearest_table
+from tcs.placement.selection.penalties import Penalties, penalties_of
+from tcs.placement.selection.preferences import disliked_candidates
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
@@ -35,6 +45,7 @@ def select(
     weights: UtilityWeights = _DEFAULT_WEIGHTS,
     travel: TravelWeights = _DEFAULT_TRAVEL,
     constraints: Constraints = _NO_CONSTRAINTS,
+    top: Top | None = None,
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
@@ -54,6 +65,7 @@ def select(
         travel: Cost of each type of motion.
         constraints: What every member of the set must satisfy. The stored sets that satisfy them
             are compared; no set is added for those that are excluded.
+        top: Number of sets to offer, and by how much they differ; by default the best alone.
         max_members: 1 to select a single configuration, 2 to allow a pair, 3 a triple; by default
             the greatest stored size.
         observed: Observed state of the person: values of the file's observed axes [m or rad]. The
@@ -94,10 +106,34 @@ def select(
             "any candidate base pose. Check the position, or use straight lines."
         )
     found = None
-    if constraints:
+    if constraints.exclude:
         found = admitted_candidates(constraints, here, tables)
-    query = _Query(tables, legs, weights, max_members, found)
-    return query.choice(query.best(), start, match)
+    query = _Query(
+        tables, here, legs, weights, max_members, found, _disliked(constraints.prefer, tables)
+    )
+    offered: list[tuple[int, ...]] = []
+    while len(offered) < (1 if top is None else top.count):
+        distinct = None
+        if top is not None and offered:
+            distinct = Distinct(sets, top.min_apart, tuple(offered))
+        rows = query.best(distinct)
+        if rows is None:
+            break
+        offered.append(rows)
+    best, *others = (query.choice(rows) for rows in offered)
+    seconds = time.perf_counter() - start
+    return replace(best, alternatives=tuple(others), match=match, seconds=seconds)
+
+
+def _disliked(
+    preferences: tuple[str, ...], tables: SelectionTables
+) -> tuple[NDArray[np.bool_], ...]:
+    """Return which candidates violate each preference, shapes (C,)."""
+    frames = {} if not preferences or tables.read_frames is None else tables.read_frames()
+    return tuple(
+        disliked_candidates(text, tables.grid, tables.sets.candidates, frames)
+        for text in preferences
+    )
 
 
 def _tables_of(
@@ -139,46 +175,78 @@ class _Query:
     """One selection: the sets, the state and what is asked for."""
 
     tables: SelectionTables
+    here: InitialConfiguration
     legs: Legs
     weights: UtilityWeights
     max_members: int
     """Greatest number of members of a set."""
     found: Admitted | None
     """The candidates that satisfy the constraints; None without constraints."""
+    disliked: tuple[NDArray[np.bool_], ...]
+    """Whether a candidate violates each of the preferences, shapes (C,)."""
 
-    def best(self) -> tuple[int, ...]:
-        """Return the candidate numbers of the best set, the first among equals."""
+    def best(self, distinct: Distinct | None) -> tuple[int, ...] | None:
+        """Return the candidate numbers of the best set, the first among equals.
+
+        Args:
+            distinct: Sets from which it must differ; None if there are none.
+
+        Returns:
+            The set, or None if no set differs from those.
+        """
         sets, legs, weights = self.tables.sets, self.legs, self.weights
-        admitted = self._reachable
         if weights.success > 0.0:
-            candidates = Candidates(admitted, *self._scores)
+            candidates = Candidates(self.admitted, *self.scores, self.penalties, distinct)
             return best_estimated(
                 sets, self.tables.success, legs, weights, self.max_members, candidates
             )
-        reachability, manipulability = sets.single_reachability, sets.single_manipulability
-        if self.found is not None and self.found.has_fewer_solutions:
-            reachability = tc_reachability(self.found.reached, sets.weights)
-            manipulability = tc_manipulability(self.found.dexterity, sets.weights)
-        singles = utility(reachability, manipulability, legs.from_here, weights)
-        singles[~admitted] = -np.inf
+        singles = self.singles.copy()
+        if distinct is not None:
+            singles[~distinct.of_sets((np.arange(singles.size),))] = -np.inf
         single = int(np.argmax(singles))
-        rows: tuple[int, ...] = (single,)
+        rows: tuple[int, ...] | None = (single,)
         best = float(singles[single])
-        for groups in self.tables.index.groups[: self.max_members - 1]:
-            found = best_set(Bounds(groups, legs, weights, self.found), best)
+        if best == -np.inf:
+            # Excluded candidates have a bound of -inf, which must not suffice.
+            rows, best = None, -sys.float_info.max
+        for size, groups in enumerate(self.tables.index.groups[: self.max_members - 1], 2):
+            bounds = Bounds(
+                groups, legs, weights.of_size(size), self.found, self.penalties, distinct
+            )
+            found = best_set(bounds, best)
             if found is not None:
                 rows, best = found.members, found.utility
         return rows
 
+    @cached_property
+    def singles(self) -> NDArray[np.float64]:
+        """Utility less penalties of each candidate, -inf where it is not admitted, shape (C,)."""
+        sets = self.tables.sets
+        reachability, manipulability = sets.single_reachability, sets.single_manipulability
+        if self.found is not None and self.found.has_fewer_solutions:
+            reachability = tc_reachability(self.found.reached, sets.weights)
+            manipulability = tc_manipulability(self.found.dexterity, sets.weights)
+        singles = utility(reachability, manipulability, self.legs.from_here, self.weights)
+        if self.penalties is not None:
+            singles -= self.penalties.of_candidates
+        singles[~self.admitted] = -np.inf
+        return singles
+
+    @cached_property
+    def penalties(self) -> Penalties | None:
+        """Penalties of the sets, if there are any."""
+        tables = self.tables
+        return penalties_of(self.weights, self.here, tables.grid, tables.sets, self.disliked)
+
     @property
-    def _scores(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    def scores(self) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
         """What the candidates reach by solutions that are not blocked, and their dexterity."""
         if self.found is None:
             return self.tables.sets.reached, self.tables.sets.dexterity
         return self.found.reached, self.found.dexterity
 
-    @property
-    def _reachable(self) -> NDArray[np.bool_]:
+    @cached_property
+    def admitted(self) -> NDArray[np.bool_]:
         """Whether a candidate is reachable and satisfies the constraints, shape (C,).
 
         Raises:
@@ -196,37 +264,58 @@ class _Query:
             )
         return np.asarray(both)
 
-    def choice(self, rows: tuple[int, ...], start: float, match: Match | None) -> Choice:
-        """Return the choice of the set of candidates `rows`; `start` is when selection began."""
+    def choice(self, rows: tuple[int, ...]) -> Choice:
+        """Return the choice of the set of candidates `rows`."""
         tables, legs = self.tables, self.legs
         member = np.array(rows)
         between = legs.between(member[:, None], member[None, :])
         cost, order = shortest_tour([float(leg) for leg in legs.from_here[member]], between)
         indices = tuple(int(h) for h in tables.sets.candidates[member])
-        reached, dexterity = (of_all[member] for of_all in self._scores)
-        weights_of_goals = tables.sets.weights
-        reachability = float(tc_reachability(np.any(reached, axis=0), weights_of_goals))
-        manipulability = float(tc_manipulability(np.max(dexterity, axis=0), weights_of_goals))
+        members = tuple(tables.grid.configuration(h) for h in indices)
+        reached, dexterity = (of_all[member] for of_all in self.scores)
+        of_goals = tables.sets.weights
+        reachability = float(tc_reachability(np.any(reached, axis=0), of_goals))
+        manipulability = float(tc_manipulability(np.max(dexterity, axis=0), of_goals))
         row = tables.success.row_of(indices) if tables.success is not None else None
         success, interval, low = None, None, None
         if tables.success is not None and row is not None:
             success = float(tables.success.success[row])
             interval = (float(tables.success.low[row]), float(tables.success.high[row]))
             low = interval[0]
+        scores = (reachability, manipulability, cost)
+        net = utility(*scores, self.weights.of_size(len(rows)), low)
+        if self.penalties is not None:
+            net -= float(self.penalties.of_sets(tuple(member[:, None]))[0])
         return Choice(
-            members=tuple(tables.grid.configuration(h) for h in indices),
+            members=members,
             indices=indices,
             order=order,
             reachability=reachability,
             manipulability=manipulability,
             cost=cost,
-            utility=utility(reachability, manipulability, cost, self.weights, low),
+            utility=utility(*scores, self.weights, low),
+            net_utility=net,
+            moves=_moves(self.here, members),
             success=success,
             success_ci95=interval,
             unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
-            match=match,
             constraints=self.found.left if self.found is not None else (),
             footprint=self.found.footprint if self.found is not None else None,
             warnings=self.found.warnings if self.found is not None else (),
-            seconds=time.perf_counter() - start,
+            seconds=0.0,
         )
+
+
+def _moves(
+    here: InitialConfiguration, members: tuple[InitialConfiguration, ...]
+) -> tuple[str, ...]:
+    """Return the environment axes that change from the present state, or between members."""
+    now = dict(here.environment)
+    return tuple(
+        name
+        for name, first in members[0].environment
+        if any(
+            abs(dict(member.environment)[name] - now.get(name, first)) > SAME_VALUE
+            for member in members
+        )
+    )

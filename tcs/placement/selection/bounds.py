@@ -12,8 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.placement.selection.alternatives import Distinct
 from tcs.placement.selection.constraints import Admitted
 from tcs.placement.selection.index import GroupIndex
+from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights
 
@@ -39,6 +41,10 @@ class Bounds:
     admitted: Admitted | None = None
     """The candidates that satisfy the constraints; None without constraints. Their scores without
     blocked solutions are not greater than the stored ones, so the bounds hold for both."""
+    penalties: Penalties | None = None
+    """Penalties of the sets, if there are any."""
+    distinct: Distinct | None = None
+    """Sets from which others must differ, if there are any."""
 
     @property
     def travel(self) -> float:
@@ -145,9 +151,11 @@ class Bounds:
     def _net_gain(self) -> FloatArray:
         """Bound on the gain of the sets of each candidate minus that cost, shape (C,).
 
-        It is -inf for candidates that violate a constraint.
+        Penalties are subtracted. It is -inf for candidates that violate a constraint.
         """
         net = self._member_gain - self._levels
+        if self.penalties is not None:
+            net -= self.penalties.of_candidates
         if self.admitted is not None:
             net[~self.admitted.candidates] = -np.inf
         return net
@@ -157,4 +165,6 @@ class Bounds:
         """Margin for rounding in the difference of gain, levels and driving, shape (K,)."""
         most = float(self.weights.reachability) + float(self.weights.manipulability)
         most += float(self._levels.max(initial=0.0))
+        if self.penalties is not None:
+            most += sum(self.penalties.amounts)
         return SLACK * (most + self.travel * self._driving)

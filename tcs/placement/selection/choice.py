@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.selection.constraints import Left
@@ -17,6 +20,8 @@ from tcs.placement.selection.regions import Footprint
 from tcs.placement.store import ScoreFile
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -37,17 +42,21 @@ class SelectionTables:
     """Returns the robot's shapes, if they are known."""
     read_scores: Callable[[], ScoreTable] | None = None
     """Returns the stored solutions."""
+    read_frames: Callable[[], dict[str, FloatArray]] | None = None
+    """Returns the positions of the body frames in W for each environment state [m], (states, 3)."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
         """Return one of the tables of a loaded score file, the nominal one by default."""
-        chosen = file.nominal if table is None else file.tables[table]
+        number = file.nominal_index if table is None else table
+        chosen = file.tables[number]
         return cls(
             chosen.sets,
             Grid.from_dict(file.grid),
             chosen.success,
             partial(getattr, file, "robot_shapes"),
             partial(getattr, chosen, "scores"),
+            partial(_frames, file, number),
         )
 
     @cached_property
@@ -73,6 +82,12 @@ class SelectionTables:
     def index(self) -> SetIndex:
         """The sets, prepared for the search."""
         return SetIndex(self.sets)
+
+
+def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:
+    """Return the positions of the body frames of a table [m], shapes (states, 3)."""
+    count = len(file.tables)
+    return {name: np.reshape(at, (count, -1, 3))[table] for name, at in file.body_frames.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +123,13 @@ class Choice:
     """Each constraint, and what it and those before it leave."""
     footprint: Footprint | None = None
     """The floor that the robot covers, for forbidden regions; None without any."""
+    net_utility: float
+    """The utility less the penalties for further members, for moving the environment and for
+    violated preferences, by which sets are compared."""
+    moves: tuple[str, ...]
+    """Environment axes that change from the present state to the members, or between these."""
+    alternatives: tuple[Choice, ...] = ()
+    """Further sets, the best first, if they were asked for."""
     warnings: tuple[str, ...] = ()
     """What the user should know about the choice, one sentence each."""
 
@@ -129,6 +151,8 @@ class Choice:
             "manipulability": round(self.manipulability, 12),
             "cost": self.cost,
             "utility": self.utility,
+            "net_utility": self.net_utility,
+            "moves": list(self.moves),
             "unreachable": self.unreachable,
             "seconds": self.seconds,
         }
@@ -140,6 +164,25 @@ class Choice:
             plain["constraints"] = [left.to_json() for left in self.constraints]
         if self.footprint is not None:
             plain["footprint"] = self.footprint.to_json()
+        if self.alternatives:
+            plain["alternatives"] = [other.compared_with(self) for other in self.alternatives]
         if self.warnings:
             plain["warnings"] = list(self.warnings)
         return plain
+
+    def compared_with(self, best: Choice) -> dict[str, Any]:
+        """Return an alternative as plain containers, with what it trades against the best set.
+
+        Args:
+            best: The best set; `trades` are the differences from it.
+        """
+        names = ("reachability", "manipulability", "cost", "utility", "net_utility")
+        return {
+            "members": [self.members[i].to_json() for i in self.order],
+            **{name: round(getattr(self, name), 12) for name in names},
+            "moves": list(self.moves),
+            "trades": {
+                **{name: round(getattr(self, name) - getattr(best, name), 12) for name in names},
+                "places": len(self.members) - len(best.members),
+            },
+        }

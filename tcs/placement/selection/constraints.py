@@ -15,6 +15,7 @@ from tcs.model.grid import Axis, AxisCondition, Grid, InitialConfiguration
 from tcs.model.grid.condition import axis_named, values_text
 from tcs.placement.selection.blocking import blocked_bodies, blocked_solutions
 from tcs.placement.selection.obstacles import Obstacle
+from tcs.placement.selection.preferences import check_preference
 from tcs.placement.selection.regions import Footprint, Region
 from tcs.placement.selection.travel import current_values
 
@@ -29,7 +30,7 @@ SAME_VALUE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """Constraints that every member of a selected set satisfies; none by default."""
+    """Constraints that every member of a selected set satisfies, and preferences."""
 
     only: tuple[str, ...] = ()
     """Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; see `AxisCondition`."""
@@ -39,6 +40,9 @@ class Constraints:
     """Regions of the floor on which the robot must not stand."""
     blocked: tuple[Obstacle, ...] = ()
     """Obstacles that neither the robot's body nor its arm may touch."""
+    prefer: tuple[str, ...] = ()
+    """Preferences, each of which a set may violate at a cost (`UtilityWeights.preference`): a side
+    of the person, "left", "right", "head" or "foot", or a condition on an axis."""
 
     def __post_init__(self) -> None:
         """Turn lists into tuples, and check the form of the constraints.
@@ -68,10 +72,13 @@ class Constraints:
                     )
         for text in self.only:
             AxisCondition.parse(text)
+        for text in self.prefer:
+            check_preference(text)
 
-    def __bool__(self) -> bool:
-        """Return whether there is any constraint."""
-        return any(getattr(self, field.name) for field in fields(self))
+    @property
+    def exclude(self) -> bool:
+        """Whether any set may be excluded, rather than disliked."""
+        return bool(self.only or self.keep or self.forbid or self.blocked)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
+from tcs.placement.selection.alternatives import Distinct
+from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.search import tour_costs
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights, utility
@@ -23,6 +25,10 @@ class Candidates(NamedTuple):
     """Whether it reaches a goal, shape (C, G)."""
     dexterity: NDArray[np.float32]
     """Its dexterity there, shape (C, G)."""
+    penalties: Penalties | None
+    """Penalties of the sets."""
+    distinct: Distinct | None
+    """Sets from which others must differ."""
 
 
 def best_estimated(
@@ -32,7 +38,7 @@ def best_estimated(
     weights: UtilityWeights,
     max_members: int,
     candidates: Candidates,
-) -> tuple[int, ...]:
+) -> tuple[int, ...] | None:
     """Return the set with an estimate that has the greatest utility, the first among equals.
 
     Args:
@@ -44,7 +50,8 @@ def best_estimated(
         candidates: Which candidates may be selected, and what they reach.
 
     Returns:
-        Candidate numbers of its members, ascending.
+        Candidate numbers of its members, ascending; None if no set differs from those that it must
+        differ from.
 
     Raises:
         SelectionError: If no set has an estimate, or none with an estimate is admitted.
@@ -60,16 +67,20 @@ def best_estimated(
         rows = success.of_size(size)
         members = np.searchsorted(sets.candidates, success.members[rows, :size])
         feasible = np.all(candidates.admitted[members], axis=1)
+        if candidates.distinct is not None:
+            feasible &= candidates.distinct.of_sets(tuple(members.T))
         rows, members = rows[feasible], members[feasible]
         if not rows.size:
             continue
-        found = _utilities(sets.weights, candidates, success.low[rows], legs, weights, members)
+        found = _utilities(
+            sets.weights, candidates, success.low[rows], legs, weights.of_size(size), members
+        )
         first = int(np.argmax(found))
         # The table is sorted in the order that breaks ties.
         if found[first] > most:
             most = float(found[first])
             best = tuple(int(i) for i in members[first])
-    if best is None:
+    if best is None and candidates.distinct is None:
         raise SelectionError(
             "No set whose success under error was estimated is reachable from here and satisfies "
             f"the constraints with at most {max_members} members. Use --delta 0, or estimate more "
@@ -105,10 +116,13 @@ def _utilities(
     columns = tuple(np.ascontiguousarray(column) for column in members.T)
     reached = np.logical_or.reduce([candidates.reached[column] for column in columns], axis=0)
     dexterity = np.maximum.reduce([candidates.dexterity[column] for column in columns], axis=0)
-    return utility(
+    found = utility(
         tc_reachability(reached, of_goals),
         tc_manipulability(dexterity, of_goals),
         tour_costs(legs, columns),
         weights,
         success,
     )
+    if candidates.penalties is not None:
+        found = found - candidates.penalties.of_sets(columns)
+    return found

@@ -195,7 +195,10 @@ def _best_of(
     members, cost = tuple(member[feasible] for member in members), cost[feasible]
     every = bounds.index.all
     scores = _scores(every.dexterity, every.reached, every.sets.weights, members)
-    kept = np.flatnonzero(_is_kept(bounds.index, members, *scores))
+    is_kept = _is_kept(bounds.index, members, *scores)
+    if bounds.distinct is not None:
+        is_kept &= bounds.distinct.of_sets(members)
+    kept = np.flatnonzero(is_kept)
     if not kept.size:
         return None
     members = tuple(member[kept] for member in members)
@@ -207,6 +210,8 @@ def _best_of(
             admitted.dexterity.T, admitted.reached.T, every.sets.weights, members
         )
     utilities = utility(reachability, manipulability, cost[kept], bounds.weights)
+    if bounds.penalties is not None:
+        utilities = utilities - bounds.penalties.of_sets(members)
     best = utilities.max()
     ties = np.flatnonzero(utilities == best)
     first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.errors import SelectionError
 from tcs.placement.selection.checks import check_weight
+
+MOST_PLACES = 0.5
+"""Greatest fraction of the score that a further member may cost."""
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 
@@ -31,6 +35,14 @@ class UtilityWeights:
     """delta, the weight of the success under error P_S: the lower confidence bound of its estimate,
     so that a set with few, favourable samples does not outrank a good set with many. Above 0, only
     sets with an estimate can be selected."""
+    places: float = 0.01
+    """epsilon, the fraction of alpha P_R + beta P_M that each member after the first costs: a
+    single that loses at most one percent is preferred to a pair. 0 in the paper."""
+    environment: float = 0.01
+    """kappa, what moving the environment from its present state costs, once for a set: as much as
+    one percent of P_R. 0 in the paper."""
+    preference: float = 0.05
+    """pi, what a set costs that violates a preference: as much as five percent of P_R."""
 
     def __post_init__(self) -> None:
         """Refuse weights that are negative or not finite.
@@ -42,6 +54,29 @@ class UtilityWeights:
         check_weight("beta (manipulability)", self.manipulability)
         check_weight("gamma (travel)", self.travel)
         check_weight("delta (success)", self.success)
+        check_weight("kappa (environment)", self.environment)
+        check_weight("pi (preference)", self.preference)
+        check_weight("epsilon (places)", self.places)
+        if self.places > MOST_PLACES:
+            raise SelectionError(
+                f"Weight epsilon (places) is {self.places:g}; must be at most {MOST_PLACES:g}, "
+                "with which a third place has lost its value."
+            )
+
+    def of_size(self, members: int) -> UtilityWeights:
+        """Return the weights by which sets of a size are compared: alpha and beta are reduced."""
+        left = 1.0 - float(self.places) * (members - 1)
+        if left == 1.0:
+            return self
+        return replace(
+            self,
+            reachability=float(self.reachability) * left,
+            manipulability=float(self.manipulability) * left,
+        )
+
+
+PAPER_WEIGHTS = UtilityWeights(places=0.0, environment=0.0)
+"""TCS eq. (5) alone, without the penalties for further places and for moving the environment."""
 
 
 def utility(

@@ -11,7 +11,14 @@ from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
+from tcs.placement.selection import (
+    Constraints,
+    SelectionTables,
+    TravelWeights,
+    UtilityWeights,
+    search,
+    select,
+)
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.tables.small import all_sets, random_scores, small_grid
 
@@ -31,8 +38,23 @@ def leg(p, q, travel):
     return cost
 
 
-def brute_force(kept, grid, here, weights, travel):
-    """Members, utility and cost of the best of all kept sets, the first among equals."""
+def keeps(configuration, here, grid):
+    """Whether a configuration has the scored environment state nearest to the present one."""
+    at = dict(configuration.environment)
+    for name, now in here.environment:
+        values = grid.axis(name).values.tolist()
+        nearest = min(values, key=lambda value: abs(value - now))
+        if at[name] != nearest:
+            return False
+    return True
+
+
+def brute_force(kept, grid, here, weights, travel, disliked=()):
+    """Members, utility and cost of the best of all kept sets, the first among equals.
+
+    Sets are compared by their utility less their penalties; `disliked` holds functions that
+    return whether a configuration violates a preference.
+    """
     best = None
     configuration = {h: grid.configuration(h) for members in kept for h in members}
     for members, (reachability, manipulability) in kept.items():
@@ -47,14 +69,35 @@ def brute_force(kept, grid, here, weights, travel):
         value = (
             weights.reachability * reachability + weights.manipulability * manipulability
         ) - weights.travel * cost
-        if best is None or value > best[1]:
-            best = (members, value, cost)
-    return best
+        left = 1.0 - weights.places * (len(members) - 1)
+        net = (
+            weights.reachability * left * reachability
+            + weights.manipulability * left * manipulability
+        ) - weights.travel * cost
+        penalty = 0.0
+        for dislikes in disliked:
+            penalty += weights.preference * any(dislikes(configuration[h]) for h in members)
+        if not all(keeps(configuration[h], here, grid) for h in members):
+            penalty += weights.environment
+        net -= penalty
+        if best is None or net > best[0]:
+            best = (net, members, value, cost)
+    return best[1:]
 
 
 weight = st.one_of(st.just(0.0), st.sampled_from([0.05, 0.5, 1.0, 10.0]), st.floats(0.0, 3.0))
+no_penalties = {"places": st.just(0.0), "environment": st.just(0.0)}
 utility_weights = st.builds(
-    UtilityWeights, reachability=weight, manipulability=weight, travel=weight
+    UtilityWeights, reachability=weight, manipulability=weight, travel=weight, **no_penalties
+)
+all_weights = st.builds(
+    UtilityWeights,
+    reachability=weight,
+    manipulability=weight,
+    travel=weight,
+    places=st.sampled_from([0.0, 0.01, 0.3]),
+    environment=weight,
+    preference=weight,
 )
 place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0, 3.0))
 
@@ -67,8 +110,9 @@ place = st.one_of(st.sampled_from([-0.7, -0.5, -0.1, 0.1, 0.3]), st.floats(-3.0,
     share=st.sampled_from([0.1, 0.5, 1.0]),
     beds=st.sampled_from([(0, 0), (2, 0), (2, 2)]),
     min_distance=st.sampled_from([0.0, 0.4]),
-    weights=utility_weights,
+    weights=all_weights,
     travel=st.tuples(weight, weight, weight, weight, weight),
+    turned=st.booleans(),
     where=st.tuples(place, place, st.floats(-7.0, 7.0), st.floats(0.0, 0.2)),
     bed_now=st.floats(0.0, 0.15),
     first_candidates=st.sampled_from([1, 5, search.FIRST_CANDIDATES]),
@@ -90,6 +134,7 @@ def test_equals_brute_force_over_all_kept_sets(
     min_distance,
     weights,
     travel,
+    turned,
     where,
     bed_now,
     first_candidates,
@@ -122,8 +167,14 @@ def test_equals_brute_force_over_all_kept_sets(
         # Small tables open every group in the first round, unless that is small too.
         patch.setattr(search, "FIRST_CANDIDATES", first_candidates)
         patch.setattr(search, "CHUNK", chunk)
-        choice = select(tables, here, weights=weights, travel=travel)
-    members, value, cost = brute_force(kept, grid, here, weights, travel)
+        constraints = Constraints(prefer=("base_yaw = 120 deg", "base_x <= 0")) if turned else None
+        choice = select(
+            tables, here, weights=weights, travel=travel, constraints=constraints or Constraints()
+        )
+    disliked = (lambda c: abs(c.base_yaw - 2.0943951) > 1e-3, lambda c: c.base_x > 1e-9)
+    members, value, cost = brute_force(
+        kept, grid, here, weights, travel, disliked if turned else ()
+    )
     assert choice.indices == members
     assert (choice.utility, choice.cost) == (value, cost)
     assert (choice.reachability, choice.manipulability) == kept[members]
@@ -244,7 +295,9 @@ def test_equals_brute_force_on_a_larger_table(seed, levels, monkeypatch):
         ]
         values = (alpha * reachability + beta * manipulability) - gamma * np.array(cost)
         first = int(np.argmax(values))
-        weights = UtilityWeights(reachability=alpha, manipulability=beta, travel=gamma)
+        weights = UtilityWeights(
+            reachability=alpha, manipulability=beta, travel=gamma, places=0.0, environment=0.0
+        )
         choice = select(tables, here, weights=weights)
         assert choice.indices == members[first]
         assert choice.utility == values[first]

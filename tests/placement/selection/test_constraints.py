@@ -253,5 +253,5 @@ def test_constraints_are_tuples_of_texts():
         Constraints(blocked=("1 1 1 1",))
     with pytest.raises(SelectionError, match="must be a tuple"):
         Constraints(only="bed_height = 0")
-    assert not Constraints()
-    assert Constraints(keep=("torso",))
+    assert not Constraints(prefer=("left",)).exclude
+    assert Constraints(keep=("torso",)).exclude

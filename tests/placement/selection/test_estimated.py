@@ -97,7 +97,12 @@ def test_the_best_of_all_sets_with_an_estimate(file, moves):
         (0.0, 1.0), (0.0, 1.0), (0.0, 0.2, 3.0), (0.1, 1.0, 50.0), (1, 2)
     ):
         weights = UtilityWeights(
-            reachability=alpha, manipulability=beta, travel=gamma, success=delta
+            reachability=alpha,
+            manipulability=beta,
+            travel=gamma,
+            success=delta,
+            places=0.0,
+            environment=0.0,
         )
         choice = select(file, here, weights=weights, travel=travel, max_members=most)
         assert (choice.utility, choice.indices) == by_hand(file, cost, weights, most)
