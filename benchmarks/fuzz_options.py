@@ -84,7 +84,8 @@ class Command:
 
 _THREE = ("--environment", "kitchen.yaml", "--robot", "iiwa7.yaml")
 _PICK = ("--task", "pick-and-place")
-_SMALL_MAP = ("--step", "0.4", "--yaw-bins", "4", "--out", "out.tcm")
+_GRID = ("--step", "0.4", "--yaw-bins", "4")
+_SMALL_MAP = (*_GRID, "--out", "out.tcm")
 _WINDOW = ("--no-browser", "--duration", "0")
 COMMANDS = (
     Command("list"),
@@ -105,6 +106,12 @@ COMMANDS = (
     Command("picture", ("scores.tcs",), ("--out", "out.png")),
     Command("report", ("scores.tcs",), ("--out", "out.html", "--pairs", "2", "--dense", "0")),
     Command("map-check", ("ik.tcm",), ("--queries", "5", "--jobs", "1")),
+    Command(
+        "map-check",
+        (),
+        ("--robot", "iiwa7", *_GRID, "--radius", "0.8", "--queries", "5", "--jobs", "1"),
+        ("--torso-height", "--step", "--yaw-bins", "--tool", "--robot", "--grasps", "--radius"),
+    ),
     Command("robot new", ("iiwa7.urdf",), ("--tool", "iiwa_link_ee_kuka", "--out", "out.yaml")),
     Command("robot check", ("iiwa7.yaml",), ("--samples", "2")),
     Command(
@@ -123,8 +130,8 @@ COMMANDS = (
     Command("capability merge", ("map.tcm",), (*_PICK, "--height", "0.41")),
     Command(
         "capability merge",
-        ("map.tcm",),
-        ("--task", "curved", "--height", "0.41", "--length", "0.3"),
+        ("ik.tcm",),
+        ("--task", "curved", "--height", "1.0", "--length", "0.4", "--samples", "1"),
         ("--length", "--samples", "--start-deg", "--end-deg"),
     ),
     Command(

@@ -187,3 +187,21 @@ def test_options_that_a_merge_does_not_use_are_checked(tcs_command, base, words,
     ran = tcs_command("capability", "merge", *base["capability merge"], *words)
     assert ran.code == code
     assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("map-check", "map.tcm", "--step", "nan"),
+        ("map-check", "map.tcm", "--radius", "-1"),
+        ("map-check", "map.tcm", "--tool", "nonsense"),
+        ("capability", "record", "run.csv", "--out", "out.tcm", "--seconds", "nan"),
+        ("capability", "record", "run.csv", "--out", "out.tcm", "--save-csv", "pipe"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_a_given_file_replaces_are_misuse(tcs_command, base, words):
+    """Before, they had no effect."""
+    ran = tcs_command(*words)
+    assert ran.code == 2
+    assert "leave" in ran.err

@@ -71,6 +71,11 @@ def map_check(
     as_json: options.Json = False,
 ) -> None:
     """Compare a capability map with inverse kinematics at random tool poses."""
+    if capability is not None and (radius is not None or grid != GridOptions()):
+        raise typer.BadParameter(
+            "a map has its own grid, torso height, tool and radius; leave out their options.",
+            param_hint="MAP",
+        )
     from tcs.capability import check_file, check_map
 
     if capability is not None:

@@ -23,6 +23,9 @@ from tcs.output.terminal import capability_tables
 if TYPE_CHECKING:
     from tcs.capability import Reach, Recording
 
+_SIMULATED = (3200.0, 7.5, (0.65, 0.0))
+"""Length [s], scale and centre [m] of a simulated recording."""
+
 
 @expand_options
 def from_ik(
@@ -74,17 +77,17 @@ def record(
     ] = None,
     seconds: Annotated[
         float, typer.Option(help="Simulated: length of the recording, in seconds.")
-    ] = 3200.0,
+    ] = _SIMULATED[0],
     scale: Annotated[
         float, typer.Option(help="Simulated: metres at the arm per metre at the master.")
-    ] = 7.5,
+    ] = _SIMULATED[1],
     centre: Annotated[
         tuple[float, float],
         typer.Option(
             metavar="X Y",
             help="Simulated: centre of the workspace of the hand in the base frame, in metres.",
         ),
-    ] = (0.65, 0.0),
+    ] = _SIMULATED[2],
     seed: options.Seed = 0,
     save_csv: Annotated[
         Path | None, typer.Option(help="Simulated: also write the joint states to this file.")
@@ -95,6 +98,12 @@ def record(
 
     The simulated hand keeps the tool at --height, by default 0.41 m.
     """
+    if csv is not None and (save_csv, seconds, scale, centre) != (None, *_SIMULATED):
+        raise typer.BadParameter(
+            "--seconds, --scale, --centre and --save-csv belong to a simulated recording; leave "
+            "them out.",
+            param_hint="CSV",
+        )
     from tcs.capability import read_csv, write_csv
 
     files.check(save_csv, inputs=[] if csv is None else [csv])
