@@ -22,6 +22,7 @@ from tcs.placement.selection.constraints import (
     Constraints,
     admitted_candidates,
 )
+from tcs.placement.selection.coverage import warning_outside
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
@@ -121,6 +122,9 @@ def select(
             break
         offered.append(rows)
     best, *others = (query.choice(rows) for rows in offered)
+    outside = warning_outside(legs, here, query.tour(best), tables.grid)
+    if outside is not None:
+        best = replace(best, warnings=(*best.warnings, outside))
     seconds = time.perf_counter() - start
     return replace(best, alternatives=tuple(others), match=match, seconds=seconds)
 
@@ -263,6 +267,12 @@ class _Query:
                 "leave. Relax a constraint, or use straight lines."
             )
         return np.asarray(both)
+
+    def tour(self, choice: Choice) -> tuple[int, ...]:
+        """Return the base cells of a choice, in the order of its tour."""
+        sets = self.tables.sets
+        rows = np.searchsorted(sets.candidates, choice.indices)
+        return tuple(int(sets.cell[rows[i]]) for i in choice.order)
 
     def choice(self, rows: tuple[int, ...]) -> Choice:
         """Return the choice of the set of candidates `rows`."""

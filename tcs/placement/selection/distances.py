@@ -8,6 +8,7 @@ percent longer than the straight line.
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,6 +25,15 @@ IntArray = NDArray[np.integer[Any]]
 
 ROUTES = ("straight", "around")
 """Names of the two routes."""
+
+PREFERENCE = 1e-9
+"""Relative excess of moves outside a rectangle: decides between equally short paths only."""
+
+ON_EDGE = 1e-6
+"""Tolerance [m] of a lattice position on the edge of a rectangle."""
+
+NO_NODE = -9999
+"""What scipy enters as the node before the first one of a path."""
 
 CHUNK = 64
 """Cells whose shortest paths are computed in one call: their distances take some megabytes."""
@@ -83,23 +93,50 @@ class LatticeDistances(Distances):
         Raises:
             SelectionError: If the base cannot move from any corner of the square.
         """
-        nodes, legs = self._entries(x, y)
-        from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import dijkstra
 
-        # The robot is one more node, after those of the lattice.
-        graph = self._graph
-        size = graph.shape[0]
-        with_robot = csr_matrix(
-            (
-                np.concatenate([graph.data, legs]),
-                np.concatenate([graph.indices, nodes.astype(graph.indices.dtype)]),
-                np.concatenate([graph.indptr, [graph.nnz + nodes.size]]),
-            ),
-            shape=(size + 1, size + 1),
-        )
-        found: FloatArray = dijkstra(with_robot, indices=size)[self._node]
+        graph = _with_robot(self._graph, *self._entries(x, y))
+        found: FloatArray = dijkstra(graph, indices=graph.shape[0] - 1)[self._node]
         return found
+
+    def path(
+        self, x: float, y: float, cells: Sequence[int], low: FloatArray, high: FloatArray
+    ) -> FloatArray:
+        """Return the corners of a shortest path from a position through cells, in this order.
+
+        Among equally short paths, one is returned that stays within a rectangle if possible.
+
+        Args:
+            x: x of the position in W [m], from which the cells are reachable.
+            y: Its y [m].
+            cells: The cells to visit.
+            low: Least x and y of the rectangle [m], shape (2,).
+            high: Greatest x and y of the rectangle [m], shape (2,).
+
+        Returns:
+            Positions in W [m], shape (n, 2); the first is that of the robot.
+        """
+        from scipy.sparse.csgraph import dijkstra
+
+        position = self.lattice.start + np.indices(self.lattice.shape).reshape(2, -1).T * np.array(
+            self.lattice.step
+        )
+        outside = np.any((position < low - ON_EDGE) | (position > high + ON_EDGE), axis=1)
+        graph = self._graph.copy()
+        begin = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
+        graph.data *= 1.0 + PREFERENCE * (outside[begin] | outside[graph.indices])
+        nodes, legs = self._entries(x, y)
+        graph = _with_robot(graph, nodes, legs * (1.0 + PREFERENCE * outside[nodes]))
+        corners = [np.array([[x, y]])]
+        source = graph.shape[0] - 1
+        for target in self._node[list(cells)]:
+            before = dijkstra(graph, indices=source, return_predecessors=True)[1]
+            reverse = [int(target)]
+            while before[reverse[-1]] not in (source, NO_NODE):
+                reverse.append(int(before[reverse[-1]]))
+            corners.append(position[reverse[::-1]])
+            source = int(target)
+        return np.concatenate(corners)
 
     def between(self, first: IntArray, second: IntArray) -> FloatArray:
         """Return the distance between cells that one position can reach [m], shape (...)."""
@@ -180,3 +217,18 @@ def _distance(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the Euclidean distance of positions of shapes (..., 2), shape (...)."""
     dx, dy = q[..., 0] - p[..., 0], q[..., 1] - p[..., 1]
     return np.asarray(np.sqrt(dx * dx + dy * dy))
+
+
+def _with_robot(graph: Any, nodes: IntArray, legs: FloatArray) -> Any:
+    """Return a graph with the robot as its last node, joined to some nodes by legs [m]."""
+    from scipy.sparse import csr_matrix
+
+    size = graph.shape[0]
+    return csr_matrix(
+        (
+            np.concatenate([graph.data, legs]),
+            np.concatenate([graph.indices, nodes.astype(graph.indices.dtype)]),
+            np.concatenate([graph.indptr, [graph.nnz + nodes.size]]),
+        ),
+        shape=(size + 1, size + 1),
+    )

@@ -125,3 +125,33 @@ def test_a_walled_position_is_unreachable():
     assert distances.from_position(0.0, 0.0)[7 * 3 + 3] == math.inf
     with pytest.raises(SelectionError, match=r"collision at \(-0.75, 2.50\) m"):
         distances.from_position(-0.75, 2.5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_path_is_as_long_as_the_distance(seed):
+    rng = np.random.default_rng(seed)
+    lattice = lattice_of(rng.random((7, 6)) > 0.2)
+    distances = distances_over(lattice)
+    x, y = position(lattice, 2.5, 2.5)
+    try:
+        metres = distances.from_position(x, y)
+    except SelectionError:
+        pytest.skip("the robot is in collision")
+    first, second = (int(i) for i in rng.choice(np.flatnonzero(np.isfinite(metres)), 2))
+    path = distances.path(x, y, [first, second], np.zeros(2), np.ones(2))
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    between = distances.between(np.array(first), np.array(second))
+    # Moves outside the rectangle count a billionth more.
+    assert length == pytest.approx(metres[first] + between, rel=1e-8)
+    np.testing.assert_allclose(path[-1], distances.cell_xy[second])
+
+
+@pytest.mark.parametrize("row", [0, 2])
+def test_of_equally_short_paths_one_stays_inside(row):
+    free = np.ones((3, 3), dtype=bool)
+    free[1, 1] = False
+    lattice = lattice_of(free, step=(0.2, 0.2))
+    distances = distances_over(lattice)
+    low, high = position(lattice, 0, min(row, 1)), position(lattice, 2, max(row, 1))
+    path = distances.path(*position(lattice, 0, 1), [1, 7], np.array(low), np.array(high))
+    assert np.all((path >= np.array(low) - 1e-9) & (path <= np.array(high) + 1e-9))
