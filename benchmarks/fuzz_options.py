@@ -25,6 +25,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import table
 from fuzz_files import prepare
 from worker import Worker
@@ -126,7 +127,7 @@ COMMANDS = (
         ("--robot", "pr2", "--seconds", "2", *_SMALL_MAP),
         ("--seconds", "--scale", "--centre", "--seed", "--save-csv"),
     ),
-    Command("capability from-bag", ("noise",), ("--robot", "pr2", *_SMALL_MAP)),
+    Command("capability from-bag", ("arm.bag",), ("--robot", "pr2", *_SMALL_MAP)),
     Command("capability merge", ("map.tcm",), (*_PICK, "--height", "0.41")),
     Command(
         "capability merge",
@@ -239,6 +240,25 @@ def make_map(folder: Path) -> None:
     reach = Reach.load("iiwa7", step=0.4)
     grid = MapGrid.of(0.4, 4, "all")
     save_map(folder / "ik.tcm", map_from_ik(reach, grid, map_type="ICM", radius=0.8))
+
+
+def make_bag(folder: Path) -> None:
+    """Write a bag of ROS 1 with the joint states of the recording."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    names, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types, name = store.types, "sensor_msgs/msg/JointState"
+    stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    header = types["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="")
+    nothing = np.zeros(0)
+    with Writer(folder / "arm.bag") as writer:
+        connection = writer.add_connection("/joint_states", name, typestore=store)
+        for i, row in enumerate(rows[:20]):
+            positions = np.array(row.split(","), dtype=np.float64)
+            state = types[name](header, names.split(","), positions, nothing, nothing)
+            writer.write(connection, i * 20_000_000, store.serialize_ros1(state, name))
 
 
 def make_odd_files(folder: Path) -> None:
@@ -384,6 +404,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:
         prepare(Path(folder))
         make_map(Path(folder))
+        make_bag(Path(folder))
         worker = Worker(Path(__file__), (), Path(folder), SECONDS)
         for command in COMMANDS:
             if options.only and command.name not in options.only:

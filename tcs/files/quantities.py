@@ -166,6 +166,16 @@ RADIUS = Quantity(
     "`--radius` of capability maps",
     "ten times the reach of the longest arm that ships",
 )
+MASTER_SCALE = Quantity(
+    *("scale", "", 0.01, 100.0),
+    "`--scale` of a simulated recording",
+    "a master of 16 cm then moves the tool by 2 mm to 16 m",
+)
+RECORDING = Quantity(
+    *("length of a recording", "s", 0.02, 86_400.0),
+    "`--seconds` of a simulated recording",
+    "from one sample at 50 Hz to a day, which fits into memory",
+)
 DURATION = Quantity(
     *("duration", "s", 0.0, 604_800.0),
     "`--duration` of viewers and live pages",
@@ -201,6 +211,7 @@ PRIMITIVES = Quantity(
 QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
     JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT,
-    UTILITY_WEIGHT, HEADING, DURATION, JOBS, QUERIES, AXIS_VALUES, GOALS, ENTRIES, PRIMITIVES,
+    UTILITY_WEIGHT, HEADING, MASTER_SCALE, RECORDING, DURATION, JOBS, QUERIES, AXIS_VALUES,
+    GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

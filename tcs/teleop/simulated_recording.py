@@ -15,6 +15,7 @@ import numpy as np
 
 from tcs.capability import Reach, Recording
 from tcs.errors import DataFileError
+from tcs.files.quantities import MASTER_SCALE, POSITION, RECORDING
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.arm import JOINTS, load_arm
 from tcs.teleop.control.resolved_rate import pose_error
@@ -25,8 +26,6 @@ MASTER_BOX = (0.070, 0.160, 0.120)
 """Depth, width and height of the workspace of a Geomagic Touch [m]: forward, left, up."""
 PERIOD = 0.02
 """Time between samples [s]: joint states are published at 50 Hz, ITCM thesis, Appendix C.1."""
-LONGEST = 86_400.0
-"""Longest recording [s]: a day, 27 times as long as that of the thesis, fits into memory."""
 _GAIN = 4.0
 """Commanded tool speed per distance to the hand [1/s]."""
 _FASTEST = (1.5, 0.4)
@@ -130,8 +129,8 @@ def simulate_recording(
         on_progress: Called with the number of samples done and of all.
 
     Raises:
-        DataFileError: If a number is not finite, the duration is out of range, or the arm reaches
-            no pose in the box to start from.
+        DataFileError: If a number is out of its physical range, or the arm reaches no pose in the
+            box to start from.
 
     Source:
         The "complete simulation" that the ITCM thesis proposes as future work, Appendix C.4:
@@ -238,14 +237,12 @@ def _sample_count(motion: HandMotion) -> int:
     """Return the number of samples.
 
     Raises:
-        DataFileError: If a number is not finite, or the duration is out of range.
+        DataFileError: If a number is out of its physical range.
     """
-    numbers = (motion.seconds, motion.height, motion.scale, *motion.centre)
-    if not (np.all(np.isfinite(numbers)) and PERIOD <= motion.seconds <= LONGEST):
-        raise DataFileError(
-            f"simulated recording of {motion.seconds:g} s at a height of {motion.height:g} m: "
-            f"numbers must be finite, and the time from {PERIOD:g} to {LONGEST:,.0f} s."
-        )
+    where = "simulated recording: its"
+    POSITION.check((motion.height, *motion.centre), f"{where} height or centre", DataFileError)
+    MASTER_SCALE.check((motion.scale,), f"{where} scale", DataFileError)
+    RECORDING.check((motion.seconds,), f"{where} length", DataFileError)
     return round(motion.seconds / PERIOD)
 
 

@@ -138,11 +138,13 @@ def test_progress_ends_with_all_samples(reach):
     ("motion", "words"),
     [
         (HandMotion(centre=(9.0, 0.0)), "cannot start, as it reaches no pose in the box"),
-        (HandMotion(seconds=0.0), "from 0.02 to 86,400 s"),
-        (HandMotion(seconds=1e12), "from 0.02 to 86,400 s"),
-        (HandMotion(seconds=math.nan), "finite"),
-        (HandMotion(height=math.nan), "finite"),
-        (HandMotion(scale=math.inf), "finite"),
+        (HandMotion(seconds=0.0), "length is 0 s, .* 0.02 to 86,400 s"),
+        (HandMotion(seconds=1e12), "0.02 to 86,400 s"),
+        (HandMotion(seconds=math.nan), "nan"),
+        (HandMotion(height=math.nan), "height or centre is nan m"),
+        (HandMotion(scale=math.inf), "scale is inf"),
+        (HandMotion(scale=0.0), "scale is 0, but a scale must be 0.01 to 100"),
+        (HandMotion(scale=-7.5), "scale is -7.5"),
     ],
 )
 def test_invalid_recordings_are_refused(reach, motion, words):
