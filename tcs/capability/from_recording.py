@@ -81,7 +81,7 @@ def map_from_recording(
         GridError: If there are more torso heights than a map can have.
 
     Source:
-        ITCM thesis section II.B and Appendix C.3, eqs. (23) to (25). The sample of a cell is
+        ITCM thesis section II.B and Appendix C.2.3, eqs. (23) to (25). The sample of a cell is
         the one nearest to its centre: the distances in position and in orientation are each
         scaled linearly to [0, 1] over all samples, and multiplied.
     """

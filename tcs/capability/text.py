@@ -43,7 +43,7 @@ def export_text(
         OutputError: If the file cannot be written.
 
     Source:
-        ITCM thesis, Appendix C.4 and eq. (26).
+        ITCM thesis, Appendix C.2.4 and eq. (26).
     """
     R_TB, p_TB = capability.grid.base_in_tool(capability.cells)
     values = capability.manipulability if score == "manipulability" else capability.score(FIXED)

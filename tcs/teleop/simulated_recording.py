@@ -52,11 +52,12 @@ class HandMotion:
     """Motion of the operator's hand, scaled to the arm.
 
     The defaults are those of the recording in the ITCM thesis where the thesis states them: fixed
-    height, roll and pitch, and an hour. It does not state scale, centre, yaw and speed of the hand.
+    height, roll and pitch, and the duration of Appendix C.1 (section II.A rounds it to an hour). It
+    does not state scale, centre, yaw and speed of the hand.
 
     Attributes:
         height: Height of the tool above the floor [m].
-        seconds: Duration of the recording [s]: about 53 min, as in Appendix C.1.
+        seconds: Duration of the recording [s]: 53 min 17 s, as in Appendix C.1.
         scale: Metres at the arm per metre at the master: 0.16 m become the 1.2 m of the thesis.
         centre: Centre of the box, x and y in B [m].
         yaw: Lowest and highest yaw of the tool [rad].
@@ -66,7 +67,7 @@ class HandMotion:
     """
 
     height: float = 0.41
-    seconds: float = 3200.0
+    seconds: float = 3197.0
     scale: float = 7.5
     centre: tuple[float, float] = (0.65, 0.0)
     yaw: tuple[float, float] = (-math.pi / 2, math.pi / 2)

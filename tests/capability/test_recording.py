@@ -141,7 +141,7 @@ def test_the_height_is_measured_above_the_floor(ihcm, reach, tiago):
 
 
 def test_the_sample_of_a_cell_is_the_nearest(ihcm, reach, tiago):
-    """By the product of both distances, each scaled linearly over all samples: Appendix C.3."""
+    """By the product of both distances, each scaled linearly over all samples: Appendix C.2.3."""
     rng = np.random.default_rng(3)
     row = int(np.argmax(ihcm.manipulability))
     near = ihcm.joints[row] + rng.normal(0.0, 0.02, (40, 7))

@@ -1,11 +1,13 @@
 """Simulated recordings: reproducible, within limits, free of contact, and fit for maps."""
 
+import inspect
 import math
 
 import numpy as np
 import pytest
 
 from tcs.capability import MapGrid, Reach, map_from_recording
+from tcs.cli.capability.making import record
 from tcs.errors import DataFileError
 from tcs.model.robots import load_robot
 from tcs.teleop import load_arm
@@ -125,6 +127,12 @@ def test_its_map_holds_only_what_inverse_kinematics_reaches(reach, minute):
     here = found.capability.manipulability[inside][solved.reached]
     # The kernel samples the free joint, so a posture in a narrow window may be better than its own.
     assert (solved.manipulability[solved.reached] >= here - 1e-4).mean() > 0.97
+
+
+def test_by_default_it_is_as_long_as_that_of_the_thesis():
+    # Appendix C.1: 53 min and 17 s.
+    assert HandMotion().seconds == 53 * 60 + 17
+    assert inspect.signature(record).parameters["seconds"].default == HandMotion().seconds
 
 
 def test_progress_ends_with_all_samples(reach):

@@ -23,7 +23,7 @@ from tcs.output.terminal import capability_tables
 if TYPE_CHECKING:
     from tcs.capability import Reach, Recording
 
-_SIMULATED = (3200.0, 7.5, (0.65, 0.0))
+_SIMULATED = (3197.0, 7.5, (0.65, 0.0))
 """Length [s], scale and centre [m] of a simulated recording."""
 
 

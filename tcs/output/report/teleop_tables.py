@@ -10,12 +10,15 @@ from tcs.output.report.blocks import Block, Column, Table, Text
 from tcs.output.words import p_value
 from tcs.output.words.teleop import NAMES, SCALE
 from tcs.teleop.experiment.maps import ControllerMaps
+from tcs.teleop.experiment.statistics import Tail
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment
 
 PAPER = {"accuracy": (0.0572, 0.0351), "time": (37.09, 36.65), "effort": (0.25e-6, 0.11e-6)}
 """Medians of end-effector control and of the novel controller: null-space paper, Table II, of 26
 people."""
+SIGNS: dict[Tail, str] = {"greater": ">", "less": "<", "two-sided": "≠"}
+"""Sign between two conditions in an alternative hypothesis."""
 
 
 def group_table(experiment: Experiment) -> Table:
@@ -52,12 +55,11 @@ def group_table(experiment: Experiment) -> Table:
 def signed_rank_table(experiment: Experiment) -> Table:
     """Return the paper's Table III."""
     rows = []
-    tails = {"greater": "EE > NV", "less": "EE < NV", "two-sided": "EE ≠ NV"}
     for name, test in experiment.tested().items():
         rows.append(
             [
                 NAMES[name],
-                tails[test.tail],
+                f"EE {SIGNS[test.tail]} NV",
                 number(test.levene_f),
                 p_value(test.levene_p),
                 number(test.statistic),
@@ -92,10 +94,11 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
             ]
         )
         for pair in found.post_hoc:
+            both = (title_of(experiment, one) for one in (pair.first, pair.second))
             pairs.append(
                 [
                     NAMES[name],
-                    f"{title_of(experiment, pair.first)} – {title_of(experiment, pair.second)}",
+                    f" {SIGNS[pair.tail]} ".join(both),
                     number(pair.difference),
                     number(pair.t),
                     p_value(pair.p),
@@ -111,11 +114,11 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
             rows,
         ),
         Table(
-            "Pairs of controllers: two-tailed paired t tests, p with Bonferroni correction; "
-            f"{SCRIPTED}.",
+            "Pairs of controllers: paired t tests of the alternative, one-tailed for time and "
+            f"steering as in the thesis, p with Bonferroni correction; {SCRIPTED}.",
             [
                 Column("measure", False),
-                Column("pair", False),
+                Column("alternative", False),
                 *(Column(title) for title in ("difference", "t", "p", "r")),
             ],
             pairs,

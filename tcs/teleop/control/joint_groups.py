@@ -1,4 +1,4 @@
-"""Null-space control: motion of a joint group while the tool is held (paper, eqs. 9-14)."""
+"""Null-space control: motion of a joint group while the tool is held (paper, eqs. 10-14)."""
 
 from __future__ import annotations
 

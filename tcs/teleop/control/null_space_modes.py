@@ -32,7 +32,7 @@ times as fast as the lead joint."""
 
 
 def null_space(command: Command, state: ControlState) -> RateCommand:
-    """Move a joint group while the tool's position is held: eqs. (9) to (14).
+    """Move a joint group while the tool's position is held: eqs. (10) to (14).
 
     At a limit all joints of the group come to rest together. With `clamped` behaviour the motion
     continues with that joint at its limit, if the other joints can hold the tool.
@@ -91,7 +91,7 @@ def _drift_feedback(jacobian: FloatArray, error: FloatArray, state: ControlState
     """
     settings = state.settings
     velocity = settings.gain * error
-    options = {"length": settings.length, "damping": settings.damping}
+    options = {"length": settings.length, "damping": settings.inverse_damping}
     rates, _ = resolved_rates(jacobian, velocity, singular=settings.singular, **options)
     if settings.limits == "clamped":
         distance = np.minimum(state.joints - state.arm.lower, state.arm.upper - state.joints)

@@ -22,7 +22,7 @@ class Mode(StrEnum):
     END_EFFECTOR = "end-effector"
     """The tool, in all six directions (eqs. 6-8)."""
     NULL_SPACE = "null-space"
-    """One joint group, while the tool's position is held (eqs. 9-14)."""
+    """One joint group, while the tool's position is held (eqs. 10-14)."""
     POSE = "pose"
     """The elbow, while the tool's pose is held: self-motion."""
     ASSISTED = "assisted"
@@ -35,6 +35,8 @@ NULL_SPACE_MODES = (Mode.NULL_SPACE, Mode.POSE)
 """Modes that move the arm in the null space of the tool."""
 FASTEST = 100.0
 """Greatest velocity of a valid command [m/s or rad/s]."""
+_DAMPING = 0.01
+"""Damping of the pseudo-inverse with "clamped" limits [m/rad]: at most 5 rad/s at 0.1 m/s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +100,8 @@ class Settings:
         acceleration: Greatest change of a joint's rate [rad/s^2].
         group_rate: Rate of a group's lead joint at k = 1 [rad/s].
         groups: The joint groups of eq. (12), counted from 0, each with its lead joint first.
-        damping: Damping of the pseudo-inverse at a singularity [m/rad]; 0 for none.
+        damping: Damping of the pseudo-inverse at a singularity [m/rad]; 0 for none. None is 0.01
+            with "clamped" limits, and 0 with "paper", as in eq. (7).
         singular: Smallest singular value of the task's Jacobian below which the posture counts as
             singular [m/rad].
         near_limit: Distance from a limit within which a joint is reported as at the limit [rad].
@@ -118,7 +121,7 @@ class Settings:
     acceleration: float = 10.0
     group_rate: float = 0.4
     groups: tuple[tuple[int, ...], ...] = ((0, 1, 2), (1, 3, 5), (0, 3, 4), (6,))
-    damping: float = 0.01
+    damping: float | None = None
     singular: float = 0.01
     near_limit: float = 0.01
     length: float = 0.1
@@ -142,8 +145,9 @@ class Settings:
         )
         for name in (*positive, "singular", "length", "assist_lead_angle", "timeout"):
             _check(name, getattr(self, name), above_zero=True)
-        for name in ("damping", "near_limit", "assist_rate"):
+        for name in ("near_limit", "assist_rate"):
             _check(name, getattr(self, name), above_zero=False)
+        _check("damping", self.inverse_damping, above_zero=False)
         # Feedback that corrects more than the whole error in a step is unstable.
         if self.gain * self.period > 1.0:
             raise TcsError(
@@ -160,6 +164,13 @@ class Settings:
                     f"teleop settings: joint group {group} must name joints 0 to {JOINTS - 1}, "
                     "each once, its lead joint first."
                 )
+
+    @property
+    def inverse_damping(self) -> float:
+        """Damping of the pseudo-inverse [m/rad], that of `limits` where `damping` is None."""
+        if self.damping is not None:
+            return self.damping
+        return _DAMPING if self.limits == "clamped" else 0.0
 
 
 def _check(name: str, value: float, *, above_zero: bool) -> None:

@@ -39,7 +39,7 @@ def end_effector(command: Command, state: ControlState) -> RateCommand:
         state.jacobian,
         wanted,
         length=settings.length,
-        damping=settings.damping,
+        damping=settings.inverse_damping,
         singular=settings.singular,
     )
     if settings.limits == "paper":
@@ -72,6 +72,9 @@ def _until_invalid(rates: FloatArray, smallest: float, state: ControlState) -> R
         # they would otherwise pass through it before they could stop.
         most = _NEAR_RATE * (nearness - _BEYOND) / (_NEAR - _BEYOND)
         rates = rates * min(1.0, most / float(np.abs(rates).max()))
+    elif nearness < 1.0:
+        # The undamped pseudo-inverse may demand a thousand times what the joints can do.
+        rates = rates * scale_to_bounds(rates, -state.arm.velocity, state.arm.velocity)[0]
     fraction, joint = slow_down_together(rates, state)
     if joint >= 0:
         return RateCommand(np.zeros(JOINTS), f"{limit_message([joint])}: motion ends there.")

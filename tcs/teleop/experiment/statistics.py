@@ -150,8 +150,10 @@ class PostHoc:
     """Mean of the first condition less that of the second."""
     t: float
     """Statistic of the paired t test."""
+    tail: Tail
+    """Alternative hypothesis about the first condition against the second."""
     p: float
-    """Two-sided p value of that test, times the number of pairs (Bonferroni), at most 1."""
+    """p value of that test, times the number of pairs (Bonferroni), at most 1."""
     effect: float
     """Effect size r = sqrt(t^2 / (t^2 + degrees of freedom))."""
 
@@ -176,11 +178,14 @@ class RepeatedMeasures:
         return asdict(self)
 
 
-def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
+def repeated_measures(
+    samples: Mapping[str, FloatArray], *, tail: Tail = "two-sided"
+) -> RepeatedMeasures:
     """Return the analysis of variance of conditions over the same operators.
 
     Args:
         samples: By condition, the values of all operators, shape (n,), n >= 3.
+        tail: Alternative hypothesis of the t tests about each condition against those after it.
 
     Raises:
         DataFileError: If there are fewer than two conditions, their sizes differ, or the error sum
@@ -188,8 +193,8 @@ def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
 
     Source:
         ITCM thesis, section III.C.5: one-way repeated-measures analysis of variance, then paired t
-        tests with Bonferroni's correction. Its t tests are one-tailed; here no direction is
-        hypothesised beforehand, so they are two-tailed.
+        tests with Bonferroni's correction. Its t tests are one-tailed: the condition that is
+        expected to be worse has the greater mean.
     """
     import pandas as pd
     from scipy import stats
@@ -224,11 +229,12 @@ def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
     for a, b in pairs:
         off = values[a] - values[b]
         if np.ptp(off) == 0.0:
-            t, p = (0.0, 1.0) if off[0] == 0.0 else (math.copysign(math.inf, off[0]), 0.0)
+            t = 0.0 if off[0] == 0.0 else math.copysign(math.inf, off[0])
         else:
-            t, p = (float(x) for x in stats.ttest_1samp(off, 0.0))
+            t = float(stats.ttest_1samp(off, 0.0).statistic)
         effect = 1.0 if math.isinf(t) else math.sqrt(t * t / (t * t + n - 1))
-        post_hoc.append(PostHoc(a, b, float(off.mean()), t, min(1.0, p * len(pairs)), effect))
+        p = min(1.0, _t_test_p(t, n - 1, tail) * len(pairs)) if off.any() else 1.0
+        post_hoc.append(PostHoc(a, b, float(off.mean()), t, tail, p, effect))
     return RepeatedMeasures(
         float(row["F Value"]),
         float(row["Num DF"]),
@@ -236,6 +242,17 @@ def repeated_measures(samples: Mapping[str, FloatArray]) -> RepeatedMeasures:
         float(row["Pr > F"]),
         tuple(post_hoc),
     )
+
+
+def _t_test_p(t: float, freedom: int, tail: Tail) -> float:
+    """Return the p value of a t statistic."""
+    from scipy import stats
+
+    return {
+        "greater": float(stats.t.sf(t, freedom)),
+        "less": float(stats.t.cdf(t, freedom)),
+        "two-sided": 2.0 * float(stats.t.sf(abs(t), freedom)),
+    }[tail]
 
 
 def _checked(sample: FloatArray) -> FloatArray:

@@ -55,8 +55,15 @@ SCRIPTED = "scripted operators, not people"
 HYPOTHESES: dict[str, Tail] = {"accuracy": "greater", "time": "two-sided", "effort": "greater"}
 """Alternative hypothesis on end-effector control against the novel controller, by measure (paper,
 section II.C.6)."""
-ANOVA_MEASURES = ("time", "steering_angle", "steering_translation", "arc_length")
-"""Measures of the ITCM thesis, compared over all conditions."""
+ANOVA_MEASURES: dict[str, Tail] = {
+    "time": "greater",
+    "steering_angle": "greater",
+    "steering_translation": "greater",
+    "arc_length": "two-sided",
+}
+"""Measures of the ITCM thesis, compared over all conditions, and the alternative hypothesis of the
+t tests about each condition against those after it. The thesis has one-tailed tests of time and
+steering, and none of the arc length."""
 
 OnProgress = Callable[[int, int], None]
 
@@ -162,8 +169,8 @@ class Experiment:
     def varied(self) -> dict[str, RepeatedMeasures]:
         """Return the thesis's analyses of variance over all conditions."""
         return {
-            name: repeated_measures({c: self.sample(c, name) for c in self.drives})
-            for name in ANOVA_MEASURES
+            name: repeated_measures({c: self.sample(c, name) for c in self.drives}, tail=tail)
+            for name, tail in ANOVA_MEASURES.items()
         }
 
 

@@ -53,6 +53,37 @@ class TestEndEffector:
         # It accelerates for 0.05 s.
         assert back[-1].p[0] - last.p[0] > 0.045
 
+    @pytest.mark.parametrize(
+        ("settings", "damped"),
+        [
+            (Settings(limits="paper"), False),
+            (Settings(limits="paper", damping=0.01), True),
+            (Settings(), True),
+        ],
+        ids=["paper", "paper, damped", "clamped"],
+    )
+    def test_paper_uses_the_pseudo_inverse_as_printed(self, iiwa, ready, settings, damped):
+        # Nearly stretched, on the way back: eq. (7) at a singular value of 2 mm/rad.
+        ready[3] = -0.01
+        J = iiwa.kinematics(ready).jacobian
+        twist = -1e-4 * np.linalg.svd(J)[0][:, -1]
+        step = Teleoperation(iiwa, ready, settings).step(
+            Command(linear=twist[3:], angular=twist[:3])
+        )
+        as_printed = np.allclose(step.rates, np.linalg.pinv(J) @ twist, rtol=1e-6, atol=1e-9)
+        assert as_printed is not damped
+
+    @pytest.mark.parametrize("elbow", [0.0, -1e-7, -1e-5, -1e-4, -1e-3])
+    def test_paper_leaves_a_singular_posture_however_singular(self, iiwa, ready, elbow):
+        # From singular values of 0 to 0.2 mm/rad, where the pseudo-inverse is unbounded.
+        ready[3] = elbow
+        start = iiwa.kinematics(ready)
+        back = -np.linalg.svd(start.jacobian)[0][3:, -1]
+        session = Teleoperation(iiwa, ready, Settings(limits="paper"))
+        steps = drive(session, Command(linear=0.1 * back / np.linalg.norm(back)), 0.5)
+        assert not any(step.stopped for step in steps)
+        assert np.linalg.norm(steps[-1].p - start.p) > 0.03
+
     @pytest.mark.parametrize("limits", BOTH)
     def test_a_joint_at_its_limit_that_is_not_needed_stops_nothing(self, iiwa, ready, limits):
         joints = ready.copy()

@@ -15,6 +15,7 @@ from tcs.teleop.experiment.statistics import (
     repeated_measures,
     signed_rank_test,
 )
+from tcs.teleop.experiment.within_subject import ANOVA_MEASURES
 
 
 def with_rank_sum(total: int, count: int) -> np.ndarray:
@@ -130,14 +131,30 @@ def test_of_two_conditions_the_analysis_is_the_paired_t_test():
     assert pair.effect == pytest.approx(math.sqrt(t**2 / (t**2 + 14)))
 
 
-def test_bonferroni_multiplies_by_the_number_of_pairs():
+@pytest.mark.parametrize("tail", ["greater", "less", "two-sided"])
+def test_bonferroni_multiplies_by_the_number_of_pairs(tail):
     rng = np.random.default_rng(9)
     shifted = rng.standard_normal((3, 15)) + np.array([[0], [0.3], [3]])
     table = dict(zip("abc", shifted, strict=True))
-    pairs = {(one.first, one.second): one for one in repeated_measures(table).post_hoc}
+    pairs = {(one.first, one.second): one for one in repeated_measures(table, tail=tail).post_hoc}
     assert len(pairs) == 3
     for (a, b), one in pairs.items():
-        assert one.p == pytest.approx(min(1.0, 3 * stats.ttest_rel(table[a], table[b]).pvalue))
+        there = stats.ttest_rel(table[a], table[b], alternative=tail)
+        assert (one.tail, one.p) == (tail, pytest.approx(min(1.0, 3 * there.pvalue)))
+
+
+def test_pairs_with_equal_differences_have_the_limits_of_p():
+    flat = {"a": np.arange(4.0), "b": np.arange(4.0) + 1, "c": np.array([3.0, 1, 4, 1])}
+    for tail, p in [("greater", 1.0), ("less", 0.0), ("two-sided", 0.0)]:
+        assert repeated_measures(flat, tail=tail).post_hoc[0].p == p
+    same = flat | {"b": flat["a"]}
+    assert repeated_measures(same, tail="greater").post_hoc[0].p == 1.0
+
+
+def test_the_thesis_tests_time_and_steering_with_one_tail():
+    # Section III.C.5 and Table 2; its Table 7 states the direction.
+    one_tailed = ("time", "steering_angle", "steering_translation")
+    assert ANOVA_MEASURES == dict.fromkeys(one_tailed, "greater") | {"arc_length": "two-sided"}
 
 
 @pytest.mark.parametrize(
