@@ -158,7 +158,8 @@ class ConstraintOptions:
         typer.Option(
             metavar="BOX",
             help="Obstacle seen just now, which neither body nor arm may touch: 'X Y WIDTH DEPTH "
-            "[YAW_DEG] [Z_LOW Z_HIGH]' in the environment frame (m, deg).",
+            "[YAW_DEG] [Z_LOW Z_HIGH]' in the environment frame (m, deg), or a polygon 'X1 Y1, "
+            "X2 Y2, X3 Y3, ... [; Z_LOW Z_HIGH]'.",
         ),
     ] = None
 
@@ -171,25 +172,44 @@ class ConstraintOptions:
         ),
     ] = None
 
+    constraints_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--constraints",
+            metavar="FILE",
+            help="YAML file with lists under only, keep, forbid, blocked and prefer, besides those "
+            "of the command line.",
+        ),
+    ] = None
+
     def constraints(self) -> Constraints:
-        """Return the constraints.
+        """Return the constraints of the file and of the command line.
 
         Raises:
             TcsError: If one is not of its form.
         """
-        from tcs.placement.selection import Constraints, Obstacle, Region
+        from tcs.placement.selection import (
+            Constraints,
+            Obstacle,
+            Region,
+            merged,
+            read_constraints,
+        )
 
         regions = []
         for given in self.forbid or ():
             is_file = Path(given).suffix in (".yaml", ".yml")
             regions.append(Region.read(Path(given)) if is_file else Region.parse(given))
-        return Constraints(
+        given_here = Constraints(
             only=tuple(self.only or ()),
             keep=tuple(self.keep or ()),
             forbid=tuple(regions),
             blocked=tuple(Obstacle.parse(given) for given in self.blocked or ()),
             prefer=tuple(self.prefer or ()),
         )
+        if self.constraints_file is None:
+            return given_here
+        return merged(read_constraints(self.constraints_file), given_here)
 
 
 @dataclass(frozen=True, kw_only=True)

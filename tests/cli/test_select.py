@@ -312,3 +312,14 @@ def test_penalties_reach_the_selection(tcs_command, small_file):
     for penalty, size in ((0, 2), (0.5, 1)):
         members = tcs_command("select", small_file, *HERE, "--place-penalty", penalty, "--json")
         assert len(members.json["members"]) == size
+
+
+def test_constraints_of_a_file_are_added(tcs_command, small_file, tmp_path):
+    path = tmp_path / "ward.yaml"
+    path.write_text("only: ['base_x <= 0']")
+    words = ("select", small_file, *HERE, "--constraints", path, "--only", "bed_height = 0")
+    result = tcs_command(*words, "--json").json
+    assert [entry["constraint"] for entry in result["constraints"]] == [
+        "only base_x <= 0",
+        "only bed_height = 0",
+    ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
+from tcs.placement.selection.constraint_files import merged, read_constraints
 from tcs.placement.selection.constraints import Constraints
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.obstacles import Obstacle
@@ -27,7 +28,9 @@ __all__ = [
     "Top",
     "TravelWeights",
     "UtilityWeights",
+    "merged",
     "nearest_table",
+    "read_constraints",
     "select",
     "shortest_tour",
     "utility",

@@ -36,14 +36,15 @@ def in_contact(
         p: Their centres in that frame [m], shape (n, 3).
         clearance: Least distance of each that is free [m], shape (n,).
     """
+    contact = np.zeros(len(type), dtype=np.bool_)
+    boxes, round_ = np.flatnonzero(type == BOX), np.flatnonzero(type != BOX)
+    contact[boxes] = boxes_overlap(half, size[boxes], R[boxes], p[boxes], clearance[boxes])
     # A sphere is a capsule of length 0.
-    reach = np.where(type == CAPSULE, size[:, 1], 0.0)
-    axis = R[:, :, 2] * reach[:, None]
-    contact = segment_distance(half, p - axis, p + axis) <= size[:, 0] + clearance
-    boxes = np.flatnonzero(type == BOX)
-    if boxes.size:
-        contact[boxes] = boxes_overlap(half, size[boxes], R[boxes], p[boxes], clearance[boxes])
-    return np.asarray(contact)
+    reach = np.where(type[round_] == CAPSULE, size[round_, 1], 0.0)
+    axis = R[round_, :, 2] * reach[:, None]
+    distance = segment_distance(half, p[round_] - axis, p[round_] + axis)
+    contact[round_] = distance <= size[round_, 0] + clearance[round_]
+    return contact
 
 
 def point_distance(half: FloatArray, p: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, one_line
 from tcs.files.quantities import ANGLE_DEG, POSITION, SIZE
+from tcs.placement.selection.regions import Region
 
 CEILING = 40.0
 """Top of an obstacle whose height is not given [m]: above every robot."""
@@ -52,24 +53,34 @@ class Obstacle:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the obstacle of a text "X Y WIDTH DEPTH [YAW_DEG] [Z_LOW Z_HIGH]" [m, deg].
+        """Return the obstacle of a text [m, deg].
 
-        Commas count as spaces.
+        A text "X Y WIDTH DEPTH [YAW_DEG] [Z_LOW Z_HIGH]" is a box. A text "X1 Y1, X2 Y2, X3 Y3,
+        ... [; Z_LOW Z_HIGH]" is a polygon, see `around`.
 
         Raises:
             SelectionError: If the text is not of that form, or a number is out of its range.
 
         >>> Obstacle.parse("1 -0.5 0.4 0.6 90").yaw
         1.5707963267948966
+        >>> Obstacle.parse("0 0, 2 0, 2 1; 0 0.9").name
+        '1 0.5 2 1 0 0 0.9'
         """
+        if ";" in text or len(text.split(",")) >= 3:
+            corners, _, span = text.partition(";")
+            region = Region.parse(corners)
+            if not span.strip():
+                return cls.around(region)
+            return cls.around(region, *_two_numbers(span, text))
         try:
-            numbers = [float(word) for word in text.replace(",", " ").split()]
+            numbers = [float(word) for word in text.split()]
         except ValueError:
             numbers = []
         if not 4 <= len(numbers) <= 7:
             raise SelectionError(
                 f"Obstacle '{one_line(text)}' must be X Y WIDTH DEPTH [YAW_DEG] [Z_LOW Z_HIGH], "
-                "four to seven numbers in metres and degrees."
+                "four to seven numbers in metres and degrees, or a polygon X1 Y1, X2 Y2, X3 Y3, "
+                "... [; Z_LOW Z_HIGH]."
             )
         heights = numbers[-2:] if len(numbers) >= 6 else [0.0, CEILING]
         x, y, width, depth = numbers[:4]
@@ -82,6 +93,39 @@ class Obstacle:
             yaw=math.radians(yaw_deg),
             z_low=heights[0],
             z_high=heights[1],
+        )
+
+    @classmethod
+    def around(cls, region: Region, z_low: float = 0.0, z_high: float = CEILING) -> Self:
+        """Return a box that encloses a polygon, parallel to one of its edges, with the least area.
+
+        Args:
+            region: The polygon.
+            z_low: Height of the lower side [m].
+            z_high: Height of the upper side [m].
+
+        Raises:
+            SelectionError: If the upper side is not above the lower one.
+        """
+        vertices = np.array(region.vertices)
+        edges = np.roll(vertices, -1, axis=0) - vertices
+        yaw = np.arctan2(edges[:, 1], edges[:, 0])
+        # Axes of a box parallel to each edge, shape (edges, 2, 2); vertices along them.
+        axes = np.stack([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+        along = np.einsum("aie,vi->eva", axes, vertices)
+        low, high = along.min(axis=1), along.max(axis=1)
+        best = int(np.argmin(np.prod(high - low, axis=1)))
+        x, y = axes[:, :, best].T @ ((low[best] + high[best]) / 2.0)
+        # A polygon without area still blocks what touches it.
+        width, depth = np.maximum(high[best] - low[best], SIZE.low)
+        return cls(
+            x=float(x),
+            y=float(y),
+            width=float(width),
+            depth=float(depth),
+            yaw=float(yaw[best]),
+            z_low=z_low,
+            z_high=z_high,
         )
 
     @property
@@ -101,3 +145,18 @@ class Obstacle:
     def centre(self) -> NDArray[np.float64]:
         """Centre in W [m], shape (3,)."""
         return np.array([self.x, self.y, (self.z_low + self.z_high) / 2.0])
+
+
+def _two_numbers(heights: str, text: str) -> tuple[float, float]:
+    """Return the heights of a polygon.
+
+    Raises:
+        SelectionError: If they are not two numbers.
+    """
+    try:
+        low, high = (float(word) for word in heights.split())
+    except ValueError:
+        raise SelectionError(
+            f"Obstacle '{one_line(text)}': after ';' there must be Z_LOW Z_HIGH, two numbers [m]."
+        ) from None
+    return low, high

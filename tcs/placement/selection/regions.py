@@ -91,9 +91,25 @@ class Region:
             content = read_mapping(path, where, DataFileError, known=("polygon",))
         except DataFileError as error:
             raise SelectionError(str(error)) from None
-        polygon = content.get("polygon")
-        if set(content) != {"polygon"} or not isinstance(polygon, list):
+        if set(content) != {"polygon"} or not isinstance(content["polygon"], list):
             raise SelectionError(f"{where} must have the one key 'polygon', a list of [x, y].")
+        return cls.of(content["polygon"], where)
+
+    @classmethod
+    def of(cls, polygon: object, where: str) -> Self:
+        """Return the region of a list of [x, y] [m].
+
+        Args:
+            polygon: The list.
+            where: Its source, for the message.
+
+        Raises:
+            SelectionError: If it is no such list.
+        """
+        if not isinstance(polygon, list):
+            raise SelectionError(
+                f"{where}: {one_line(repr(polygon))} must be a list of [x, y] [m]."
+            )
         return cls(tuple(tuple(vertex) for vertex in polygon if _is_pair(vertex, where)))
 
     @property

@@ -93,6 +93,8 @@ def test_region_files_that_cannot_be_used(tmp_path, text, message):
         (Region.parse, "0 0, 1 0, 1 1e9", "must be -40 to 40 m"),
         (Region.parse, "0 0, 1 0, 1 nan", "must be -40 to 40 m"),
         (Obstacle.parse, "1 1 1", "four to seven numbers"),
+        (Obstacle.parse, "1 1, 2 2, 3 1; 0.5", "there must be Z_LOW Z_HIGH"),
+        (Obstacle.parse, "1 1, 2 2, 3", "must be X1 Y1, X2 Y2"),
         (Obstacle.parse, "1 1 1 chair", "four to seven numbers"),
         (Obstacle.parse, "1 1 -1 1", "a size must be"),
         (Obstacle.parse, "1 1 1 1 0 1 0.5", "must be above z_low, 1 m"),
@@ -102,6 +104,22 @@ def test_region_files_that_cannot_be_used(tmp_path, text, message):
 def test_texts_that_cannot_be_used(make, text, message):
     with pytest.raises(SelectionError, match=message):
         make(text)
+
+
+def test_a_polygon_is_enclosed_by_a_box():
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        region = Region(tuple(map(tuple, rng.uniform(-2, 2, (5, 2)))))
+        box = Obstacle.around(region, 0.2, 0.9)
+        offset = np.array(region.vertices) - (box.x, box.y)
+        cos, sin = np.cos(box.yaw), np.sin(box.yaw)
+        along = np.abs(offset @ np.array([[cos, -sin], [sin, cos]]))
+        assert np.all(along <= box.half[:2] + 1e-12)
+        np.testing.assert_allclose(along.max(axis=0), box.half[:2])
+    # A rectangle is its own box, whatever its heading.
+    box = Obstacle.parse("0 0, 0.3 0.3, 0.1 0.5, -0.2 0.2")
+    assert (box.width, box.depth) == pytest.approx((0.3 * 2**0.5, 0.2 * 2**0.5))
+    assert Obstacle.parse("0 0, 1 0, 2 0").depth == 1e-6
 
 
 @pytest.mark.parametrize("text", ["1 -0.5 0.4 0.6", "1 2 0.4 0.6 30", "1 2 0.4 0.6 30 0.1 0.9"])
