@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tcs.capability.grid import CellArray, MapGrid
 from tcs.errors import StoreError, UnknownNameError
+from tcs.files.quantities import JOINT_POSITION, POSITION
 from tcs.kernel.arrays import FloatArray
 
 ICM, IHCM, ITCM = "ICM", "IHCM", "ITCM"
@@ -77,6 +78,8 @@ class CapabilityMap:
             tilt, yaw = self.cells[:, 0], self.cells[:, 4]
             if min(tilt.min(), yaw.min()) < 0 or yaw.max() >= self.grid.yaw_bins:
                 raise StoreError("capability map: a cell is outside the grid.")
+            farthest = float(np.abs(self.cells[:, 1:4]).max()) * self.grid.step
+            POSITION.check((farthest,), "capability map: the coordinate of a cell", StoreError)
             if tilt.max() >= len(self.grid.tilts) or np.any(np.diff(self.keys) <= 0):
                 raise StoreError("capability map: cells are not sorted, or outside the grid.")
         for name in ("manipulability", "visibility"):
@@ -88,6 +91,10 @@ class CapabilityMap:
             or self.torso_height not in self.torso_heights
         ):
             raise StoreError("capability map: its torso height is not one of those checked.")
+        where = "capability map: a torso height"
+        JOINT_POSITION.check(self.torso_heights, where, StoreError)
+        if not np.all(np.diff(self.torso_heights) > 0.0):
+            raise StoreError("capability map: its torso heights are not ascending.")
         if not self.manipulability_scale > 0.0:
             raise StoreError("capability map: the manipulability scale must be positive.")
         for name in (*shapes, "torso_heights"):

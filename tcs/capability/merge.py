@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tcs.capability.grid import MapGrid
 from tcs.capability.map import FIXED, CapabilityMap
 from tcs.capability.tasks import GraspPosition, GraspTask
-from tcs.capability.volume import Box, MapVolume, Nearness
+from tcs.capability.volume import Box, MapVolume, Nearness, check_volume
 from tcs.errors import SelectionError
 from tcs.kernel.arrays import FloatArray
 
@@ -109,6 +109,7 @@ def merge(
 
     Raises:
         SelectionError: If no base pose reaches all positions; the message names the best subset.
+            Also if the base poses would fill the memory.
 
     Source:
         ITCM thesis eqs. (7) to (9) and Appendix A.2.
@@ -169,10 +170,9 @@ def position_scores(
         box: Base positions.
         torso_heights: Torso heights [m].
     """
-    best = np.full(
-        (len(torso_heights), box.width, box.depth, volume.capability.grid.yaw_bins), np.nan
-    )
-    best = best.astype(np.float32)
+    shape = (len(torso_heights), box.width, box.depth, volume.capability.grid.yaw_bins)
+    check_volume(shape)
+    best = np.full(shape, np.nan, np.float32)
     nearness = []
     for grasp in position.grasps:
         R_FT = grasp.R_FT

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from tcs.capability.grid import TILT, YAW, X, Y, Z
 from tcs.capability.map import FIXED, CapabilityMap
+from tcs.errors import SelectionError
+from tcs.files.quantities import VOLUME
 from tcs.kernel.arrays import FloatArray, IntArray
 
 _WHOLE = 1e-6
@@ -175,12 +177,22 @@ class MapVolume:
             rows = np.flatnonzero(cells[:, TILT] == tilt)
             z, x, y = (cells[rows, column] - self._low[column] for column in (Z, X, Y))
             size = self._high - self._low + 1
-            shape = (size[Z], size[X], size[Y], self.capability.grid.yaw_bins)
+            shape = (*size[[Z, X, Y]].tolist(), self.capability.grid.yaw_bins)
+            check_volume(shape)
             layer = _Layer(np.full(shape, np.nan, np.float32), np.zeros(shape, np.uint32))
             layer.score[z, x, y, cells[rows, YAW]] = self._score[rows]
             layer.free[z, x, y, cells[rows, YAW]] = self.capability.free_torso_heights[rows]
             self._of_tilt[tilt] = layer
         return self._of_tilt[tilt]
+
+
+def check_volume(shape: Sequence[int]) -> None:
+    """Refuse an array of cells that would fill the memory.
+
+    Raises:
+        SelectionError: If it has more than `VOLUME` cells.
+    """
+    VOLUME.check((math.prod(shape),), "the size of the map, as an array,", SelectionError)
 
 
 def _clean(value: float) -> float:

@@ -166,6 +166,11 @@ RADIUS = Quantity(
     "`--radius` of capability maps",
     "ten times the reach of the longest arm that ships",
 )
+VOLUME = Quantity(
+    *("number of cells", "", 0, 200_000_000),
+    "box around the cells of a tilt of a capability map, base poses of a task map",
+    "1.6 GB of memory",
+)
 MASTER_SCALE = Quantity(
     *("scale", "", 0.01, 100.0),
     "`--scale` of a simulated recording",
@@ -212,6 +217,6 @@ QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
     JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT,
     UTILITY_WEIGHT, HEADING, MASTER_SCALE, RECORDING, DURATION, JOBS, QUERIES, AXIS_VALUES,
-    GOALS, ENTRIES, PRIMITIVES,
+    VOLUME, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

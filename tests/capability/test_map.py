@@ -96,3 +96,17 @@ def test_maps_cannot_be_written_to():
         found.cells[0, 0] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.torso_height = 0.2
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"torso_heights": np.array([0.1, 1e300])}, "torso height is 1e\\+300"),
+        ({"torso_heights": np.array([0.1, np.nan])}, "torso height is nan"),
+        ({"torso_heights": np.array([0.1, 0.05])}, "not ascending"),
+        ({"cells": [[0, 1000, 0, 0, 0]]}, "coordinate of a cell is 50 m"),
+    ],
+)
+def test_maps_of_impossible_extent_are_refused(changes, message):
+    with pytest.raises(StoreError, match=message):
+        small_map(**({"cells": CELLS[:1], "manipulability": [0.1], "visibility": [0.1]} | changes))

@@ -317,3 +317,12 @@ def test_one_stop_where_one_suffices(ihcm):
 def test_an_unreachable_position_cannot_be_split(ihcm):
     with pytest.raises(SelectionError, match="nor any one"):
         split(ihcm, linear_task(0.2, 2, 2.9, step=0.1))
+
+
+def test_a_merge_that_would_fill_the_memory_is_refused():
+    grid = MapGrid.of(0.005, 256, "side")
+    cells = [[0, -4000, 0, 0, 0], [0, 4000, 0, 0, 0]]
+    heights = {"torso_heights": np.array([0.1]), "torso_height": 0.1}
+    wide = small_map(cells, [0.1, 0.1], [1.0, 1.0], grid=grid, **heights)
+    with pytest.raises(SelectionError, match="number of cells must be 0 to 200,000,000"):
+        merge(wide, pick_and_place_task(0.1, 0.0, step=grid.step))

@@ -105,8 +105,11 @@ class Run:
         )
         rising = np.diff(self.time, prepend=self.time[0] - 1.0) > 0.0
         self._check(rising, "'time' must rise from sample to sample")
+        unit = "'quaternion' must have length 1"
+        # The square of a huge number would overflow.
+        self._check(np.abs(self.quaternion) <= 1.0 + _UNIT_SLACK, unit)
         length = np.linalg.norm(self.quaternion, axis=1)
-        self._check(np.abs(length - 1.0) <= _UNIT_SLACK, "'quaternion' must have length 1")
+        self._check(np.abs(length - 1.0) <= _UNIT_SLACK, unit)
 
     def _check(self, valid: BoolArray, requirement: str) -> None:
         """Raise an error for the first sample that is not valid.

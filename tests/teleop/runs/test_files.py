@@ -98,6 +98,7 @@ def test_without_its_library_parquet_gives_advice_to_install_it(tmp_path, monkey
         ({"limits": np.full((40, 7), 9)}, "sample 0: 'limits' must be -1, 0 or 1"),
         ({"position": np.full((40, 3), np.nan)}, "sample 0: 'position' is not finite"),
         ({"quaternion": np.ones((40, 4))}, "sample 0: 'quaternion' must have length 1"),
+        ({"quaternion": np.full((40, 4), 1e300)}, "sample 0: 'quaternion' must have length 1"),
         ({"mode": np.full(40, "xyz")}, "sample 0: 'mode' must be one of end-effector, null-"),
         ({"joints": np.full((40, 7), 1e9)}, "sample 0: 'joints' must be within 1000 rad"),
     ],

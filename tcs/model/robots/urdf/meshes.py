@@ -107,6 +107,9 @@ def _check(mesh: Path, loaded: trimesh.Trimesh) -> None:
             f"mesh '{mesh}' has {len(faces):,} triangles; at most {MAX_TRIANGLES:,} are read. "
             "Decimate it."
         )
+    # Of a line of an OBJ file that lacks a number, trimesh may keep the others.
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise RobotError(f"mesh '{mesh}' is damaged: a vertex has not three coordinates.")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise RobotError(f"mesh '{mesh}' is damaged: a triangle names a vertex that is not there.")
     # In the unit of the mesh: `geometry_triangles` checks the metres.

@@ -78,3 +78,11 @@ def test_cache_that_cannot_be_written_is_reported(stl, tmp_path, monkeypatch):
         OutputError, match=r"cache folder .*meshes' cannot be created: File exists\. Set TCS_"
     ):
         as_obj(stl)
+
+
+def test_an_obj_of_vertices_with_two_coordinates_is_refused(tmp_path):
+    """Before, numpy raised ValueError where its triangles were scaled."""
+    flat = tmp_path / "flat.obj"
+    flat.write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
+    with pytest.raises(RobotError, match="a vertex has not three coordinates"):
+        mesh_triangles(flat)
