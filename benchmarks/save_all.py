@@ -25,6 +25,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "rows": ("--out", SCORES),
     "run": ("--pairs", "500", "--dense", "200"),
     "selection": (f"{SCORES}/bathing-bed-pr2.tcs", f"{SCORES}/shaving-wheelchair-pr2.tcs"),
+    "constraints": (f"{SCORES}/bathing-bed-pr2.tcs",),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),
