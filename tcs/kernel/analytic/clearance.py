@@ -40,7 +40,7 @@ END_HALVINGS = 12
 SAME_STRETCH = 1.01
 """Candidates closer than this many sample spacings have no infeasible sample between them; the
 excess over 1 allows for rounding."""
-TWO = int_constant(2)
+TWO, NOWHERE = int_constant(2), int_constant(-1)
 
 
 @inner
@@ -141,7 +141,7 @@ def free_between(
     found = add_ends(problem, search, found)
     search.free_from[0] = found
     by_angle(search, found)
-    count, halvings = found, 0
+    count, halvings, left, placed = found, 0, 0, NOWHERE
     for rank in range(count):
         n = search.order[rank]
         if search.found_pair[n, 0] == UNCHECKED_PAIR and _is_free_at(
@@ -159,12 +159,19 @@ def free_between(
         ends[0, 0], ends[0, 1] = search.found_angle[m], search.found_angle[n]
         _keep(search.found_q[m], search.found_pair[m], end_q[0, 0], end_pair[0, 0])
         _keep(search.found_q[n], search.found_pair[n], end_q[0, 1], end_pair[0, 1])
-        top = 1
+        # The links are at the left end already if they were at the right end of the last interval.
+        is_placed, is_whole, top = placed == m, True, 1
+        left = 1 - left if is_placed else left
+        placed = NOWHERE
         while top and halvings < MAX_HALVINGS:
             top -= 1
-            if _stays_in_contact(problem, work, body_A, search, top):
+            if end_pair[top, 0, 0] == NO_PAIR and end_pair[top, 1, 0] == NO_PAIR:
+                continue
+            if _stays_in_contact(problem, work, body_A, search, top, left, is_placed):
+                placed = n if is_whole else NOWHERE
                 continue
             halvings += 1
+            is_placed = is_whole = False
             first, last = ends[top, 0], ends[top, 1]
             middle = 0.5 * (first + last)
             if not first < middle < last or top + 2 > MAX_STACK:
@@ -212,37 +219,55 @@ def _is_free_at(
 
 @inner
 def _stays_in_contact(
-    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, top: int
+    problem: Problem,
+    work: Workspace,
+    body_A: FloatArray,
+    search: Search,
+    top: int,
+    left: int,
+    is_placed: bool,
 ) -> bool:
     """Return whether the pairs in contact at the ends of an interval keep in contact between them.
 
     True also if they move too little for a free angle between the ends to matter.
+
+    Args:
+        problem: The scene.
+        work: Workspace with environment, base, gripper and goal in place.
+        body_A: The robot's other shapes in A at the current torso level.
+        search: Holds the interval; its link poses are filled, at the left end in row `left`.
+        top: Index of the interval.
+        left: 0 or 1.
+        is_placed: Whether the link poses at the left end are up to date.
     """
-    q, pair = search.ends_q[top], search.ends_pair[top]
+    q, pair, R, p = search.ends_q[top], search.ends_pair[top], search.link_R, search.link_p
     if pair[0, 0] == NO_PAIR or pair[1, 0] == NO_PAIR:
-        return pair[0, 0] == pair[1, 0]
-    link_poses(problem.chain_R, problem.chain_p, q[0], search.link_R, search.link_p)
-    link_poses(problem.chain_R, problem.chain_p, q[1], work.link_R, work.link_p)
-    motion = _motion(problem, work, search, pair[0])
-    other = _motion(problem, work, search, pair[1])
+        return False
+    right = 1 - left
+    if not is_placed:
+        link_poses(problem.chain_R, problem.chain_p, q[0], R[left], p[left])
+    link_poses(problem.chain_R, problem.chain_p, q[1], R[right], p[right])
+    motion = other = _motion(problem, search, pair[0])
+    if pair[0, 0] != pair[1, 0] or pair[0, 1] != pair[1, 1] or pair[0, 2] != pair[1, 2]:
+        other = _motion(problem, search, pair[1])
     if max(motion, other) < LEAST_MOTION:
         return True
-    return _touches(problem, search.link_R, search.link_p, work, body_A, pair[0], motion) and (
-        _touches(problem, work.link_R, work.link_p, work, body_A, pair[1], other)
+    return _touches(problem, R[left], p[left], work, body_A, pair[0], motion) and (
+        _touches(problem, R[right], p[right], work, body_A, pair[1], other)
     )
 
 
 @inner
-def _motion(problem: Problem, work: Workspace, search: Search, pair: IntArray) -> float:
-    """Return how far the shapes of a pair move between two postures [m]."""
-    total = 0.0
+def _motion(problem: Problem, search: Search, pair: IntArray) -> float:
+    """Return how far the shapes of a pair move between the two postures of `link_R` [m]."""
+    total, R, p = 0.0, search.link_R, search.link_p
     for side in range(1, 3):
         if side == 2 and pair[0] != ARM:
             break
         i = pair[side]
         frame, rows = problem.link_frame[i], search.moved
-        move(search.link_R[frame], search.link_p[frame], problem.links, i, rows, 0)
-        move(work.link_R[frame], work.link_p[frame], problem.links, i, rows, 1)
+        move(R[0, frame], p[0, frame], problem.links, i, rows, 0)
+        move(R[1, frame], p[1, frame], problem.links, i, rows, 1)
         total += np.sqrt(_square(rows, CENTRE, 1))
         shape = int(rows[0, TYPE])
         if shape == CAPSULE:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.analytic.samples import LEAST_BEND
+from tcs.kernel.analytic.samples import LEAST_BEND, LEAST_FLEX, LEAST_TILT, TILTED
 from tcs.kernel.analytic.solver import LAST, ArmSolver
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
@@ -82,7 +82,7 @@ def sample_joints(
     ux = arm.u0[0] + arm.uc[0] * c4 + arm.us[0] * s4
     uy = arm.u0[1] + arm.uc[1] * c4 + arm.us[1] * s4
     uz = arm.u0[2] + arm.uc[2] * c4 + arm.us[2] * s4
-    q[2] = _angle_to_height(R[2], ux, uy, uz, v[2], branch[1])
+    q[2] = _angle_to_height(R[2], ux, uy, uz, v[2], branch[1], 0.0)
     c3, s3 = np.cos(q[2]), np.sin(q[2])
     rx, ry = c3 * ux - s3 * uy, s3 * ux + c3 * uy
     kx = R[2, 0, 0] * rx + R[2, 0, 1] * ry + R[2, 0, 2] * uz
@@ -96,12 +96,14 @@ def sample_joints(
     _inverse_rotate(R[4], z)
     _inverse_rotate(R[4], x)
     fx, fy, fz = R[6, 0, 2], R[6, 1, 2], R[6, 2, 2]
-    q[5] = _angle_to_height(R[5], fx, fy, fz, z[2], branch[2])
+    q[5] = _angle_to_height(R[5], fx, fy, fz, z[2], branch[2], LEAST_FLEX)
     c6, s6 = np.cos(q[5]), np.sin(q[5])
     rx, ry = c6 * fx - s6 * fy, s6 * fx + c6 * fy
     kx = R[5, 0, 0] * rx + R[5, 0, 1] * ry + R[5, 0, 2] * fz
     ky = R[5, 1, 0] * rx + R[5, 1, 1] * ry + R[5, 1, 2] * fz
-    q[4] = np.arctan2(kx * z[1] - ky * z[0], kx * z[0] + ky * z[1])
+    tilt = LEAST_TILT if z[0] * z[0] + z[1] * z[1] < TILTED else 0.0
+    zx, zy = z[0] + tilt, z[1] + tilt
+    q[4] = np.arctan2(kx * zy - ky * zx, kx * zx + ky * zy)
     _inverse_rot_z(q[4], x)
     _inverse_rotate(R[5], x)
     _inverse_rot_z(q[5], x)
@@ -131,16 +133,18 @@ def within(angle: float, lower: float, upper: float) -> float:
 
 @inner
 def _angle_to_height(
-    R: FloatArray, x: float, y: float, z: float, height: float, sign: int
+    R: FloatArray, x: float, y: float, z: float, height: float, sign: int, least: float
 ) -> float:
     """Return the angle t [rad] for which R Rz(t) (x, y, z) has the z component `height`.
 
-    Of the two such angles, `sign` selects one.
+    Of the two such angles, `sign` selects one; the squared sine of half their difference is
+    `least` or more.
     """
     P = R[2, 0] * x + R[2, 1] * y
     Q = R[2, 1] * x - R[2, 0] * y
     m = height - R[2, 2] * z
-    h = sign * np.sqrt(max(P * P + Q * Q - m * m, 0.0))
+    N = P * P + Q * Q
+    h = sign * np.sqrt(max(N - m * m, least * N))
     return np.arctan2(Q * m + P * h, P * m - Q * h)
 
 

@@ -26,6 +26,7 @@ from tcs.kernel.analytic.samples import (
     S6,
     S7,
     WRIST,
+    measure_samples,
 )
 from tcs.kernel.analytic.scratch import (
     MAX_INTERVALS,
@@ -51,10 +52,12 @@ FAR = 0.15
 """Motion of a joint between two feasible samples [rad] from which on the interval is divided:
 contacts and measure change with the joints, not with the free joint alone."""
 FAR_ENDS = 0.5
-"""The same where the goal is reached already, for intervals of the search and for those with one
+"""The same where the goal is reached already, for intervals of the search and for those with an
 infeasible end: up to here, refinement of the best sample and the samples at the ends of windows
 suffice."""
-SLOPE = 0.5
+COS_FAST = float(np.cos(FAR_ENDS))
+"""Cosine of a motion of FAR_ENDS."""
+SLOPE = 0.8
 """Change of isotropy over the motion of the joint that moves farthest [1/rad], from above: where
 the goal is reached already, intervals that cannot hold a better solution are left out."""
 NEAR = 2e-4
@@ -64,7 +67,8 @@ PARTS = int_constant(8)
 FINEST = 1e-15
 """Spacing of samples [rad] at which the free joint's own digits end."""
 MAX_DIVISIONS = 4096
-"""Most intervals divided for one goal. Reached only if a joint follows its limit for a while."""
+"""Most intervals divided for one goal, shared among those recorded. Reached only if a joint follows
+its limit for a while."""
 
 
 @jit
@@ -135,8 +139,31 @@ def record_intervals(arm: ArmSolver, search: Search, b: int, count: int, step: f
     """Append the intervals between the samples on branch b that need to be divided."""
     motions(arm, search.goal, search.rows, search.slack, count, step, search.motion)
     for i in range(count - 1):
+        if search.motion[i] > FAR_ENDS:
+            measure_samples(arm, search.rows, search.slack, count, search.measure)
+            break
+    for i in range(count - 1):
         if search.motion[i] > 0.0:
-            _record(search, b, i, _best_end(search, i))
+            _record(search, b, i, _most(search, i) if search.motion[i] > FAR_ENDS else -1.0)
+
+
+@inner
+def record_fast(arm: ArmSolver, search: Search, b: int, count: int, step: float) -> None:
+    """Append the intervals in which joints move farther than FAR_ENDS, between samples on branch b.
+
+    Next to singular postures joints 2, 3 and 5 move that far, and others only with them.
+    """
+    rows, fast = search.rows, 0
+    for i in range(count - 1):
+        n = np.uint64(i)
+        m = n + ONE
+        along2 = rows[C2 + n] * rows[C2 + m] + rows[S2 + n] * rows[S2 + m]
+        along3 = rows[C3 + n] * rows[C3 + m] + rows[S3 + n] * rows[S3 + m]
+        along5 = rows[C5 + n] * rows[C5 + m] + rows[S5 + n] * rows[S5 + m]
+        # Counted, not returned early: so the loop is vectorised.
+        fast += min(along2, min(along3, along5)) < COS_FAST
+    if fast:
+        record_intervals(arm, search, b, count, step)
 
 
 @inner
@@ -154,40 +181,30 @@ def record_uncovered(
 
 
 @inner
-def _record(search: Search, b: int, i: int, measure: float) -> None:
-    """Append the interval between samples i and i + 1."""
+def _record(search: Search, b: int, i: int, most: float) -> None:
+    """Append the interval between samples i and i + 1, which holds at most a given isotropy."""
     n = search.interval_count[0]
     if n < MAX_INTERVALS:
         interval = search.intervals[n]
         interval[0], interval[1], interval[2] = search.angle[i], search.angle[i + 1], b
-        interval[3], interval[4] = search.motion[i], measure
-        interval[5] = min(search.slack[i], search.slack[i + 1])
+        interval[3] = most
         search.interval_count[0] = n + 1
 
 
 @inner
-def _best_end(search: Search, i: int) -> float:
-    """Return the greater measure of samples i and i + 1, -1 if neither is feasible."""
-    best = -1.0
-    for k in range(i, i + 2):
-        if search.slack[k] >= 0.0:
-            best = max(best, search.measure[k])
-    return best
+def _most(search: Search, i: int) -> float:
+    """Return the greatest isotropy that may lie between samples i and i + 1."""
+    ends = abs(search.measure[i]) ** (1.0 / 6.0) + abs(search.measure[i + 1]) ** (1.0 / 6.0)
+    return 0.5 * (ends + SLOPE * search.motion[i])
 
 
 @inner
-def _may_improve(motion: float, measure: float, least_slack: float, isotropy: float) -> bool:
-    """Return whether an interval may hold a solution of more than an isotropy.
-
-    Args:
-        motion: Farthest motion of a joint [rad].
-        measure: Greater measure of its ends, -1 if both are infeasible.
-        least_slack: Smaller slack of its ends.
-        isotropy: To be exceeded.
-    """
-    if measure < 0.0 or motion <= (FAR if least_slack >= 0.0 else FAR_ENDS):
+def _may_improve(search: Search, i: int, isotropy: float) -> bool:
+    """Return whether more than an isotropy may lie between samples i and i + 1."""
+    least = min(search.slack[i], search.slack[i + 1])
+    if search.motion[i] <= (FAR if least >= 0.0 else FAR_ENDS):
         return False
-    return measure ** (1.0 / 6.0) + SLOPE * motion > isotropy
+    return _most(search, i) > isotropy
 
 
 @jit
@@ -204,24 +221,24 @@ def divide_intervals(arm: ArmSolver, search: Search, found: int, isotropy: float
     Returns:
         Updated number of candidates.
     """
-    stack = search.stack
-    divisions = 0
-    for k in range(search.interval_count[0]):
+    stack, intervals, divisions = search.stack, search.interval_count[0], 0
+    for k in range(intervals):
         interval = search.intervals[k]
-        if isotropy >= 0.0 and (
-            interval[3] <= FAR_ENDS
-            or not _may_improve(interval[3], interval[4], interval[5], isotropy)
-        ):
+        if isotropy >= 0.0 and interval[3] <= isotropy:
             continue
         b = int(interval[2])
         stack[0, 0], stack[0, 1] = interval[0], interval[1]
         top = 1
-        while top and divisions < MAX_DIVISIONS:
+        # No interval takes more than its part and what earlier ones left.
+        while top and divisions * intervals < MAX_DIVISIONS * (k + 1):
             top -= 1
             divisions += 1
             step = fill_samples(search, stack[top, 0], stack[top, 1], PARTS)
             solve(arm, search, b, PARTS)
-            measure_feasible(arm, search, PARTS)
+            if isotropy >= 0.0:
+                measure_samples(arm, search.rows, search.slack, PARTS, search.measure)
+            else:
+                measure_feasible(arm, search, PARTS)
             motions(arm, search.goal, search.rows, search.slack, PARTS, step, search.motion)
             for i in range(PARTS):
                 if 0 < i < PARTS - 1 and search.slack[i] >= 0.0:
@@ -229,10 +246,7 @@ def divide_intervals(arm: ArmSolver, search: Search, found: int, isotropy: float
                 divisible = i < PARTS - 1 and step > FINEST and top < MAX_STACK
                 if not divisible or search.motion[i] <= NEAR:
                     continue
-                least = min(search.slack[i], search.slack[i + 1])
-                if isotropy < 0.0 or _may_improve(
-                    search.motion[i], _best_end(search, i), least, isotropy
-                ):
+                if isotropy < 0.0 or _may_improve(search, i, isotropy):
                     stack[top, 0], stack[top, 1] = search.angle[i], search.angle[i + 1]
                     top += 1
     return found

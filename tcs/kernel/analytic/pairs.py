@@ -20,7 +20,7 @@ from tcs.kernel.analytic.scratch import (
     solve,
     sort_candidates,
 )
-from tcs.kernel.analytic.search import find_candidates
+from tcs.kernel.analytic.search import find_candidates, record_all
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.contacts import NO_CONTACT, Workspace, arm_contact, at_goal
@@ -31,9 +31,10 @@ from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
 
 NONE, NOTHING = int_constant(0), int_constant(-1)
 
-REFINEMENTS, CONTACT_REFINEMENTS = int_constant(3), int_constant(8)
+REFINEMENTS, MORE_REFINEMENTS = int_constant(3), int_constant(8)
 """Number of refinement rounds; each multiplies the spacing by 2 / (REFINE_SAMPLES - 1). Between two
-contacts the best solution lies next to one of them, which takes more."""
+contacts the best solution lies next to one of them, and where joints move fast they move far from
+one sample to the next: both take more."""
 REFINE_SAMPLES = int_constant(8)
 WORTH = 1.00001
 """By what factor a solution found later must be better to replace one: isotropy counts to the sixth
@@ -209,6 +210,8 @@ def score_pair(
     exceeded = -1.0
     if winner >= 0:
         exceeded = value ** (1.0 / 6.0) if samples_hold_measure(problem) else 0.0
+    elif found:
+        record_all(problem.arm, search, search.arc_count[0])
     total = divide_intervals(problem.arm, search, found, exceeded)
     if total > found:
         _measure_candidates(problem, search, found, total)
@@ -219,7 +222,7 @@ def score_pair(
             contact = first
         if better >= 0:
             least = value * WORTH if winner >= 0 else -1.0
-            refine(problem, work, body_A, search, better, REFINEMENTS, least)
+            refine(problem, work, body_A, search, better, MORE_REFINEMENTS, least)
             return REACHED, NO_CONTACT
     if winner >= 0:
         return REACHED, NO_CONTACT
@@ -231,7 +234,7 @@ def score_pair(
         return ARM_BLOCKED, contact
     _measure_candidates(problem, search, first, last)
     for n in range(first, last):
-        value = refine(problem, work, body_A, search, n, CONTACT_REFINEMENTS, value)
+        value = refine(problem, work, body_A, search, n, MORE_REFINEMENTS, value)
     return REACHED, NO_CONTACT
 
 

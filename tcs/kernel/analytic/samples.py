@@ -24,13 +24,11 @@ C5, S5, C6, S6, C7, S7 = (np.uint64(k) * _ROW for k in range(6, 12))
 that all of them vary continuously with q1."""
 AIM, WRIST = np.uint64(12) * _ROW, np.uint64(13) * _ROW
 """How far aim [m] and wrist [1] are out of reach; <= 0 where they exist."""
-STRAIGHTNESS = np.uint64(14) * _ROW
-"""Minus the squared sine of joint 6 from the straight wrist, in [-1, 0]."""
-A7X, A7Y, A7Z = (np.uint64(k) * _ROW for k in range(15, 18))
+A7X, A7Y, A7Z = (np.uint64(k) * _ROW for k in range(14, 17))
 """Axis 7 in L3."""
-TOOL_X, TOOL_Y, TOOL_Z = (np.uint64(k) * _ROW for k in range(18, 21))
+TOOL_X, TOOL_Y, TOOL_Z = (np.uint64(k) * _ROW for k in range(17, 20))
 """From the wrist centre to the tool, in L3 [m]."""
-ROWS = 21
+ROWS = 20
 TINY = 1e-300
 """Avoids 0/0 at a singularity; such samples are infeasible."""
 SHARP = 1e24
@@ -44,6 +42,19 @@ ELBOW_ROUNDING = 1e-11
 """What rounding may take from 1 - cos^2 of the elbow at full stretch: twice the rounding of |SW|^2
 that counts as reached (`arcs.REACH_ROUNDING`) over twice the product of the lengths of upper arm
 and forearm, which is above 0.02 m^2."""
+LEAST_TILT = 1e-11
+"""Added to the components of axis 7 across axis 5 before joint 5 is computed from them. Where the
+wrist is exactly straight, joints 5 and 7 may rotate against each other at a single angle of the
+free joint: this spreads their postures over 1e-11 rad of it, and changes the pose by no more."""
+TILTED = 1e-14
+"""Squared sine of joint 6 below which LEAST_TILT is added: elsewhere it would only change the
+order of solutions of equal measure."""
+LEAST_FLEX = 1e-22
+"""Least squared sine of joint 6 from the straight wrist: it keeps an angle of 1e-11 rad, so that
+joint 5 stays determined."""
+WRIST_ROUNDING = 2e-15
+"""What rounding may take from the squared sine of joint 6, ten times over: at the straight wrist it
+must not decide whether a sample is feasible. The tool rotates by up to 4e-8 rad for that."""
 
 
 @jit
@@ -192,12 +203,14 @@ def solve_samples(
         wrist_left = N6 - m * m
         wrist_excess = abs(m) - root6
         m = min(max(m, -root6), root6)
-        h = wrist * np.sqrt(max(wrist_left, 0.0))
+        h = wrist * np.sqrt(max(wrist_left, LEAST_FLEX * N6))
         c6, s6 = (P6 * m - Q6 * h) / N6, (Q6 * m + P6 * h) / N6
         rx, ry = c6 * f02 - s6 * f12, s6 * f02 + c6 * f12
         kx = e00 * rx + e01 * ry + e02 * f22
         ky = e10 * rx + e11 * ry + e12 * f22
         D5 = kx * kx + ky * ky
+        tilt = LEAST_TILT if m7x * m7x + m7y * m7y < TILTED else 0.0
+        m7x, m7y = m7x + tilt, m7y + tilt
         D = np.sqrt(D5 * (m7x * m7x + m7y * m7y) + TINY)
         c5, s5 = (kx * m7x + ky * m7y) / D, (kx * m7y - ky * m7x) / D
         px, py = c5 * k7x + s5 * k7y, -s5 * k7x + c5 * k7y
@@ -210,8 +223,7 @@ def solve_samples(
         # Its length is 1 except where wrist or aim is out of reach: normalise as for joint 2.
         D = np.sqrt(c7 * c7 + s7 * s7 + TINY)
         c7, s7 = c7 / D, s7 / D
-        sine_squared = wrist_left / N6
-        left = min(elbow_left, min(aim_left / N, sine_squared))
+        left = min(elbow_left, min(aim_left / N, wrist_left / N6 + WRIST_ROUNDING))
         # Where SW lies along axis 2 or 3, or axis 7 along axis 5, a joint is undetermined: such
         # samples are infeasible. Elsewhere these terms are far above any slack.
         left = min(left, min(min(N, D2) * SHARP - square, D5 * SHARP - 1.0))
@@ -231,7 +243,6 @@ def solve_samples(
         rows[C6 + n], rows[S6 + n] = c6, s6
         rows[C7 + n], rows[S7 + n] = c7, s7
         rows[AIM + n], rows[WRIST + n] = aim_excess, wrist_excess
-        rows[STRAIGHTNESS + n] = -max(sine_squared, 0.0)
         rows[A7X + n], rows[A7Y + n], rows[A7Z + n] = a7x, a7y, a7z
         rows[TOOL_X + n], rows[TOOL_Y + n], rows[TOOL_Z + n] = ox, oy, oz
 
@@ -240,15 +251,15 @@ def solve_samples(
 def measure_samples(
     arm: ArmSolver, rows: FloatArray, slack: FloatArray, count: int, measure: FloatArray
 ) -> None:
-    """Fill the isotropy of each feasible sample.
+    """Fill the isotropy of each sample.
 
     Args:
         arm: The arm.
         rows: From `solve_samples`.
         slack: From `solve_samples`.
         count: Number of samples.
-        measure: Filled, shape (>= count,): kinematic isotropy to the sixth power where slack >= 0;
-            elsewhere minus the squared sine of joint 6 from the straight wrist, in [-1, 0].
+        measure: Filled, shape (>= count,): kinematic isotropy to the sixth power, negative where
+            slack < 0.
 
     Source:
         Isotropy: TCS eq. (2) with the sixth root, Delta = det(J J^T)^(1/6) / (trace(J J^T)/6).
@@ -353,4 +364,4 @@ def measure_samples(
         scale = 6.0 / trace
         scale = scale * scale * scale
         isotropy = det * scale * scale
-        measure[i] = isotropy if slack[i] >= 0.0 else rows[STRAIGHTNESS + n]
+        measure[i] = isotropy if slack[i] >= 0.0 else -isotropy

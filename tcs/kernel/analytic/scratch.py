@@ -37,9 +37,6 @@ class Search(NamedTuple):
     (MAX_WINDOWS, 2)."""
     peaks: FloatArray
     """Infeasible angles at which the slack has a local maximum [rad], shape (MAX_WINDOWS,)."""
-    straight: FloatArray
-    """Where the wrist is straightest: angle [rad], spacing of the samples [rad] and branch, shape
-    (MAX_WINDOWS, 3)."""
     angle: FloatArray
     cosine: FloatArray
     sine: FloatArray
@@ -50,8 +47,8 @@ class Search(NamedTuple):
     motion: FloatArray
     """How far joints move between neighbouring samples, from `motions`, shape (MAX_SAMPLES,)."""
     intervals: FloatArray
-    """Intervals between neighbouring samples to search later on: first and last [rad], branch,
-    motion [rad], greater measure and smaller slack of the ends, shape (MAX_INTERVALS, 6)."""
+    """Intervals between neighbouring samples to search later on: first and last [rad], branch, and
+    the greatest isotropy that they may hold, shape (MAX_INTERVALS, 4)."""
     interval_count: IntArray
     """Number of intervals, shape (1,)."""
     stack: FloatArray
@@ -85,9 +82,9 @@ class Search(NamedTuple):
     ends_pair: IntArray
     """Pairs in contact at their ends, as in `Workspace.last`, shape (MAX_STACK, 2, 3)."""
     link_R: FloatArray
-    """Orientations of L1..L7 in A at one end, shape (8, 3, 3)."""
+    """Orientations of A, L1..L7 in A at both ends of an interval, shape (2, 8, 3, 3)."""
     link_p: FloatArray
-    """Origins of L1..L7 in A at one end [m], shape (8, 3)."""
+    """Origins of A, L1..L7 in A at both ends [m], shape (2, 8, 3)."""
     moved: FloatArray
     """A shape at both ends of an interval, packed, shape (2, COLUMNS)."""
     trial: FloatArray
@@ -107,7 +104,6 @@ def new_search() -> Search:
         np.empty((MAX_WINDOWS, 2)),
         np.empty((MAX_WINDOWS, 2)),
         np.empty(MAX_WINDOWS),
-        np.empty((MAX_WINDOWS, 3)),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
@@ -115,7 +111,7 @@ def new_search() -> Search:
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
         np.empty(MAX_SAMPLES),
-        np.empty((MAX_INTERVALS, 6)),
+        np.empty((MAX_INTERVALS, 4)),
         np.zeros(1, np.int64),
         np.empty((MAX_STACK, 2)),
         np.empty(MAX_CANDIDATES),
@@ -131,8 +127,8 @@ def new_search() -> Search:
         np.empty((MAX_STACK, 2)),
         np.empty((MAX_STACK, 2, 7)),
         np.empty((MAX_STACK, 2, 3), np.int64),
-        np.empty((8, 3, 3)),
-        np.empty((8, 3)),
+        np.empty((2, 8, 3, 3)),
+        np.empty((2, 8, 3)),
         np.empty((2, COLUMNS)),
         np.empty(7),
         np.empty(7),

@@ -126,8 +126,6 @@ class Solution:
     """Joint angles [rad], shifted by full turns towards the middle of their limits, shape (7,)."""
     slack: float
     """>= 0 if the branch exists and every joint is within its limits."""
-    sine_squared: float
-    """Squared sine of the wrist angle (of the shoulder, in the spherical-shoulder class)."""
     excess: float
     """How far aim [m] or wrist are out of reach, whichever is farther; <= 0 if both exist."""
 
@@ -182,8 +180,7 @@ def spherical_wrist_solutions(
                 left = min(elbow_left, aim_left, wrist_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
                 excess = max(aim_excess, wrist_excess)
-                solution = limited(chain, q, left, wrist_left, excess)
-                found[elbow_sign, aim_sign, wrist_sign] = solution
+                found[elbow_sign, aim_sign, wrist_sign] = limited(chain, q, left, excess)
     return found
 
 
@@ -223,20 +220,17 @@ def spherical_shoulder_solutions(
                 left = min(elbow_left, aim_left, shoulder_left)
                 q = [q1, q2, q3, q4, q5, q6, q7]
                 excess = max(aim_excess, shoulder_excess)
-                solution = limited(chain, q, left, shoulder_left, excess)
-                found[elbow_sign, aim_sign, shoulder_sign] = solution
+                found[elbow_sign, aim_sign, shoulder_sign] = limited(chain, q, left, excess)
     return found
 
 
-def limited(
-    chain: Chain, angles: list[float], left: float, sine_squared: float, excess: float
-) -> Solution:
+def limited(chain: Chain, angles: list[float], left: float, excess: float) -> Solution:
     """Return the solution with joints shifted into their limits; its slack is at most `left`."""
     q = np.array(angles)
     for i in range(7):
         q[i], kept = into_limits(q[i], chain.lower[i], chain.upper[i])
         left = min(left, kept)
-    return Solution(q, left, max(sine_squared, 0.0), excess)
+    return Solution(q, left, excess)
 
 
 def elbow(chain: Chain, square: float) -> tuple[float, float, float]:

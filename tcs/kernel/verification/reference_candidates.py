@@ -18,8 +18,6 @@ from tcs.kernel.analytic.search import (
     FIRST_SAMPLES,
     MIN_SAMPLES,
     PEAK_REFINEMENTS,
-    STRAIGHT,
-    STRAIGHT_REFINEMENTS,
 )
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.verification.reference import (
@@ -114,7 +112,6 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
     """Return the feasible samples of the kernel's two passes: over the arcs, inside the windows."""
     length = sum(last - first for first, last in arcs)
     found: list[Candidate] = []
-    straight: list[tuple[Branch, float, float]] = []
     for first, last in arcs:
         share = FIRST_SAMPLES * (last - first) / length if length else 0
         count = max(MIN_SAMPLES, int(share + 0.5))
@@ -125,13 +122,6 @@ def find_candidates(chain: Chain, X_AG: Pose, arcs: list[tuple[float, float]]) -
             step = (last - first) / (count - 1)
             for i, j in windows_of(slack, step):
                 found += refine_window(chain, X_AG, branch, angles[i], angles[j])
-            sines = [math.inf, *(look[branch].sine_squared for look in looks), math.inf]
-            for i in range(1, count + 1):
-                if sines[i] < STRAIGHT and sines[i] <= sines[i - 1] and sines[i] < sines[i + 1]:
-                    straight.append((branch, angles[i - 1], step))
-    if not found:
-        for branch, middle, step in straight:
-            found += refine_straight(chain, X_AG, branch, middle, step)
     return found
 
 
@@ -177,20 +167,6 @@ def is_worth_halving(chain: Chain, width: float, left: Solution, right: Solution
         return left.excess + right.excess < length * (width + motion)
     # Slack is a difference of cosines, and changes no faster than the joints.
     return max(left.slack, right.slack) > -2 * motion
-
-
-def refine_straight(
-    chain: Chain, X_AG: Pose, branch: Branch, middle: float, step: float
-) -> list[Candidate]:
-    """Return feasible samples near an angle at which the wrist is nearly straight."""
-    for _ in range(STRAIGHT_REFINEMENTS):
-        low, step = middle - step, 2 * step / (FINE_SAMPLES - 1)
-        angles = [low + i * step for i in range(FINE_SAMPLES)]
-        found = candidates_at(chain, X_AG, branch, angles, step)
-        if found:
-            return found
-        middle = min(angles, key=lambda angle: solutions(chain, X_AG, angle)[branch].sine_squared)
-    return []
 
 
 def windows_of(slack: list[float], step: float) -> list[tuple[int, int]]:
