@@ -66,25 +66,25 @@ def test_goals_of_nearly_singular_postures_are_reached(scene, joint, away):
     assert missed(made) == []
 
 
-# The last goal of each. The first two: joints 5 and 7 (1 and 3 of the Panda) rotate against each
+# Of fifty goals each. The first two: joints 5 and 7 (1 and 3 of the Panda) rotate against each
 # other at one angle of the free joint. The third: both samples about it are beyond limits. The
 # fourth: another joint follows its limit in an interval before, which may not use up all divisions.
 @pytest.mark.parametrize(
-    ("scene", "joint", "away", "count"),
+    ("scene", "joint", "away", "goal"),
     [
-        ("tiago", WRIST, 0.0, 5),
-        ("panda", SHOULDER, 0.0, 1),
-        ("tiago", WRIST, 1e-3, 21),
-        ("iiwa7", ELBOW, 1e-3, 47),
+        ("tiago", WRIST, 0.0, 4),
+        ("panda", SHOULDER, 0.0, 0),
+        ("tiago", WRIST, 1e-3, 20),
+        ("iiwa7", ELBOW, 1e-3, 46),
     ],
     indirect=["scene"],
 )
-def test_the_measure_is_that_of_the_posture_or_better(scene, joint, away, count):
+def test_the_measure_is_that_of_the_posture_or_better(scene, joint, away, goal):
     rng = np.random.default_rng([0, joint, round(1e4 * away)])
-    made = near_singular_goals(rng, *scene, joint, away, count)
-    scores, q = made.scores(), made.postures[-1]
-    assert scores.reason[0, -1] == REACHED
-    assert scores.dexterity[0, -1] >= isotropy(jacobian(made.scene.chain, q)) - 1e-3
+    made = near_singular_goals(rng, *scene, joint, away, 50)
+    scores, q = made.scores(), made.postures[goal]
+    assert scores.reason[0, goal] == REACHED
+    assert scores.dexterity[0, goal] >= isotropy(jacobian(made.scene.chain, q)) - 1e-3
 
 
 @pytest.mark.parametrize("width", some_of([0.01, 0.003, 0.001], 0.003))
