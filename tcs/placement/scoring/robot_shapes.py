@@ -22,31 +22,31 @@ def robot_shapes(arrays: SceneArrays) -> RobotShapes | None:
     """
     if len(arrays.arm.type) + len(arrays.body.type) > MAX_SHAPES:
         return None
-    lift = _lift(arrays)
-    if lift is None:
+    torso_shift = _torso_shift(arrays)
+    if torso_shift is None:
         return None
     return RobotShapes(
         chain_R=arrays.chain.R,
         chain_p=arrays.chain.p,
         arm_base_R=arrays.arm_base_R[0],
         arm_base_p=arrays.arm_base_p[0],
-        lift=lift,
+        torso_shift=torso_shift,
         arm=_primitives(arrays.arm),
         body=_primitives(arrays.body),
         margin=float(arrays.margin),
     )
 
 
-def _lift(arrays: SceneArrays) -> FloatArray | None:
+def _torso_shift(arrays: SceneArrays) -> FloatArray | None:
     """Return the displacement of the torso at each level, shape (levels, 3), if it translates."""
-    lift: FloatArray = arrays.arm_base_p - arrays.arm_base_p[0]
-    moved = arrays.body.p[0] + (arrays.body.frame == 1)[None, :, None] * lift[:, None]
+    torso_shift: FloatArray = arrays.arm_base_p - arrays.arm_base_p[0]
+    moved = arrays.body.p[0] + (arrays.body.frame == 1)[None, :, None] * torso_shift[:, None]
     same = (
         np.allclose(moved, arrays.body.p, rtol=0.0, atol=SAME)
         and np.allclose(arrays.body.R, arrays.body.R[0], rtol=0.0, atol=SAME)
         and np.allclose(arrays.arm_base_R, arrays.arm_base_R[0], rtol=0.0, atol=SAME)
     )
-    return lift if same else None
+    return torso_shift if same else None
 
 
 def _primitives(shapes: Shapes) -> Primitives:

@@ -176,7 +176,7 @@ def _check_members(requested: int, stored: int) -> None:
 
 @dataclass(frozen=True)
 class _Query:
-    """One selection: the sets, the state and what is asked for."""
+    """One selection: the sets, the state and the request."""
 
     tables: SelectionTables
     here: InitialConfiguration

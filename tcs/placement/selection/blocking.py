@@ -29,8 +29,8 @@ def blocked_bodies(obstacle: Obstacle, postures: Postures) -> BoolArray:
     frames = _Frames(obstacle, postures.base[first])
     reach += shapes.margin + ROUNDING
     near = np.flatnonzero(point_distance(obstacle.half[:2], frames.base[:, :2]) <= reach)
-    lift = shapes.lift[postures.level[first[near]]]
-    p_B = body.p + (body.frame == 1)[:, None] * lift[:, None]
+    torso_shift = shapes.torso_shift[postures.level[first[near]]]
+    p_B = body.p + (body.frame == 1)[:, None] * torso_shift[:, None]
     p_O = frames.to_obstacle(near, p_B)
     clearance = np.maximum(shapes.margin, body.pad) + ROUNDING
     blocked = np.zeros(len(first), dtype=np.bool_)

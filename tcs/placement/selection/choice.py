@@ -129,7 +129,7 @@ class Choice:
     moves: tuple[str, ...]
     """Environment axes that change from the present state to the members, or between these."""
     alternatives: tuple[Choice, ...] = ()
-    """Further sets, the best first, if they were asked for."""
+    """Further sets, the best first, if they were requested."""
     warnings: tuple[str, ...] = ()
     """What the user should know about the choice, one sentence each."""
 

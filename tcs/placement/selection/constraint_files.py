@@ -1,4 +1,4 @@
-"""Constraints in a YAML file, for a room whose forbidden regions and conditions stay the same."""
+"""Constraints in a YAML file, for an environment in which they stay the same."""
 
 from __future__ import annotations
 

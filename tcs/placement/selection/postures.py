@@ -97,7 +97,7 @@ class Postures:
         """Return the poses of the arm's links in B in some solutions, (m, 7, 3, 3), (m, 7, 3)."""
         shapes, q = self.shapes, self.joints[pairs]
         R = np.broadcast_to(shapes.arm_base_R, (len(q), 3, 3))
-        p = shapes.arm_base_p + shapes.lift[self.level[self.pairs[0][pairs]]]
+        p = shapes.arm_base_p + shapes.torso_shift[self.level[self.pairs[0][pairs]]]
         links_R, links_p = np.empty((len(q), 7, 3, 3)), np.empty((len(q), 7, 3))
         for joint in range(7):
             p = p + R @ shapes.chain_p[joint]

@@ -62,7 +62,7 @@ def disliked_candidates(
     wanted, other = (_middle(frames, part) for part in SIDES[text])
     if wanted is None or other is None:
         raise SelectionError(
-            f"prefer {text}: the environment has no body frames that tell this side of the person. "
+            f"prefer {text}: the environment has no body frames on this side of the person. "
             f"Known: {', '.join(frames) or 'none'}. Prefer values of an axis instead."
         )
     states = int(np.prod(grid.environment_shape))

@@ -65,7 +65,7 @@ class RobotShapes:
     """Orientation of A in the base frame B, shape (3, 3)."""
     arm_base_p: FloatArray
     """Origin of A in B [m], shape (3,)."""
-    lift: FloatArray
+    torso_shift: FloatArray
     """Displacement of the torso at each of its levels from level 0, in B [m], shape (levels, 3)."""
     arm: Primitives
     """The shapes of the scored arm, in link frames."""
@@ -111,7 +111,7 @@ _ARRAYS = {
     "chain_p": (ARM_JOINTS + 1, 3),
     "arm_base_R": (3, 3),
     "arm_base_p": (3,),
-    "lift": (-1, 3),
+    "torso_shift": (-1, 3),
 }
 _COLUMNS = {"type": (-1,), "size": (-1, 3), "pad": (-1,), "frame": (-1,), "R": (-1, 3, 3)} | {
     "p": (-1, 3)

@@ -160,7 +160,7 @@ def test_a_side_of_the_person(person, side):
 def test_preferences_that_cannot_be_used(scored, person):
     with pytest.raises(GridError, match="is not of the form"):
         Constraints(prefer=("window",))
-    with pytest.raises(SelectionError, match="no body frames that tell this side"):
+    with pytest.raises(SelectionError, match="no body frames on this side"):
         select(scored[0], HERE, constraints=Constraints(prefer=("left",)))
     with pytest.raises(UnknownNameError, match="unknown axis 'headrest'"):
         select(person, HERE, constraints=Constraints(prefer=("headrest = 0 deg",)))

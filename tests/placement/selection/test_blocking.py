@@ -79,9 +79,9 @@ def test_the_stored_shapes_hold_at_every_torso_level(corner):
     file, job = corner
     shapes = file.robot_shapes
     arrays = job.lowered(job.scene()).arrays
-    for level in range(len(shapes.lift)):
+    for level in range(len(shapes.torso_shift)):
         mounted = (shapes.body.frame == 1)[:, None]
         np.testing.assert_allclose(
-            shapes.body.p + mounted * shapes.lift[level], arrays.body.p[level], atol=1e-9
+            shapes.body.p + mounted * shapes.torso_shift[level], arrays.body.p[level], atol=1e-9
         )
-    assert shapes.lift[:, 2].tolist() == pytest.approx([0.0, 0.15])
+    assert shapes.torso_shift[:, 2].tolist() == pytest.approx([0.0, 0.15])

@@ -132,7 +132,7 @@ def made_up_robot():
         chain_p=chain_p,
         arm_base_R=np.eye(3),
         arm_base_p=np.array([0.0, 0.0, 0.7]),
-        lift=np.zeros((1, 3)),
+        torso_shift=np.zeros((1, 3)),
         arm=arm,
         body=body,
         margin=0.001,

@@ -11,7 +11,7 @@ def test_round_trip_through_the_metadata():
     robot = made_up_robot()
     file = score_file(metadata={**METADATA, "robot_shapes": robot.to_dict()})
     again = file.robot_shapes
-    for name in ("chain_R", "chain_p", "arm_base_R", "arm_base_p", "lift", "margin"):
+    for name in ("chain_R", "chain_p", "arm_base_R", "arm_base_p", "torso_shift", "margin"):
         np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
     for part in ("arm", "body"):
         for name in ("type", "size", "pad", "frame", "R", "p"):
@@ -25,8 +25,8 @@ def test_round_trip_through_the_metadata():
     [
         ({"margin": -1.0}, "margin must be a number"),
         ({"chain_R": [0.0] * 71}, "'chain_R' must be a list of finite numbers"),
-        ({"lift": [0.0, float("nan"), 0.0]}, "'lift' must be"),
-        ({"lift": [0.0] * 4}, "'lift' must be"),
+        ({"torso_shift": [0.0, float("nan"), 0.0]}, "'torso_shift' must be"),
+        ({"torso_shift": [0.0] * 4}, "'torso_shift' must be"),
         ({"arm": None}, "must have 'arm' and 'body'"),
         ({"body": {"type": [1]}}, "'size' must be"),
     ],
