@@ -5,8 +5,9 @@ Usage: python benchmarks/shapes.py [--robots pr2,baxter] [--postures 10000] [--e
 
 Of random postures whose meshes are free of contact: the fraction that the shapes call blocked, by
 self-collision and by random boxes, and the pairs that block most. Conversely: pairs that need no
-check whose meshes cross in some postures. Arm and torso move, everything else keeps its posture.
-Coal measures the meshes. The results depend on the seed alone, not on the machine.
+check whose meshes cross in some postures. Arm and torso move within the joint limits, everything
+else keeps its posture; what is outside a range of the robot file counts as blocked. Coal measures
+the meshes. The results depend on the seed alone, not on the machine.
 """
 
 from __future__ import annotations
@@ -121,17 +122,27 @@ def main() -> None:
 def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[str]]:
     """Print what shapes block although meshes are free, and return the worst pairs."""
     positions, poses = draw(bodies, postures, seed)
-    plant, allowed = SelfCollision(bodies.robot), set(bodies.pairs())
-    allowed -= {tuple(sorted(pair)) for pair in bodies.robot.disabled_pairs}
+    robot, checked = bodies.robot, set(bodies.pairs())
+    plant, limits = SelfCollision(robot), robot.joint_limits()
+    narrowed = {tuple(sorted(p)) for g in robot.disabled_groups if g.ranges for p in g.pairs}
+    exempt_pairs = {tuple(sorted(pair)) for pair in robot.disabled_pairs}
     boxes = Boxes(bodies, poses, seed)
     counts: dict[str, Counter[str]] = {"self": Counter(), "boxes": Counter()}
     free, lost = Counter[str](), Counter[str]()
     for i in range(postures):
-        touching = plant.touching({name: q[i] for name, q in positions.items()}) & allowed
+        at = {name: float(q[i]) for name, q in positions.items()}
+        outside = {
+            f"range of {name}"
+            for name in robot.arm_joints
+            if not limits[name][0] <= at[name] <= limits[name][1]
+        }
+        off = exempt_pairs - narrowed if outside else exempt_pairs
+        touching = (plant.touching(at) & checked) - off
         if not all(bodies.are_apart(pair, poses, i) for pair in touching):
             continue
         struck = boxes.touching(i)
-        for what, contacts in (("self", {" / ".join(p) for p in touching}), ("boxes", struck)):
+        own = outside or {" / ".join(pair) for pair in touching}
+        for what, contacts in (("self", own), ("boxes", struck)):
             if contacts is not None:
                 free[what] += 1
                 lost[what] += bool(contacts)
@@ -170,7 +181,7 @@ def draw(bodies: Bodies, postures: int, seed: int) -> tuple[dict[str, FloatArray
     robot = bodies.robot
     rest = robot.with_mimics(robot.joint_positions())
     positions = {name: np.full(postures, q) for name, q in rest.items()}
-    drawn = sample_positions(robot, postures, seed)
+    drawn = sample_positions(robot.without_ranges, postures, seed)
     for name in (*robot.arm_joints, *([robot.torso_joint] if robot.torso_joint else [])):
         positions[name] = np.array([sample[name] for sample in drawn])
     return positions, body_poses(bodies.model, positions, postures)

@@ -37,6 +37,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
                 f"{where}, field 'torso_joint': '{torso.name}' is {torso.type}, but must be "
                 "prismatic."
             )
+    _check_ranges(robot, model, where)
     _check_rest(robot, model, f"{where}, field 'rest'")
     for field, choices in (("postures", robot.postures), ("grippers", robot.grippers)):
         for name, positions in choices.items():
@@ -133,11 +134,30 @@ def _check_positions(
         _check_within(joint, value, where)
 
 
+def _check_ranges(robot: RobotFile, model: Urdf, where: str) -> None:
+    """Check that the ranges of disabled groups are of joints of the arm, and leave them a range."""
+    for i, group in enumerate(robot.disabled_groups):
+        at = f"{where}, field 'disabled_groups[{i}].ranges'"
+        for name in group.ranges:
+            _check_known_joint(name, robot, at)
+            limits = model.joints[name].hard
+            lower, upper = group.ranges[name]
+            if not max(lower, limits[0]) < min(upper, limits[1]):
+                raise RobotError(
+                    f"{at}: '{name}' has [{lower:g}, {upper:g}], which must overlap its limits "
+                    f"[{limits[0]:g}, {limits[1]:g}]."
+                )
+
+
+def _check_known_joint(name: str, robot: RobotFile, where: str) -> None:
+    if name not in robot.arm_joints:
+        raise UnknownNameError("joint of the arm", name, robot.arm_joints, where=where)
+
+
 def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
     """Check that a rest posture has only joints of the arm, within hard limits."""
     for name, value in robot.rest.items():
-        if name not in robot.arm_joints:
-            raise UnknownNameError("joint of the arm", name, robot.arm_joints, where=where)
+        _check_known_joint(name, robot, where)
         _check_within(model.joints[name], value, where)
 
 

@@ -15,6 +15,7 @@ from tcs.model.robots.urdf import Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
+Range = tuple[JointPosition, JointPosition]
 Positions = Annotated[Mapping[Name, JointPosition], Entries]
 
 
@@ -49,7 +50,17 @@ class DisabledGroup(Document):
     reason: Annotated[str, Field(min_length=10)]
     limits: Literal["soft", "hard"] = "hard"
     """Widest joint limits under which the reason holds; "hard" includes the soft limits."""
+    ranges: Annotated[Mapping[Name, Range], Entries] = {}
+    """Ranges of arm joints, within their limits, in which the reason holds [rad]: while the group
+    is in force, the joints are kept within them."""
     pairs: tuple[tuple[Name, Name], ...]
+
+    @model_validator(mode="after")
+    def _ranges_are_ordered(self) -> Self:
+        for joint, (lower, upper) in self.ranges.items():
+            if not lower < upper:
+                raise ValueError(f"ranges: that of '{joint}' must be [lower, upper]")
+        return self
 
 
 class RobotFile(Document):
@@ -110,8 +121,17 @@ class RobotFile(Document):
     @property
     def disabled_pairs(self) -> tuple[tuple[str, str], ...]:
         """All pairs of bodies whose contact is not checked under the limits in force."""
-        holding = (g for g in self.disabled_groups if g.limits in ("hard", self.limits))
-        return tuple(pair for group in holding for pair in group.pairs)
+        return tuple(pair for group in self._groups_in_force for pair in group.pairs)
+
+    @property
+    def _groups_in_force(self) -> tuple[DisabledGroup, ...]:
+        return tuple(g for g in self.disabled_groups if g.limits in ("hard", self.limits))
+
+    @property
+    def without_ranges(self) -> RobotFile:
+        """The robot with its joint limits alone, as if no disabled group narrowed them."""
+        groups = tuple(g.model_copy(update={"ranges": {}}) for g in self.disabled_groups)
+        return self.model_copy(update={"disabled_groups": groups})
 
     def urdf_path(self) -> Path:
         """Return the path of the URDF on this machine.
@@ -132,11 +152,19 @@ class RobotFile(Document):
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
 
+        They are narrowed by the ranges of the disabled groups in force.
+
         Raises:
             RobotError: If the URDF cannot be used.
         """
         joints = self.model().joints.values()
-        return {j.name: j.soft if self.limits == "soft" else j.hard for j in joints if j.is_movable}
+        limits = {
+            j.name: j.soft if self.limits == "soft" else j.hard for j in joints if j.is_movable
+        }
+        for group in self._groups_in_force:
+            for name, (lower, upper) in group.ranges.items():
+                limits[name] = max(limits[name][0], lower), min(limits[name][1], upper)
+        return limits
 
     def joint_positions(self) -> dict[str, float]:
         """Return the position of every movable joint except scored arm and torso [rad or m].

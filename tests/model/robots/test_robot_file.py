@@ -12,6 +12,7 @@ import yaml
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.paths import data_folder
 from tcs.model.robots import load_robot
+from tcs.model.robots.robot_file import DisabledGroup
 
 FOLDER = data_folder() / "models" / "robots"
 
@@ -92,6 +93,21 @@ def test_groups_found_under_soft_limits_do_not_hold_under_hard_ones(pr2):
     assert hard < soft
 
 
+def test_ranges_of_groups_in_force_narrow_the_limits(pr2):
+    elbow = "l_elbow_flex_joint"
+    soft = pr2.joint_limits()[elbow]
+    groups = [
+        DisabledGroup(reason="below, they meet", ranges={elbow: (-2.0, 9.0)}, pairs=()),
+        DisabledGroup(
+            reason="soft ones alone", limits="soft", ranges={elbow: (-9.0, -1.0)}, pairs=()
+        ),
+    ]
+    robot = pr2.model_copy(update={"disabled_groups": tuple(groups)})
+    assert robot.joint_limits()[elbow] == (-2.0, -1.0)
+    assert robot.with_choices(limits="hard").joint_limits()[elbow] == (-2.0, 0.0)
+    assert robot.without_ranges.joint_limits()[elbow] == soft
+
+
 def test_messages_name_the_file_as_it_was_given(content, tmp_path, monkeypatch):
     write(tmp_path, content | {"tool_frame": "nowhere"})
     monkeypatch.chdir(tmp_path)
@@ -125,6 +141,10 @@ def change(field, value):
 
 def put(field, name, value):
     return lambda content: content[field].update({name: value})
+
+
+def narrowed(joint, lower, upper):
+    return [{"reason": "because I say so", "pairs": [], "ranges": {joint: [lower, upper]}}]
 
 
 WRONG = {
@@ -213,6 +233,18 @@ WRONG = {
     "disabled pair without reason": (
         change("disabled_groups", [{"pairs": [["base_link", "torso_lift_link"]]}]),
         r"field 'disabled_groups\[0\]\.reason' is missing",
+    ),
+    "range of an unknown joint": (
+        change("disabled_groups", narrowed("l_elbow_joint", -2.0, -1.0)),
+        r"field 'disabled_groups\[0\]\.ranges': unknown joint of the arm 'l_elbow_joint'",
+    ),
+    "range upside down": (
+        change("disabled_groups", narrowed("l_elbow_flex_joint", -1.0, -2.0)),
+        r"disabled_groups\[0\].*'l_elbow_flex_joint' must be \[lower, upper\]",
+    ),
+    "range beyond the limits": (
+        change("disabled_groups", narrowed("l_elbow_flex_joint", 1.0, 2.0)),
+        r"'l_elbow_flex_joint' has \[1, 2\], which must overlap its limits \[-2\.3213, 0\]",
     ),
     "extra frame with a taken name": (
         change("frames", [{"name": "base_link", "parent": "base_footprint"}]),

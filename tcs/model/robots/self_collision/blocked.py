@@ -22,7 +22,8 @@ class Blocked:
 
     Attributes:
         free: Number of random postures whose surfaces are free of contact.
-        blocked: Number of these in which shapes touch.
+        blocked: Number of these in which shapes touch, or a joint is outside a range to which a
+            group of disabled pairs keeps it.
         pairs: The pairs of bodies whose shapes touch, and in how many of these postures, most
             frequent first.
     """
@@ -52,9 +53,10 @@ class Blocked:
 def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -> Blocked:
     """Return how many postures the shapes block although the surfaces are free of contact.
 
-    Arm and torso are drawn within the limits in force, everything else keeps its posture. Shapes
+    Arm and torso are drawn within the joint limits, everything else keeps its posture. Shapes
     enclose the surfaces, so only pairs whose shapes touch need the distance of the surfaces, which
-    are sampled as points: a distance below their spacing counts as contact.
+    are sampled as points: a distance below their spacing counts as contact. Postures outside the
+    ranges of disabled groups are drawn too, and count as blocked if their surfaces are free.
 
     Args:
         robot: The robot.
@@ -68,22 +70,25 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
     triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
-    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    limits, off = robot.joint_limits(), {frozenset(pair) for pair in robot.disabled_pairs}
+    narrowed = {frozenset(p) for g in robot.disabled_groups if g.ranges for p in g.pairs}
     plant, others = SelfCollision(robot), robot.with_mimics(robot.joint_positions())
     scored = [*robot.arm_joints, *([robot.torso_joint] if robot.torso_joint else [])]
     free = blocked = 0
     pairs = Counter[BodyPair]()
-    for sample in sample_positions(robot, postures, seed):
+    for sample in sample_positions(robot.without_ranges, postures, seed):
         positions = others | {name: sample[name] for name in scored}
+        is_within = all(limits[n][0] <= positions[n] <= limits[n][1] for n in robot.arm_joints)
+        exempt = off if is_within else off - narrowed
         touching = [
             pair
             for pair in plant.touching(positions)
-            if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in off
+            if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in exempt
         ]
         if any(surfaces.distance(pair, positions) < SPACING for pair in touching):
             continue
         free += 1
-        blocked += bool(touching)
+        blocked += bool(touching) or not is_within
         pairs.update(touching)
     ranked = sorted(pairs.items(), key=lambda item: (-item[1], item[0]))
     return Blocked(free, blocked, tuple(ranked))
