@@ -14,7 +14,8 @@ from tcs.capability.files import load_map, robot_reference, stored_name
 from tcs.capability.grid import GRASPS, SIDE, TOP, MapGrid, yaw_rotation
 from tcs.capability.map import ITCM, CapabilityMap
 from tcs.capability.reach import Reach
-from tcs.errors import StoreError, UnknownNameError
+from tcs.errors import GridError, StoreError, UnknownNameError
+from tcs.files.quantities import RADIUS
 from tcs.kernel.arrays import BoolArray, FloatArray
 
 HALF_WIDTH = 1.0
@@ -77,11 +78,13 @@ def check_map(
 
     Raises:
         UnknownNameError: If there is no such set of grasps.
+        GridError: If the radius is out of its physical range.
     """
+    most = reach.length if radius is None else radius
+    RADIUS.check((most,), "the radius of the map", GridError)
     R_BT, p_BT = random_poses(reach, grasps, queries, seed)
     cells, of_query = np.unique(grid.nearest(R_BT, p_BT).cells, axis=0, return_inverse=True)
     R_BC, p_BC = grid.tool_in_base(cells)
-    most = reach.length if radius is None else radius
     near = np.linalg.norm(p_BC - reach.shoulder, axis=1) <= most
     held = near & reach.solve(R_BC, p_BC, jobs=jobs).reached
     return MapCheck.of(held[of_query.ravel()], reach.solve(R_BT, p_BT, jobs=jobs).reached)

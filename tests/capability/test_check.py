@@ -3,7 +3,7 @@ import pytest
 
 from tcs.capability import MapGrid, Reach, check_map, check_stored
 from tcs.capability.check import MapCheck, random_poses
-from tcs.errors import UnknownNameError
+from tcs.errors import GridError, UnknownNameError
 
 
 def test_fractions_by_hand():
@@ -63,3 +63,9 @@ def test_orientations_of_the_queries(reach):
 def test_unknown_queries_are_refused(reach):
     with pytest.raises(UnknownNameError, match=r"side\+top"):
         random_poses(reach, "side+top", 10, 0)
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 1e308])
+def test_an_impossible_radius_is_refused(reach, coarse, radius):
+    with pytest.raises(GridError, match="the radius of the map is"):
+        check_map(reach, coarse, "side", radius=radius, queries=1)
