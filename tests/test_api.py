@@ -76,6 +76,9 @@ def test_choosing_loads_neither_simulator_nor_compiler(tmp_path):
         "here = tcs.InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)\n"
         "choice = tcs.select(file, here, weights=tcs.UtilityWeights(travel=0.2))\n"
         "assert len(choice.members) in (1, 2)\n"
+        "constraints = tcs.Constraints(only=('base_x <= 0',), prefer=('base_y >= 0.3',),\n"
+        "    forbid=(tcs.Region(((5, 5), (6, 5), (6, 6))),))\n"
+        "tcs.select(file, here, constraints=constraints, top=tcs.Top(count=2))\n"
         "print([m for m in ('pydrake', 'numba', 'matplotlib') if m in sys.modules])"
     )
     assert fresh(code) == "[]"

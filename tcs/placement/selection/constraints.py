@@ -231,11 +231,14 @@ def _present(axis: Axis, now: dict[str, float]) -> tuple[int, float]:
         apart = np.abs(np.mod(apart + math.pi, 2.0 * math.pi) - math.pi)
     index = int(np.argmin(apart))
     half = (math.radians(axis.step) if axis.unit == "deg" else axis.step) / 2.0
-    # An axis with a single value covers no range, so any present value counts as that value.
-    if axis.count > 1 and apart[index] > half * (1.0 + 1e-9):
+    # A single value has no neighbour that shows what range it covers.
+    if apart[index] > (half * (1.0 + 1e-9) if axis.count > 1 else SAME_VALUE):
         raise SelectionError(
             f"keep {axis.name}: the present value {_shown(axis, now[axis.name])} is more than half "
             f"a step from the scored ones: {values_text(axis)}."
+            if axis.count > 1
+            else f"keep {axis.name}: the present value is {_shown(axis, now[axis.name])}, but only "
+            f"{values_text(axis)} is scored."
         )
     return index, float(apart[index])
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.errors import SelectionError
+from tcs.errors import SelectionError, one_line
 from tcs.model.grid import AxisCondition, Grid
 
 FloatArray = NDArray[np.float64]
@@ -28,11 +28,18 @@ def check_preference(text: str) -> None:
     """Check the form of a preference.
 
     Raises:
-        GridError: If it is neither a side nor a condition on an axis.
+        SelectionError: If it is neither a side nor a condition on an axis.
+        GridError: If it is a condition of another form.
         UnknownNameError: If a condition has an unknown unit.
     """
-    if text not in SIDES:
-        AxisCondition.parse(text)
+    if text in SIDES:
+        return
+    if not any(comparison in text for comparison in "<>="):
+        raise SelectionError(
+            f"Preference '{one_line(text)}' must be a side of the person, {', '.join(SIDES)}, or a "
+            "condition on an axis, e.g. torso <= 0.15 m."
+        )
+    AxisCondition.parse(text)
 
 
 def disliked_candidates(

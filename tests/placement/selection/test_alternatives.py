@@ -158,8 +158,10 @@ def test_a_side_of_the_person(person, side):
 
 
 def test_preferences_that_cannot_be_used(scored, person):
-    with pytest.raises(GridError, match="is not of the form"):
+    with pytest.raises(SelectionError, match="must be a side of the person, left, right, head"):
         Constraints(prefer=("window",))
+    with pytest.raises(GridError, match="is not of the form"):
+        Constraints(prefer=("torso <= low",))
     with pytest.raises(SelectionError, match="no body frames on this side"):
         select(scored[0], HERE, constraints=Constraints(prefer=("left",)))
     with pytest.raises(UnknownNameError, match="unknown axis 'headrest'"):

@@ -42,7 +42,7 @@ def test_every_key_is_read(tmp_path):
         ("only: [high]", "Condition 'high' is not of the form"),
         ("forbid: [5]", "'forbid': 5 must be a list of [x, y]"),
         ("blocked: [a chair]", "four to seven numbers"),
-        ("prefer: [window]", "is not of the form"),
+        ("prefer: [window]", "must be a side of the person"),
         ("only: [", "is not valid YAML"),
         ("5", "must contain keys and values: only, keep, forbid, blocked, prefer"),
     ],

@@ -1,3 +1,4 @@
+import dataclasses
 import itertools
 import math
 
@@ -211,11 +212,12 @@ def test_without_constraints_nothing_changes(scored):
             "'keep bed_height' excludes all of the [0-9]+ that 'only bed_height = 0' leaves",
         ),
         (Constraints(keep=("base_x",)), "more than half a step from the scored ones"),
+        (Constraints(keep=("torso",)), "present value is 0.01 m, but only 0 m is scored"),
     ],
 )
 def test_constraints_that_leave_nothing(scored, constraints, message):
     with pytest.raises(SelectionError, match=message):
-        select(scored[0], HERE, constraints=constraints)
+        select(scored[0], dataclasses.replace(HERE, torso=0.01), constraints=constraints)
 
 
 def test_keep_requires_the_present_value(scored):
