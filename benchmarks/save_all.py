@@ -41,6 +41,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "itcm_task": ("--pictures", "out/pictures"),
     "robustness": ("--scores", SCORES),
     "printed_grid": (),
+    "row_measures": (),
     "experiment": (),
     "lines": (),
     "faults": (),
