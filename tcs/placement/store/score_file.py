@@ -201,10 +201,19 @@ class ScoreFile:
         """The robot's collision shapes, None in files without them.
 
         Raises:
-            StoreError: If they are malformed.
+            StoreError: If they are malformed, or have other torso levels than the grid.
         """
         stored = self.metadata.get("robot_shapes")
-        return None if stored is None else RobotShapes.from_dict(stored)
+        if stored is None:
+            return None
+        shapes = RobotShapes.from_dict(stored)
+        levels = Grid.from_dict(self.grid).axis("torso").count
+        if len(shapes.torso_shift) != levels:
+            raise StoreError(
+                f"metadata 'robot_shapes' has {len(shapes.torso_shift)} torso levels; the grid has "
+                f"{levels}."
+            )
+        return shapes
 
     @property
     def nominal(self) -> StateTables:

@@ -5,11 +5,13 @@ from tcs.errors import StoreError
 from tcs.placement.store.robot_shapes import RobotShapes
 from tests.placement.selection.test_constraints import made_up_robot
 from tests.placement.store.example import METADATA, score_file
+from tests.placement.tables.small import small_grid
 
 
 def test_round_trip_through_the_metadata():
     robot = made_up_robot()
-    file = score_file(metadata={**METADATA, "robot_shapes": robot.to_dict()})
+    metadata = {**METADATA, "robot_shapes": robot.to_dict()}
+    file = score_file(grid=small_grid(torsos=1), metadata=metadata)
     again = file.robot_shapes
     for name in ("chain_R", "chain_p", "arm_base_R", "arm_base_p", "torso_shift", "margin"):
         np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
@@ -18,6 +20,8 @@ def test_round_trip_through_the_metadata():
             found, expected = (getattr(getattr(r, part), name) for r in (again, robot))
             np.testing.assert_array_equal(found, expected)
     assert score_file().robot_shapes is None
+    with pytest.raises(StoreError, match="has 1 torso levels; the grid has 2"):
+        _ = score_file(metadata=metadata).robot_shapes
 
 
 @pytest.mark.parametrize(
