@@ -64,6 +64,30 @@ def test_the_view_of_tiago_is_that_of_the_thesis(reach):
     np.testing.assert_allclose(np.degrees(view.pitch), [-82.5, 67.5], atol=1e-6)
 
 
+def test_the_camera_is_where_the_urdf_has_it_not_eq_16(reach):
+    plant, state = reach.scene.built.plant, reach.scene.plant_context
+    frames = (plant.GetFrameByName(name) for name in ("xtion_rgb_frame", "arm_1_link"))
+    camera, shoulder = (
+        frame.CalcPose(state, reach.scene.built.base_frame).translation() for frame in frames
+    )
+    np.testing.assert_allclose(camera - shoulder, [0.12275, 0.008, 0.329], atol=1e-6)
+    view = head_view(reach.scene, reach.torso_height)
+    # The scene is at another torso height.
+    np.testing.assert_allclose(view.p_BoCo_B[:2], camera[:2], atol=1e-9)
+    printed = np.array([0.136, 0.043, 0.155])
+    assert (camera - shoulder - printed)[2] == pytest.approx(0.174, abs=1e-6)
+
+
+def test_the_tool_frame_of_the_thesis_is_8_cm_behind_that_of_the_robot_file(reach):
+    plant, state = reach.scene.built.plant, reach.scene.plant_context
+    ours, theirs = (
+        plant.GetFrameByName(name) for name in ("gripper_tool_frame", "gripper_grasping_frame")
+    )
+    X = theirs.CalcPose(state, ours)
+    np.testing.assert_allclose(X.translation(), [-0.08, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(X.rotation().matrix(), np.eye(3), atol=1e-9)
+
+
 def test_the_camera_moves_with_the_torso_and_the_scene_is_restored(reach):
     before = reach.scene.positions()
     low, high = (head_view(reach.scene, torso_height).p_BoCo_B for torso_height in (0.0, 0.3))
