@@ -162,7 +162,13 @@ def exempt(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[str
 
     Pairs that cross in every posture are parts of one joint, and left out.
     """
-    _, poses = draw(bodies, postures, seed)
+    positions, poses = draw(bodies, postures, seed)
+    limits = bodies.robot.joint_limits()
+    within = [
+        i
+        for i in range(postures)
+        if all(limits[n][0] <= positions[n][i] <= limits[n][1] for n in bodies.robot.arm_joints)
+    ]
     off = {frozenset(pair) for pair in bodies.robot.disabled_pairs}
     counts = Counter[str]()
     for pair in bodies.pairs():
@@ -170,10 +176,10 @@ def exempt(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[str
             first, second = (bodies.meshes[body] for body in pair)
             counts[" / ".join(pair)] = sum(
                 _cross(first, _pose(poses[pair[0]], i), second, _pose(poses[pair[1]], i))
-                for i in range(postures)
+                for i in within
             )
-    partly = Counter({pair: count for pair, count in counts.items() if count < postures})
-    return _named(line, partly, postures, shown=len(partly))
+    partly = Counter({pair: count for pair, count in counts.items() if count < len(within)})
+    return _named(line, partly, len(within), shown=len(partly))
 
 
 def draw(bodies: Bodies, postures: int, seed: int) -> tuple[dict[str, FloatArray], Poses]:

@@ -2,8 +2,10 @@
 
     python scripts/fit_primitives.py pr2            rewrites the primitives file of its YAML file
     python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry
+    python scripts/fit_primitives.py tiago base_link=6 ...     fits these bodies again, with up to
+                                                    so many shapes, and keeps those of the others
 
-The results are deterministic. Both commands take a few minutes; pairs depend on the primitives.
+The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
 With `--pairs` the last line says how many postures the shapes block although the surfaces are free.
 """
 
@@ -17,14 +19,15 @@ import yaml
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, write_primitives
-from tcs.model.robots.fitting import fit_robot
+from tcs.model.robots.fitting import fit_robot, refit
 from tcs.model.robots.self_collision import blocked_by_shapes, propose_disabled_pairs
 
 
 def main() -> int:
     """Rewrite primitives or pairs of the robot given on the command line."""
-    names = [argument for argument in sys.argv[1:] if argument != "--pairs"]
-    if len(names) != 1:
+    names = [a for a in sys.argv[1:] if a != "--pairs" and "=" not in a]
+    more = [a.split("=") for a in sys.argv[1:] if "=" in a]
+    if len(names) != 1 or not all(len(m) == 2 and m[1].isdecimal() and int(m[1]) for m in more):
         print(__doc__, file=sys.stderr)
         return 2
     try:
@@ -34,6 +37,10 @@ def main() -> int:
             if path.suffix != ".yaml":
                 path = data_folder() / "models" / "robots" / f"{robot.name}.yaml"
             rewrite_pairs(robot, path)
+        elif more:
+            shapes = refit(robot, {body: int(most) for body, most in more})
+            write_primitives(Path(robot.primitives), shapes)
+            print(blocked_by_shapes(robot).text())
         else:
             rewrite_primitives(robot)
     except TcsError as error:

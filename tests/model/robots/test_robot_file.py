@@ -55,7 +55,7 @@ def test_soft_limits_come_from_the_urdf(pr2):
 
 def test_hard_limits_on_request(pr2):
     limits = pr2.with_choices(limits="hard").joint_limits()
-    assert limits["l_shoulder_lift_joint"] == (-0.5236, 1.3963)
+    assert limits["l_elbow_flex_joint"] == (-2.3213, 0.0)
     assert limits["torso_lift_joint"] == (0.0, 0.31)
 
 

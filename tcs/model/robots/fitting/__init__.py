@@ -1,12 +1,12 @@
 """Fitting: boxes and capsules that enclose the meshes of a robot, and the check that they do.
 
-In: a robot file and the triangles of its meshes. Out: primitives for each body (`fit_robot`), and
-how those of a robot file enclose its surface (`enclosure`).
+In: a robot file and the triangles of its meshes. Out: primitives for each body (`fit_robot`), more
+of them for some (`refit`), and how those of a robot file enclose its surface (`enclosure`).
 """
 
 from __future__ import annotations
 
-from tcs.model.robots.fitting.bodies import BodyFit, fit_robot
+from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
 
-__all__ = ["BodyEnclosure", "BodyFit", "enclosure", "fit_robot"]
+__all__ = ["BodyEnclosure", "BodyFit", "enclosure", "fit_robot", "refit"]

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tcs.errors import UnknownNameError
 from tcs.model.robots.fitting.bounding import corner_points, enclose, hull_volume
 from tcs.model.robots.fitting.division import Fit, Target, fit_triangles
-from tcs.model.robots.primitives import Primitive, union_volume
+from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
+from tcs.model.robots.primitives import Primitive, read_primitives, union_volume
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Urdf
 from tcs.model.robots.urdf.surfaces import (
@@ -31,6 +34,9 @@ ARM = Target(excess=1.40, max_shapes=2)
 """Links that the arm joints move."""
 REST = Target(excess=0.0, max_shapes=6)
 """Base, torso and head: large and not convex, so the fit uses every shape allowed."""
+CLOSE = Target(excess=0.0, max_shapes=0, saving=0.005, fine=2_000, units=1_200)
+"""Bodies that are fitted again with a number of shapes of their own. Grouping triangles coarsely
+keeps the search with many shapes short."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +100,31 @@ def fit_robot(
     if on_progress is not None:
         on_progress(len(groups), len(groups))
     return tuple(results)
+
+
+def refit(robot: RobotFile, shapes: Mapping[str, int]) -> tuple[Primitive, ...]:
+    """Return the primitives of a robot's file, those of some bodies fitted again.
+
+    More shapes follow a body more closely, and block fewer postures that its surface allows.
+
+    Args:
+        robot: The robot.
+        shapes: Largest number of shapes of each body to fit again.
+
+    Raises:
+        UnknownNameError: If the file has no primitive of a body.
+        RobotError: If a mesh or the primitives cannot be read.
+    """
+    found: dict[str, tuple[Primitive, ...]] = {}
+    for shape in read_primitives(Path(robot.primitives)):
+        found[shape.body] = (*found.get(shape.body, ()), shape)
+    surfaces = surfaces_to_enclose(robot)
+    for body, most in shapes.items():
+        if body not in found:
+            raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
+        _, _, surface = surfaces[body]
+        found[body] = fit_triangles(body, surface, replace(CLOSE, max_shapes=most)).primitives
+    return tuple(shape for fitted in found.values() for shape in fitted)
 
 
 def _groups(

@@ -29,13 +29,6 @@ _BEAM = 6
 """Beam width: divisions that are kept in each step of the search."""
 _SPLITS = 8
 """Splits of one part that are kept."""
-_ENOUGH = 0.04
-"""Least volume that a further shape must save, as a fraction of the hull volume."""
-_FINE = 15_000
-"""Number of triangles above which small neighbouring triangles are grouped into units; the division
-of a fine mesh would otherwise take many minutes."""
-_MOST_UNITS = 4_000
-"""Most units of grouped triangles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +38,17 @@ class Target:
     Attributes:
         excess: Volume of the union over the volume of the hull below which no shape is added.
         max_shapes: Largest number of shapes on one body.
+        saving: Least volume that a further shape must save, as a fraction of the hull volume.
+        fine: Number of triangles above which small neighbouring triangles are grouped into units;
+            the division of a fine mesh would otherwise take many minutes.
+        units: Most units of grouped triangles.
     """
 
     excess: float
     max_shapes: int
+    saving: float = 0.04
+    fine: int = 15_000
+    units: int = 4_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
         target: Stopping criterion.
     """
     hull = hull_volume(triangles)
-    search = _Search(body, triangles)
+    search = _Search(body, triangles, target)
     best: Fit | None = None
     beam: Beam = [(search.volume(search.everything), (search.everything,))]
     for count in range(1, target.max_shapes + 1):
@@ -92,7 +92,10 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
             beam = search.divide(beam)
         fits = [_finish(parts, search, hull) for _, parts in beam]
         found = min(fits, key=lambda fit: fit.union)
-        if best is None or found.excess < best.excess - _ENOUGH * (count - len(best.primitives)):
+        if best is None:
+            best = found
+        further = count - len(best.primitives)
+        if found.excess < best.excess - target.saving * further:
             best = found
         if best.excess <= target.excess:
             break
@@ -110,13 +113,13 @@ class _Search:
     A part is a set of units; a unit is one triangle, or several small neighbouring ones.
     """
 
-    def __init__(self, body: str, triangles: FloatArray) -> None:
+    def __init__(self, body: str, triangles: FloatArray, target: Target) -> None:
         self._body = body
         # About six triangles share a corner of a mesh: store each corner once.
         corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
         self._corners, self._index = corners, index.reshape(-1, 3)
         self._shapes: dict[bytes, Primitive] = {}
-        units = _units(triangles)
+        units = _units(triangles, target)
         self._order = np.argsort(units, kind="stable")
         starts = np.flatnonzero(np.diff(units[self._order], prepend=-1))
         self._starts = np.append(starts, len(triangles))
@@ -200,10 +203,10 @@ class _Search:
         return sorted(distinct.values(), key=lambda s: (s[0], s[1].tobytes()))[:_SPLITS]
 
 
-def _units(triangles: FloatArray) -> IntArray:
+def _units(triangles: FloatArray, target: Target) -> IntArray:
     """Return the unit of each triangle, numbered from 0, shape (n,)."""
     count = len(triangles)
-    if count <= _FINE:
+    if count <= target.fine:
         return np.arange(count, dtype=np.int64)
     middles = triangles.mean(axis=1)
     sizes = np.ptp(triangles, axis=1).max(axis=1)
@@ -215,7 +218,7 @@ def _units(triangles: FloatArray) -> IntArray:
         keys[alone] = np.array([-1, -1, 0])
         keys[alone, 2] = np.arange(int(alone.sum()))
         _, units = np.unique(keys, axis=0, return_inverse=True)
-        if units.max() < _MOST_UNITS:
+        if units.max() < target.units:
             return np.asarray(units.reshape(-1), dtype=np.int64)
         # This ends, because a cell that contains everything makes one unit.
         cell *= 1.25

@@ -1,11 +1,14 @@
 """Fitting: tight boxes, divisions, and that the shipped file is what the script writes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tcs.model.robots.fitting.bodies import HAND, fit_robot
+from tcs.errors import UnknownNameError
+from tcs.model.robots.fitting.bodies import HAND, fit_robot, refit
 from tcs.model.robots.fitting.bounding import (
     best_candidate,
     corner_points,
@@ -13,7 +16,7 @@ from tcs.model.robots.fitting.bounding import (
     tightest_orientation,
 )
 from tcs.model.robots.fitting.division import Target, fit_triangles
-from tcs.model.robots.primitives import enclosed
+from tcs.model.robots.primitives import enclosed, read_primitives, union_volume
 from tcs.model.robots.urdf.surfaces import body_triangles
 
 
@@ -84,3 +87,15 @@ def test_shipped_file_is_what_the_script_writes(pr2):
     assert [(s.body, s.kind) for s in fitted] == [(s.body, s.kind) for s in shipped]
     # As above.
     np.testing.assert_allclose([s.volume for s in fitted], [s.volume for s in shipped], rtol=1e-3)
+
+
+def test_fitting_one_body_again_follows_it_more_closely(pr2):
+    before = read_primitives(Path(pr2.primitives))
+    after = refit(pr2, {"l_forearm_link": 3})
+    body = [shape for shape in after if shape.body == "l_forearm_link"]
+    assert 1 < len(body) <= 3
+    assert [s for s in after if s not in body] == [s for s in before if s.body != body[0].body]
+    assert enclosed(body, body_triangles(pr2.model())[body[0].body]).all()
+    assert union_volume(body) < union_volume(s for s in before if s.body == body[0].body)
+    with pytest.raises(UnknownNameError, match="Did you mean 'l_forearm_link'"):
+        refit(pr2, {"l_forearm_lin": 3})

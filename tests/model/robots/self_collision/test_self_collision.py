@@ -165,7 +165,9 @@ def test_bodies_welded_to_the_base_are_checked_with_it(tmp_path):
 @pytest.mark.slow
 def test_shipped_pairs_are_what_the_search_finds(pr2):
     proposed = {group.reason: set(group.pairs) for group in propose_disabled_pairs(pr2)}
-    shipped = {group.reason: set(group.pairs) for group in pr2.disabled_groups}
+    # Groups with ranges are found by hand.
+    found = [group for group in pr2.disabled_groups if not group.ranges]
+    shipped = {group.reason: set(group.pairs) for group in found}
     assert proposed.keys() == shipped.keys()
     for reason, pairs in shipped.items():
         assert pairs <= proposed[reason]
