@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from tcs.cli import (
+    arplace,
     capability,
     options,
     pictures,
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 app.add_typer(robots.app, name="robot")
 app.add_typer(capability.app, name="capability")
+app.add_typer(arplace.app, name="arplace")
 app.add_typer(teleop.app, name="teleop")
 
 

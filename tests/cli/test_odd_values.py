@@ -10,8 +10,10 @@ import pytest
 from typer.main import get_command
 
 from tcs.capability import save_map
+from tcs.capability.arplace import query, save_arplace, save_probability_map
 from tcs.cli.app import app
 from tcs.teleop.runs.files import save_run
+from tests.capability.arplace.example import model
 from tests.capability.test_map import small_map
 from tests.teleop.runs.test_files import made
 
@@ -35,6 +37,8 @@ def base(tmp_path, monkeypatch, small_file):
         tmp_path / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.25], [1, 1])
     )
     save_run(tmp_path / "run.csv", made())
+    save_arplace(tmp_path / "discs.arp", model())
+    save_probability_map(tmp_path / "discs.apm", query(model()).map)
     return {
         "select": [small_file, "--here", "1", "0.3", "180"],
         "explain": [small_file, "--goal", "0"],
@@ -42,6 +46,9 @@ def base(tmp_path, monkeypatch, small_file):
         "map": [small_file, "--out", "map.png"],
         "capability show": ["map.tcm", "--out", "layer.png"],
         "capability merge": ["map.tcm", "--task", "pick-and-place", "--height", "0.4"],
+        "arplace query": ["discs.arp", "--std", "0.05"],
+        "arplace merge": ["discs.apm", "discs.apm"],
+        "arplace show": ["discs.arp", "--out", "modes.png"],
         "teleop replay": ["run.csv", "--robot", "nonsense", "--export", "page.html"],
     }
 
@@ -55,7 +62,10 @@ def command(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["select", "explain", "export", "map", "capability show", "capability merge", "teleop replay"],
+    [
+        *("select", "explain", "export", "map", "capability show", "capability merge"),
+        *("arplace query", "arplace merge", "arplace show", "teleop replay"),
+    ],
 )
 def test_odd_values_of_every_option_are_one_line(tcs_command, base, name):
     numbers, integers, texts = (itertools.cycle(v) for v in (NUMBERS, INTEGERS, TEXTS))

@@ -97,11 +97,14 @@ class ProbabilityMap:
             probability[obstacle.distance(self.x, self.y) < clearance] = 0.0
         return replace(self, probability=probability)
 
-    def best(self) -> tuple[int, int]:
+    def best(self, within: float = _SAME) -> tuple[int, int]:
         """Return the indices of the most probable base position.
 
         Of several equal ones it is the one farthest from all that are less probable, the first if
         these are several, too.
+
+        Args:
+            within: Probabilities this far below the greatest one count as equal to it.
 
         Raises:
             SelectionError: If all probabilities are 0.
@@ -112,7 +115,7 @@ class ProbabilityMap:
                 "the grasp succeeds from no base position of the map. Reduce the error, move the "
                 "object or the obstacles, or learn more base positions."
             )
-        ties = self.probability >= most - _SAME
+        ties = (self.probability >= most - within) & (self.probability > 0.0)
         spacing = [float(a[1] - a[0]) if len(a) > 1 else 1.0 for a in (self.x, self.y)]
         depth = distance_transform_edt(np.pad(ties, 1), sampling=spacing)[1:-1, 1:-1]
         i, j = np.unravel_index(int(np.argmax(depth)), depth.shape)
