@@ -39,6 +39,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "null_space": (),
     "capability": (),
     "itcm_task": ("--pictures", "out/pictures"),
+    "arplace": (),
     "robustness": ("--scores", SCORES),
     "printed_grid": (),
     "row_measures": (),

@@ -16,7 +16,7 @@ DATA_PARTS = ("models", "tasks")
 
 # Distributions whose module is called otherwise; one that is found by its files alone, and one
 # that trimesh imports for us.
-MODULE_OF = {"drake": "pydrake", "pillow": "PIL", "pyyaml": "yaml"}
+MODULE_OF = {"drake": "pydrake", "pillow": "PIL", "pyyaml": "yaml", "scikit-learn": "sklearn"}
 WITHOUT_MODULE = {"example-robot-data", "pycollada"}
 
 
@@ -26,7 +26,9 @@ def dependencies() -> set[str]:
 
 def of_extras() -> set[str]:
     """Modules of the extras that the package itself imports where they are installed."""
-    return {re.split(r"[^\w-]", line)[0] for line in PROJECT["optional-dependencies"]["bags"]}
+    extras = PROJECT["optional-dependencies"]
+    names = {re.split(r"[^\w-]", line)[0] for line in (*extras["arplace"], *extras["bags"])}
+    return {MODULE_OF.get(name, name) for name in names}
 
 
 def imported_modules() -> set[str]:

@@ -24,6 +24,9 @@ AXES = ("x", "y", "z", "angle")
 _X, _Y, _Z, _ANGLE = range(4)
 _CHUNK = 250
 """Samples whose regions are in memory together."""
+_INDISTINCT = 4
+"""Base positions whose numbers of successes differ by at most this many samples are equal: all see
+the same samples, and four that favour one of two occur by chance once in sixteen times."""
 _ROUNDING = 1e-9
 """Rounding of task parameters at the ends of their ranges [m or rad]."""
 _Z95 = 1.959963984540054
@@ -150,8 +153,8 @@ def query(
 
     Poses of the object are drawn from a normal distribution. The success model predicts the region
     of base positions for each; the fraction of regions that contain a base position is its
-    probability. Among base positions that are equal within two standard errors, the best one is the
-    farthest from all others. It is evaluated on fresh samples.
+    probability. Among base positions whose counts differ by at most four samples, the best one is
+    the farthest from all others. It is evaluated on fresh samples.
 
     Args:
         arplace: The model.
@@ -183,7 +186,7 @@ def query(
     if obstacles:
         radius = arplace.base_radius if clearance is None else clearance
         found = found.without(obstacles, radius)
-    i, j = found.best(_sampling_error(float(found.probability.max()), samples))
+    i, j = found.best(_INDISTINCT / samples if samples > _INDISTINCT else _ROUNDING)
     fresh = _draw(pose, spread, samples, seed, "arplace success")
     count = _count(arplace, fresh, (found.x[i : i + 1], found.y[j : j + 1]))[0, 0]
     success = count / samples
@@ -210,12 +213,6 @@ def wilson_interval(count: int, samples: int) -> tuple[float, float]:
     half = _Z95 * math.sqrt(fraction * (1.0 - fraction) / samples + 0.25 * square / samples)
     half /= 1.0 + square
     return max(0.0, centre - half), min(1.0, centre + half)
-
-
-def _sampling_error(probability: float, samples: int) -> float:
-    """Return two standard errors of an estimated probability, that of one sample at least."""
-    variance = max(probability * (1.0 - probability), 1.0 / samples)
-    return 2.0 * math.sqrt(variance / samples) if samples > 1 else _ROUNDING
 
 
 def _check_pose(arplace: Arplace, pose: ObjectPose, covariance: FloatArray) -> None:
