@@ -124,8 +124,12 @@ class GeneralisationOptions:
         ),
     ] = "automatic"
     energy: Annotated[
-        float, typer.Option(help="Fraction of the variance that the deformation modes hold.")
-    ] = 0.99
+        float | None,
+        typer.Option(
+            help="Fraction of the variance that the deformation modes hold.",
+            show_default="0.99 for landmarks, 0.999 for signed distances",
+        ),
+    ] = None
     scale: Annotated[
         float, typer.Option(help="Kernel scale of the support vector machine, in metres.")
     ] = 0.15

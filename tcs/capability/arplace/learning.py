@@ -12,7 +12,14 @@ import numpy as np
 from tcs.capability.arplace.boundary import Classifier, region_of
 from tcs.capability.arplace.labels import label
 from tcs.capability.arplace.model import Arplace
-from tcs.capability.arplace.shapes import AUTOMATIC, SIGNED_DISTANCE, chosen, shape_vectors
+from tcs.capability.arplace.shapes import (
+    AUTOMATIC,
+    BY_SHAPE,
+    EQUIDISTANT,
+    SIGNED_DISTANCE,
+    chosen,
+    shape_vectors,
+)
 from tcs.capability.arplace.success_model import INTERPOLATED, QUADRATIC
 from tcs.capability.arplace.task import TableTask
 from tcs.capability.reach import OnProgress
@@ -20,6 +27,9 @@ from tcs.errors import SelectionError
 from tcs.files.paths import data_reference
 from tcs.kernel.arrays import BoolArray
 from tcs.model.robots import load_robot
+
+_ENERGY = {BY_SHAPE: 0.99, EQUIDISTANT: 0.99, SIGNED_DISTANCE: 0.999}
+"""Fraction of the variance that is kept by default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +41,9 @@ class ModelOptions:
     rule: str = AUTOMATIC
     """One of `tcs.capability.arplace.success_model.RULES`; `AUTOMATIC` is quadratic for landmarks
     and interpolated for signed distances."""
-    energy: float = 0.99
-    """Fraction of the variance that its modes hold."""
+    energy: float | None = None
+    """Fraction of the variance that its modes hold; None is 0.99 for landmarks and 0.999 for signed
+    distances, most of whose variance is far from the boundary."""
     classifier: Classifier = field(default_factory=Classifier)
     """Parameters of the support vector machine."""
 
@@ -116,7 +127,7 @@ def generalised(
         vectors=np.asarray(vectors, dtype=np.float64),
         used=used,
         rule=rule,
-        energy=options.energy,
+        energy=_ENERGY[representation] if options.energy is None else options.energy,
         torso_height=torso_height,
         base_radius=base_radius,
         metadata={

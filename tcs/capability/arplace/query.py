@@ -23,7 +23,10 @@ AXES = ("x", "y", "z", "angle")
 """Axes of the object's pose in F, in the order of a covariance."""
 _X, _Y, _Z, _ANGLE = range(4)
 _CHUNK = 250
-"""Samples whose regions are in memory together."""
+"""Most samples whose regions are in memory together: they fit into the processor's cache."""
+_ONE_THREAD = 1 << 18
+"""Multiplications up to which OpenBLAS multiplies matrices in one thread; waiting for a second
+thread takes longer than a whole query if the processor is busy."""
 _INDISTINCT = 4
 """Base positions whose numbers of successes differ by at most this many samples are equal: all see
 the same samples, and four that favour one of two occur by chance once in sixteen times."""
@@ -283,8 +286,11 @@ def _count(arplace: Arplace, poses: FloatArray, at: tuple[FloatArray, FloatArray
     window, (x, y) = arplace.window, arplace.grid
     grid = (x[window.x], y[window.y])
     total: Any = 0
-    for start in range(0, max(len(learned), 1), _CHUNK):
-        part = learned[start : start + _CHUNK]
+    size = max(
+        1, min(_CHUNK, _ONE_THREAD // window.model.distribution.mean.size // window.model.kept)
+    )
+    for start in range(0, max(len(learned), 1), size):
+        part = learned[start : start + size]
         vectors = window.model.shapes(part[:, [_X, _Z, _ANGLE]])
         inside = is_inside(arplace.representation, vectors, grid, part[:, _Y], at)
         total = total + inside.sum(axis=0, dtype=np.int64)
