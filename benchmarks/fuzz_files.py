@@ -165,8 +165,29 @@ def write_texts(folder: Path) -> None:
     trimesh.creation.box((0.05, 0.1, 0.2)).export(folder / "mesh.stl")
 
 
+def _write_arplace(folder: Path) -> None:
+    """Write an ARPlace model of TIAGo and a probability map."""
+    from tcs.capability.arplace import (
+        TableTask,
+        learn,
+        query,
+        save_arplace,
+        save_probability_map,
+    )
+    from tcs.model.grid import Axis
+
+    task = TableTask(
+        distance=Axis("distance", "m", 0.0, 0.15, 3),
+        base_x=Axis("base_x", "m", -1.0, 0.1, 11),
+        base_y=Axis("base_y", "m", -0.9, 0.1, 19),
+    )
+    model = learn("tiago", task)
+    save_arplace(folder / "model.arp", model)
+    save_probability_map(folder / "map.apm", query(model).map)
+
+
 def _write_results(folder: Path) -> None:
-    """Write the files that `tcs` makes itself: scores, run, recording and map."""
+    """Write the files that `tcs` makes itself: scores, run, recording and maps."""
     import tcs
     from tcs.capability import MapGrid, Reach, map_from_recording, save_map, write_csv
     from tcs.model.robots import load_robot
@@ -181,6 +202,7 @@ def _write_results(folder: Path) -> None:
     write_csv(folder / "recording.csv", reach.robot, recording)
     grid = MapGrid.of(0.1, 8, "all")
     save_map(folder / "map.tcm", map_from_recording(reach, grid, recording).capability)
+    _write_arplace(folder)
     robot = load_robot("iiwa7")
     rng, n = np.random.default_rng(0), 20
     quaternion = rng.standard_normal((n, 4))
@@ -271,6 +293,18 @@ def _read_map(path: Path) -> Any:
     from tcs.capability import load_map
 
     return load_map(path)
+
+
+def _read_arplace(path: Path) -> Any:
+    from tcs.capability.arplace import load_arplace
+
+    return load_arplace(path)
+
+
+def _read_probability_map(path: Path) -> Any:
+    from tcs.capability.arplace import load_probability_map
+
+    return load_probability_map(path)
 
 
 def _read_run(path: Path) -> Any:
@@ -371,6 +405,19 @@ def _map(path: Path, _: int) -> None:
     merge(loaded, TaskShape(shape="pick-and-place", height=0.41).task(loaded.grid.step))
 
 
+def _arplace(path: Path, _: int) -> None:
+    from tcs.capability.arplace import covariance_of, load_arplace, query
+
+    query(load_arplace(path), covariance=covariance_of((0.05, 0.05, 0.0, 0.0)), samples=50)
+
+
+def _probability_map(path: Path, _: int) -> None:
+    from tcs.capability.arplace import load_probability_map, merge_maps
+
+    loaded = load_probability_map(path)
+    merge_maps([loaded, loaded], "product").best()
+
+
 def _run(path: Path, number: int) -> None:
     from tcs.output.view.teleop.replay import load_run_view
 
@@ -402,6 +449,14 @@ FILE_TYPES = (
     FileType("head file", "head.yaml", mutations.yaml_mutated, _read_head, _head),
     FileType("score file", "scores.tcs", mutations.joblib_mutated, _read_scores, _scores),
     FileType("capability map", "map.tcm", mutations.joblib_mutated, _read_map, _map),
+    FileType("ARPlace model", "model.arp", mutations.joblib_mutated, _read_arplace, _arplace),
+    FileType(
+        "probability map",
+        "map.apm",
+        mutations.joblib_mutated,
+        _read_probability_map,
+        _probability_map,
+    ),
     FileType("run (CSV)", "run.csv", mutations.json_cell_mutated, _read_run, _run),
     FileType(
         "recording (CSV)", "recording.csv", mutations.csv_mutated, _read_recording, _recording

@@ -142,6 +142,17 @@ COMMANDS = (
         ("--environment", "--task-at", "--robot"),
     ),
     Command("capability show", ("map.tcm",), ("--out", "out.png", "--tilt", "9")),
+    Command(
+        "arplace learn",
+        (),
+        (
+            *("--distances", "0.1", "0.1", "2", "--heights", "0.5", "0.1", "1", "--jobs", "1"),
+            *("--base-x", "-0.8", "0.1", "6", "--base-y", "-0.5", "0.2", "6", "--out", "out.arp"),
+        ),
+    ),
+    Command("arplace query", ("model.arp",), ("--std", "0.05", "--samples", "20")),
+    Command("arplace merge", ("map.apm",)),
+    Command("arplace show", ("model.arp",)),
     Command("teleop", (), _WINDOW),
     Command("teleop replay", ("run.csv",), ("--export", "out.html")),
     Command("teleop replay", ("run.csv",), _WINDOW, ("--port", "--duration")),

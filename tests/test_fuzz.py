@@ -31,9 +31,11 @@ def scripts():
 def folder(scripts, tmp_path_factory):
     """A valid example of every file; what `tcs` makes comes from the suites of the formats."""
     from tcs.capability import save_map
+    from tcs.capability.arplace import query, save_arplace, save_probability_map
     from tcs.model.robots import load_robot
     from tcs.placement.store import save_scores
     from tcs.teleop.runs.files import save_run
+    from tests.capability.arplace.example import model
     from tests.capability.test_map import small_map
     from tests.placement.store.example import score_file
     from tests.teleop.runs.test_files import made
@@ -42,6 +44,8 @@ def folder(scripts, tmp_path_factory):
     scripts[1].write_texts(made_in)
     save_scores(made_in / "scores.tcs", score_file())
     save_map(made_in / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.2], [1, 1]))
+    save_arplace(made_in / "model.arp", model())
+    save_probability_map(made_in / "map.apm", query(model()).map)
     save_run(made_in / "run.csv", made())
     joints = load_robot("pr2").arm_joints
     rows = [",".join(joints), *([",".join(["-0.3"] * len(joints))] * 5)]
@@ -49,7 +53,7 @@ def folder(scripts, tmp_path_factory):
     return made_in
 
 
-@pytest.mark.parametrize("number", range(14))
+@pytest.mark.parametrize("number", range(16))
 def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
     fuzz, fuzz_files, _ = scripts
     file_type = fuzz_files.FILE_TYPES[number]
@@ -74,7 +78,7 @@ def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
 
 
 def test_every_type_has_its_entry(scripts):
-    assert len(scripts[1].FILE_TYPES) == 14
+    assert len(scripts[1].FILE_TYPES) == 16
 
 
 def test_a_mutant_is_the_same_in_every_run(scripts, folder):

@@ -215,9 +215,12 @@ class PoseOptions:
 
         Raises:
             SelectionError: If a value is invalid.
+            typer.BadParameter: If both --std and --covariance are given.
         """
         from tcs.capability.arplace import covariance_of
 
+        if self.covariance is not None and self.std:
+            raise typer.BadParameter("replaces --std; give one of them.", param_hint="--covariance")
         std = (self.std, self.std, self.std_z, math.radians(self.std_angle_deg))
         return covariance_of(std, self.covariance)
 
@@ -281,6 +284,8 @@ def query(
     from tcs.capability.arplace import load_arplace, save_probability_map
     from tcs.capability.arplace import query as query_arplace
 
+    if clearance is not None and not obstacle:
+        raise typer.BadParameter("requires --obstacle.", param_hint="--clearance")
     _check_outputs(out, picture)
     obstacles = [obstacle_of(text) for text in obstacle or ()]
     arplace = load_arplace(model)
@@ -336,24 +341,29 @@ def show(
     ],
     out: Annotated[Path | None, typer.Option(help=PICTURE)] = None,
     figure: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="modes|reconstruction|generalisation",
-            help="Picture of a model: deformation modes and their energy, errors of the "
-            "reconstruction, or boundaries by degree and energy.",
+            help="With --out, picture of a model: deformation modes and their energy, errors of "
+            "the reconstruction, or boundaries by degree and energy.",
+            show_default="modes",
         ),
-    ] = "modes",
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Print a summary of a model or a map, and draw it."""
     from tcs.capability.arplace import load_arplace, load_probability_map
     from tcs.capability.arplace.files import is_probability_map
 
-    if figure not in FIGURES:
+    if figure is not None and out is None:
+        raise typer.BadParameter("requires --out.", param_hint="--figure")
+    if figure not in (None, *FIGURES):
         raise typer.BadParameter(f"must be one of {', '.join(FIGURES)}.", param_hint="--figure")
     _check_outputs(None, out)
     if is_probability_map(model):
         found = load_probability_map(model)
+        if figure is not None:
+            raise typer.BadParameter("a map has a single figure.", param_hint="--figure")
         i, j = found.best()
         if out is not None:
             _draw_map(out, found, (float(found.x[i]), float(found.y[j])), "")
@@ -365,7 +375,7 @@ def show(
         from tcs.output.draw import save_figure
         from tcs.output.draw.arplace import figure_of
 
-        save_figure(out, figure_of(arplace, figure))
+        save_figure(out, figure_of(arplace, figure or FIGURES[0]))
     result = arplace_tables.model_result(model, arplace)
     terminal.print_result(result, arplace_tables.report_model, as_json=as_json)
 

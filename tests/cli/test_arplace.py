@@ -165,4 +165,13 @@ def test_files_of_the_wrong_type_are_one_line(holed, tcs_command, tmp_path):
         ran = tcs_command("arplace", *words)
         assert ran.code == 1
         assert ran.err.count("\n") == 1
-    assert tcs_command("arplace", "show", holed, "--figure", "faces").code == 2
+    picture = tmp_path / "map.png"
+    for words in (
+        ("show", holed, "--out", picture, "--figure", "faces"),
+        ("show", holed, "--figure", "modes"),
+        ("show", stored, "--out", picture, "--figure", "modes"),
+        ("query", holed, "--clearance", 0.1),
+        ("query", holed, "--std", 0.1, "--covariance", 0.01, 0.0, 0.01),
+    ):
+        assert tcs_command("arplace", *words).code == 2, words
+    assert not picture.exists()
