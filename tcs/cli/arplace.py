@@ -20,9 +20,9 @@ from tcs.output.terminal import arplace_tables
 if TYPE_CHECKING:
     from tcs.capability.arplace import (
         Arplace,
+        FloorObstacle,
         ModelOptions,
         ObjectPose,
-        Obstacle,
         ProbabilityMap,
         TableTask,
     )
@@ -380,13 +380,13 @@ def show(
     terminal.print_result(result, arplace_tables.report_model, as_json=as_json)
 
 
-def obstacle_of(text: str) -> Obstacle:
+def obstacle_of(text: str) -> FloorObstacle:
     """Return an obstacle given as "X,Y,SIZE_X,SIZE_Y[,YAW_DEG]" [m, deg].
 
     Raises:
         SelectionError: If the text is not of that form, or a value is out of range.
     """
-    from tcs.capability.arplace import Obstacle
+    from tcs.capability.arplace import FloorObstacle
 
     try:
         numbers = [float(number) for number in text.split(",")]
@@ -396,7 +396,7 @@ def obstacle_of(text: str) -> Obstacle:
         raise SelectionError(
             f"--obstacle is '{text[:80]}'; must be X,Y,SIZE_X,SIZE_Y or X,Y,SIZE_X,SIZE_Y,YAW_DEG."
         )
-    return Obstacle(*numbers[:4], *map(math.radians, numbers[4:]))
+    return FloorObstacle(*numbers[:4], *map(math.radians, numbers[4:]))
 
 
 def _axis(name: str, unit: str, values: Values) -> Axis:

@@ -16,7 +16,7 @@ from tcs.capability.arplace.files import (
 from tcs.capability.arplace.learning import ModelOptions, learn
 from tcs.capability.arplace.model import Arplace, Errors, reconstruction_errors
 from tcs.capability.arplace.point_distribution import PointDistribution
-from tcs.capability.arplace.probability_map import Obstacle, ProbabilityMap, merge_maps
+from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap, merge_maps
 from tcs.capability.arplace.query import ObjectPose, Query, covariance_of, query
 from tcs.capability.arplace.success_model import SuccessModel
 from tcs.capability.arplace.task import TableTask
@@ -25,9 +25,9 @@ __all__ = [
     "Arplace",
     "Classifier",
     "Errors",
+    "FloorObstacle",
     "ModelOptions",
     "ObjectPose",
-    "Obstacle",
     "PointDistribution",
     "ProbabilityMap",
     "Query",

@@ -21,7 +21,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class FloorObstacle:
     """A rectangle on the floor plan, in F."""
 
     x: float
@@ -85,7 +85,7 @@ class ProbabilityMap:
         for array in (self.x, self.y, self.probability):
             array.flags.writeable = False
 
-    def without(self, obstacles: Sequence[Obstacle], clearance: float) -> ProbabilityMap:
+    def without(self, obstacles: Sequence[FloorObstacle], clearance: float) -> ProbabilityMap:
         """Return the map with probability 0 at base positions too close to an obstacle.
 
         Args:

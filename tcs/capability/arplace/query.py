@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tcs.capability.arplace.model import Arplace
-from tcs.capability.arplace.probability_map import Obstacle, ProbabilityMap
+from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap
 from tcs.capability.arplace.shapes import is_inside
 from tcs.capability.arplace.task import PARAMETERS
 from tcs.errors import SelectionError
@@ -147,7 +147,7 @@ def query(
     pose: ObjectPose | None = None,
     covariance: FloatArray | None = None,
     *,
-    obstacles: Sequence[Obstacle] = (),
+    obstacles: Sequence[FloorObstacle] = (),
     clearance: float | None = None,
     samples: int = 1000,
     seed: int = 0,

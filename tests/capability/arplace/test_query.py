@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tcs.capability.arplace import (
+    FloorObstacle,
     ObjectPose,
-    Obstacle,
     ProbabilityMap,
     covariance_of,
     merge_maps,
@@ -127,20 +127,20 @@ def test_ties_are_decided_by_depth():
 
 def test_obstacles_are_subtracted(arplace):
     free = query(arplace, MIDDLE)
-    obstacle = Obstacle(free.x, free.y, 0.2, 0.4, 0.3)
+    obstacle = FloorObstacle(free.x, free.y, 0.2, 0.4, 0.3)
     found = query(arplace, MIDDLE, obstacles=[obstacle], clearance=0.1)
     x, y = np.meshgrid(found.map.x, found.map.y, indexing="ij")
     assert (found.x, found.y) != (free.x, free.y)
     assert np.all(found.map.probability <= free.map.probability)
     changed = found.map.probability < free.map.probability
     assert np.hypot(x - free.x, y - free.y)[changed].max() < 0.1 + np.hypot(0.1, 0.2) + 1e-9
-    wide = [Obstacle(0.0, 0.0, 4.0, 4.0)]
+    wide = [FloorObstacle(0.0, 0.0, 4.0, 4.0)]
     with pytest.raises(SelectionError, match="from no base position"):
         query(arplace, MIDDLE, obstacles=wide)
 
 
 def test_the_distance_from_an_obstacle():
-    found = Obstacle(1.0, 0.0, 2.0, 1.0, np.pi / 2).distance(
+    found = FloorObstacle(1.0, 0.0, 2.0, 1.0, np.pi / 2).distance(
         np.array([1.0, 2.0]), np.array([0.0, 2.0])
     )
     np.testing.assert_allclose(found, [[0.0, 1.0], [0.5, np.hypot(0.5, 1.0)]], atol=1e-12)
