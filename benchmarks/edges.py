@@ -34,7 +34,12 @@ from tcs.placement.tables import Reason
 
 AWAY = (0.1, 0.06, 0.01, 0.003, 1e-3, 1e-4, 0.0)
 """How far a joint is from singular [rad]."""
-JOINTS = {"shoulder, joint 2": SHOULDER, "elbow, joint 4": ELBOW, "wrist, joint 6": WRIST}
+JOINTS = {
+    "joint 2 near singular": SHOULDER,
+    "joint 4 near singular": ELBOW,
+    "joint 6 near singular": WRIST,
+}
+WINDOWS = {"window between limits": between_limits, "window between contacts": between_contacts}
 WIDTHS = (0.01, 0.003, 0.001)
 """Widths of windows [rad of the free joint]."""
 BATCH = 50
@@ -53,7 +58,8 @@ def main() -> int:
     header()
     missed, rows = 0, []
     for robot in options.robots:
-        for name, goals in strata(robot, options):
+        sums = {group: np.zeros(3, int) for group in (*JOINTS, *WINDOWS)}
+        for group, name, goals in strata(robot, options):
             reasons, short, total, most = counted(goals)
             if not total:
                 continue
@@ -61,20 +67,24 @@ def main() -> int:
             missed += lost
             text = ", ".join(f"{k} {n}" for k, n in reasons.items() if k != "reached")
             row(
-                f"{robot}: {name}",
+                f"{robot}: {group}, {name}",
                 f"missed {lost} of {total}{f' ({text})' if text else ''}, "
                 f"measure short {short} (most {most:.3f})",
             )
-            rows.append([robot, name, f"{lost} of {total}", str(short)])
-    record("edges", ["robot", "goals", "missed", "measure short by more than 1e-3"], rows)
+            sums[group] += lost, short, total
+        for group, (lost, short, total) in sums.items():
+            if total:
+                rows.append([robot, group, str(total), str(lost), str(short)])
+    columns = ["robot", "goals", "number", "missed", "measure short by more than 1e-3"]
+    record("edges", columns, rows)
     save(options)
     return int(missed > 0)
 
 
 def strata(
     robot: str, options: argparse.Namespace
-) -> Iterator[tuple[str, Iterator[Constructed | None]]]:
-    """Return the strata of one robot by name, those that its limits allow."""
+) -> Iterator[tuple[str, str, Iterator[Constructed | None]]]:
+    """Return group, name and goals of the strata of one robot."""
     job = load_job("shaving", "wheelchair", robot)
     lowered = job.lowered(job.scene())
     scene, grid = lowered.arrays, lowered.grid
@@ -85,12 +95,12 @@ def strata(
                 near_singular_goals(rng, scene, grid, joint, away, min(BATCH, options.goals))
                 for _ in range(0, options.goals, BATCH)
             )
-            yield f"{name}, {away:g} rad", batches
-    for border, make in (("limits", between_limits), ("contacts", between_contacts)):
+            yield name, f"{away:g} rad", batches
+    for name, make in WINDOWS.items():
         for width in WIDTHS:
             rng = np.random.default_rng([options.seed, round(1e4 * width)])
             tries = (make(rng, scene, grid, width) for _ in range(20 * options.windows))
-            yield f"window of {width:g} rad between {border}", first(tries, options.windows)
+            yield name, f"{width:g} rad", first(tries, options.windows)
 
 
 def first(tries: Iterator[Constructed | None], count: int) -> Iterator[Constructed]:

@@ -46,6 +46,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "experiment": (),
     "lines": (),
     "faults": (),
+    "edges": (),
     "fuzz": ("--mutants", "5000"),
     "fuzz_options": (),
 }

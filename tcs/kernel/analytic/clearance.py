@@ -16,7 +16,6 @@ from tcs.kernel.analytic.scratch import (
     UNCHECKED_PAIR,
     Search,
     add_candidate,
-    fill_samples,
     measure_feasible,
     solve,
     sort_candidates,
@@ -40,7 +39,7 @@ END_HALVINGS = 12
 SAME_STRETCH = 1.01
 """Candidates closer than this many sample spacings have no infeasible sample between them; the
 excess over 1 allows for rounding."""
-TWO, NOWHERE = int_constant(2), int_constant(-1)
+ONE, NOWHERE = int_constant(1), int_constant(-1)
 
 
 @inner
@@ -105,19 +104,16 @@ def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) ->
             outside = middle
     if inside == 0.0:
         return found
-    search.angle[0] = angle + side * inside
+    is_feasible(problem, search, b, angle + side * inside)
+    measure_feasible(problem.arm, search, ONE)
     return add_candidate(search, b, 0, inside, found)
 
 
 @inner
 def is_feasible(problem: Problem, search: Search, b: int, angle: float) -> bool:
-    """Return whether all joints keep their limits at an angle on branch b.
-
-    Slack and isotropy become the first entries of `slack` and `measure`.
-    """
-    fill_samples(search, angle, angle, TWO)
-    solve(problem.arm, search, b, TWO)
-    measure_feasible(problem.arm, search, TWO)
+    """Return whether all joints keep their limits at an angle on branch b, the first sample."""
+    search.angle[0], search.cosine[0], search.sine[0] = angle, np.cos(angle), np.sin(angle)
+    solve(problem.arm, search, b, ONE)
     return search.slack[0] >= 0.0
 
 
@@ -141,7 +137,7 @@ def free_between(
     found = add_ends(problem, search, found)
     search.free_from[0] = found
     by_angle(search, found)
-    count, halvings, left, placed = found, 0, 0, NOWHERE
+    count, halvings, placed = found, 0, NOWHERE
     for rank in range(count):
         n = search.order[rank]
         if search.found_pair[n, 0] == UNCHECKED_PAIR and _is_free_at(
@@ -159,28 +155,27 @@ def free_between(
         ends[0, 0], ends[0, 1] = search.found_angle[m], search.found_angle[n]
         _keep(search.found_q[m], search.found_pair[m], end_q[0, 0], end_pair[0, 0])
         _keep(search.found_q[n], search.found_pair[n], end_q[0, 1], end_pair[0, 1])
-        # The links are at the left end already if they were at the right end of the last interval.
-        is_placed, is_whole, top = placed == m, True, 1
-        left = 1 - left if is_placed else left
-        placed = NOWHERE
+        R, p = search.ends_R, search.ends_p
+        # The left end is the right end of the last interval.
+        if placed == m:
+            _copy_poses(R[0, 1], p[0, 1], R[0, 0], p[0, 0])
+        else:
+            link_poses(problem.chain_R, problem.chain_p, search.found_q[m], R[0, 0], p[0, 0])
+        link_poses(problem.chain_R, problem.chain_p, search.found_q[n], R[0, 1], p[0, 1])
+        placed, top = n, 1
         while top and halvings < MAX_HALVINGS:
             top -= 1
-            if end_pair[top, 0, 0] == NO_PAIR and end_pair[top, 1, 0] == NO_PAIR:
-                continue
-            if _stays_in_contact(problem, work, body_A, search, top, left, is_placed):
-                placed = n if is_whole else NOWHERE
+            if _stays_in_contact(problem, work, body_A, search, top):
                 continue
             halvings += 1
-            is_placed = is_whole = False
             first, last = ends[top, 0], ends[top, 1]
             middle = 0.5 * (first + last)
             if not first < middle < last or top + 2 > MAX_STACK:
                 continue
             work.last[:] = end_pair[top, 0]
             if _is_free_at(problem, work, body_A, search, b, middle):
-                search.angle[0] = middle
                 if is_feasible(problem, search, b, middle):
-                    search.angle[0] = middle
+                    measure_feasible(problem.arm, search, ONE)
                     found = add_candidate(search, b, 0, 0.5 * (last - first), found)
                     break
                 work.last[0] = NO_PAIR
@@ -188,8 +183,12 @@ def free_between(
             ends[top + 1, 0], ends[top + 1, 1] = middle, last
             _keep(search.q, work.last, end_q[top + 1, 0], end_pair[top + 1, 0])
             _keep(end_q[top, 1], end_pair[top, 1], end_q[top + 1, 1], end_pair[top + 1, 1])
+            _copy_poses(work.link_R, work.link_p, R[top + 1, 0], p[top + 1, 0])
+            _copy_poses(R[top, 1], p[top, 1], R[top + 1, 1], p[top + 1, 1])
             ends[top, 1] = middle
             _keep(search.q, work.last, end_q[top, 1], end_pair[top, 1])
+            _copy_poses(work.link_R, work.link_p, R[top, 1], p[top, 1])
+            placed = NOWHERE
             top += 2
     return found
 
@@ -201,6 +200,16 @@ def _keep(q: FloatArray, pair: IntArray, to_q: FloatArray, to_pair: IntArray) ->
         to_q[k] = q[k]
     for k in range(3):
         to_pair[k] = pair[k]
+
+
+@inner
+def _copy_poses(R: FloatArray, p: FloatArray, to_R: FloatArray, to_p: FloatArray) -> None:
+    """Copy the poses of the links."""
+    for i in range(8):
+        for r in range(3):
+            to_p[i, r] = p[i, r]
+            for c in range(3):
+                to_R[i, r, c] = R[i, r, c]
 
 
 @inner
@@ -219,48 +228,31 @@ def _is_free_at(
 
 @inner
 def _stays_in_contact(
-    problem: Problem,
-    work: Workspace,
-    body_A: FloatArray,
-    search: Search,
-    top: int,
-    left: int,
-    is_placed: bool,
+    problem: Problem, work: Workspace, body_A: FloatArray, search: Search, top: int
 ) -> bool:
     """Return whether the pairs in contact at the ends of an interval keep in contact between them.
 
     True also if they move too little for a free angle between the ends to matter.
-
-    Args:
-        problem: The scene.
-        work: Workspace with environment, base, gripper and goal in place.
-        body_A: The robot's other shapes in A at the current torso level.
-        search: Holds the interval; its link poses are filled, at the left end in row `left`.
-        top: Index of the interval.
-        left: 0 or 1.
-        is_placed: Whether the link poses at the left end are up to date.
     """
-    q, pair, R, p = search.ends_q[top], search.ends_pair[top], search.link_R, search.link_p
+    pair, R, p = search.ends_pair[top], search.ends_R[top], search.ends_p[top]
     if pair[0, 0] == NO_PAIR or pair[1, 0] == NO_PAIR:
-        return False
-    right = 1 - left
-    if not is_placed:
-        link_poses(problem.chain_R, problem.chain_p, q[0], R[left], p[left])
-    link_poses(problem.chain_R, problem.chain_p, q[1], R[right], p[right])
-    motion = other = _motion(problem, search, pair[0])
+        return pair[0, 0] == pair[1, 0]
+    motion = other = _motion(problem, search, R, p, pair[0])
     if pair[0, 0] != pair[1, 0] or pair[0, 1] != pair[1, 1] or pair[0, 2] != pair[1, 2]:
-        other = _motion(problem, search, pair[1])
+        other = _motion(problem, search, R, p, pair[1])
     if max(motion, other) < LEAST_MOTION:
         return True
-    return _touches(problem, R[left], p[left], work, body_A, pair[0], motion) and (
-        _touches(problem, R[right], p[right], work, body_A, pair[1], other)
+    return _touches(problem, R[0], p[0], work, body_A, pair[0], motion) and (
+        _touches(problem, R[1], p[1], work, body_A, pair[1], other)
     )
 
 
 @inner
-def _motion(problem: Problem, search: Search, pair: IntArray) -> float:
-    """Return how far the shapes of a pair move between the two postures of `link_R` [m]."""
-    total, R, p = 0.0, search.link_R, search.link_p
+def _motion(
+    problem: Problem, search: Search, R: FloatArray, p: FloatArray, pair: IntArray
+) -> float:
+    """Return how far the shapes of a pair move between the link poses R, p at two ends [m]."""
+    total = 0.0
     for side in range(1, 3):
         if side == 2 and pair[0] != ARM:
             break

@@ -81,10 +81,10 @@ class Search(NamedTuple):
     """Joint angles at their ends [rad], shape (MAX_STACK, 2, 7)."""
     ends_pair: IntArray
     """Pairs in contact at their ends, as in `Workspace.last`, shape (MAX_STACK, 2, 3)."""
-    link_R: FloatArray
-    """Orientations of A, L1..L7 in A at both ends of an interval, shape (2, 8, 3, 3)."""
-    link_p: FloatArray
-    """Origins of A, L1..L7 in A at both ends [m], shape (2, 8, 3)."""
+    ends_R: FloatArray
+    """Orientations of A, L1..L7 in A at their ends, shape (MAX_STACK, 2, 8, 3, 3)."""
+    ends_p: FloatArray
+    """Origins of A, L1..L7 in A at their ends [m], shape (MAX_STACK, 2, 8, 3)."""
     moved: FloatArray
     """A shape at both ends of an interval, packed, shape (2, COLUMNS)."""
     trial: FloatArray
@@ -127,8 +127,8 @@ def new_search() -> Search:
         np.empty((MAX_STACK, 2)),
         np.empty((MAX_STACK, 2, 7)),
         np.empty((MAX_STACK, 2, 3), np.int64),
-        np.empty((2, 8, 3, 3)),
-        np.empty((2, 8, 3)),
+        np.empty((MAX_STACK, 2, 8, 3, 3)),
+        np.empty((MAX_STACK, 2, 8, 3)),
         np.empty((2, COLUMNS)),
         np.empty(7),
         np.empty(7),
