@@ -388,7 +388,7 @@ def interrupted(
         lines = [line for line in err.splitlines() if "compiling for this" not in line]
         if len(lines) != int(is_reported):
             counts["tracebacks or other lines"] += 1
-            row("", f"{command.name}, {number.name}: {err.splitlines()[-1:]}")
+            row("", f"{command.name}, {number.name}, exit code {running.returncode}: {err!r}")
         new = leftovers(folder, command) - left
         counts["left by SIGKILL" if number == signal.SIGKILL else "left by SIGINT or SIGTERM"] += (
             len(new)
