@@ -45,13 +45,14 @@ def propose_disabled_pairs(
     - the primitives touch in every posture, so a check would forbid all of them.
 
     Args:
-        robot: The robot; its present disabled pairs are ignored.
+        robot: The robot; its present disabled pairs are ignored, and so are their ranges.
         postures: Postures drawn uniformly within the hard limits.
         seed: Seed of the draws.
 
     Raises:
         RobotError: If the robot's model cannot be used.
     """
+    robot = robot.without_ranges
     hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
     model = model_with_extras(robot)
     built = robot.model().links.keys()
