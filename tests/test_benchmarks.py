@@ -161,7 +161,7 @@ def test_a_small_run_prints_every_part():
 
 
 def test_the_base_poses_of_the_thesis_are_as_far_apart_as_published(module):
-    script = module("capability")
+    script = module("itcm_task")
     high, expert = (script.base_of(task) for task in (script.HIGH, script.EXPERT))
     # "14 cm apart and the yaw angle difference was only 2.8 deg", from figures of two digits.
     assert np.hypot(high[0] - expert[0], high[1] - expert[1]) == pytest.approx(0.14, abs=0.005)
