@@ -196,7 +196,10 @@ def test_map_check_refuses_recorded_maps(tcs_command, tmp_path):
         (("from-ik", "--tool", "hand"), "unknown tool frame 'hand'"),
         (("from-ik", "--lift", 2), "torso height 2 m is out of range"),
         (("from-ik", "--step", 0), "step of the map is 0.0 m"),
-        (("record", "--seconds", 0), "its length is 0 s, but a length of a recording must be 0.02 to"),
+        (
+            ("record", "--seconds", 0),
+            "its length is 0 s, but a length of a recording must be 0.02 to",
+        ),
     ],
 )
 def test_invalid_options_are_one_line(words, message, tcs_command, tmp_path):
