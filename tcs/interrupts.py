@@ -6,6 +6,8 @@ it comes. It imports nothing large.
 
 from __future__ import annotations
 
+import atexit
+import os
 import signal
 import sys
 import threading
@@ -16,6 +18,12 @@ from types import FrameType
 _ENDINGS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 _received: list[int] = []
 """The signals received: compiled libraries may drop the exception, or replace it by another one."""
+_reported: list[int] = []
+"""The exit code that `report_interrupt` returned last, if it did."""
+_LATER = 0.05
+"""Time after which a signal is sent again that came while a compiled module was loaded [s]."""
+_LOADER = ("create_module", "<frozen importlib._bootstrap_external>")
+"""Function and file of the frame in which Python loads a compiled module."""
 
 
 @contextmanager
@@ -41,6 +49,10 @@ def remember_interrupts(*, to_the_end: bool = False) -> Iterator[None]:
         yield
         return
     _received.clear()
+    _reported.clear()
+    if to_the_end:
+        # The first one to be registered is the last one to be called.
+        atexit.register(_exit_as_reported)
     report_unraisable = sys.unraisablehook
 
     def report_other(unraisable: sys.UnraisableHookArgs) -> None:
@@ -60,9 +72,29 @@ def remember_interrupts(*, to_the_end: bool = False) -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL if to_the_end else handler)
 
 
-def _remember(number: int, _frame: FrameType | None) -> None:
+def _remember(number: int, frame: FrameType | None) -> None:
     _received.append(number)
+    while frame is not None:
+        if (frame.f_code.co_name, frame.f_code.co_filename) == _LOADER:
+            # Drake, for one, logs an exception that is raised in the initialisation of its modules.
+            again = threading.Timer(_LATER, signal.raise_signal, (number,))
+            again.daemon = True
+            again.start()
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt
+
+
+def _exit_as_reported() -> None:
+    """End an interrupted process with the exit code that `report_interrupt` returned.
+
+    Where compiled code ran the Python code that the interrupt ended, Python notes an unhandled
+    interrupt, even if it is handled further out, and would end with the signal instead.
+    """
+    if _reported:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_reported[0])
 
 
 def was_interrupted() -> bool:
@@ -81,4 +113,5 @@ def report_interrupt() -> int:
     number = _received[0] if _received else signal.SIGINT
     sys.stderr.write(f"tcs: {_ENDINGS[signal.Signals(number)]}; no half-written file is left.\n")
     sys.stderr.flush()
+    _reported[:] = [128 + number]
     return 128 + number

@@ -147,6 +147,44 @@ typer.core.TyperGroup.parse_args = parse_args
     assert (ran.code, ran.out, ran.err) == (code, "", line)
 
 
+@SIGNALS
+def test_interrupt_while_a_compiled_module_is_loaded_waits_for_its_end(process, number, code, line):
+    # Drake logs an exception raised there, with its traceback.
+    before = f"""
+import signal, sys, time
+text = "def create_module():\\n    signal.raise_signal({int(number)})\\n    print('loaded')"
+exec(compile(text, "<frozen importlib._bootstrap_external>", "exec"))
+class Loading:
+    def find_spec(self, name, *_):
+        if name == "tcs.cli.view":
+            create_module()
+            time.sleep(5.0)
+sys.meta_path.insert(0, Loading())
+"""
+    ran = process("list", before=before)
+    assert (ran.code, ran.out, ran.err) == (code, "loaded\n", line)
+
+
+@SIGNALS
+def test_interrupt_of_python_code_run_by_compiled_code_ends_with_the_exit_code(
+    process, number, code, line
+):
+    # Python notes an unhandled interrupt there, whatever happens further out.
+    before = f"""
+import ctypes, signal, sys
+class Running:
+    def find_spec(self, name, *_):
+        if name == "tcs.cli.view":
+            run = ctypes.pythonapi.PyRun_String
+            names = 2 * [ctypes.py_object]
+            run.restype, run.argtypes = ctypes.py_object, [ctypes.c_char_p, ctypes.c_int, *names]
+            run(b"import signal; signal.raise_signal({int(number)})", 257, {{}}, {{}})
+sys.meta_path.insert(0, Running())
+"""
+    ran = process("list", before=before)
+    assert (ran.code, ran.out, ran.err) == (code, "", line)
+
+
 def test_interrupt_after_the_end_prints_no_traceback(process):
     before = """
 import atexit, signal
