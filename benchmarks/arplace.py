@@ -47,6 +47,7 @@ from tcs.capability.arplace.labels import grasp_rotation, label, table_scene
 from tcs.capability.arplace.learning import generalised
 from tcs.capability.arplace.query import wilson_interval
 from tcs.errors import SelectionError
+from tcs.files.writing import make_folder
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import REACHED, Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
@@ -102,6 +103,8 @@ def main() -> None:
     command_line.add_argument("--queries", type=int, default=100, help="timed queries of each")
     command_line.add_argument("--pictures", type=Path, metavar="FOLDER", help="also draw these")
     options = command_line.parse_args()
+    if options.pictures is not None:
+        make_folder(options.pictures)
     header("scikit-learn")
     begun = time.process_time()
     arplace = learn(ROBOT)

@@ -36,6 +36,7 @@ from tcs.capability.head import head_view
 from tcs.capability.surroundings import Surroundings
 from tcs.capability.visibility import visibility
 from tcs.errors import SelectionError
+from tcs.files.writing import make_folder
 from tcs.model.robots import load_robot
 from tcs.model.scene import EnvironmentFile
 from tcs.output.draw import save_figure
@@ -86,6 +87,8 @@ def main() -> None:
     command_line.add_argument("--pictures", type=Path)
     options = command_line.parse_args()
     header()
+    if options.pictures is not None:
+        make_folder(options.pictures)
     thesis_task(options.seeds, options.jobs, options.pictures)
     save(options)
 
