@@ -82,7 +82,6 @@ def test_saved_figures_state_machine_and_versions(path):
     assert saved["tables"]
 
 
-@pytest.mark.xfail(strict=True, reason="tables of 0.1.0 stand until `make benchmark-save` has run")
 def test_every_block_and_cell_is_saved(figures):
     pages = (page.read_text(encoding="utf-8") for page in figures.pages())
     assert set().union(*map(figures.unsaved, pages)) == set()
