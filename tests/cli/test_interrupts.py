@@ -8,6 +8,7 @@ import pty
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import joblib
 import pytest
@@ -167,11 +168,12 @@ sys.meta_path.insert(0, Loading())
 
 @SIGNALS
 def test_interrupt_of_python_code_run_by_compiled_code_ends_with_the_exit_code(
-    process, number, code, line
+    tmp_path, number, code, line
 ):
-    # Python notes an unhandled interrupt there, whatever happens further out.
-    before = f"""
-import ctypes, signal, sys
+    # Python notes an unhandled interrupt there, whatever happens further out, and `python -m` then
+    # ends with the signal. The site module is the only place for code before that of `-m`.
+    (tmp_path / "sitecustomize.py").write_text(f"""
+import ctypes, sys
 class Running:
     def find_spec(self, name, *_):
         if name == "tcs.cli.view":
@@ -180,9 +182,16 @@ class Running:
             run.restype, run.argtypes = ctypes.py_object, [ctypes.c_char_p, ctypes.c_int, *names]
             run(b"import signal; signal.raise_signal({int(number)})", 257, {{}}, {{}})
 sys.meta_path.insert(0, Running())
-"""
-    ran = process("list", before=before)
-    assert (ran.code, ran.out, ran.err) == (code, "", line)
+""")
+    checkout = Path(__file__).resolve().parents[2]
+    done = subprocess.run(
+        [sys.executable, "-m", "tcs", "list"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{checkout}"},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", line)
 
 
 def test_interrupt_after_the_end_prints_no_traceback(process):
