@@ -89,7 +89,7 @@ def _exit_as_reported() -> None:
     """End an interrupted process with the exit code that `report_interrupt` returned.
 
     Where compiled code ran the Python code that the interrupt ended, Python notes an unhandled
-    interrupt, even if it is handled further out, and would end with the signal instead.
+    interrupt, even if it is handled further out, and `python -m` would end with the signal instead.
     """
     if _reported:
         sys.stdout.flush()

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import coal
 import numpy as np
 import pytest
 
@@ -202,7 +203,6 @@ def test_both_arms_have_the_same_disabled_pairs(pr2):
 
 def bvh(triangles):
     """Return triangles as a model of Coal, which tests them exactly."""
-    coal = pytest.importorskip("coal")
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for corner in corners:
@@ -218,7 +218,6 @@ def bvh(triangles):
 
 def mesh_distances(robot, pair, postures):
     """Return the distances of two meshes in given postures [m], at most 0 if they cross."""
-    coal = pytest.importorskip("coal")
     model = robot.model()
     triangles = body_triangles(model)
     meshes = [bvh(triangles[body]) for body in pair]
