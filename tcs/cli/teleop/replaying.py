@@ -1,0 +1,57 @@
+"""`tcs teleop replay`: play back a saved run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tcs.cli import options
+from tcs.cli.option_groups import expand_options
+from tcs.cli.teleop.groups import open_page
+from tcs.output import terminal
+from tcs.output.terminal import tables
+
+
+@expand_options
+def replay(
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="A run saved by `tcs teleop`.", show_default=False),
+    ],
+    *,
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Name or YAML file of the robot.", show_default="that of the run"),
+    ] = None,
+    page: options.ExportOptions,
+    window: options.WindowOptions,
+) -> None:
+    """Play back a saved run in the browser, or write it as one page."""
+    page.check()
+    if page.export is not None:
+        from tcs.output.view.teleop.replay_page import export_run
+
+        written = export_run(run, page.export, robot, meshes=page.meshes)
+        result = {
+            "file": str(page.export), "bytes": written.size, "samples": written.samples,
+            "seconds": written.seconds, "meshes": page.meshes,
+            "source": written.source if page.meshes else None,
+        }  # fmt: skip
+        terminal.print_result(result, tables.report_page, as_json=page.as_json)
+        return
+
+    from tcs.output.view import open_meshcat
+    from tcs.output.view.teleop import Replay, RobotDisplay
+    from tcs.output.view.teleop.replay import load_run_view
+
+    view = load_run_view(run, robot)
+    meshcat = open_meshcat(window.port)
+    playback = Replay(meshcat, RobotDisplay(view.arm, meshes=True), view)
+    typer.echo(f"{view.arm.robot.title}: {view.summary}")
+    open_page(meshcat.web_url(), window.browser)
+    try:
+        playback.run(window.duration)
+    except KeyboardInterrupt:
+        terminal.note("closed.")
