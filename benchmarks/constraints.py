@@ -21,15 +21,8 @@ import numpy as np
 from table import cell, header, parser, row, save
 
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.selection import (
-    PAPER_WEIGHTS,
-    Constraints,
-    Obstacle,
-    Region,
-    SelectionTables,
-    Top,
-    select,
-)
+from tcs.placement.constraints import Constraints, Obstacle, Region
+from tcs.placement.selection import PAPER_WEIGHTS, SelectionTables, Top, select
 from tcs.placement.store import load_scores
 
 

@@ -21,13 +21,7 @@ from table import cell, header, parser, row, save
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.scoring import build_sets
-from tcs.placement.selection import (
-    PAPER_WEIGHTS,
-    SelectionTables,
-    TravelWeights,
-    select,
-    utility,
-)
+from tcs.placement.selection import PAPER_WEIGHTS, SelectionTables, TravelWeights, select, utility
 from tcs.placement.selection.travel import legs_from
 from tcs.placement.store import load_scores
 from tcs.placement.tables import Reason, ScoreTable, SetTable

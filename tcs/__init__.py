@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
+    from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.robustness import Evaluation, evaluate, robustify
     from tcs.placement.scoring import (
@@ -27,16 +28,7 @@ if TYPE_CHECKING:
         summary,
         verify,
     )
-    from tcs.placement.selection import (
-        Choice,
-        Constraints,
-        Obstacle,
-        Region,
-        Top,
-        TravelWeights,
-        UtilityWeights,
-        select,
-    )
+    from tcs.placement.selection import Choice, Top, TravelWeights, UtilityWeights, select
     from tcs.placement.store import ScoreFile
     from tcs.placement.store import load_scores as load
     from tcs.placement.store import save_scores as save
@@ -74,14 +66,14 @@ __all__ = [
 
 _HOMES = {
     "Choice": ("tcs.placement.selection", "Choice"),
-    "Constraints": ("tcs.placement.selection", "Constraints"),
+    "Constraints": ("tcs.placement.constraints", "Constraints"),
     "Evaluation": ("tcs.placement.robustness", "Evaluation"),
     "Explanation": ("tcs.placement.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.model.grid", "InitialConfiguration"),
     "LiveScorer": ("tcs.placement.scoring", "LiveScorer"),
     "Observation": ("tcs.model.scene", "Observation"),
-    "Obstacle": ("tcs.placement.selection", "Obstacle"),
-    "Region": ("tcs.placement.selection", "Region"),
+    "Obstacle": ("tcs.placement.constraints", "Obstacle"),
+    "Region": ("tcs.placement.constraints", "Region"),
     "ScoreFile": ("tcs.placement.store", "ScoreFile"),
     "TcsError": ("tcs.errors", "TcsError"),
     "Top": ("tcs.placement.selection", "Top"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,20 +13,20 @@ from tcs.errors import StoreError, StoreFormatError, TcsError
 from tcs.files.compression import (
     AtMost,
     ascending_from,
-    check_claims,
     compress,
     decompress,
     differences,
 )
-from tcs.files.joblib_file import check_header, check_types, header, write_joblib
+from tcs.files.joblib_file import JoblibFormat, check_types
 from tcs.files.plain import plain
-from tcs.files.reader import explained, read_joblib
 from tcs.model.robots import robot_names
 
-FORMAT = "tcs capability map"
-FORMAT_VERSION = 2
-WHAT = "Capability map"
-AGAIN = "Make the map again with `tcs capability from-ik`, `record` or `from-bag`."
+FORMAT = JoblibFormat(
+    what="Capability map",
+    name="tcs capability map",
+    version=2,
+    again="Make the map again with `tcs capability from-ik`, `record` or `from-bag`.",
+)
 
 
 def save_map(path: str | os.PathLike[str], capability: CapabilityMap) -> None:
@@ -40,7 +39,7 @@ def save_map(path: str | os.PathLike[str], capability: CapabilityMap) -> None:
     Raises:
         OutputError: If the file cannot be written.
     """
-    write_joblib(Path(path), _encode(capability), WHAT)
+    FORMAT.save(path, _encode(capability))
 
 
 def load_map(path: str | os.PathLike[str]) -> CapabilityMap:
@@ -51,15 +50,12 @@ def load_map(path: str | os.PathLike[str]) -> CapabilityMap:
         StoreFormatError: If the file is truncated, of another format or version, or inconsistent.
         UnsafeStoreError: If it names an object outside the store's allow-list.
     """
-    path = Path(path)
-    content = read_joblib(path, WHAT, AGAIN)
-    return explained(path, lambda: _decode(content), WHAT, AGAIN)
+    return FORMAT.load(path, _decode)
 
 
 def _encode(capability: CapabilityMap) -> dict[str, Any]:
     c = capability
     return {
-        **header(FORMAT, FORMAT_VERSION),
         "map_type": c.map_type,
         "step": c.grid.step,
         "yaw_bins": c.grid.yaw_bins,
@@ -76,9 +72,7 @@ def _encode(capability: CapabilityMap) -> dict[str, Any]:
     }
 
 
-def _decode(content: object) -> CapabilityMap:
-    content = check_header(content, FORMAT, FORMAT_VERSION)
-    check_claims(content)
+def _decode(content: dict[str, Any]) -> CapabilityMap:
     types = {"map_type": str, "step": float, "yaw_bins": int, "tilts": list, "torso_height": float}
     check_types(content, {**types, "manipulability_scale": float, "metadata": dict})
     tilts = content["tilts"]
@@ -114,7 +108,7 @@ def stored_name(capability: CapabilityMap, key: str) -> str:
     """
     name = capability.metadata.get(key)
     if not isinstance(name, str) or not name:
-        raise StoreError(f"{WHAT}: its metadata do not name its {key}. {AGAIN}")
+        raise StoreError(f"{FORMAT.what}: its metadata do not name its {key}. {FORMAT.again}")
     return name
 
 
@@ -135,6 +129,6 @@ def robot_reference(
     if robot is not None or stored in robot_names() or os.path.isfile(stored):
         return stored
     raise StoreError(
-        f"{WHAT} '{path}' was made for robot '{stored}', which does not ship with tcs and whose "
-        "file is missing. Name its file with --robot FILE."
+        f"{FORMAT.what} '{path}' was made for robot '{stored}', which does not ship with tcs and "
+        "whose file is missing. Name its file with --robot FILE."
     )

@@ -14,7 +14,8 @@ from tcs.files.quantities import DURATION, JOBS, QUERIES
 
 if TYPE_CHECKING:
     from tcs.model.grid import Axis, InitialConfiguration
-    from tcs.placement.selection import Constraints, Top, TravelWeights
+    from tcs.placement.constraints import Constraints
+    from tcs.placement.selection import Top, TravelWeights
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A file made by `tcs score`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -188,7 +189,7 @@ class ConstraintOptions:
         Raises:
             TcsError: If one is not of its form.
         """
-        from tcs.placement.selection import (
+        from tcs.placement.constraints import (
             Constraints,
             Obstacle,
             Region,

@@ -3,15 +3,71 @@
 from __future__ import annotations
 
 import io
+import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import joblib
 
 from tcs.errors import StoreFormatError
+from tcs.files.compression import check_claims
+from tcs.files.reader import explained, read_joblib
 from tcs.files.writing import whole_file
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, slots=True)
+class JoblibFormat:
+    """A file format: a joblib file of plain containers under a header."""
+
+    what: str
+    """Name of such a file in messages, e.g. "Capability map"."""
+    name: str
+    """Name of the format in the header, e.g. "tcs capability map"."""
+    version: int
+    """Version that this program writes and reads."""
+    again: str
+    """Advice in messages on how to make such a file."""
+
+    def save(self, path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
+        """Write a file; an interrupted write leaves none.
+
+        Args:
+            path: File to write; its folder must exist.
+            content: Content without the header; large arrays should be compressed already.
+
+        Raises:
+            OutputError: If the file cannot be written.
+        """
+        write_joblib(Path(path), {**header(self.name, self.version), **content}, self.what)
+
+    def load(
+        self, path: str | os.PathLike[str], decode: Callable[[dict[str, Any]], Value]
+    ) -> Value:
+        """Read a file; the content is validated and never executed.
+
+        Args:
+            path: The file.
+            decode: Returns the value of a content whose header and array sizes were checked.
+
+        Raises:
+            StoreError: If the file cannot be read.
+            StoreFormatError: If the file is truncated, of another format or version, or `decode`
+                raises an error.
+            UnsafeStoreError: If it names an object outside the store's allow-list.
+        """
+        path = Path(path)
+        content = read_joblib(path, self.what, self.again)
+        return explained(path, lambda: decode(self._checked(content)), self.what, self.again)
+
+    def _checked(self, content: object) -> dict[str, Any]:
+        checked = check_header(content, self.name, self.version)
+        check_claims(checked)
+        return checked
 
 
 def write_joblib(path: Path, content: Mapping[str, Any], what: str) -> None:

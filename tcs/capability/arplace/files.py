@@ -14,16 +14,23 @@ from tcs.capability.arplace.model import Arplace
 from tcs.capability.arplace.probability_map import ProbabilityMap
 from tcs.capability.arplace.task import MAX_LABELS, TableTask
 from tcs.errors import StoreFormatError, TcsError
-from tcs.files.compression import AtMost, check_claims, compress, decompress
-from tcs.files.joblib_file import check_header, check_types, header, write_joblib
+from tcs.files.compression import AtMost, compress, decompress
+from tcs.files.joblib_file import JoblibFormat, check_types
 from tcs.files.plain import plain
-from tcs.files.reader import explained, read_joblib
+from tcs.files.reader import read_joblib
 
-MODEL, MAP = "ARPlace model", "Probability map"
-MODEL_FORMAT, MAP_FORMAT = "tcs arplace model", "tcs arplace probability map"
-FORMAT_VERSION = 1
-MODEL_AGAIN = "Learn the model again with `tcs arplace learn`."
-MAP_AGAIN = "Make the map again with `tcs arplace query`."
+MODEL = JoblibFormat(
+    what="ARPlace model",
+    name="tcs arplace model",
+    version=1,
+    again="Learn the model again with `tcs arplace learn`.",
+)
+MAP = JoblibFormat(
+    what="Probability map",
+    name="tcs arplace probability map",
+    version=1,
+    again="Make the map again with `tcs arplace query`.",
+)
 
 
 def save_arplace(path: str | os.PathLike[str], arplace: Arplace) -> None:
@@ -36,7 +43,7 @@ def save_arplace(path: str | os.PathLike[str], arplace: Arplace) -> None:
     Raises:
         OutputError: If the file cannot be written.
     """
-    write_joblib(Path(path), _encode(arplace), MODEL)
+    MODEL.save(path, _encode(arplace))
 
 
 def load_arplace(path: str | os.PathLike[str]) -> Arplace:
@@ -47,9 +54,7 @@ def load_arplace(path: str | os.PathLike[str]) -> Arplace:
         StoreFormatError: If the file is truncated, of another format or version, or inconsistent.
         UnsafeStoreError: If it names an object outside the store's allow-list.
     """
-    path = Path(path)
-    content = read_joblib(path, MODEL, MODEL_AGAIN)
-    return explained(path, lambda: _decode(content), MODEL, MODEL_AGAIN)
+    return MODEL.load(path, _decode)
 
 
 def save_probability_map(path: str | os.PathLike[str], found: ProbabilityMap) -> None:
@@ -63,13 +68,12 @@ def save_probability_map(path: str | os.PathLike[str], found: ProbabilityMap) ->
         OutputError: If the file cannot be written.
     """
     content = {
-        **header(MAP_FORMAT, FORMAT_VERSION),
         "base_yaw": float(found.base_yaw),
         "torso_height": float(found.torso_height),
         "metadata": {},
         **{name: compress(getattr(found, name)) for name in ("x", "y", "probability")},
     }
-    write_joblib(Path(path), content, MAP)
+    MAP.save(path, content)
 
 
 def load_probability_map(path: str | os.PathLike[str]) -> ProbabilityMap:
@@ -80,9 +84,7 @@ def load_probability_map(path: str | os.PathLike[str]) -> ProbabilityMap:
         StoreFormatError: If the file is truncated, of another format or version, or inconsistent.
         UnsafeStoreError: If it names an object outside the store's allow-list.
     """
-    path = Path(path)
-    content = read_joblib(path, MAP, MAP_AGAIN)
-    return explained(path, lambda: _decode_map(content), MAP, MAP_AGAIN)
+    return MAP.load(path, _decode_map)
 
 
 def is_probability_map(path: str | os.PathLike[str]) -> bool:
@@ -91,15 +93,14 @@ def is_probability_map(path: str | os.PathLike[str]) -> bool:
     Raises:
         StoreError: If the file cannot be read.
     """
-    content = read_joblib(Path(path), MODEL, MODEL_AGAIN)
-    return isinstance(content, dict) and content.get("format") == MAP_FORMAT
+    content = read_joblib(Path(path), MODEL.what, MODEL.again)
+    return isinstance(content, dict) and content.get("format") == MAP.name
 
 
 def _encode(arplace: Arplace) -> dict[str, Any]:
     polygons = [polygon for boundary in arplace.boundaries for polygon in boundary]
     corners = np.concatenate([np.empty((0, 2)), *polygons])
     return {
-        **header(MODEL_FORMAT, FORMAT_VERSION),
         "task": plain("task", arplace.task.to_dict()),
         "representation": arplace.representation,
         "rule": arplace.rule,
@@ -116,9 +117,7 @@ def _encode(arplace: Arplace) -> dict[str, Any]:
     }
 
 
-def _decode(content: object) -> Arplace:
-    content = check_header(content, MODEL_FORMAT, FORMAT_VERSION)
-    check_claims(content)
+def _decode(content: dict[str, Any]) -> Arplace:
     numbers = dict.fromkeys(("energy", "torso_height", "base_radius"), float)
     check_types(
         content, {"task": dict, "representation": str, "rule": str, "metadata": dict, **numbers}
@@ -168,9 +167,7 @@ def _boundaries(content: dict[str, Any], grasps: int) -> tuple[Boundary, ...]:
     )
 
 
-def _decode_map(content: object) -> ProbabilityMap:
-    content = check_header(content, MAP_FORMAT, FORMAT_VERSION)
-    check_claims(content)
+def _decode_map(content: dict[str, Any]) -> ProbabilityMap:
     check_types(content, {"base_yaw": float, "torso_height": float, "metadata": dict})
     plain("metadata", content["metadata"])
     x = decompress(content, "x", "f8", (AtMost(MAX_LABELS),))

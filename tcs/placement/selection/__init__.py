@@ -9,28 +9,19 @@ from __future__ import annotations
 from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
-from tcs.placement.selection.constraint_files import merged, read_constraints
-from tcs.placement.selection.constraints import Constraints
 from tcs.placement.selection.observed import Match, nearest_table
-from tcs.placement.selection.obstacles import Obstacle
-from tcs.placement.selection.regions import Region
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utility
 
 __all__ = [
     "PAPER_WEIGHTS",
     "Choice",
-    "Constraints",
     "Match",
-    "Obstacle",
-    "Region",
     "SelectionTables",
     "Top",
     "TravelWeights",
     "UtilityWeights",
-    "merged",
     "nearest_table",
-    "read_constraints",
     "select",
     "shortest_tour",
     "utility",

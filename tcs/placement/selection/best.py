@@ -13,20 +13,15 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
+from tcs.placement.constraints import Constraints, disliked_candidates
+from tcs.placement.selection.admission import SAME_VALUE, Admitted, admitted_candidates
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables
-from tcs.placement.selection.constraints import (
-    SAME_VALUE,
-    Admitted,
-    Constraints,
-    admitted_candidates,
-)
 from tcs.placement.selection.coverage import warning_outside
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
-from tcs.placement.selection.preferences import disliked_candidates
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility

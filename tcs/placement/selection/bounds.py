@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.placement.selection.admission import Admitted
 from tcs.placement.selection.alternatives import Distinct
-from tcs.placement.selection.constraints import Admitted
 from tcs.placement.selection.index import GroupIndex
 from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.travel import Legs

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.selection.constraints import Left
+from tcs.placement.constraints import Footprint, Postures
+from tcs.placement.selection.admission import Left
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
-from tcs.placement.selection.postures import Postures
-from tcs.placement.selection.regions import Footprint
 from tcs.placement.store import ScoreFile
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import ScoreTable, SetTable, SuccessTable

@@ -4,15 +4,9 @@ import pytest
 
 from tcs.errors import GridError, SelectionError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
+from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.selection import (
-    Constraints,
-    SelectionTables,
-    Top,
-    TravelWeights,
-    UtilityWeights,
-    select,
-)
+from tcs.placement.selection import SelectionTables, Top, TravelWeights, UtilityWeights, select
 from tests.placement.selection.test_choice import brute_force, keeps
 from tests.placement.store.example import score_file
 from tests.placement.tables.small import all_sets, random_scores, small_grid

@@ -9,16 +9,10 @@ from hypothesis import assume, given, settings
 
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.base_lattice import lattice_of
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.selection import (
-    Constraints,
-    SelectionTables,
-    TravelWeights,
-    UtilityWeights,
-    search,
-    select,
-)
+from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, search, select
 from tcs.placement.tables import Reason, ScoreTable
 from tests.placement.tables.small import all_sets, random_scores, small_grid
 

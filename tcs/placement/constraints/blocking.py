@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tcs.placement.selection.contact import in_contact, point_distance
-from tcs.placement.selection.obstacles import Obstacle
-from tcs.placement.selection.postures import ROUNDING, Postures
+from tcs.placement.constraints.contact import in_contact, point_distance
+from tcs.placement.constraints.obstacles import Obstacle
+from tcs.placement.constraints.postures import ROUNDING, Postures
 from tcs.placement.store.robot_shapes import Primitives
 
 FloatArray = NDArray[np.float64]

@@ -7,18 +7,11 @@ import pytest
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
+from tcs.placement.constraints import Constraints, Obstacle, Region
+from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
+from tcs.placement.constraints.regions import Footprint
 from tcs.placement.scoring.sets import build_sets
-from tcs.placement.selection import (
-    Constraints,
-    Obstacle,
-    Region,
-    SelectionTables,
-    TravelWeights,
-    UtilityWeights,
-    select,
-)
-from tcs.placement.selection.blocking import blocked_bodies, blocked_solutions
-from tcs.placement.selection.regions import Footprint
+from tcs.placement.selection import SelectionTables, TravelWeights, UtilityWeights, select
 from tcs.placement.store.robot_shapes import Primitives, RobotShapes
 from tests.placement.selection.test_choice import brute_force
 from tests.placement.tables.small import all_sets, random_scores, small_grid

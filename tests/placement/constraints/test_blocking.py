@@ -5,9 +5,10 @@ import pytest
 
 from tcs.model.scene import EnvironmentFile, Scene
 from tcs.model.scene.spec import SceneSpec
+from tcs.placement.constraints import Obstacle
+from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
 from tcs.placement.scoring import load_job, score
-from tcs.placement.selection import Obstacle, SelectionTables
-from tcs.placement.selection.blocking import blocked_bodies, blocked_solutions
+from tcs.placement.selection import SelectionTables
 from tests.environments import CORNER, write_environment
 
 OBSTACLES = (

@@ -3,8 +3,8 @@ import pytest
 from scipy.optimize import linprog
 
 from tcs.errors import SelectionError
-from tcs.placement.selection import Obstacle, Region
-from tcs.placement.selection.regions import RADIUS, Footprint
+from tcs.placement.constraints import Obstacle, Region
+from tcs.placement.constraints.regions import RADIUS, Footprint
 
 RECTANGLE = Footprint((-0.2, -0.3), (0.4, 0.3), 0.0)
 

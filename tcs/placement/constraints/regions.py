@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, one_line
 from tcs.files.quantities import POSITION
-from tcs.placement.selection.contact import segment_distance
+from tcs.placement.constraints.contact import segment_distance
 from tcs.placement.store.robot_shapes import BOX, RobotShapes
 
 FloatArray = NDArray[np.float64]

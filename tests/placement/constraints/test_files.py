@@ -1,7 +1,7 @@
 import pytest
 
 from tcs.errors import TcsError
-from tcs.placement.selection import Constraints, Obstacle, Region, merged, read_constraints
+from tcs.placement.constraints import Constraints, Obstacle, Region, merged, read_constraints
 
 TEXT = """
 only: ["head_rest >= 35 deg"]

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from tcs.errors import DataFileError, GridError, SelectionError, UnknownNameError, one_line
-from tcs.placement.selection.constraints import Constraints
-from tcs.placement.selection.obstacles import Obstacle
-from tcs.placement.selection.regions import Region
+from tcs.placement.constraints.constraints import Constraints
+from tcs.placement.constraints.obstacles import Obstacle
+from tcs.placement.constraints.regions import Region
 
 KEYS = ("only", "keep", "forbid", "blocked", "prefer")
 """Keys of the file, each a list of texts as on the command line."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, one_line
 from tcs.files.quantities import ANGLE_DEG, POSITION, SIZE
-from tcs.placement.selection.regions import Region
+from tcs.placement.constraints.regions import Region
 
 CEILING = 40.0
 """Top of an obstacle whose height is not given [m]: above every robot."""

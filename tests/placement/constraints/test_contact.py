@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from tcs.placement.selection.contact import boxes_overlap, in_contact, segment_distance
+from tcs.placement.constraints.contact import boxes_overlap, in_contact, segment_distance
 from tcs.placement.store.robot_shapes import BOX, CAPSULE, SPHERE
 
 HALF = np.array([0.3, 0.2, 0.5])

@@ -1,0 +1,20 @@
+"""The commands `tcs arplace learn`, `query`, `merge` and `show`."""
+
+from __future__ import annotations
+
+import typer
+
+from tcs.cli.arplace.drawing import merge, show
+from tcs.cli.arplace.learning import learn
+from tcs.cli.arplace.querying import query
+
+app = typer.Typer(
+    help="ARPlace: probability of a grasp over base positions, learned for varying parameters.",
+    no_args_is_help=True,
+)
+app.command()(learn)
+app.command()(query)
+app.command()(merge)
+app.command()(show)
+
+__all__ = ["app"]

@@ -1,0 +1,91 @@
+"""The command `tcs arplace query`: the best base position for an object."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tcs.cli import options
+from tcs.cli.arplace.drawing import PICTURE, check_outputs, draw_map
+from tcs.cli.arplace.groups import PoseOptions
+from tcs.cli.option_groups import expand_options
+from tcs.errors import SelectionError
+from tcs.output import terminal
+from tcs.output.terminal import arplace_tables
+
+if TYPE_CHECKING:
+    from tcs.capability.arplace import FloorObstacle
+
+Model = Annotated[Path, typer.Argument(metavar="FILE", help="A model made by `tcs arplace learn`.")]
+
+
+@expand_options
+def query(
+    model: Model,
+    pose: PoseOptions,
+    obstacle: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,SIZE_X,SIZE_Y[,YAW_DEG]",
+            help="A rectangle on the floor (m, deg); may be repeated.",
+        ),
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            help="Least distance of the base's centre from obstacles, in metres.",
+            show_default="the radius of the base",
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Random poses of the object.")] = 1000,
+    seed: options.Seed = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="Also write the map, for `tcs arplace merge`.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help=PICTURE)] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Return the base position of the greatest probability of success under pose errors."""
+    from tcs.capability.arplace import load_arplace, save_probability_map
+    from tcs.capability.arplace import query as query_arplace
+
+    if clearance is not None and not obstacle:
+        raise typer.BadParameter("requires --obstacle.", param_hint="--clearance")
+    check_outputs(out, picture)
+    obstacles = [obstacle_of(text) for text in obstacle or ()]
+    arplace = load_arplace(model)
+    # The first query prepares what all queries of a model share.
+    at = pose.pose(arplace)
+    _ = arplace.window
+    found = query_arplace(
+        arplace, at, pose.error(), obstacles=obstacles, clearance=clearance, samples=samples,
+        seed=seed,
+    )  # fmt: skip
+    if out is not None:
+        save_probability_map(out, found.map)
+    if picture is not None:
+        draw_map(picture, found.map, (found.x, found.y), f"success {found.success:.3f}")
+    result = {"file": str(model), **found.to_json()}
+    terminal.print_result(result, arplace_tables.report_query, as_json=as_json)
+
+
+def obstacle_of(text: str) -> FloorObstacle:
+    """Return an obstacle given as "X,Y,SIZE_X,SIZE_Y[,YAW_DEG]" [m, deg].
+
+    Raises:
+        SelectionError: If the text is not of that form, or a value is out of range.
+    """
+    from tcs.capability.arplace import FloorObstacle
+
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (4, 5):
+        raise SelectionError(
+            f"--obstacle is '{text[:80]}'; must be X,Y,SIZE_X,SIZE_Y or X,Y,SIZE_X,SIZE_Y,YAW_DEG."
+        )
+    return FloorObstacle(*numbers[:4], *map(math.radians, numbers[4:]))

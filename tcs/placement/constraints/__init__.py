@@ -1,0 +1,29 @@
+"""Constraints on initial configurations, and preferences.
+
+In: conditions on axes, regions of the floor, obstacles and preferences, from Python, the command
+line or a file; the robot's shapes. Out: which base poses overlap a region, which bodies and stored
+solutions touch an obstacle, which configurations are not preferred.
+"""
+
+from __future__ import annotations
+
+from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
+from tcs.placement.constraints.constraints import Constraints
+from tcs.placement.constraints.files import merged, read_constraints
+from tcs.placement.constraints.obstacles import Obstacle
+from tcs.placement.constraints.postures import Postures
+from tcs.placement.constraints.preferences import disliked_candidates
+from tcs.placement.constraints.regions import Footprint, Region
+
+__all__ = [
+    "Constraints",
+    "Footprint",
+    "Obstacle",
+    "Postures",
+    "Region",
+    "blocked_bodies",
+    "blocked_solutions",
+    "disliked_candidates",
+    "merged",
+    "read_constraints",
+]
