@@ -186,6 +186,11 @@ DURATION = Quantity(
     "`--duration` of viewers and live pages",
     "a week; without the option they run until Ctrl-C",
 )
+LATENCY = Quantity(
+    *("latency", "s", 0.0, 10.0),
+    "`--latency` of teleoperation",
+    "twenty times the way over a geostationary satellite and back",
+)
 JOBS = Quantity(
     *("number of jobs", "", 1, 1024), "`--jobs`", "more threads than any machine in use has cores"
 )
@@ -216,7 +221,7 @@ PRIMITIVES = Quantity(
 QUANTITIES = (
     POSITION, SIZE, CLEARANCE, DEVIATION, DEVIATION_DEG, ANGLE_DEG, ANGLE, JOINT_POSITION,
     JOINT_LIMIT, FIELD_OF_VIEW_DEG, STEP, MAP_STEP, RADIUS, EXTENT, MESH_SCALE, WEIGHT,
-    UTILITY_WEIGHT, HEADING, MASTER_SCALE, RECORDING, DURATION, JOBS, QUERIES, AXIS_VALUES,
-    VOLUME, GOALS, ENTRIES, PRIMITIVES,
+    UTILITY_WEIGHT, HEADING, MASTER_SCALE, RECORDING, DURATION, LATENCY, JOBS, QUERIES,
+    AXIS_VALUES, VOLUME, GOALS, ENTRIES, PRIMITIVES,
 )  # fmt: skip
 """All quantities, in the order of the documentation."""

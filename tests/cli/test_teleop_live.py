@@ -261,3 +261,13 @@ def test_every_condition_opens(tcs_command, condition):
     )  # fmt: skip
     assert ran.code == 0
     assert f", {condition}, limits as in clamped" in ran.err
+
+
+def test_latency_is_stated_and_its_range_checked(tcs_command):
+    words = ["teleop", "--start-deg", *READY_DEG, "--no-browser", "--duration", 0.1]
+    ran = tcs_command(*words, "--latency", 0.3, "--latency-of", "command")
+    assert ran.code == 0
+    assert "latency: 0.3 s for commands." in ran.err
+    assert "latency:" not in tcs_command(*words).err
+    for latency in (11, -0.1, "nan"):
+        assert tcs_command(*words, "--latency", latency).code == 2

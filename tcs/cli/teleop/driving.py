@@ -11,7 +11,7 @@ import typer
 
 from tcs.cli import options
 from tcs.cli.option_groups import expand_options
-from tcs.cli.teleop.groups import TorsoHeight, open_page
+from tcs.cli.teleop.groups import LatencyOptions, TorsoHeight, open_page
 from tcs.output import terminal
 from tcs.output.terminal import teleop_tables
 
@@ -77,6 +77,7 @@ def live(
         Path | None,
         typer.Option(metavar="RUN", help="Write the run at the end: .csv or .parquet."),
     ] = None,
+    delay: LatencyOptions,
     window: options.WindowOptions,
 ) -> None:
     """Teleoperate an arm in the browser by keys, sliders or gamepad; `experiment` and `replay`."""
@@ -103,15 +104,19 @@ def live(
         check_writable(save)
     if line:
         terminal.note("searching for a line that requires null-space motion, some seconds.")
+    latency = delay.value()
     session = LiveSession(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
             start_deg=start_deg, torso_height=torso_height, line=line,
+            latency=latency,
         ),
         port=window.port, on_stop=typer.echo, record=save is not None,
     )  # fmt: skip
     title = session.arm.robot.title
     terminal.note(f"{title}, {condition}, limits as in {behaviour}. {_KEYS}")
+    if latency.seconds:
+        terminal.note(f"latency: {latency.summary}.")
     open_page(session.url, window.browser)
     begun = time.perf_counter()
     try:

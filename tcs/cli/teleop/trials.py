@@ -9,12 +9,15 @@ from typing import Annotated
 import typer
 
 from tcs.cli import options
-from tcs.cli.teleop.groups import TorsoHeight
+from tcs.cli.option_groups import expand_options
+from tcs.cli.teleop.groups import LatencyOptions, TorsoHeight
 from tcs.output import terminal
 from tcs.output.terminal import teleop_tables
 
 
+@expand_options
 def experiment(
+    *,
     robot: options.Robot = "iiwa7",
     operators: Annotated[
         int,
@@ -30,6 +33,7 @@ def experiment(
         int,
         typer.Option(min=0, max=1000, help="Training trials of each operator and controller."),
     ] = 4,
+    delay: LatencyOptions,
     torso_height: TorsoHeight = None,
     line_seed: Annotated[int, typer.Option(min=0, help="Seed of the search for the line.")] = 0,
     seed: options.Seed = 0,
@@ -63,9 +67,14 @@ def experiment(
     words += ["--line-seed", str(line_seed)]
     words += [] if torso_height is None else ["--torso-height", f"{torso_height:g}"]
     words += ["--maps"] if maps else []
+    latency = delay.value()
+    if latency.seconds:
+        words += ["--latency", f"{latency.seconds:g}", "--latency-of", latency.path]
     folder = out or Path(f"teleop-{Path(robot).stem}")
     suffix = f".{runs_as.removeprefix('.')}" if runs else None
-    plan = ExperimentPlan(operators=operators, trials=trials, training=training, seed=seed)
+    plan = ExperimentPlan(
+        operators=operators, trials=trials, training=training, seed=seed, latency=latency
+    )
     file = load_robot(robot)
     arm = load_arm(file, torso_height=torso_height_of(file, torso_height))
     make_experiment_folder(arm, folder, runs_as=suffix, maps=maps)

@@ -40,7 +40,13 @@ from tcs.output.words.teleop import NAMES, SCALE
 from tcs.teleop.experiment.course import BLOCKED_AFTER
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
-from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment, median_ratio
+from tcs.teleop.experiment.within_subject import (
+    HYPOTHESES,
+    SCRIPTED,
+    Experiment,
+    ExperimentPlan,
+    median_ratio,
+)
 from tcs.teleop.operators.scripted import OperatorTraits
 
 
@@ -62,7 +68,7 @@ def experiment_page(
             f"{plan.operators} {SCRIPTED}, move {arm.robot.title} along a straight line on which "
             f"joint {experiment.course.blocking + 1} meets its limit after three quarters of the "
             f"length, in {plan.trials} trials with each controller after {plan.training} training "
-            "trials."
+            f"trials.{_latency(plan)}"
         ),
         sections=[
             Section("Findings", [Bullets(findings(experiment))]),
@@ -221,6 +227,12 @@ def _made(experiment: Experiment, seconds: float, command: str) -> list[Block]:
             ],
         ),
     ]
+
+
+def _latency(plan: ExperimentPlan) -> str:
+    """Return the latency as a sentence, empty if there is none."""
+    summary = plan.latency.summary
+    return f" Latency between operator and arm: {summary}." if summary else ""
 
 
 def _place(point: Sequence[float]) -> str:

@@ -118,6 +118,7 @@ def write_experiment(
         **line,
         "operators": plan.operators,
         "seed": plan.seed,
+        **plan.latency.to_json(),
         "seconds": seconds,
         **_numbers(experiment, by_controller),
         "files": files,

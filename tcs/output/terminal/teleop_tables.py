@@ -32,6 +32,9 @@ def report_experiment(result: dict[str, Any]) -> None:
 
     out = results_console()
     out.print(f"{result['operators']} {SCRIPTED}, robot {result['robot']}, seed {result['seed']}")
+    if "command_latency" in result:
+        late = f"{result['command_latency']:g} s, of pictures {result['picture_latency']:g} s"
+        out.print(f"latency of commands {late}")
     conditions = list(result["medians"])
     table = new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
     for name, text in NAMES.items():

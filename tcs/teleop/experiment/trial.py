@@ -11,6 +11,7 @@ import numpy as np
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
+from tcs.teleop.control.latency import DelayLine, Latency
 from tcs.teleop.control.session import Teleoperation
 from tcs.teleop.control.settings import Command, Mode, Settings
 from tcs.teleop.experiment.course import Course
@@ -31,6 +32,8 @@ from tcs.teleop.runs.run import Run
 
 GOAL_RADIUS = 0.02
 """Radius of the sphere at the end of the line [m]; the paper shows one without its size."""
+NO_LATENCY = Latency()
+"""The latency of a trial where none is given."""
 SCRIPTED_TYPE = "scripted"
 """Metadata `operator_type` of a run with a scripted operator."""
 TIME_LIMIT = 120.0
@@ -105,6 +108,7 @@ def run_trial(
     rng: np.random.Generator,
     *,
     time_limit: float = TIME_LIMIT,
+    latency: Latency = NO_LATENCY,
     metadata: Mapping[str, Any] | None = None,
 ) -> Run:
     """Return the run of an operator until the end of the line is reached or the time is over.
@@ -117,6 +121,8 @@ def run_trial(
         habits: Successful recoveries with this controller; updated in place.
         rng: Random generator.
         time_limit: Time limit of the trial [s].
+        latency: Latency of commands and pictures. The run holds each command with the step that
+            executes it.
         metadata: Further metadata of the run.
 
     Raises:
@@ -132,9 +138,12 @@ def run_trial(
     command = Command()
     step = session.step(command)
     rows = [(command, step)]
+    period = condition.settings.period
+    commands = DelayLine(latency.command, period, command)
+    pictures = DelayLine(latency.picture, period, step)
     end = np.asarray(course.line.end)
     while step.time < time_limit and np.linalg.norm(step.p - end) > GOAL_RADIUS:
-        command = operator.command(step)
+        command = commands.send(operator.command(pictures.send(step)))
         step = session.step(command)
         rows.append((command, step))
     origin = {
@@ -144,6 +153,7 @@ def run_trial(
         "operator_type": SCRIPTED_TYPE,
         "line_start": list(course.line.start),
         "line_end": list(course.line.end),
+        **latency.to_json(),
     }
     return run_from_steps(arm, rows, {**origin, **(metadata or {})})
 

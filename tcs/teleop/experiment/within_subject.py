@@ -18,6 +18,7 @@ from joblib import Parallel, delayed
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
+from tcs.teleop.control.latency import Latency
 from tcs.teleop.experiment.course import Course
 from tcs.teleop.experiment.statistics import (
     GroupStatistics,
@@ -31,6 +32,7 @@ from tcs.teleop.experiment.statistics import (
 from tcs.teleop.experiment.trial import (
     CONDITIONS,
     END_EFFECTOR,
+    NO_LATENCY,
     NOVEL,
     TIME_LIMIT,
     Condition,
@@ -79,6 +81,7 @@ class ExperimentPlan:
         seed: Seed of the operators and their noise.
         conditions: Controllers to compare.
         time_limit: Time limit of a trial [s].
+        latency: Latency between operator and arm.
     """
 
     operators: int = OPERATORS
@@ -87,6 +90,7 @@ class ExperimentPlan:
     seed: int = 0
     conditions: tuple[Condition, ...] = CONDITIONS
     time_limit: float = TIME_LIMIT
+    latency: Latency = NO_LATENCY
 
     def __post_init__(self) -> None:
         """Check the plan.
@@ -246,6 +250,7 @@ def _drive(
         run = run_trial(
             arm, course, condition, traits, habits, _rng(plan.seed, operator, number, trial),
             time_limit=plan.time_limit,
+            latency=plan.latency,
             metadata={
                 "operator": operator + 1,
                 "trial": trial - plan.training + 1 if counts else trial + 1,

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tcs.errors import TcsError
+from tcs.teleop.control.latency import Latency
 from tcs.teleop.experiment.trial import (
     ASSISTED,
     CONDITIONS,
@@ -95,6 +96,26 @@ def test_the_same_seed_gives_the_same_trial(iiwa, course):
         for _ in range(2)
     )
     np.testing.assert_array_equal(first.joints, second.joints)
+
+
+@pytest.mark.parametrize(("path", "ways"), [("command", 1), ("picture", 1), ("both", 2)])
+def test_latency_delays_the_hand_by_its_time_on_each_path(iiwa, course, path, ways):
+    def moved(latency):
+        run = run_trial(
+            iiwa, course, NOVEL, OperatorTraits(), Experience(), np.random.default_rng(9),
+            time_limit=1.2, latency=latency,
+        )  # fmt: skip
+        return int(np.argmax(np.linalg.norm(run.linear, axis=1) > 0.03)), run
+
+    begun, prompt = moved(Latency())
+    late, run = moved(Latency(0.2, path))
+    # Tremor moves the hand past the threshold some steps earlier or later.
+    assert late == pytest.approx(begun + 20 * ways, abs=4)
+    if path == "command":
+        # The same hand 20 steps later, until it reacts to the arm.
+        np.testing.assert_array_equal(run.linear[20:45], prompt.linear[:25])
+    assert run.metadata["command_latency"] == (0.0 if path == "picture" else 0.2)
+    assert "command_latency" not in prompt.metadata
 
 
 def test_measures_of_a_trial_that_is_broken_off(iiwa, course):

@@ -23,8 +23,11 @@ from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
 from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
 from tcs.output.view.teleop.timing import Durations, StepClock
 from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation
+from tcs.teleop.control.latency import DelayLine, Latency
 
 FloatArray = NDArray[np.float64]
+_REST = Command(clutch=True)
+"""Command at the arm until one of the operator arrives."""
 SHOW_EVERY = 3
 """Steps per frame: 33 frames a second at 100 steps."""
 _MESSAGE_TIME = 0.7
@@ -92,6 +95,7 @@ class LivePage:
         *,
         settings: Settings,
         modes: tuple[Mode, ...],
+        latency: Latency | None = None,
         on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
     ) -> None:
@@ -104,9 +108,11 @@ class LivePage:
             start: Joint positions at the start [rad], shape (7,).
             settings: Settings of the controller.
             modes: Modes that the operator can switch between, the initial one first.
+            latency: Latency between the operator and the arm; None for none. A lost operator and
+                the return to the start act at once.
             on_stop: Called with the reason whenever the arm stops, or its reason changes.
-            on_step: Called after each step with the command and the step, once a browser has
-                connected.
+            on_step: Called after each step with the command that the arm executes and the step,
+                once a browser has connected.
 
         Raises:
             TcsError: If the start posture is not seven finite numbers.
@@ -122,13 +128,16 @@ class LivePage:
         self._on_stop, self._on_step = on_stop, on_step
         self._message, self._message_until = "", 0.0
         self._touching = ""
-        self._seen = False
+        self._watched = False
         self._shown = 0
         display.set_up(meshcat, arm.kinematics(self._start).p)
         self._panel = Panel(meshcat, arm)
         self._trail = Trail(meshcat)
         self._input = OperatorCommand(Command())
-        self.last = self.session.step(Command(clutch=True))
+        self.last = self.seen = self.session.step(_REST)
+        latency = latency or Latency()
+        self._commands = DelayLine(latency.command, settings.period, _REST)
+        self._pictures = DelayLine(latency.picture, settings.period, self.last)
         self.show()
 
     def step(self) -> Step:
@@ -138,39 +147,52 @@ class LivePage:
         if operator_input.back:
             self.session.place(self._start)
             self._trail.clear()
+        if operator_input.back or operator_input.lost:
+            # The watchdog is at the arm: commands on their way are dropped.
+            self._commands.reset(_REST)
+        command = self._arriving(operator_input)
         read = time.perf_counter()
-        self.last = self.session.step(operator_input.command)
+        self.last = self.session.step(command)
         now = time.perf_counter()
         self.steps.add(now - read)
         self.worked.add(now - begun)
         if operator_input.lost:
             self.last = dataclasses.replace(self.last, stopped=True, reason=operator_input.lost)
-        reason = self.last.reason
+        if operator_input.back:
+            self._pictures.reset(self.last)
+        self.seen = self._pictures.send(self.last)
+        reason = operator_input.lost or self.seen.reason
         if reason:
             # A message that is still visible is not repeated.
             if reason != self._message or now >= self._message_until:
                 self._on_stop(reason)
             self._message, self._message_until = reason, now + _MESSAGE_TIME
-        self._seen = self._seen or operator_input.watched
-        if self._seen and self._on_step is not None:
-            self._on_step(operator_input.command, self.last)
+        self._watched = self._watched or operator_input.watched
+        if self._watched and self._on_step is not None:
+            self._on_step(command, self.last)
         return self.last
+
+    def _arriving(self, operator_input: OperatorCommand) -> Command:
+        """Return the command that arrives at the arm now; that of a lost operator at once."""
+        if operator_input.lost:
+            return operator_input.command
+        return self._commands.send(operator_input.command)
 
     def show(self) -> None:
         """Send the changes to the browser."""
         begun = time.perf_counter()
-        last, meshcat = self.last, self._meshcat
-        for path, pose in self._display.poses(last.joints).items():
+        seen, meshcat = self.seen, self._meshcat
+        for path, pose in self._display.poses(seen.joints).items():
             meshcat.SetTransform(path, pose)
         if self._shown % _CHECK_EVERY == 0:
             touching = self._display.contacts()
             self._touching = "" if touching is None else f"{touching[0]} touches {touching[1]}"
         self._shown += 1
-        meshcat.SetTransform(TOOL, pose_of(last.R, last.p))
-        meshcat.SetTransform(TARGET, pose_of(last.target_R, last.target_p))
-        self._trail.add(last.p)
+        meshcat.SetTransform(TOOL, pose_of(seen.R, seen.p))
+        meshcat.SetTransform(TARGET, pose_of(seen.target_R, seen.target_p))
+        self._trail.add(seen.p)
         mode, message = self.mode_line(), self.message(time.perf_counter())
-        self._panel.show(readout(self._arm, last.joints, last.limits, last.singular, mode, message))
+        self._panel.show(readout(self._arm, seen.joints, seen.limits, seen.singular, mode, message))
         self.pictures.add(time.perf_counter() - begun)
 
     def run(self, duration: float | None = None) -> None:
@@ -199,10 +221,10 @@ class LivePage:
     def mode_line(self) -> str:
         """Return the control mode in one line."""
         number = self.operator.group
-        chosen = self.last.mode is Mode.NULL_SPACE
+        chosen = self.seen.mode is Mode.NULL_SPACE
         group = self.session.settings.groups[number] if chosen else None
         clutch = self._input.command.clutch and not self._input.lost
-        return mode_line(self.last.mode, group, number, clutch)
+        return mode_line(self.seen.mode, group, number, clutch)
 
     def message(self, now: float) -> str:
         """Return the message for the operator: why the arm stops, joint limits, contacts.
@@ -212,7 +234,7 @@ class LivePage:
         """
         if now < self._message_until:
             return self._message
-        facts = [state_facts(self.last.limits, self.last.singular)]
+        facts = [state_facts(self.seen.limits, self.seen.singular)]
         if self._touching:
             facts.append(f"{self._touching} (contacts are not prevented)")
         return self._input.hint or "; ".join(one for one in facts if one)

@@ -19,9 +19,10 @@ from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
 from tcs.output.view.teleop.start import start_posture
 from tcs.teleop import Arm, Mode, Settings, load_arm
 from tcs.teleop.arm import torso_height_of
+from tcs.teleop.control.latency import Latency
 from tcs.teleop.control.settings import LimitBehaviour
 from tcs.teleop.experiment.course import find_course
-from tcs.teleop.experiment.trial import GOAL_RADIUS
+from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
@@ -46,6 +47,7 @@ class LiveOptions:
         start_deg: Start posture [deg], seven numbers; None to search for one.
         torso_height: Height of the torso joint [m]; None for the middle of its range.
         line: Whether to show the experiment's line and start there.
+        latency: Latency between the operator and the arm.
     """
 
     robot: str
@@ -54,6 +56,7 @@ class LiveOptions:
     start_deg: tuple[float, ...] | None = None
     torso_height: float | None = None
     line: bool = False
+    latency: Latency = NO_LATENCY
 
 
 class LiveSession:
@@ -104,6 +107,7 @@ class LiveSession:
             start_posture(self.arm, display) if start is None else start,
             settings=Settings(limits=options.behaviour),
             modes=CONDITION_MODES[options.condition],
+            latency=options.latency,
             on_stop=on_stop,
             on_step=self._recorder.add if record or self.course is not None else None,
         )
@@ -121,6 +125,7 @@ class LiveSession:
             "condition": self._options.condition,
             "limits": self._options.behaviour,
             "operator_type": "live",
+            **self._options.latency.to_json(),
         }
         if self.course is not None:
             line = self.course.line

@@ -12,6 +12,7 @@ from tcs.output.view.teleop.controls import BACK, NEXT_MODE, TAP, TURN_UP, butto
 from tcs.output.view.teleop.live import key_name
 from tcs.output.view.teleop.panel import LIMIT, SINGULAR, readout
 from tcs.teleop import Mode, Settings, load_arm
+from tcs.teleop.control.latency import Latency
 from tcs.teleop.runs.recorder import Recorder
 from tests.output.view.teleop.conftest import MODES, Instead
 
@@ -31,6 +32,46 @@ def test_a_slider_moves_the_tool(page, desk):
     # Half a second at 0.1 m/s, less the acceleration.
     assert 0.03 < moved[0] <= 0.05
     assert np.abs(moved[1:]).max() < 1e-3
+
+
+@pytest.fixture
+def late(meshcat, iiwa_display, iiwa, ready, reasons, desk):
+    """A live page with a latency of five periods each way."""
+    found = LivePage(
+        meshcat, iiwa_display, iiwa, ready, settings=Settings(), modes=MODES,
+        latency=Latency(0.05), on_stop=reasons.append,
+    )  # fmt: skip
+    found.operator.source = desk
+    return found
+
+
+def test_latency_delays_commands_and_picture(late, desk):
+    start = late.last.p
+    desk.sliders[FORWARD] = 0.2
+    drive(late, 5)
+    assert not late.last.rates.any()
+    drive(late, 5)
+    assert late.last.p[0] > start[0]
+    np.testing.assert_array_equal(late.seen.p, start)
+    moved = late.last
+    drive(late, 5)
+    assert late.seen is moved
+
+
+def test_a_lost_operator_stops_the_arm_without_latency(late, desk, reasons):
+    desk.sliders[FORWARD] = 0.05
+    drive(late, 40)
+    assert late.last.rates.any()
+    desk.watched = False
+    drive(late, 1)
+    assert reasons[-1].startswith("no browser")
+    # 0.05 m/s needs joint rates that vanish within some steps of 0.1 rad/s each.
+    drive(late, 4)
+    assert not late.last.rates.any()
+    # Commands that were on their way are gone.
+    desk.watched = True
+    drive(late, 5)
+    assert not late.last.rates.any()
 
 
 def test_a_group_turns_while_the_tool_stays(page, desk):
