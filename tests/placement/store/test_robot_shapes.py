@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from tests.placement.selection.test_constraints import made_up_robot
+from tests.placement.selection.test_admission import made_up_robot
 
 from tcs.errors import StoreError
 from tcs.placement.store.robot_shapes import RobotShapes
