@@ -135,8 +135,8 @@ class TravelCosts:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConstraintOptions:
-    """Constraints on what may be selected."""
+class ScoringConstraintOptions:
+    """Constraints on what may be scored or selected."""
 
     only: Only = None
     keep: Annotated[
@@ -158,18 +158,9 @@ class ConstraintOptions:
         list[str] | None,
         typer.Option(
             metavar="BOX",
-            help="Obstacle seen just now, which neither body nor arm may touch: 'X Y WIDTH DEPTH "
+            help="Further obstacle, which neither body nor arm may touch: 'X Y WIDTH DEPTH "
             "[YAW_DEG] [Z_LOW Z_HIGH]' in the environment frame (m, deg), or a polygon 'X1 Y1, "
             "X2 Y2, X3 Y3, ... [; Z_LOW Z_HIGH]'.",
-        ),
-    ] = None
-
-    prefer: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SIDE|CONDITION",
-            help="Preferred side of the person, left, right, head or foot, or a condition as of "
-            "--only; see --preference-penalty.",
         ),
     ] = None
 
@@ -206,11 +197,34 @@ class ConstraintOptions:
             keep=tuple(self.keep or ()),
             forbid=tuple(regions),
             blocked=tuple(Obstacle.parse(given) for given in self.blocked or ()),
-            prefer=tuple(self.prefer or ()),
         )
         if self.constraints_file is None:
             return given_here
         return merged(read_constraints(self.constraints_file), given_here)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstraintOptions(ScoringConstraintOptions):
+    """Constraints on what may be selected, and preferences."""
+
+    prefer: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SIDE|CONDITION",
+            help="Preferred side of the person, left, right, head or foot, or a condition as of "
+            "--only; see --preference-penalty.",
+        ),
+    ] = None
+
+    def constraints(self) -> Constraints:
+        """Return the constraints and preferences of the file and of the command line.
+
+        Raises:
+            TcsError: If one is not of its form.
+        """
+        from tcs.placement.constraints import Constraints, merged
+
+        return merged(super().constraints(), Constraints(prefer=tuple(self.prefer or ())))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from tcs.output import terminal
 from tcs.output.terminal import tables
 
 
+@expand_options
 def score(
     task: Annotated[
         str | None,
@@ -62,7 +63,8 @@ def score(
             min=1, max=3, help="Greatest number of members of a set; with 3 it takes longer."
         ),
     ] = 2,
-    only: options.Only = None,
+    *,
+    wanted: options.ScoringConstraintOptions,
     observed: Annotated[
         list[str] | None,
         typer.Option(
@@ -85,12 +87,14 @@ def score(
         raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
         raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
-    if at and not frames:
+    constraints = wanted.constraints()
+    if at and not frames and not constraints.keep:
         raise typer.BadParameter(
-            "requires --frames: it is the setting of the environment at the observation.",
+            "requires --frames or --keep: it is the present setting of the environment.",
             param_hint="--at",
         )
 
+    from tcs.cli.values import settings
     from tcs.placement.scoring import default_path, files
 
     scoring_options: dict[str, Any] = {
@@ -98,7 +102,8 @@ def score(
         "rule": rules,
         "same_environment": same_environment,
         "max_members": max_members,
-        "only": tuple(only or ()),
+        "constraints": constraints,
+        "now": settings(at or (), "--at"),
         "jobs": jobs,
         "on_compile": terminal.note_compiling,
     }
@@ -119,7 +124,7 @@ def score(
         return
 
     import tcs
-    from tcs.cli.values import frame_values, observed_settings, settings
+    from tcs.cli.values import frame_values, observed_settings
     from tcs.model.scene import load_environment
 
     if out is None:

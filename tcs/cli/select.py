@@ -53,6 +53,7 @@ def select(
     """Select the set with the greatest utility from the current state."""
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
+    from tcs.placement.constraints import constraint_texts
 
     loaded = tcs.load(file)
     choice = tcs.select(
@@ -77,6 +78,8 @@ def select(
     for warning in choice.warnings:
         terminal.note(warning)
     result = choice.to_json(loaded.metadata["measure"])
+    if scored := constraint_texts(loaded):
+        result["scored_constraints"] = scored
     terminal.print_result(result, tables.report_choice, as_json=as_json)
 
 

@@ -54,6 +54,42 @@ def test_number_of_jobs_changes_nothing(tcs_command, corner, corner_file, tmp_pa
     np.testing.assert_array_equal(one.nominal.scores.arm_joints, two.nominal.scores.arm_joints)
 
 
+def test_constraints_when_scoring(tcs_command, corner, tmp_path):
+    path, told = tmp_path / "out.tcs", tmp_path / "bedroom.yaml"
+    told.write_text('forbid: ["0.9 -1, 1.2 -1, 1.2 -0.5, 0.9 -0.5"]\nprefer: [left]\n')
+    words = ("--constraints", told, "--blocked", "0.3 0.9 0.3 0.3 20", "--keep", "torso")
+    words = ("score", "shaving", "--environment", corner, *words, "--out", path)
+    ran = tcs_command(*words, "--at", "torso=0.2", "--json")
+    assert ran.code == 0, ran.err
+    texts = ["only torso = 0.15 m", "forbid 0.9 -1, 1.2 -1, 1.2 -0.5, 0.9 -0.5"]
+    texts.append("blocked 0.3 0.9 0.3 0.3 20")
+    assert ran.json["constraints"] == texts
+    assert ran.json["configurations"] == 18
+    file = tcs.load(path)
+    assert ran.json["reasons"]["excluded"] == 8 * file.metadata["constraints"]["excluded"] > 0
+    here = ("--here", 2, 1, 180)
+    assert tcs_command("select", path, *here, "--json").json["scored_constraints"] == texts
+    assert "scored under constraints: only torso = 0.15 m; forbid" in tcs_command(
+        "select", path, *here
+    ).out.replace("\n", " ")
+    excluded = int(np.flatnonzero(file.nominal.scores.reason[:, 0] == 7)[0])
+    out = tcs_command("explain", path, "--goal", 0, "--configuration", excluded).out
+    assert "excluded by a constraint when scoring" in out
+    assert tcs_command("map", path, "--out", tmp_path / "map.png").code == 0
+
+
+def test_constraints_that_cannot_be_met_when_scoring(tcs_command, corner, tmp_path):
+    words = ("score", "shaving", "--environment", corner, "--out", tmp_path / "out.tcs")
+    ran = tcs_command(*words, "--keep", "torso")
+    assert ran.code == 1
+    assert ran.err.startswith("tcs: keep torso: the current state lacks its value.")
+    ran = tcs_command(*words, "--forbid", "0 0, 1")
+    assert ran.code == 1
+    assert "Region '0 0, 1' must be X1 Y1" in ran.err
+    assert tcs_command(*words, "--at", "torso=0.2").code == 2
+    assert not (tmp_path / "out.tcs").exists()
+
+
 def test_verify_finds_a_sound_file_sound(tcs_command, corner_file):
     ran = tcs_command("verify", corner_file, "--pairs", 20, "--dense", 6, "--seed", 3, "--json")
     assert ran.code == 0, ran.err

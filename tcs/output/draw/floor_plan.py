@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -26,6 +27,8 @@ ARROW = 0.45
 """Length of a heading arrow [m]: it ends ahead of the front of a mobile robot."""
 MARGIN = 0.05
 """Margin around what is shown [m]."""
+_EXCLUDED = "////"
+"""Hatch of base positions that constraints excluded."""
 _EDGE = "#00000066"
 """Outline of each shape, visible where its colour resembles that below."""
 
@@ -48,7 +51,7 @@ class BaseFootprint:
 
 
 def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: float) -> QuadMesh:
-    """Colour each base position by its value, grey where the base is blocked.
+    """Colour each base position by its value, grey where the base is blocked, hatched if excluded.
 
     Args:
         axes: The axes.
@@ -59,6 +62,15 @@ def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: 
     edges = (cell_edges(places.x), cell_edges(places.y))
     blocked = np.ma.masked_where(places.free, np.ones(places.free.shape))
     axes.pcolormesh(*edges, blocked.T, cmap=ListedColormap([BLOCKED]), rasterized=True)
+    if places.excluded is not None:
+        corners = [
+            [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+            for i, (x0, x1) in enumerate(pairwise(edges[0]))
+            for j, (y0, y1) in enumerate(pairwise(edges[1]))
+            if places.excluded[i, j]
+        ]
+        hatched = PolyCollection(corners, facecolors=EMPTY, edgecolors=BLOCKED, hatch=_EXCLUDED)
+        axes.add_collection(hatched, autolim=False)
     scored = np.ma.masked_less_equal(values, 0.0)
     return axes.pcolormesh(*edges, scored.T, cmap=SCALE, vmin=0.0, vmax=most, rasterized=True)
 
@@ -175,14 +187,25 @@ def cell_edges(centres: FloatArray) -> FloatArray:
     return np.append(centres - step / 2.0, centres[-1] + step / 2.0)
 
 
-def legend_handles(environment: Sequence[Solid], *, robot: bool) -> list[Artist]:
-    """Return the legend of solids, base positions without a colour, and bases."""
+def legend_handles(
+    environment: Sequence[Solid], *, robot: bool, excluded: bool = False
+) -> list[Artist]:
+    """Return the legend of solids, base positions without a colour, and bases.
+
+    Args:
+        environment: The solids.
+        robot: Whether bases are drawn.
+        excluded: Whether constraints excluded base positions.
+    """
     shown = {solid.category for solid in environment}
     handles: list[Artist] = [
         Patch(facecolor=one.colour, label=one.label) for one in Category if one in shown
     ]
     handles.append(Patch(facecolor=BLOCKED, label="base blocked"))
     handles.append(Patch(facecolor=EMPTY, edgecolor="#bbbbbb", label="reaches no goal"))
+    if excluded:
+        label = "excluded by a constraint"
+        handles.append(Patch(facecolor=EMPTY, edgecolor=BLOCKED, hatch=_EXCLUDED, label=label))
     if robot:
         label = "robot's base to scale, with heading"
         handles.append(Patch(facecolor="none", edgecolor=MEMBER, lw=2.0, label=label))

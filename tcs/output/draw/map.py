@@ -69,7 +69,9 @@ def draw_map(
     left.set_ylabel(axis_title("base_y"))
     lines = [*textwrap.wrap(title, _TITLE_WIDTH), *textwrap.wrap(subtitle, _TITLE_WIDTH)]
     figure.suptitle("\n".join(lines), fontsize=13)
-    handles = floor_plan.legend_handles(environment, robot=bool(members))
+    handles = floor_plan.legend_handles(
+        environment, robot=bool(members), excluded=places.excluded is not None
+    )
     if here is not None:
         handles.append(
             Line2D([], [], ls=":", color=HERE, label="straight-line path of the travel cost")

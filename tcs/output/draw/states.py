@@ -101,7 +101,8 @@ def draw_states(
     lines.append(f"Best of all {panels[0][0].places.over_words} at each base position.")
     figure.suptitle("\n".join(lines), fontsize=11)
     environment = [solid for row in panels for panel in row for solid in panel.environment]
-    handles = floor_plan.legend_handles(environment, robot=bool(members))
+    excluded = any(panel.places.excluded is not None for row in panels for panel in row)
+    handles = floor_plan.legend_handles(environment, robot=bool(members), excluded=excluded)
     handles += floor_plan.pose_handles(members, None)
     figure.legend(handles=handles, loc="outside lower left", ncols=1, frameon=False, fontsize=9)
     return figure

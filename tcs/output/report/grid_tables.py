@@ -7,7 +7,7 @@ from collections import Counter
 from tcs.output.report.blocks import Cell, Column, Table
 from tcs.output.report.score_report import ScoreReport
 from tcs.output.words import REASON_NAMES, body_name, frame_name, percent, percentage
-from tcs.placement.reasons.distribution import CHECKS
+from tcs.placement.reasons.distribution import CHECKS, checks_of
 from tcs.placement.tables import Reason
 
 MOST_PAIRS = 4
@@ -16,7 +16,7 @@ MOST_PAIRS = 4
 
 def reasons_table(report: ScoreReport) -> Table:
     """Return how many configurations of the grid have each reason, goal by goal."""
-    reasons = (*CHECKS, Reason.REACHED)
+    reasons = (*checks_of(report.distributions[0].reasons), Reason.REACHED)
     rows: list[list[Cell | str]] = []
     for goal, counts in enumerate(report.distributions):
         fractions = [counts.reasons[reason] / counts.configurations for reason in reasons]

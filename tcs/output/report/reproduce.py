@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tcs.output.report.score_report import ScoreReport
+from tcs.placement.constraints import constraint_texts
 from tcs.placement.store import ScoreFile, state_to_json
 
 PAPER_DISTANCE = 0.40
@@ -35,8 +36,9 @@ def score_command(report: ScoreReport) -> str:
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
         words.append("--same-environment")
-    for condition in file.metadata.get("only", ()):
-        words += ["--only", condition]
+    for constraint in constraint_texts(file):
+        option, _, value = constraint.partition(" ")
+        words += [f"--{option}", value]
     if "observation" in file.metadata:
         words += _observed(report)
     line = shlex.join([*words, "--out", str(report.path)])

@@ -13,7 +13,9 @@ from tcs.output.words import (
     percentage,
     settings_text,
 )
+from tcs.placement.constraints import constraint_texts
 from tcs.placement.store import state_to_json
+from tcs.placement.tables import Reason
 
 LIMITS = (
     "Each goal is checked by itself in a static scene. The approach to a goal, the path of the arm "
@@ -54,7 +56,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
         tables = len(report.file.tables)
         of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
         items.append(f"The scores are those of the observed state {values}{of_states}.")
-    items += _success(report)
+    items += _constraints(report) + _success(report)
     return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
 
 
@@ -69,6 +71,16 @@ def unreached_everywhere(report: ScoreReport) -> list[str]:
         f"the most checks: {reason}."
         for reason, goals in found.items()
     ]
+
+
+def _constraints(report: ScoreReport) -> list[str]:
+    """Return the constraints under which the file was scored, if there were any."""
+    texts = constraint_texts(report.file)
+    if not texts:
+        return []
+    excluded = report.distributions[0].reasons[Reason.EXCLUDED]
+    ending = f"; {excluded:,} configurations were excluded and not scored" if excluded else ""
+    return [f"Scored under constraints: {'; '.join(texts)}{ending}."]
 
 
 def _soundness(report: ScoreReport) -> str:

@@ -60,7 +60,11 @@ def report_scores(result: Mapping[str, Any]) -> None:
     if result["ik"] == "numeric":
         out.print(NUMERIC_NOTE)
     reasons = new_table("configuration and goal", ">pairs", ">of all")
+    if "constraints" in result:
+        out.print(f"scored under constraints: {'; '.join(result['constraints'])}")
     for name, count in result["reasons"].items():
+        if name == "excluded" and not count:
+            continue
         fraction = percentage(count / result["pairs"])
         reasons.add_row(REASON_TEXTS[reason_of(name)], f"{count:,}", fraction)
     out.print(reasons)
@@ -129,6 +133,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(f"moves the environment: {', '.join(axis_name(n) for n in result['moves'])}")
     if "alternatives" in result:
         out.print(_alternatives_table(result))
+    if "scored_constraints" in result:
+        out.print(f"scored under constraints: {'; '.join(result['scored_constraints'])}")
     for constraint in result.get("constraints", ()):
         left = f"{constraint['configurations']:,} configurations"
         if "solutions" in constraint:

@@ -14,6 +14,7 @@ REASON_TEXTS = {
     ),
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "the gripper at the goal would touch the robot's own body",
     Reason.ARM_BLOCKED: "every arm posture would touch something",
+    Reason.EXCLUDED: "excluded by a constraint when scoring",
 }
 """Each reason as part of a sentence."""
 REASON_NAMES = {
@@ -24,6 +25,7 @@ REASON_NAMES = {
     Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "gripper blocked by environment",
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "gripper blocked by robot",
     Reason.ARM_BLOCKED: "arm blocked",
+    Reason.EXCLUDED: "excluded by a constraint",
 }
 """Each reason as the title of a column or in a legend."""
 REASON_COLOURS = {
@@ -34,16 +36,18 @@ REASON_COLOURS = {
     Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "#e69f00",
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "#cc79a7",
     Reason.ARM_BLOCKED: "#d55e00",
+    Reason.EXCLUDED: "#d9d9d9",
 }
-"""The palette of Okabe and Ito, distinct under colour vision deficiency, and a dark grey."""
+"""The palette of Okabe and Ito, distinct under colour vision deficiency, and two greys."""
 COLOUR_NAMES = {
     Reason.REACHED: "green",
     Reason.TOO_FAR: "light blue",
     Reason.JOINT_LIMITS: "yellow",
-    Reason.BODY_BLOCKED: "grey",
+    Reason.BODY_BLOCKED: "dark grey",
     Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT: "light orange",
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "pink",
     Reason.ARM_BLOCKED: "dark orange",
+    Reason.EXCLUDED: "light grey",
 }
 """Names of the colours, for text without colour."""
 

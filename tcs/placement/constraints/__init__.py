@@ -7,6 +7,7 @@ solutions touch an obstacle, which configurations are not preferred.
 
 from __future__ import annotations
 
+from tcs.placement.constraints.axes import SAME_VALUE, axis_constraints, kept_conditions
 from tcs.placement.constraints.blocking import blocked_bodies, blocked_solutions
 from tcs.placement.constraints.constraints import Constraints
 from tcs.placement.constraints.files import merged, read_constraints
@@ -14,16 +15,29 @@ from tcs.placement.constraints.obstacles import Obstacle
 from tcs.placement.constraints.postures import Postures
 from tcs.placement.constraints.preferences import disliked_candidates
 from tcs.placement.constraints.regions import Footprint, Region
+from tcs.placement.constraints.scored import (
+    constraint_texts,
+    constraints_entry,
+    excluded_configurations,
+    scored_constraints,
+)
 
 __all__ = [
+    "SAME_VALUE",
     "Constraints",
     "Footprint",
     "Obstacle",
     "Postures",
     "Region",
+    "axis_constraints",
     "blocked_bodies",
     "blocked_solutions",
+    "constraint_texts",
+    "constraints_entry",
     "disliked_candidates",
+    "excluded_configurations",
+    "kept_conditions",
     "merged",
     "read_constraints",
+    "scored_constraints",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from tcs.placement.tables import Reason, ScoreTable
 
 CHECKS = (
+    Reason.EXCLUDED,
     Reason.BODY_BLOCKED,
     Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT,
     Reason.TOO_FAR,
@@ -17,7 +19,17 @@ CHECKS = (
     Reason.JOINT_LIMITS,
     Reason.ARM_BLOCKED,
 )
-"""Reasons why a goal is not reached, in the order in which they are checked."""
+"""Reasons why a goal is not reached, in the order in which they are checked. The first is there
+only in files that were scored under constraints."""
+
+
+def checks_of(reasons: Mapping[Reason, int]) -> tuple[Reason, ...]:
+    """Return the `CHECKS` that were made: constraints only if they excluded a configuration.
+
+    Args:
+        reasons: Number of configurations with each reason.
+    """
+    return CHECKS if reasons[Reason.EXCLUDED] else CHECKS[1:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +101,9 @@ class Distribution:
 
     @property
     def checks(self) -> tuple[CheckCount, ...]:
-        """Counts of each of `CHECKS`, in order."""
+        """Counts of each of `CHECKS` that were made, in order."""
         found, left = [], self.configurations
-        for reason in CHECKS:
+        for reason in checks_of(self.reasons):
             found.append(CheckCount(reason, left, self.reasons[reason]))
             left -= self.reasons[reason]
         return tuple(found)

@@ -195,11 +195,13 @@ def _distances(
 ) -> tuple[str, Distances]:
     """Return the route that is possible from the start, and the distances to the cells.
 
-    From a configuration in contact the base cannot drive, so distances are straight. A stated
-    configuration counts as free, even if the nearest one of the grid is in contact.
+    From a configuration in contact, or one that was not scored, the base cannot drive, so distances
+    are straight. A stated configuration counts as free, even if the nearest one of the grid is in
+    contact.
     """
     here = start.stated
-    if route == "around" and (start.offset or start.reason != Reason.BODY_BLOCKED):
+    stuck = (Reason.BODY_BLOCKED, Reason.EXCLUDED)
+    if route == "around" and (start.offset or start.reason not in stuck):
         around = LatticeDistances(cell_xy, lattice)
         try:
             around.from_position(here.base_x, here.base_y)

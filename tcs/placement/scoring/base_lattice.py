@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tcs.model.grid import ROBOT_AXES, Grid
-from tcs.placement.tables import BaseLattice, Reason, ScoreTable
+from tcs.placement.tables import BaseLattice, ScoreTable
 from tcs.placement.tables.base_lattice import MOVES
 
 BORDER = 0.6
@@ -25,13 +25,15 @@ def lattice_of(scores: ScoreTable, grid: Grid) -> BaseLattice:
     The base can move to a neighbour if, in some state of the environment and with some heading and
     torso height, its body is free of contact at both positions; diagonally if also at the two
     positions beside the diagonal. At each position the robot may turn, move its torso and have the
-    environment set. Positions are checked, not the path between them.
+    environment set. Positions are checked, not the path between them. Configurations that a
+    constraint excluded count as in contact.
 
     Args:
         scores: Scores of every configuration of the grid.
         grid: The grid.
     """
-    blocked = (scores.reason == Reason.BODY_BLOCKED).any(axis=1)
+    # Nothing is known about the body where a configuration was not scored.
+    blocked = scores.has_no_free_body
     names = list(ROBOT_AXES)
     x, y = names.index("base_x") - len(names), names.index("base_y") - len(names)
     free = np.moveaxis(~blocked.reshape(grid.shape), (x, y), (-2, -1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,10 @@ from tcs.model.scene import (
     lower,
 )
 from tcs.model.tasks import Task, load_task
+from tcs.placement.constraints import Constraints, kept_conditions
+from tcs.placement.scoring.obstacles import with_obstacles
+
+_NO_CONSTRAINTS = Constraints()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +38,9 @@ class Job:
     """The configurations to choose from."""
     observed: tuple[Axis, ...] = ()
     """The axes that can only be observed; each of their states is scored into tables of its own."""
+    constraints: Constraints = _NO_CONSTRAINTS
+    """Constraints whose conditions and obstacles are part of `grid` and `spec` already; forbidden
+    regions are applied when scoring."""
 
     @property
     def scored_grid(self) -> Grid:
@@ -64,6 +71,8 @@ def load_job(
     robot: str | Path | RobotFile,
     *,
     only: Sequence[str] = (),
+    constraints: Constraints = _NO_CONSTRAINTS,
+    now: Mapping[str, float] | None = None,
 ) -> Job:
     """Load a task, an environment and a robot, check them against each other and return their job.
 
@@ -73,11 +82,15 @@ def load_job(
         robot: Name of a robot, path of its file, or a robot.
         only: Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not
             scored.
+        constraints: Further conditions, axes that keep their present value, forbidden regions and
+            obstacles. Preferences have no effect.
+        now: Present values of axes [m or rad], for the axes to keep.
 
     Raises:
         UnknownNameError: If a task, environment, robot or axis of that name does not exist.
         DataFileError: If a file cannot be used, or the task is not for that environment.
         GridError: If the grid is empty or enormous, or a condition is invalid.
+        SelectionError: If the present value of an axis to keep is missing or not scored.
     """
     task = task if isinstance(task, Task) else load_task(task)
     if not isinstance(environment, EnvironmentFile):
@@ -97,8 +110,12 @@ def load_job(
     if robot.torso_joint is None:
         # Without a torso joint all torso levels are the same configuration.
         grid = grid.overridden({"torso": {"start": 0.0, "count": 1}}, where=f"robot '{robot.name}'")
-    grid = restricted(grid, only)
-    return Job(task, SceneSpec(robot, environment), grid, environment.observed_axes)
+    kept = kept_conditions(constraints.keep, now or {}, grid)
+    conditions = (*only, *constraints.only, *kept)
+    grid = restricted(grid, conditions)
+    applied = dataclasses.replace(constraints, only=conditions, keep=())
+    spec = SceneSpec(robot, with_obstacles(environment, constraints.blocked))
+    return Job(task, spec, grid, environment.observed_axes, applied)
 
 
 def data_references(job: Job, task: object, environment: object, robot: object) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from tcs.model.grid import Axis
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
+from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.offline import ScoringSetup
+from tcs.placement.scoring.offline import NO_CONSTRAINTS, ScoringSetup
 from tcs.placement.scoring.sets import SetOptions
 from tcs.placement.scoring.sweep import warm_up
 from tcs.placement.store import ScoreFile
@@ -42,6 +43,8 @@ class LiveScorer:
         jobs: int = 2,
         on_compile: Callable[[], None] | None = None,
         only: Sequence[str] = (),
+        constraints: Constraints = NO_CONSTRAINTS,
+        now: Mapping[str, float] | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -55,14 +58,17 @@ class LiveScorer:
             jobs: Number of threads.
             on_compile: Called before the kernel compiles, if it has to.
             only: Conditions on axes of the grid.
+            constraints: As for `tcs.score`.
+            now: Present values of axes [m or rad], for the axes that the constraints keep.
             **sets: Options of the kept sets.
 
         Raises:
             TcsError: The errors of `tcs.score`.
         """
         self._setup = ScoringSetup.load(
-            task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only
-        )
+            task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
+            constraints=constraints, now=now,
+        )  # fmt: skip
         lowered = self._job_at({}).lowered(self._setup.scene)
         warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
 
@@ -121,6 +127,8 @@ def score_observed(
     observation: ObservationLike | None = None,
     measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
+    constraints: Constraints = NO_CONSTRAINTS,
+    now: Mapping[str, float] | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
@@ -134,6 +142,8 @@ def score_observed(
         observation: The observed environment: an `Observation`, or values of its joints [m or rad].
         measure: Dexterity measure.
         jobs: Number of threads.
+        constraints: As for `tcs.score`.
+        now: Present values of axes [m or rad], for the axes that the constraints keep.
         **sets: Options of the kept sets.
 
     Returns:
@@ -142,5 +152,8 @@ def score_observed(
     Raises:
         TcsError: The errors of `LiveScorer` and `LiveScorer.score`.
     """
-    scorer = LiveScorer(task, environment, robot, measure=measure, jobs=jobs, **sets)
+    scorer = LiveScorer(
+        task, environment, robot, measure=measure, jobs=jobs, constraints=constraints, now=now,
+        **sets,
+    )  # fmt: skip
     return scorer.score(observation)

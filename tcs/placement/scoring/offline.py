@@ -15,12 +15,20 @@ from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
+from tcs.placement.constraints import (
+    Constraints,
+    Footprint,
+    constraints_entry,
+    excluded_configurations,
+)
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.placement.scoring.sweep import sweep
 from tcs.placement.store import ScoreFile, StateTables
+
+NO_CONSTRAINTS = Constraints()
 
 _log = logging.getLogger(__name__)
 
@@ -40,8 +48,6 @@ class ScoringSetup:
     """Name of the dexterity measure."""
     jobs: int
     """Number of threads; the result does not depend on it."""
-    only: tuple[str, ...]
-    """Conditions to which the grid was restricted."""
 
     @classmethod
     def load(
@@ -54,6 +60,8 @@ class ScoringSetup:
         jobs: int,
         sets: SetOptions,
         only: Sequence[str] = (),
+        constraints: Constraints = NO_CONSTRAINTS,
+        now: Mapping[str, float] | None = None,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -66,9 +74,9 @@ class ScoringSetup:
         """
         dexterity(measure)
         options = checked_options(**sets)
-        job = load_job(task, environment, robot, only=only)
+        job = load_job(task, environment, robot, only=only, constraints=constraints, now=now)
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs, tuple(only))
+        return cls(job, job.scene(), references, options, measure, jobs)
 
     def score(
         self,
@@ -91,6 +99,10 @@ class ScoringSetup:
         """
         job = self.job
         lowered = job.lowered(self.scene)
+        shapes = robot_shapes(lowered.arrays)
+        excluded = excluded_configurations(
+            job.constraints.forbid, Footprint.of(shapes), job.scored_grid
+        )
         swept = sweep(
             lowered,
             job.task.weights,
@@ -99,6 +111,7 @@ class ScoringSetup:
             jobs=self.jobs,
             on_progress=on_progress,
             on_compile=on_compile,
+            excluded=excluded,
         )
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
         if contact is not None:
@@ -109,7 +122,6 @@ class ScoringSetup:
             StateTables.of(scores, build_sets(scores, job.grid, jobs=self.jobs, **self.sets))
             for scores in swept.tables
         )
-        shapes = robot_shapes(lowered.arrays)
         done = time.perf_counter()
         return ScoreFile(
             metadata={
@@ -117,7 +129,8 @@ class ScoringSetup:
                 "created": datetime.now(UTC).isoformat(timespec="seconds"),
                 **self.references,
                 **(metadata or {}),
-                **({"only": list(self.only)} if self.only else {}),
+                **({"only": list(job.constraints.only)} if job.constraints.only else {}),
+                **constraints_entry(job.constraints, excluded),
                 **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
                 "scene_digest": lowered.digest(),
                 "measure": self.measure,
@@ -150,6 +163,8 @@ def score(
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
     only: Sequence[str] = (),
+    constraints: Constraints = NO_CONSTRAINTS,
+    now: Mapping[str, float] | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -166,6 +181,10 @@ def score(
         on_compile: Called before the kernel compiles, if it has to.
         only: Conditions on axes of the grid, e.g. "head_rest >= 35 deg"; other values are not
             scored, and the sets are built from what remains.
+        constraints: Constraints as for `tcs.select`. Configurations on forbidden regions are not
+            scored, and blocked boxes become obstacles of the environment. Preferences have no
+            effect.
+        now: Present values of axes [m or rad], for the axes that the constraints keep.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -177,12 +196,15 @@ def score(
             exist.
         DataFileError: If a file cannot be used.
         GridError: If the grid is empty or enormous, or a condition is invalid.
+        SelectionError: If the present value of an axis to keep is missing or not scored, or every
+            base pose is forbidden.
         TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
     setup = ScoringSetup.load(
-        task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only
-    )
+        task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
+        constraints=constraints, now=now,
+    )  # fmt: skip
     return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
 
 

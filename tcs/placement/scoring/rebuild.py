@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from tcs.model.scene import LoweredScene, Scene
+from tcs.placement.constraints import scored_constraints
 from tcs.placement.scoring.job import Job, load_job
 from tcs.placement.store import ScoreFile, check_scene
 
@@ -23,7 +24,7 @@ def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene,
     """
     job = load_job(
         *(file.metadata[key] for key in ("task", "environment", "robot")),
-        only=file.metadata.get("only", ()),
+        constraints=scored_constraints(file),
     )
     # A file that was scored live has an observed state of its own.
     job = dataclasses.replace(job, observed=file.observed_axes)

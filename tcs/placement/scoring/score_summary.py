@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Any
 
 from tcs.model.grid import Grid
+from tcs.placement.constraints import constraint_texts
 from tcs.placement.scoring.sweep import ANALYTIC
 from tcs.placement.store import ScoreFile, state_to_json
 
@@ -42,6 +43,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "best": _set_summary(file, file.nominal.sets.best),
         "best_single": _set_summary(file, file.nominal.sets.best_single),
         "reasons": dict(reasons),
+        **({"constraints": texts} if (texts := constraint_texts(file)) else {}),
         "self_contact": file.metadata.get("self_contact"),
         "tables": [
             {

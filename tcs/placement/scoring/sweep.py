@@ -13,16 +13,20 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
+from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.scene import LoweredScene
-from tcs.placement.tables import ScoreTable
+from tcs.placement.tables import Reason, ScoreTable
 
 SLICE = 1024
 """Configurations per slice: some milliseconds of work, so that threads finish together and progress
 is visible, with scratch memory that stays in the processor's cache."""
+
+SHORT_GAP = 32
+"""Excluded configurations in a row that are scored after all: preparing a run takes longer."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
@@ -53,6 +57,7 @@ def sweep(
     jobs: int = 2,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
+    excluded: NDArray[np.bool_] | None = None,
 ) -> Sweep:
     """Score every configuration of the grid against every goal.
 
@@ -65,6 +70,7 @@ def sweep(
         jobs: Number of threads; the scores do not depend on it.
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called first, if there is no cached machine code.
+        excluded: Configurations that are not scored, shape (configurations,); None for none.
 
     Returns:
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
@@ -87,7 +93,8 @@ def sweep(
     joints = []
     done = 0
     for part in Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
-        delayed(_slice)(problem, grippers, start, min(start + SLICE, size)) for start in starts
+        delayed(_slice)(problem, grippers, start, min(start + SLICE, size), excluded)
+        for start in starts
     ):
         rows = slice(done, done + len(part.reason))
         reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.dexterity
@@ -135,7 +142,13 @@ def _size(problem: Problem) -> int:
     return int(problem.environment_states * base_poses * problem.torso_levels)
 
 
-def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int) -> Scores:
+def _slice(
+    problem: Problem,
+    grippers: NDArray[np.int64],
+    start: int,
+    stop: int,
+    excluded: NDArray[np.bool_] | None = None,
+) -> Scores:
     """Return the scores of configurations start <= h < stop."""
     shape = (stop - start, problem.goal_p.shape[1])
     scores = Scores(
@@ -144,8 +157,30 @@ def _slice(problem: Problem, grippers: NDArray[np.int64], start: int, stop: int)
         dexterity=np.zeros(shape, np.float32),
         joints=np.zeros((*shape, 7), np.float32),
     )
-    score_slice(problem, grippers, start, stop, scores)
+    if excluded is None:
+        score_slice(problem, grippers, start, stop, scores)
+        return scores
+    out = excluded[start:stop]
+    for begin, end in _scored_runs(out):
+        rows = slice(begin, end)
+        part = Scores(
+            scores.reason[rows], scores.contact[rows], scores.dexterity[rows], scores.joints[rows]
+        )
+        score_slice(problem, grippers, start + begin, start + end, part)
+    scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
+    scores.dexterity[out] = 0.0
     return scores
+
+
+def _scored_runs(excluded: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return begin and end of the runs to score: all that is not excluded, and short gaps.
+
+    >>> _scored_runs(np.array([True, False, False, True, False]))
+    [(1, 5)]
+    """
+    rows = np.flatnonzero(~excluded)
+    parts = np.split(rows, np.flatnonzero(np.diff(rows) > SHORT_GAP) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size]
 
 
 def _name_contacts(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.model.grid import Axis, AxisCondition, Grid, InitialConfiguration
-from tcs.model.grid.condition import axis_named, values_text
-from tcs.placement.constraints import Constraints, Footprint, blocked_bodies, blocked_solutions
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.placement.constraints import (
+    Constraints,
+    Footprint,
+    axis_constraints,
+    blocked_bodies,
+    blocked_solutions,
+)
 from tcs.placement.selection.travel import current_values
 
 if TYPE_CHECKING:
     from tcs.placement.selection.choice import SelectionTables
 
 BoolArray = NDArray[np.bool_]
-
-SAME_VALUE = 1e-6
-"""Difference [m or rad] below which a present value counts as a scored one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,8 @@ def admitted_candidates(
     left: list[Left] = []
     warnings: list[str] = []
     along = grid.indices(sets.candidates)
-    for name, axis, admitted, warning in _axis_constraints(constraints, here, grid):
+    now = current_values(here, grid, ()) if constraints.keep else {}
+    for name, axis, admitted, warning in axis_constraints(constraints, now, grid):
         remaining &= admitted[along[:, grid.axes.index(axis)]]
         warnings += [warning] if warning else []
         _note(left, Left(name, _count(remaining)), remaining.size)
@@ -131,64 +132,6 @@ def _bases(
 
 def _count(remaining: BoolArray) -> int:
     return int(np.count_nonzero(remaining))
-
-
-def _axis_constraints(
-    constraints: Constraints, here: InitialConfiguration, grid: Grid
-) -> Iterator[tuple[str, Axis, BoolArray, str]]:
-    """Yield each constraint on an axis: its name, axis, admitted values (count,) and a warning."""
-    for text in constraints.only:
-        condition = AxisCondition.parse(text)
-        axis = condition.axis_of(grid)
-        admitted = condition.admitted(grid)
-        warning = ""
-        if np.all(admitted):
-            warning = (
-                f"only {condition.text} excludes nothing: the grid has {axis.name} "
-                f"{values_text(axis)}."
-            )
-        yield f"only {condition.text}", axis, admitted, warning
-    if not constraints.keep:
-        return
-    now = current_values(here, grid, ())
-    for name in constraints.keep:
-        axis = axis_named(grid, name, where="keep")
-        index, error = _present(axis, now)
-        warning = ""
-        if error > SAME_VALUE:
-            warning = (
-                f"keep {axis.name}: the present value {_shown(axis, now[axis.name])} is not "
-                f"scored; the scores are those of {_shown(axis, float(axis.values[index]))}."
-            )
-        yield f"keep {axis.name}", axis, np.arange(axis.count) == index, warning
-
-
-def _present(axis: Axis, now: dict[str, float]) -> tuple[int, float]:
-    """Return the index of the scored value nearest to the present one, and their difference."""
-    if axis.name not in now:
-        key = f"{axis.name}_deg" if axis.unit == "deg" else axis.name
-        raise SelectionError(
-            f"keep {axis.name}: the current state lacks its value. Give it: --at {key}=VALUE."
-        )
-    apart = np.abs(axis.values - now[axis.name])
-    if axis.name == "base_yaw":
-        apart = np.abs(np.mod(apart + math.pi, 2.0 * math.pi) - math.pi)
-    index = int(np.argmin(apart))
-    half = (math.radians(axis.step) if axis.unit == "deg" else axis.step) / 2.0
-    # A single value has no neighbour that shows what range it covers.
-    if apart[index] > (half * (1.0 + 1e-9) if axis.count > 1 else SAME_VALUE):
-        raise SelectionError(
-            f"keep {axis.name}: the present value {_shown(axis, now[axis.name])} is more than half "
-            f"a step from the scored ones: {values_text(axis)}."
-            if axis.count > 1
-            else f"keep {axis.name}: the present value is {_shown(axis, now[axis.name])}, but only "
-            f"{values_text(axis)} is scored."
-        )
-    return index, float(apart[index])
-
-
-def _shown(axis: Axis, value: float) -> str:
-    return f"{math.degrees(value) if axis.unit == 'deg' else value:g} {axis.unit}"
 
 
 def _note(left: list[Left], found: Left, candidates: int) -> None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.constraints import Constraints, disliked_candidates
-from tcs.placement.selection.admission import SAME_VALUE, Admitted, admitted_candidates
+from tcs.placement.constraints import SAME_VALUE, Constraints, disliked_candidates
+from tcs.placement.selection.admission import Admitted, admitted_candidates
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables

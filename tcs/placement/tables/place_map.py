@@ -36,6 +36,8 @@ class PlaceMap:
     """Greatest P_M of a single configuration at each position, shape (X, Y)."""
     free: NDArray[np.bool_]
     """Whether the robot's body is free of contact in at least one configuration, shape (X, Y)."""
+    excluded: NDArray[np.bool_] | None = None
+    """Whether constraints excluded every configuration there, shape (X, Y); None for nowhere."""
     over: tuple[str, ...] = ()
     """Names of the other axes, over which the maxima are taken."""
 
@@ -75,7 +77,8 @@ class PlaceMap:
         rows = rows_of_state(grid, state)
         reached, dexterity = scores.reached[rows], scores.dexterity[rows]
         # Contact of the body does not depend on the goal.
-        blocked = (scores.reason[rows] == Reason.BODY_BLOCKED).any(axis=1)
+        blocked = scores.has_no_free_body[rows]
+        excluded = np.asarray(scores.reason[rows, 0] == Reason.EXCLUDED)
         axes = _axes(grid, state)
         return cls(
             x=grid.axis("base_x").values,
@@ -85,6 +88,7 @@ class PlaceMap:
                 grid, tc_manipulability(dexterity, scores.weights), state
             ),
             free=best_per_place(grid, ~blocked, state),
+            excluded=~best_per_place(grid, ~excluded, state) if np.any(excluded) else None,
             # Axes of one value are left out. Headings and torso heights come first.
             over=tuple(a.name for a in reversed(axes) if a.count > 1 and a.name not in _PLACE),
         )

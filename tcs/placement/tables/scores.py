@@ -29,6 +29,8 @@ class Reason(IntEnum):
     GRIPPER_BLOCKED_BY_ROBOT = 5
     """The gripper at the goal touches the robot itself."""
     ARM_BLOCKED = 6
+    EXCLUDED = 7
+    """A constraint excludes the configuration, which was not scored."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,6 +121,13 @@ class ScoreTable(ArrayTable):
         reached = np.asarray(self.reason == Reason.REACHED)
         reached.flags.writeable = False
         return reached
+
+    @property
+    def has_no_free_body(self) -> NDArray[np.bool_]:
+        """Whether a configuration's body is in contact or was not checked, shape (H,)."""
+        reason = self.reason
+        stuck = (reason == Reason.BODY_BLOCKED) | (reason == Reason.EXCLUDED)
+        return np.asarray(np.any(stuck, axis=1))
 
     @cached_property
     def _reached_pairs(self) -> NDArray[np.intp]:

@@ -35,7 +35,7 @@ def random_scores(grid, goals, seed, *, levels=0, share=0.5):
     if levels:
         dexterity = np.floor(dexterity * levels).astype(np.float32) / np.float32(levels)
     reached = rng.random(shape) < share
-    blocked = rng.integers(Reason.TOO_FAR, len(Reason), size=shape)
+    blocked = rng.integers(Reason.TOO_FAR, Reason.EXCLUDED, size=shape)
     reason = np.where(reached, Reason.REACHED, blocked).astype(np.uint8)
     named = reason >= Reason.BODY_BLOCKED
     raw = rng.integers(1, 4, size=goals).astype(np.float64)
