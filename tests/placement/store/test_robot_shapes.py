@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from tests.placement.selection.test_admission import made_up_robot
 
 from tcs.errors import StoreError
 from tcs.placement.store.robot_shapes import RobotShapes
+from tests.placement.selection.test_admission import made_up_robot
 from tests.placement.store.example import METADATA, score_file
 from tests.placement.tables.small import small_grid
 
