@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.collide import BOUND, CENTRE, closer, move, spheres_overlap
 from tcs.kernel.kinematics import link_poses
@@ -30,7 +30,12 @@ class Workspace(NamedTuple):
     """Scratch of one worker, reused from pair to pair."""
 
     arm: FloatArray
-    """Arm shapes in A at the current posture, packed."""
+    """Rows of `Problem.links` in A at the current posture; the shapes only of groups that
+    `is_placed` names."""
+    is_placed: BoolArray
+    """Whether the shapes of each group of the arm are up to date, shape (arm groups,)."""
+    touching: IntArray
+    """Rows of the two shapes found in contact last, shape (2,)."""
     environment_B: FloatArray
     """Environment shapes in B, packed."""
     environment_A: FloatArray
@@ -60,6 +65,8 @@ def new_workspace(problem: Problem) -> Workspace:
     """Return scratch memory for one worker."""
     return Workspace(
         np.empty_like(problem.links),
+        np.zeros(len(problem.link_first) - 1, np.bool_),
+        np.zeros(2, np.int64),
         np.empty_like(problem.environment[0]),
         np.empty_like(problem.environment[0]),
         np.zeros(problem.environment_body.size, np.int64),
@@ -90,6 +97,7 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
     """
     body, environment, gaps = problem.body[torso], work.environment_B, problem.gap_base
     mounts, sphere = problem.body_mount, problem.body_spheres[torso, mount]
+    first, boxes = problem.body_first, len(mounts)
     for j in range(len(environment)):
         x = environment[j, CENTRE] - sphere[0]
         y = environment[j, CENTRE + 1] - sphere[1]
@@ -97,13 +105,15 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
         apart = environment[j, BOUND] + sphere[3] + problem.widest_gap
         if apart <= 0.0 or x * x + y * y + z * z > apart * apart:
             continue
-        for i in range(len(body)):
-            gap = gaps[i, j]
-            if mounts[i] != mount or gap <= 0.0:
-                continue
-            if spheres_overlap(body, i, environment, j, gap) and closer(
-                body, i, environment, j, gap
+        for g in range(len(first) - 1):
+            gap = gaps[boxes + g, j]
+            if (
+                mounts[first[g]] == mount
+                and gap > 0.0
+                and spheres_overlap(body, boxes + g, environment, j, gap)
+                and _group_touches(body, first, g, environment, j, gaps, work.touching)
             ):
+                i = work.touching[0]
                 return contact_code(
                     problem, problem.body_body[i], problem.environment_body[j], ENVIRONMENT
                 )
@@ -115,17 +125,16 @@ def gripper_environment_contact(problem: Problem, work: Workspace, state: int, g
     """Return the first contact of the gripper with the environment, the tool being at a goal."""
     _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
     arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
-    for i in range(problem.grippers):
+    box = len(problem.link_body)
+    for g in range(problem.gripper_groups):
         for j in range(len(environment)):
-            gap = gaps[i, j]
+            gap = gaps[box + g, j]
             if (
                 gap > 0.0
-                and spheres_overlap(arm, i, environment, j, gap)
-                and closer(arm, i, environment, j, gap)
+                and spheres_overlap(arm, box + g, environment, j, gap)
+                and _environment_touches(problem, work, g, environment, j)
             ):
-                return contact_code(
-                    problem, problem.link_body[i], problem.environment_body[j], ENVIRONMENT
-                )
+                return pair_code(problem, ENVIRONMENT, work.touching[0], j)
     return NO_CONTACT
 
 
@@ -133,25 +142,26 @@ def gripper_environment_contact(problem: Problem, work: Workspace, state: int, g
 def gripper_body_contact(problem: Problem, work: Workspace, body_A: FloatArray) -> int:
     """Return the first contact of the gripper with the robot's body, the tool being at the goal.
 
-    The gripper's shapes in A remain in `work.arm`.
+    The gripper's groups in A remain in `work.arm`.
     """
     _place_gripper(problem, work, work.R_AG, work.p_AG)
     arm, gaps = work.arm, problem.gap_body
-    for i in range(problem.grippers):
-        for j in range(len(body_A)):
-            gap = gaps[i, j]
+    box, others = len(problem.link_body), len(problem.body_body)
+    for g in range(problem.gripper_groups):
+        for h in range(len(problem.body_first) - 1):
+            gap = gaps[box + g, others + h]
             if (
                 gap > 0.0
-                and spheres_overlap(arm, i, body_A, j, gap)
-                and closer(arm, i, body_A, j, gap)
+                and spheres_overlap(arm, box + g, body_A, others + h, gap)
+                and _body_touches(problem, work, body_A, g, h)
             ):
-                return contact_code(problem, problem.link_body[i], problem.body_body[j], BODY)
+                return pair_code(problem, BODY, work.touching[0], work.touching[1])
     return NO_CONTACT
 
 
 @inner
 def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArray) -> None:
-    """Place the shapes of the last link such that the tool is at the pose (R, p)."""
+    """Place the groups of the last link such that the tool is at the pose (R, p)."""
     R7, p7 = work.link_R[7], work.link_p[7]
     F, f = problem.chain_R[7], problem.chain_p[7]
     for r in range(3):
@@ -159,8 +169,8 @@ def _place_gripper(problem: Problem, work: Workspace, R: FloatArray, p: FloatArr
             R7[r, c] = R[r, 0] * F[c, 0] + R[r, 1] * F[c, 1] + R[r, 2] * F[c, 2]
     for r in range(3):
         p7[r] = p[r] - (R7[r, 0] * f[0] + R7[r, 1] * f[1] + R7[r, 2] * f[2])
-    for i in range(problem.grippers):
-        move(R7, p7, problem.links, i, work.arm, i)
+    for g in range(problem.gripper_groups):
+        _place_group(problem, work, g)
 
 
 @inner
@@ -170,38 +180,46 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     Contacts of the gripper with environment and body are not checked: they depend on the goal only.
     `gripper_body_contact` must have placed the gripper. The last pair in contact is checked first.
     """
-    arm, environment = work.arm, work.environment_A
+    arm, environment, last, touching = work.arm, work.environment_A, work.last, work.touching
     gap_environment, gap_body, gap_arm = problem.gap_environment, problem.gap_body, problem.gap_arm
+    near, near_count = work.near, work.near_count[0]
+    groups, body_groups = len(problem.link_first) - 1, len(problem.body_first) - 1
+    boxes, body_boxes = len(problem.link_body), len(problem.body_body)
     link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
-    partner, i, j = work.last[0], work.last[1], work.last[2]
+    partner, i, j = last[0], last[1], last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
         return pair_code(problem, partner, i, j)
-    for i in range(problem.grippers, len(arm)):
-        _place_link(problem, work, i)
-        for n in range(work.near_count[0]):
-            j = work.near[n]
-            gap = gap_environment[i, j]
+    for g in range(problem.gripper_groups, groups):
+        box = boxes + g
+        _place_group(problem, work, g)
+        for n in range(near_count):
+            j = near[n]
+            gap = gap_environment[box, j]
             if (
                 gap > 0.0
-                and spheres_overlap(arm, i, environment, j, gap)
-                and closer(arm, i, environment, j, gap)
+                and spheres_overlap(arm, box, environment, j, gap)
+                and _environment_touches(problem, work, g, environment, j)
             ):
-                work.last[0], work.last[1], work.last[2] = ENVIRONMENT, i, j
-                return pair_code(problem, ENVIRONMENT, i, j)
-        for j in range(len(body_A)):
-            gap = gap_body[i, j]
+                last[0], last[1], last[2] = ENVIRONMENT, touching[0], j
+                return pair_code(problem, ENVIRONMENT, last[1], j)
+        for h in range(body_groups):
+            gap = gap_body[box, body_boxes + h]
             if (
                 gap > 0.0
-                and spheres_overlap(arm, i, body_A, j, gap)
-                and closer(arm, i, body_A, j, gap)
+                and spheres_overlap(arm, box, body_A, body_boxes + h, gap)
+                and _body_touches(problem, work, body_A, g, h)
             ):
-                work.last[0], work.last[1], work.last[2] = BODY, i, j
-                return pair_code(problem, BODY, i, j)
-        for j in range(i):
-            gap = gap_arm[i, j]
-            if gap > 0.0 and spheres_overlap(arm, i, arm, j, gap) and closer(arm, i, arm, j, gap):
-                work.last[0], work.last[1], work.last[2] = ARM, i, j
-                return pair_code(problem, ARM, i, j)
+                last[0], last[1], last[2] = BODY, touching[0], touching[1]
+                return pair_code(problem, BODY, last[1], last[2])
+        for h in range(g):
+            gap = gap_arm[box, boxes + h]
+            if (
+                gap > 0.0
+                and spheres_overlap(arm, box, arm, boxes + h, gap)
+                and _arm_touches(problem, work, g, h)
+            ):
+                last[0], last[1], last[2] = ARM, touching[0], touching[1]
+                return pair_code(problem, ARM, last[1], last[2])
     return NO_CONTACT
 
 
@@ -247,6 +265,126 @@ def pair_code(problem: Problem, partner: int, i: int, j: int) -> int:
     else:
         other = problem.link_body[j]
     return contact_code(problem, problem.link_body[i], other, partner)
+
+
+@inner
+def _environment_touches(
+    problem: Problem, work: Workspace, g: int, environment: FloatArray, j: int
+) -> bool:
+    """Return whether group g of the arm touches environment shape j; fills `work.touching`.
+
+    Call it, and the functions below, for a group whose bounding sphere touches.
+    """
+    arm, first, gaps = work.arm, problem.link_first, problem.gap_environment
+    box = first[-1] + g
+    if not closer(arm, box, environment, j, gaps[box, j]):
+        return False
+    _place_shapes(problem, work, g)
+    return _shapes_touch(arm, first, g, environment, j, gaps, work.touching)
+
+
+@inner
+def _group_touches(
+    a: FloatArray,
+    first: IntArray,
+    g: int,
+    b: FloatArray,
+    j: int,
+    gaps: FloatArray,
+    touching: IntArray,
+) -> bool:
+    """Return whether group g of a, with its shapes in place, touches shape j of b."""
+    box = first[-1] + g
+    return closer(a, box, b, j, gaps[box, j]) and _shapes_touch(a, first, g, b, j, gaps, touching)
+
+
+@inner
+def _shapes_touch(
+    a: FloatArray,
+    first: IntArray,
+    g: int,
+    b: FloatArray,
+    j: int,
+    gaps: FloatArray,
+    touching: IntArray,
+) -> bool:
+    """Return whether a shape of group g of a touches row j of b; fills `touching`."""
+    touching[0], touching[1] = first[g], j
+    # The box of a single shape is the shape, and touches.
+    if first[g + 1] - first[g] == 1:
+        return True
+    for i in range(first[g], first[g + 1]):
+        gap = gaps[i, j]
+        if gap > 0.0 and spheres_overlap(a, i, b, j, gap) and closer(a, i, b, j, gap):
+            touching[0] = i
+            return True
+    return False
+
+
+@inner
+def _body_touches(problem: Problem, work: Workspace, body_A: FloatArray, g: int, h: int) -> bool:
+    """Return whether group g of the arm touches group h of the body; fills `work.touching`."""
+    arm, first, others, gaps = work.arm, problem.link_first, problem.body_first, problem.gap_body
+    box, other = first[-1] + g, others[-1] + h
+    if not closer(arm, box, body_A, other, gaps[box, other]):
+        return False
+    _place_shapes(problem, work, g)
+    return _groups_touch(arm, first, g, body_A, others, h, gaps, work.touching)
+
+
+@inner
+def _arm_touches(problem: Problem, work: Workspace, g: int, h: int) -> bool:
+    """Return whether two groups of the arm touch; fills `work.touching`."""
+    arm, first, gaps = work.arm, problem.link_first, problem.gap_arm
+    box, other = first[-1] + g, first[-1] + h
+    if not closer(arm, box, arm, other, gaps[box, other]):
+        return False
+    _place_shapes(problem, work, g)
+    _place_shapes(problem, work, h)
+    return _groups_touch(arm, first, g, arm, first, h, gaps, work.touching)
+
+
+@inner
+def _groups_touch(
+    a: FloatArray,
+    first_a: IntArray,
+    g: int,
+    b: FloatArray,
+    first_b: IntArray,
+    h: int,
+    gaps: FloatArray,
+    touching: IntArray,
+) -> bool:
+    """Return whether a shape of group g of a touches one of group h of b; fills `touching`."""
+    if first_b[h + 1] - first_b[h] == 1:
+        return _shapes_touch(a, first_a, g, b, first_b[h], gaps, touching)
+    box = first_b[-1] + h
+    for i in range(first_a[g], first_a[g + 1]):
+        gap = gaps[i, box]
+        if gap <= 0.0 or not spheres_overlap(a, i, b, box, gap):
+            continue
+        for j in range(first_b[h], first_b[h + 1]):
+            gap = gaps[i, j]
+            if gap > 0.0 and spheres_overlap(a, i, b, j, gap) and closer(a, i, b, j, gap):
+                touching[0], touching[1] = i, j
+                return True
+    return False
+
+
+@inner
+def _place_group(problem: Problem, work: Workspace, g: int) -> None:
+    """Place the box around a group of the arm in A; its shapes have to follow."""
+    _place_link(problem, work, problem.link_first[-1] + g)
+    work.is_placed[g] = False
+
+
+@inner
+def _place_shapes(problem: Problem, work: Workspace, g: int) -> None:
+    """Place the shapes of a group of the arm in A unless they are up to date."""
+    if not work.is_placed[g]:
+        for i in range(problem.link_first[g], problem.link_first[g + 1]):
+            _place_link(problem, work, i)
+        work.is_placed[g] = True
 
 
 @inner

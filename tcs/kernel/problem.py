@@ -19,6 +19,7 @@ from tcs.kernel.arrays import (
 )
 from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
+from tcs.kernel.groups import first_rows, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
 """Gap of a pair of shapes that is not checked."""
@@ -27,7 +28,11 @@ TOUCH = 1e-9
 
 
 class Problem(NamedTuple):
-    """One scene, its goals and its grid."""
+    """One scene, its goals and its grid.
+
+    The robot's shapes are grouped by body: the rows of shapes are followed by a box around each
+    group. A gap of a box is the greatest gap of its shapes.
+    """
 
     measure: Dexterity
     """Dexterity measure to maximise."""
@@ -39,21 +44,27 @@ class Problem(NamedTuple):
     chain_p: FloatArray
     """Translations of the chain [m], shape (8, 3)."""
     links: FloatArray
-    """The arm's shapes, packed, in link frames, nearest to the tool first, shape (n_arm, 17)."""
+    """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
+    their groups, shape (n_arm + arm groups, 17)."""
     link_frame: IntArray
-    """Link of each shape in `links`, 7 .. 1, shape (n_arm,)."""
+    """Link of each row in `links`, 7 .. 1, shape (n_arm + arm groups,)."""
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
-    grippers: int
-    """Number of shapes of the gripper, on link 7: the first rows of `links`."""
+    link_first: IntArray
+    """First row in `links` of each group, and n_arm, shape (arm groups + 1,)."""
+    gripper_groups: int
+    """Number of groups of the gripper, on link 7: the first ones."""
     base_R: FloatArray
     """Orientation of A in B for each torso level, shape (torso levels, 3, 3)."""
     base_p: FloatArray
     """Origin of A in B for each torso level [m], shape (torso levels, 3)."""
     body: FloatArray
-    """Shapes of the rest of the robot in B, packed, shape (torso levels, n_body, 17)."""
+    """Shapes of the rest of the robot in B, packed, then the boxes around their groups, shape
+    (torso levels, n_body + body groups, 17)."""
     body_A: FloatArray
-    """The shapes in `body`, in A."""
+    """The rows of `body`, in A."""
+    body_first: IntArray
+    """First row in `body` of each group, and n_body, shape (body groups + 1,)."""
     body_spheres: FloatArray
     """Centre and radius of the bounding spheres of the body shapes fixed to the base (0) and
     mounted on the torso (1), in B [m], shape (torso levels, 2, 4)."""
@@ -71,13 +82,15 @@ class Problem(NamedTuple):
     """Number of bodies of the robot."""
     gap_environment: FloatArray
     """Distance [m] that arm and environment shapes must keep, or UNCHECKED, shape
-    (n_arm, n_environment)."""
+    (n_arm + arm groups, n_environment)."""
     gap_body: FloatArray
-    """The same for arm and body shapes, shape (n_arm, n_body)."""
+    """The same for arm and body shapes, shape (n_arm + arm groups, n_body + body
+    groups)."""
     gap_arm: FloatArray
-    """The same for arm shapes among themselves, shape (n_arm, n_arm)."""
+    """The same for arm shapes among themselves, shape (n_arm + arm groups, n_arm +
+    arm groups)."""
     gap_base: FloatArray
-    """The same for body and environment shapes, shape (n_body, n_environment)."""
+    """The same for body and environment shapes, shape (n_body + body groups, n_environment)."""
     widest_gap: float
     """Upper bound of all these distances [m]."""
     arm_radius: float
@@ -115,33 +128,48 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     pads = scene.arm.pad[order], scene.body.pad, scene.environment.pad
     margin, self_margin = scene.margin, scene.self_margin
     widest = max(margin, self_margin, 2.0 * max(float(pad.max(initial=0.0)) for pad in pads))
-    links = pack(scene.arm, order)[0]
+    links, link_body = pack(scene.arm, order), scene.arm.body[order].astype(np.int64)
+    mount, body_body = scene.body.frame.astype(np.int64), scene.body.body.astype(np.int64)
+    link_first, body_first = first_rows(frame, link_body), first_rows(mount, body_body)
+    packed = pack(scene.body)
     return Problem(
         measure=dexterity(measure),
         arm=any_solver(scene.chain),
         chain_R=_own(scene.chain.R),
         chain_p=_own(scene.chain.p),
-        links=links,
-        link_frame=frame,
-        link_body=scene.arm.body[order].astype(np.int64),
-        grippers=int(np.sum(frame == 7)),
+        links=with_boxes(links, link_first)[0],
+        link_frame=np.append(frame, frame[link_first[:-1]]),
+        link_body=link_body,
+        link_first=link_first,
+        gripper_groups=int(np.sum(frame[link_first[:-1]] == 7)),
         base_R=_own(scene.arm_base_R),
         base_p=_own(scene.arm_base_p),
-        body=pack(scene.body),
-        body_A=pack(body_A),
-        body_spheres=_bounding_spheres(pack(scene.body), scene.body.frame),
-        body_mount=scene.body.frame.astype(np.int64),
-        body_body=scene.body.body.astype(np.int64),
+        body=with_boxes(packed, body_first),
+        body_A=with_boxes(pack(body_A), body_first),
+        body_first=body_first,
+        body_spheres=_bounding_spheres(packed, scene.body.frame),
+        body_mount=mount,
+        body_body=body_body,
         environment=pack(scene.environment),
         environment_body=scene.environment.body.astype(np.int64),
         environment_bodies=_count(scene.environment),
         robot_bodies=max(_count(scene.arm), _count(scene.body)),
-        gap_environment=_gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin),
-        gap_body=_gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin),
-        gap_arm=_gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
-        gap_base=_gaps(scene.body_vs_environment, pads[1], pads[2], margin),
+        gap_environment=with_group_rows(
+            _gaps(scene.arm_vs_environment[order], pads[0], pads[2], margin), link_first
+        ),
+        gap_body=_with_groups(
+            _gaps(scene.arm_vs_body[order], pads[0], pads[1], self_margin), link_first, body_first
+        ),
+        gap_arm=_with_groups(
+            _gaps(scene.arm_vs_arm[order][:, order], pads[0], pads[0], self_margin),
+            link_first,
+            link_first,
+        ),
+        gap_base=with_group_rows(
+            _gaps(scene.body_vs_environment, pads[1], pads[2], margin), body_first
+        ),
         widest_gap=widest,
-        arm_radius=_arm_radius(scene.chain, links, frame) + widest,
+        arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
         base_x=_own(grid.base_x),
@@ -183,6 +211,12 @@ def _count(shapes: Shapes) -> int:
 def _own(array: FloatArray) -> FloatArray:
     """Return a writable copy: numba compiles anew for read-only arrays, which are another type."""
     return np.array(array, dtype=np.float64, order="C")
+
+
+def _with_groups(gaps: FloatArray, first: IntArray, others: IntArray) -> FloatArray:
+    """Return gaps of two sets of shapes with those of their groups in further rows and columns."""
+    whole = with_group_rows(with_group_rows(gaps, first).T, others).T
+    return np.ascontiguousarray(whole)
 
 
 def _gaps(checked: BoolArray, pad_a: FloatArray, pad_b: FloatArray, margin: float) -> FloatArray:
