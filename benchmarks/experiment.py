@@ -14,11 +14,10 @@ import time
 from table import header, parser, record_table, row, save
 
 from tcs.model.robots import load_robot
-from tcs.output.report.blocks import Table
 from tcs.output.report.teleop_tables import (
     group_table,
     learning_table,
-    motion_blocks,
+    motion_tables,
     signed_rank_table,
     trials_table,
 )
@@ -51,16 +50,16 @@ def main() -> None:
     begun = time.perf_counter()
     experiment = run_experiment(arm, course, plan, jobs=options.jobs)
     row("experiment", f"{time.perf_counter() - begun:.0f} s on {options.jobs} processes")
-    motion = [block for block in motion_blocks(experiment) if isinstance(block, Table)]
+    comparison = experiment.comparison()
     tables = dict(
         zip(
             ("groups", "tests", "motion", "pairs", "trials", "learning"),
             (
-                group_table(experiment),
-                signed_rank_table(experiment),
-                *motion,
-                trials_table(experiment),
-                learning_table(experiment),
+                group_table(comparison),
+                signed_rank_table(comparison),
+                *motion_tables(comparison),
+                trials_table(comparison),
+                learning_table(comparison),
             ),
             strict=True,
         )

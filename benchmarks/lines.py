@@ -23,7 +23,6 @@ from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.maps import controller_maps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import (
-    HYPOTHESES,
     Experiment,
     ExperimentPlan,
     run_experiment,
@@ -73,7 +72,7 @@ def medians(line: str, experiment: Experiment) -> None:
         "length [m], limiting joint": f"{course.line.length:.2f}, {course.blocking + 1}",
         "rotations of joint 1 that free the path [deg]": f"{min(turns):.0f} to {max(turns):.0f}",
     }
-    for measure in HYPOTHESES:
+    for measure in experiment.comparison().hypotheses:
         values = [median_of(experiment, one, measure) for one in controllers]
         cells[f"{TITLES[measure]}: {' / '.join(controllers)}"] = " / ".join(values)
         if measure == "accuracy":

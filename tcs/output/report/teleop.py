@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from tcs.output.draw import BoxGroup, BoxPlot, as_svg, draw_boxes
+from tcs.output.draw import as_svg
 from tcs.output.draw.tool_paths import PathGroup, draw_tool_paths
 from tcs.output.report.blocks import (
     Block,
@@ -25,29 +25,36 @@ from tcs.output.report.blocks import (
 from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.teleop_tables import (
     PAPER,
+    box_pictures,
     group_table,
     learning_table,
     maps_blocks,
     median_of,
-    motion_blocks,
+    motion_tables,
     number,
     signed_rank_table,
     title_of,
     trials_table,
 )
 from tcs.output.words import p_value
-from tcs.output.words.teleop import NAMES, SCALE
+from tcs.output.words.teleop import NAMES
+from tcs.teleop.experiment.comparison import Comparison
 from tcs.teleop.experiment.course import BLOCKED_AFTER
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import (
-    HYPOTHESES,
     SCRIPTED,
     Experiment,
     ExperimentPlan,
     median_ratio,
 )
 from tcs.teleop.operators.scripted import OperatorTraits
+
+_STEERING = (
+    "Steering is the motion of the hand that moves the tool. This hand pauses while the other one "
+    "moves the joint group, and pauses increase the spectral arc length. Operators rotate the hand "
+    "only in recovery motions, which the novel controller does not need."
+)
 
 
 def experiment_page(
@@ -61,7 +68,7 @@ def experiment_page(
         seconds: Wall-clock time of the experiment [s].
         command: Command that repeats the experiment.
     """
-    plan, arm = experiment.plan, experiment.arm
+    plan, arm, comparison = experiment.plan, experiment.arm, experiment.comparison()
     return Page(
         title="Following a line that requires null-space motion",
         lead=(
@@ -72,10 +79,10 @@ def experiment_page(
         ),
         sections=[
             Section("Findings", [Bullets(findings(experiment))]),
-            Section("Accuracy, time, effort", _compared(experiment)),
+            Section("Accuracy, time, effort", _compared(comparison)),
             Section("Paths of the tool", _paths(experiment)),
-            Section("Motion of the hand", motion_blocks(experiment)),
-            Section("Trials", [trials_table(experiment), learning_table(experiment)]),
+            Section("Motion of the hand", [*motion_tables(comparison), Text(_STEERING)]),
+            Section("Trials", [trials_table(comparison), learning_table(comparison)]),
             *([] if maps is None else [Section("Capability maps", maps_blocks(experiment, maps))]),
             Section("Operators", _operators(experiment)),
             Section("Reproduction", _made(experiment, seconds, command)),
@@ -91,8 +98,8 @@ def findings(experiment: Experiment) -> list[str]:
         f"The operators are {SCRIPTED}: the results show the effect of the controllers on one "
         "behaviour, not their acceptance by people."
     ]
-    for name in HYPOTHESES:
-        test, ratio = tests[name], median_ratio(experiment, name)
+    for name, test in tests.items():
+        ratio = median_ratio(experiment, name)
         theirs = PAPER[name][1] / PAPER[name][0]
         there, here = (median_of(experiment, one, name) for one in (END_EFFECTOR.name, NOVEL.name))
         sentences.append(
@@ -111,25 +118,8 @@ def findings(experiment: Experiment) -> list[str]:
     return sentences
 
 
-def _compared(experiment: Experiment) -> list[Block]:
-    figures: list[Block] = []
-    titles = [condition.title for condition in experiment.plan.conditions]
-    for name in HYPOTHESES:
-        boxes = [
-            BoxPlot(i, SCALE.get(name, 1.0) * experiment.sample(condition, name))
-            for i, condition in enumerate(experiment.drives)
-        ]
-        figure = draw_boxes([BoxGroup("", boxes)], titles, label=NAMES[name])
-        figures.append(
-            Picture(
-                as_svg(figure, f"teleop-{name}"),
-                "svg",
-                f"Box plots of {NAMES[name]} with each controller.",
-                f"{NAMES[name]}: means over the trials of each operator ({SCRIPTED}). Box: first "
-                "to third quartile; line: median; whiskers: 5th and 95th percentile; dot: mean.",
-            )
-        )
-    return [group_table(experiment), signed_rank_table(experiment), *figures]
+def _compared(comparison: Comparison) -> list[Block]:
+    return [group_table(comparison), signed_rank_table(comparison), *box_pictures(comparison)]
 
 
 def _paths(experiment: Experiment) -> list[Block]:

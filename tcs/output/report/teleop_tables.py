@@ -1,49 +1,61 @@
-"""Tables of the experiment with the teleoperated arm; each states that no people took part."""
+"""Tables of the experiment with the teleoperated arm; each states who the operators were."""
 
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 
-from tcs.output.report.blocks import Block, Column, Table, Text
+from tcs.output.draw import BoxGroup, BoxPlot, as_svg, draw_boxes
+from tcs.output.report.blocks import Block, Column, Picture, Table, Text
 from tcs.output.words import p_value
 from tcs.output.words.teleop import NAMES, SCALE
+from tcs.teleop.experiment.comparison import Comparison, hypothesis
 from tcs.teleop.experiment.maps import ControllerMaps
-from tcs.teleop.experiment.statistics import Tail
+from tcs.teleop.experiment.statistics import PostHoc, Tail
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
-from tcs.teleop.experiment.within_subject import HYPOTHESES, SCRIPTED, Experiment
+from tcs.teleop.experiment.within_subject import SCRIPTED, Experiment
 
-PAPER = {"accuracy": (0.0572, 0.0351), "time": (37.09, 36.65), "effort": (0.25e-6, 0.11e-6)}
+PAPER = {
+    "accuracy": (0.0572, 0.0351),
+    "time": (37.09, 36.65),
+    "effort": (0.25e-6, 0.11e-6),
+    "usefulness": (0.80, 1.20),
+    "satisfaction": (0.50, 1.00),
+}
 """Medians of end-effector control and of the novel controller: null-space paper, Table II, of 26
-people."""
+people, of whom 24 filled in the questionnaire."""
+ABBREVIATIONS = {END_EFFECTOR.name: "EE", NOVEL.name: "NV"}
+"""The paper's abbreviations."""
 SIGNS: dict[Tail, str] = {"greater": ">", "less": "<", "two-sided": "≠"}
 """Sign between two conditions in an alternative hypothesis."""
+NONE = "–"
+"""Cell without a value."""
 
 
-def group_table(experiment: Experiment) -> Table:
+def group_table(comparison: Comparison) -> Table:
     """Return the paper's Table II, with the tests of normality."""
     rows = []
-    for name in HYPOTHESES:
-        for condition in experiment.drives:
-            found, scale = experiment.described(condition, name), SCALE.get(name, 1.0)
-            both = {END_EFFECTOR.name: 0, NOVEL.name: 1}
-            paper = PAPER[name][both[condition]] * scale if condition in both else math.nan
-            rows.append(
-                [
-                    NAMES[name],
-                    title_of(experiment, condition),
-                    str(found.count),
-                    *(number(scale * x) for x in (found.median, found.mean, found.std)),
-                    number(found.shapiro_w),
-                    p_value(found.shapiro_p),
-                    number(paper) if math.isfinite(paper) else "–",
-                ]
-            )
-    titles = ("measure", "controller", "N", "median", "mean", "std", "Shapiro-Wilk W", "p")
+    for name in comparison.hypotheses:
+        for condition, title in comparison.titles.items():
+            sample, scale = comparison.sample(condition, name), SCALE.get(name, 1.0)
+            found = comparison.described(condition, name)
+            cells = [NONE] * 7
+            if found is not None:
+                cells = [number(scale * x) for x in (found.median, found.mean, found.std)]
+                cells += [number(found.shapiro_w), p_value(found.shapiro_p)]
+                cells += [number(found.francia_w), p_value(found.francia_p)]
+            paper = _paper_median(name, condition)
+            theirs = NONE if paper is None else number(paper * scale)
+            rows.append([NAMES[name], title, str(len(sample)), *cells, theirs])
+    titles = (
+        *("measure", "controller", "N", "median", "mean", "std"),
+        *("Shapiro-Wilk W", "p", "Shapiro-Francia W′", "p"),
+    )
     return Table(
-        f"Group statistics, as in the paper's Table II; {SCRIPTED}. Last column: the people of the "
-        "paper.",
+        f"Group statistics, as in the paper's Table II; {comparison.operators}. Last column: the "
+        "people of the paper.",
         [
             *(Column(title, i > 1) for i, title in enumerate(titles)),
             Column("median, paper"),
@@ -52,70 +64,74 @@ def group_table(experiment: Experiment) -> Table:
     )
 
 
-def signed_rank_table(experiment: Experiment) -> Table:
-    """Return the paper's Table III."""
+def _paper_median(measure: str, condition: str) -> float | None:
+    both = (END_EFFECTOR.name, NOVEL.name)
+    return PAPER[measure][both.index(condition)] if condition in both else None
+
+
+def signed_rank_table(comparison: Comparison) -> Table:
+    """Return the paper's Table III: its two controllers, or all pairs where one is missing."""
     rows = []
-    for name, test in experiment.tested().items():
-        rows.append(
-            [
-                NAMES[name],
-                f"EE {SIGNS[test.tail]} NV",
-                number(test.levene_f),
-                p_value(test.levene_p),
-                number(test.statistic),
-                number(test.z),
-                p_value(test.p),
-                f"{test.effect:.3f}",
-            ]
-        )
-    titles = ("measure", "alternative", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
+    pairs = compared_pairs(comparison)
+    for name in comparison.hypotheses:
+        for first, second in pairs:
+            test = comparison.compared(name, first, second)
+            cells = [NONE] * 7
+            if test is not None:
+                cells = [
+                    *(str(test.count), number(test.levene_f), p_value(test.levene_p)),
+                    *(number(test.statistic), number(test.z), p_value(test.p)),
+                    f"{test.effect:.3f}",
+                ]
+            sign = SIGNS[hypothesis(name, first, second)]
+            both = (ABBREVIATIONS.get(one, comparison.titles[one]) for one in (first, second))
+            rows.append([NAMES[name], f" {sign} ".join(both), *cells])
+    titles = ("measure", "alternative", "N", "Levene F", "p", "T", "z", "p", "r = z/√(2N)")
+    what = "Pairs of conditions"
+    if pairs == [(END_EFFECTOR.name, NOVEL.name)]:
+        what = "End-effector control (EE) compared with the novel controller (NV)"
     return Table(
-        "End-effector control (EE) compared with the novel controller (NV), as in the paper's "
-        f"Table III: Levene's test, Wilcoxon's signed rank test; {SCRIPTED}.",
+        f"{what}, as in the paper's Table III: Levene's test, Wilcoxon's signed rank test; "
+        f"{comparison.operators}.",
         [Column(title, i > 1) for i, title in enumerate(titles)],
         rows,
     )
 
 
-def motion_blocks(experiment: Experiment) -> list[Block]:
-    """Return steering, smoothness and time, compared as in the ITCM thesis."""
+def compared_pairs(comparison: Comparison) -> list[tuple[str, str]]:
+    """Return the paper's two controllers, or all pairs of conditions where one is missing."""
+    if {END_EFFECTOR.name, NOVEL.name} <= set(comparison.titles):
+        return [(END_EFFECTOR.name, NOVEL.name)]
+    return list(combinations(comparison.titles, 2))
+
+
+def motion_tables(comparison: Comparison) -> list[Table]:
+    """Return the thesis's measures over all conditions, and the pairs of conditions."""
     rows, pairs = [], []
-    for name, found in experiment.varied().items():
-        cells = []
-        for condition in experiment.drives:
-            sample = experiment.sample(condition, name)
-            cells.append(f"{number(sample.mean())} ({number(sample.std(ddof=1))})")
-        rows.append(
-            [
-                NAMES[name],
-                *cells,
-                f"F({found.df_between:g}, {found.df_error:g}) = {number(found.f)}",
-                p_value(found.p),
-            ]
-        )
-        for pair in found.post_hoc:
-            both = (title_of(experiment, one) for one in (pair.first, pair.second))
-            pairs.append(
-                [
-                    NAMES[name],
-                    f" {SIGNS[pair.tail]} ".join(both),
-                    number(pair.difference),
-                    number(pair.t),
-                    p_value(pair.p),
-                    f"{pair.effect:.2f}",
-                ]
-            )
-    titles = [title_of(experiment, name) for name in experiment.drives]
+    for name in comparison.anova_measures:
+        found, cells = comparison.varied(name), []
+        for condition in comparison.titles:
+            sample = comparison.sample(condition, name)
+            std = number(sample.std(ddof=1)) if len(sample) > 1 else NONE
+            cells.append(f"{number(sample.mean())} ({std})" if len(sample) else NONE)
+        f = p = NONE
+        if found is not None:
+            f = f"F({found.df_between:g}, {found.df_error:g}) = {number(found.f)}"
+            p = p_value(found.p)
+            pairs += [_pair_row(comparison, name, pair) for pair in found.post_hoc]
+        rows.append([NAMES[name], *cells, f, p])
+    titles = comparison.titles.values()
     return [
         Table(
             "Mean (std) over operators, and one-way analysis of variance with repeated measures, "
-            f"as in the ITCM thesis; {SCRIPTED}.",
+            f"as in the ITCM thesis; {comparison.operators}.",
             [Column("measure", False), *(Column(t) for t in titles), Column("F"), Column("p")],
             rows,
         ),
         Table(
             "Pairs of controllers: paired t tests of the alternative, one-tailed for time and "
-            f"steering as in the thesis, p with Bonferroni correction; {SCRIPTED}.",
+            "steering as in the thesis, p with Bonferroni correction; "
+            f"{comparison.operators}.",
             [
                 Column("measure", False),
                 Column("alternative", False),
@@ -123,47 +139,72 @@ def motion_blocks(experiment: Experiment) -> list[Block]:
             ],
             pairs,
         ),
-        Text(
-            "Steering is the motion of the hand that moves the tool. This hand pauses while the "
-            "other one moves the joint group, and pauses increase the spectral arc length. "
-            "Operators rotate the hand only in recovery motions, which the novel controller does "
-            "not need."
-        ),
     ]
 
 
-def trials_table(experiment: Experiment) -> Table:
+def _pair_row(comparison: Comparison, measure: str, pair: PostHoc) -> list[str]:
+    both = (comparison.titles[one] for one in (pair.first, pair.second))
+    return [
+        *(NAMES[measure], f" {SIGNS[pair.tail]} ".join(both)),
+        *(number(pair.difference), number(pair.t), p_value(pair.p), f"{pair.effect:.2f}"),
+    ]
+
+
+def trials_table(comparison: Comparison) -> Table:
     """Return means over the evaluated trials: completion, stops, work and planes."""
     rows = []
     for name in ("finished", "stops", "turned", "work", "planes_met"):
         scale = SCALE.get(name, 1.0)
-        means = [scale * experiment.sample(c, name).mean() for c in experiment.drives]
-        rows.append([NAMES[name], *(number(mean) for mean in means)])
-    titles = [title_of(experiment, name) for name in experiment.drives]
+        samples = [scale * comparison.sample(c, name) for c in comparison.titles]
+        rows.append([NAMES[name], *(number(s.mean()) if len(s) else NONE for s in samples)])
     return Table(
-        f"Means over the evaluated trials; {SCRIPTED}.",
-        [Column("measure", False), *(Column(title) for title in titles)],
+        f"Means over the evaluated trials; {comparison.operators}.",
+        [Column("measure", False), *(Column(title) for title in comparison.titles.values())],
         rows,
     )
 
 
-def learning_table(experiment: Experiment) -> Table:
+def learning_table(comparison: Comparison) -> Table:
     """Return accuracy and time from trial to trial."""
-    plan, rows = experiment.plan, []
-    for condition, drives in experiment.drives.items():
-        for name in ("accuracy", "time"):
-            every = np.array([[getattr(t, name) for t in (*d.training, *d.trials)] for d in drives])
-            medians = np.median(every, axis=0) * SCALE.get(name, 1.0)
-            rows.append(
-                [title_of(experiment, condition), NAMES[name], *(number(x) for x in medians)]
-            )
-    numbered = [f"training {i + 1}" for i in range(plan.training)]
-    numbered += [f"trial {i + 1}" for i in range(plan.trials)]
+    rows = []
+    for condition, title in comparison.titles.items():
+        for name, by_condition in comparison.learning.items():
+            each = SCALE.get(name, 1.0) * by_condition[condition].T
+            medians = [values[~np.isnan(values)] for values in each]
+            cells = (number(np.median(one)) if len(one) else NONE for one in medians)
+            rows.append([title, NAMES[name], *cells])
+    # Every condition has the same trials.
+    count = next(iter(next(iter(comparison.learning.values())).values())).shape[1]
+    training = comparison.training
+    numbered = [f"training {i + 1}" for i in range(training)]
+    numbered += [f"trial {i + 1}" for i in range(count - training)]
     return Table(
-        f"Learning: median of each trial over operators; {SCRIPTED}.",
+        f"Learning: median of each trial over operators; {comparison.operators}.",
         [Column("controller", False), Column("measure", False), *(Column(n) for n in numbered)],
         rows,
     )
+
+
+def box_pictures(comparison: Comparison) -> list[Picture]:
+    """Return the paper's Figure 8: a box plot of each measure with a hypothesis."""
+    pictures = []
+    for name in comparison.hypotheses:
+        samples = [SCALE.get(name, 1.0) * comparison.sample(c, name) for c in comparison.titles]
+        boxes = [BoxPlot(i, sample) for i, sample in enumerate(samples) if len(sample)]
+        if not boxes:
+            continue
+        titles = list(comparison.titles.values())
+        figure = draw_boxes([BoxGroup("", boxes)], titles, label=NAMES[name])
+        pictures.append(
+            Picture(
+                as_svg(figure, f"teleop-{name}"),
+                "svg",
+                f"Box plots of {NAMES[name]} with each controller.",
+                f"{NAMES[name]}: one value for each operator ({comparison.operators}). Box: first "
+                "to third quartile; line: median; whiskers: 5th and 95th percentile; dot: mean.",
+            )
+        )
+    return pictures
 
 
 def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:

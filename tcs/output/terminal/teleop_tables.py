@@ -37,12 +37,12 @@ def report_experiment(result: dict[str, Any]) -> None:
         out.print(f"latency of commands {late}")
     conditions = list(result["medians"])
     table = new_table("median", *(f">{name}" for name in conditions), ">EE vs NV p", ">r")
-    for name, text in NAMES.items():
+    for name in result["medians"][conditions[0]]:
         scale = SCALE.get(name, 1.0)
         cells = [f"{scale * result['medians'][c][name]:.3g}" for c in conditions]
         test = result["tests"].get(name)
         cells += ["", ""] if test is None else [f"{test['p']:.2g}", f"{test['effect']:.3f}"]
-        table.add_row(text, *cells)
+        table.add_row(NAMES[name], *cells)
     out.print(table)
     for one in result["maps"] or ():
         best = one["best"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 
 def percent(fraction: float, digits: int = 1) -> str:
     """Return a fraction as a percentage without its sign.
@@ -32,11 +34,13 @@ def signed(points: float) -> str:
 
 
 def p_value(p: float) -> str:
-    """Return a p-value.
+    """Return a p-value; a dash for NaN, which is no p-value.
 
-    >>> p_value(3e-7), p_value(0.0312), p_value(1.0)
-    ('< 0.0001', '0.031', '1')
+    >>> p_value(3e-7), p_value(0.0312), p_value(1.0), p_value(math.nan)
+    ('< 0.0001', '0.031', '1', '–')
     """
+    if math.isnan(p):
+        return "–"
     if p < 1e-4:
         return "< 0.0001"
     return f"{p:.2g}"

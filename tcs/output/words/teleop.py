@@ -1,6 +1,11 @@
-"""Names and units of the measures of the teleoperation experiment."""
+"""Names and units of the measures of the teleoperation experiment and of questionnaires."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tcs.teleop.experiment.trial import TrialMeasures
 
 NAMES = {
     "accuracy": "accuracy: greatest error of the barycentre [mm]",
@@ -14,7 +19,19 @@ NAMES = {
     "turned": "rotation of joint 1 by its group [rad]",
     "finished": "fraction of completed trials",
     "planes_met": "normal planes crossed, of 30",
+    "usefulness": "usefulness, van der Laan [-2 to 2]",
+    "satisfaction": "satisfaction, van der Laan [-2 to 2]",
+    "workload": "weighted workload, NASA-TLX [0 to 100]",
+    "difficulty": "difficulty of the task, agreement [1 to 5]",
 }
 """Name of each measure, with the unit in which it is printed."""
 SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
 """Factors from SI units to those of `NAMES`."""
+
+
+def trial_words(measures: TrialMeasures, time_limit: float) -> str:
+    """Return the result of a trial in a few words."""
+    worst = f"greatest error of the mean path {1e3 * measures.accuracy:.1f} mm"
+    if not measures.finished:
+        return f"the end was not reached: counts with {time_limit:g} s; {worst}"
+    return f"{measures.time:.1f} s; {worst}"

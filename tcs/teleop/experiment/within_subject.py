@@ -6,7 +6,6 @@ over the counted trials are the samples that the tests compare (paper, section I
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,19 +18,14 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.teleop.arm import Arm
 from tcs.teleop.control.latency import Latency
+from tcs.teleop.experiment.comparison import Comparison
 from tcs.teleop.experiment.course import Course
-from tcs.teleop.experiment.statistics import (
-    GroupStatistics,
-    RepeatedMeasures,
-    SignedRankTest,
-    Tail,
-    group_statistics,
-    repeated_measures,
-    signed_rank_test,
-)
+from tcs.teleop.experiment.order import counterbalanced_orders
+from tcs.teleop.experiment.statistics import RepeatedMeasures, SignedRankTest
 from tcs.teleop.experiment.trial import (
     CONDITIONS,
     END_EFFECTOR,
+    MEASURES,
     NO_LATENCY,
     NOVEL,
     TIME_LIMIT,
@@ -54,18 +48,8 @@ TRIALS = 3
 """Number of counted trials of an operator with a controller."""
 SCRIPTED = "scripted operators, not people"
 """Note of every table."""
-HYPOTHESES: dict[str, Tail] = {"accuracy": "greater", "time": "two-sided", "effort": "greater"}
-"""Alternative hypothesis on end-effector control against the novel controller, by measure (paper,
-section II.C.6)."""
-ANOVA_MEASURES: dict[str, Tail] = {
-    "time": "greater",
-    "steering_angle": "greater",
-    "steering_translation": "greater",
-    "arc_length": "two-sided",
-}
-"""Measures of the ITCM thesis, compared over all conditions, and the alternative hypothesis of the
-t tests about each condition against those after it. The thesis has one-tailed tests of time and
-steering, and none of the arc length."""
+LEARNING = ("accuracy", "time")
+"""Measures that are reported from trial to trial."""
 
 OnProgress = Callable[[int, int], None]
 
@@ -115,7 +99,7 @@ class ExperimentPlan:
 
         Operators take all orders in turn; with two conditions this is the paper's Table I.
         """
-        orders = list(itertools.permutations(self.conditions))
+        orders = counterbalanced_orders(self.conditions)
         return orders[operator % len(orders)]
 
 
@@ -137,6 +121,10 @@ class ControllerTrials:
         """Mean of each measure over the counted trials."""
         return mean_measures(list(self.trials))
 
+    def every(self, measure: str) -> list[float]:
+        """Return a measure of all trials, training first."""
+        return [getattr(trial, measure) for trial in (*self.training, *self.trials)]
+
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
@@ -153,29 +141,39 @@ class Experiment:
         """Return the mean of a measure over the counted trials of each operator, shape (n,)."""
         return np.array([getattr(drive.mean, measure) for drive in self.drives[condition]])
 
-    def described(self, condition: str, measure: str) -> GroupStatistics:
-        """Return the statistics of a sample: a row of the paper's Table II."""
-        return group_statistics(self.sample(condition, measure))
-
-    def compared(self, measure: str, first: str, second: str, tail: Tail) -> SignedRankTest:
-        """Return the comparison of two conditions: a row of the paper's Table III."""
-        return signed_rank_test(
-            self.sample(first, measure), self.sample(second, measure), tail=tail
+    def comparison(self) -> Comparison:
+        """Return all measures by condition, for the tables and tests of the papers."""
+        return Comparison(
+            titles={condition.name: condition.title for condition in self.plan.conditions},
+            values={
+                name: {condition: self.sample(condition, name) for condition in self.drives}
+                for name in MEASURES
+            },
+            operators=SCRIPTED,
+            learning={
+                name: {
+                    condition: np.array([drive.every(name) for drive in drives])
+                    for condition, drives in self.drives.items()
+                }
+                for name in LEARNING
+            },
+            training=self.plan.training,
         )
 
     def tested(self) -> dict[str, SignedRankTest]:
         """Return the paper's tests of end-effector control against the novel controller."""
-        return {
-            name: self.compared(name, END_EFFECTOR.name, NOVEL.name, tail)
-            for name, tail in HYPOTHESES.items()
+        comparison = self.comparison()
+        found = {
+            name: comparison.compared(name, END_EFFECTOR.name, NOVEL.name)
+            for name in comparison.hypotheses
         }
+        return {name: test for name, test in found.items() if test is not None}
 
     def varied(self) -> dict[str, RepeatedMeasures]:
         """Return the thesis's analyses of variance over all conditions."""
-        return {
-            name: repeated_measures({c: self.sample(c, name) for c in self.drives}, tail=tail)
-            for name, tail in ANOVA_MEASURES.items()
-        }
+        comparison = self.comparison()
+        found = {name: comparison.varied(name) for name in comparison.anova_measures}
+        return {name: analysis for name, analysis in found.items() if analysis is not None}
 
 
 def run_experiment(
