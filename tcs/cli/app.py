@@ -16,6 +16,7 @@ from tcs.cli import (
     robustness,
     score,
     select,
+    study,
     teleop,
     view,
 )
@@ -33,6 +34,7 @@ app.add_typer(robots.app, name="robot")
 app.add_typer(capability.app, name="capability")
 app.add_typer(arplace.app, name="arplace")
 app.add_typer(teleop.app, name="teleop")
+app.add_typer(study.app, name="study")
 
 
 def main() -> None:

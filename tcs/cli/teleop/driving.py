@@ -35,7 +35,6 @@ class Condition(StrEnum):
     NOVEL = "novel"
     ASSISTED = "assisted"
     DRAKE = "drake"
-    JOINT = "joint"
 
 
 @expand_options
@@ -54,8 +53,7 @@ def live(
         Condition,
         typer.Option(
             help="Control of the tool alone (end-effector), or with manual null-space control "
-            "(novel); assisted and drake avoid joint limits automatically; joint has a slider for "
-            "each joint."
+            "(novel); assisted and drake avoid joint limits automatically."
         ),
     ] = Condition.NOVEL,
     start_deg: Annotated[

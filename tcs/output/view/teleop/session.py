@@ -17,22 +17,21 @@ from tcs.output.view.live import open_meshcat
 from tcs.output.view.teleop.live import LivePage
 from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
 from tcs.output.view.teleop.start import start_posture
-from tcs.teleop import Arm, Mode, Settings, load_arm
+from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
 from tcs.teleop.arm import torso_height_of
 from tcs.teleop.control.latency import Latency
 from tcs.teleop.control.settings import LimitBehaviour
-from tcs.teleop.experiment.course import find_course
+from tcs.teleop.experiment.course import Course, find_course
 from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
-LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
+LiveCondition = Literal["end-effector", "novel", "assisted", "drake"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
     "novel": (Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.POSE),
     "assisted": (Mode.ASSISTED, Mode.NULL_SPACE, Mode.POSE),
     "drake": (Mode.DRAKE, Mode.NULL_SPACE, Mode.POSE),
-    "joint": (Mode.JOINT, Mode.END_EFFECTOR),
 }
 """Modes between which the operator can switch, by condition."""
 
@@ -47,7 +46,8 @@ class LiveOptions:
         condition: Key of `CONDITION_MODES`.
         start_deg: Start posture [deg], seven numbers; None to search for one.
         torso_height: Height of the torso joint [m]; None for the middle of its range.
-        line: Whether to show the experiment's line and start there.
+        line: Whether to search for the experiment's line, show it and start there.
+        course: The line to show and its start posture; None to search for one if `line`.
         latency: Latency between the operator and the arm.
     """
 
@@ -57,6 +57,7 @@ class LiveOptions:
     start_deg: tuple[float, ...] | None = None
     torso_height: float | None = None
     line: bool = False
+    course: Course | None = None
     latency: Latency = NO_LATENCY
 
 
@@ -77,6 +78,7 @@ class LiveSession:
         port: int | None,
         on_stop: Callable[[str], None],
         record: bool,
+        on_step: Callable[[Command, Step], None] | None = None,
     ) -> None:
         """Open the page.
 
@@ -85,6 +87,7 @@ class LiveSession:
             port: Port of the page; None for the first free one.
             on_stop: Called with the reason whenever the arm stops.
             record: Whether to record a run; with a line it is recorded in any case.
+            on_step: Called with each command and step that is recorded.
 
         Raises:
             OutputError: If the port cannot be used.
@@ -97,10 +100,12 @@ class LiveSession:
         start = None if options.start_deg is None else _start(self.arm, options.start_deg)
         meshcat = open_meshcat(port)
         display = RobotDisplay(self.arm, meshes=True)
-        self.course = find_course(self.arm) if options.line else None
+        self.course = options.course
+        if self.course is None and options.line:
+            self.course = find_course(self.arm)
         if self.course is not None:
             start = self.course.joints
-        self._recorder = Recorder(self.arm)
+        self._recorder, self._on_step = Recorder(self.arm), on_step
         self.page = LivePage(
             meshcat,
             display,
@@ -110,12 +115,22 @@ class LiveSession:
             modes=CONDITION_MODES[options.condition],
             latency=options.latency,
             on_stop=on_stop,
-            on_step=self._recorder.add if record or self.course is not None else None,
+            on_step=self._record if record or self.course is not None else None,
         )
         if self.course is not None:
             ends = np.array(self.course.line.start), np.array(self.course.line.end)
             draw_course(meshcat, *ends, GOAL_RADIUS)
         self.url = str(meshcat.web_url())
+
+    def begin(self) -> None:
+        """Put the arm back to the start, in the first mode, and begin a new run."""
+        self.page.restart()
+        self._recorder = Recorder(self.arm)
+
+    def _record(self, command: Command, step: Step) -> None:
+        self._recorder.add(command, step)
+        if self._on_step is not None:
+            self._on_step(command, step)
 
     def run(self) -> Run | None:
         """Return the recorded run; None if no browser was connected."""
