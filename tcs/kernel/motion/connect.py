@@ -1,0 +1,253 @@
+"""A path between two sets of postures: RRT-Connect (Kuffner, LaValle 2000) with certified edges.
+
+Two trees grow, from the starts and from the goals. The smaller one takes a step towards a random
+posture; the other one is then extended to the new posture until it arrives or is blocked.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import inner, jit
+from tcs.kernel.motion.edges import edge_is_free
+from tcs.kernel.motion.random import RandomState, random_state, uniform
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.views import unowned
+
+STEP = 1.0
+"""Longest edge of a tree [rad, norm of the joints]."""
+MOST_NODES = 20_000
+"""Capacity of each tree."""
+MOST_POINTS = 1024
+"""Capacity of a path."""
+DIRECT = 4
+"""Pairs of start and goal, the nearest ones, that are connected directly if possible."""
+NONE = -1
+SAME = 1e-12
+"""Greatest distance of two postures that are the same up to rounding of full turns [rad]."""
+
+
+class Trees(NamedTuple):
+    """The two trees of a query, from the starts (0) and from the goals (1), and its path."""
+
+    q: FloatArray
+    """Postures [rad], shape (2, MOST_NODES, 7)."""
+    parent: IntArray
+    """Node that each node was extended from, NONE for a root, shape (2, MOST_NODES)."""
+    nodes: IntArray
+    """Number of nodes, shape (2,)."""
+    target: FloatArray
+    """Posture to grow towards, and next posture [rad], shape (2, 7)."""
+    path: FloatArray
+    """Postures of the path, from a start to a goal [rad], shape (MOST_POINTS, 7)."""
+    spare: FloatArray
+    """Scratch to rebuild the path [rad], shape (MOST_POINTS, 7)."""
+    ends: IntArray
+    """Start and goal that the path connects, shape (2,)."""
+    random: RandomState
+    """State of the random numbers."""
+
+
+def new_trees(seed: int) -> Trees:
+    """Return memory for a query."""
+    return Trees(
+        q=np.empty((2, MOST_NODES, 7)),
+        parent=np.empty((2, MOST_NODES), np.int64),
+        nodes=np.zeros(2, np.int64),
+        target=np.empty((2, 7)),
+        path=np.empty((MOST_POINTS, 7)),
+        spare=np.empty((MOST_POINTS, 7)),
+        ends=np.zeros(2, np.int64),
+        random=random_state(seed),
+    )
+
+
+@inner
+def difference(scene: MotionScene, start: float, end: float, k: int) -> float:
+    """Return the angle of joint k from one position to another, the short way round [rad]."""
+    period = scene.period[k]
+    angle = end - start
+    if period > 0.0:
+        angle -= period * np.floor(angle / period + 0.5)
+    return angle
+
+
+@inner
+def distance(scene: MotionScene, a: FloatArray, b: FloatArray) -> float:
+    """Return the distance of two postures [rad, norm of the joints]."""
+    square = 0.0
+    for k in range(7):
+        angle = difference(scene, a[k], b[k], k)
+        square += angle * angle
+    return np.sqrt(square)
+
+
+@jit
+def connect(
+    owned_scene: MotionScene,
+    owned_work: MotionWorkspace,
+    owned_trees: Trees,
+    starts: FloatArray,
+    goals: FloatArray,
+    iterations: int,
+) -> int:
+    """Find a path of certified edges from one of the starts to one of the goals.
+
+    Args:
+        owned_scene: The scene.
+        owned_work: Scratch; `hits` counts how often each pair blocked an edge.
+        owned_trees: Holds the random state; `path` and `ends` are filled. Joints without limits
+            may end full turns away from the goal.
+        starts: Postures at which nothing touches [rad], shape (n, 7).
+        goals: Postures at which nothing touches [rad], shape (m, 7).
+        iterations: Greatest number of random postures to grow towards.
+
+    Returns:
+        Number of postures of the path, 0 if none was found.
+    """
+    scene, work, trees = unowned(owned_scene), unowned(owned_work), unowned(owned_trees)
+    _plant(trees, 0, starts)
+    _plant(trees, 1, goals)
+    if len(starts) == 0 or len(goals) == 0:
+        return 0
+    if _connect_directly(scene, work, trees, len(starts), len(goals)):
+        return _path(scene, trees, trees.ends[0], trees.ends[1])
+    target, following = trees.target[0], trees.target[1]
+    for _ in range(iterations):
+        grown = trees.nodes[0] - len(starts), trees.nodes[1] - len(goals)
+        side = 0 if grown[0] <= grown[1] else 1
+        for k in range(7):
+            low, high = scene.lower[k], scene.upper[k]
+            if scene.period[k] > 0.0:
+                low, high = -np.pi, np.pi
+            target[k] = low + (high - low) * uniform(trees.random)
+        if max(trees.nodes[0], trees.nodes[1]) >= MOST_NODES:
+            return 0
+        new = _grow(scene, work, trees, side, _nearest(scene, trees, side, target), target)
+        if new == NONE:
+            continue
+        for k in range(7):
+            following[k] = trees.q[side, new, k]
+        other = 1 - side
+        met = _nearest(scene, trees, other, following)
+        while met != NONE and distance(scene, trees.q[other, met], following) > SAME:
+            if trees.nodes[other] >= MOST_NODES:
+                return 0
+            met = _grow(scene, work, trees, other, met, following)
+        if met != NONE and side == 0:
+            return _path(scene, trees, new, met)
+        if met != NONE:
+            return _path(scene, trees, met, new)
+    return 0
+
+
+@inner
+def _plant(trees: Trees, side: int, roots: FloatArray) -> None:
+    """Make the postures the roots of a tree, as many as it holds."""
+    count = min(len(roots), MOST_NODES - 1)
+    for n in range(count):
+        trees.parent[side, n] = NONE
+        for k in range(7):
+            trees.q[side, n, k] = roots[n, k]
+    trees.nodes[side] = count
+
+
+@inner
+def _connect_directly(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, starts: int, goals: int
+) -> bool:
+    """Try one edge between each of the nearest pairs of start and goal; fills `ends`."""
+    least, end = -1.0, trees.target[1]
+    for _ in range(DIRECT):
+        nearest = np.inf
+        for i in range(starts):
+            for j in range(goals):
+                d = distance(scene, trees.q[0, i], trees.q[1, j])
+                if least < d < nearest:
+                    nearest, trees.ends[0], trees.ends[1] = d, i, j
+        if nearest == np.inf:
+            return False
+        start, goal = trees.q[0, trees.ends[0]], trees.q[1, trees.ends[1]]
+        for k in range(7):
+            end[k] = start[k] + difference(scene, start[k], goal[k], k)
+        if edge_is_free(scene, work, start, end):
+            return True
+        least = nearest
+    return False
+
+
+@inner
+def _nearest(scene: MotionScene, trees: Trees, side: int, target: FloatArray) -> int:
+    """Return the node of a tree that is nearest to a posture."""
+    q, best, least = trees.q[side], 0, np.inf
+    for n in range(trees.nodes[side]):
+        square = 0.0
+        for k in range(7):
+            angle = target[k] - q[n, k]
+            if scene.period[k] > 0.0:
+                angle = difference(scene, q[n, k], target[k], k)
+            square += angle * angle
+        if square < least:
+            best, least = n, square
+    return best
+
+
+@inner
+def _grow(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, side: int, n: int, target: FloatArray
+) -> int:
+    """Extend node n of a tree towards a posture by at most STEP.
+
+    Returns:
+        The new node, or NONE if the edge is not free. At the posture itself, the new node equals
+        it, up to full turns.
+    """
+    new, q = trees.nodes[side], trees.q[side]
+    d = distance(scene, q[n], target)
+    fraction = 1.0 if d <= STEP else STEP / d
+    for k in range(7):
+        angle = difference(scene, q[n, k], target[k], k)
+        reached = fraction == 1.0 and scene.period[k] == 0.0
+        q[new, k] = target[k] if reached else q[n, k] + fraction * angle
+    if not edge_is_free(scene, work, q[n], q[new]):
+        return NONE
+    trees.parent[side, new] = n
+    trees.nodes[side] += 1
+    return new
+
+
+@inner
+def _path(scene: MotionScene, trees: Trees, first: int, second: int) -> int:
+    """Fill the path from the start over two nodes that meet to the goal; return its length."""
+    depth, n = 0, first
+    while n != NONE:
+        depth, n = depth + 1, trees.parent[0, n]
+    at, n = depth, first
+    while n != NONE:
+        at -= 1
+        trees.ends[0] = n
+        if at < MOST_POINTS:
+            for k in range(7):
+                trees.path[at, k] = trees.q[0, n, k]
+        n = trees.parent[0, n]
+    count, n = depth, second
+    # The two nodes are the same posture, unless they were connected directly.
+    if distance(scene, trees.q[0, first], trees.q[1, second]) <= SAME:
+        n = trees.parent[1, second]
+        trees.ends[1] = second
+    while n != NONE:
+        trees.ends[1] = n
+        if count < MOST_POINTS:
+            for k in range(7):
+                trees.path[count, k] = trees.q[1, n, k]
+        count, n = count + 1, trees.parent[1, n]
+    if count > MOST_POINTS:
+        return 0
+    for n in range(1, count):
+        for k in range(7):
+            before = trees.path[n - 1, k]
+            trees.path[n, k] = before + difference(scene, before, trees.path[n, k], k)
+    return count

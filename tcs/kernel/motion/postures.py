@@ -1,0 +1,70 @@
+"""Postures that hold the tool at a pose, spread over all of them, collisions not considered."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.analytic.ik import sample_joints, wrist_goal
+from tcs.kernel.analytic.solver import ArmSolver, is_outside
+from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.cache import jit
+from tcs.kernel.kinematics import pose_error, tool_pose
+from tcs.kernel.numeric.solutions import numeric_solutions
+from tcs.kernel.problem import Problem
+
+AT_POSE = 1e-7
+"""Greatest error of a posture [rad and m]."""
+
+
+def postures_at(problem: Problem, R_AG: FloatArray, p_AG: FloatArray, samples: int) -> FloatArray:
+    """Return postures with the tool at a pose and all joints within their limits.
+
+    Args:
+        problem: The scene with its arm.
+        R_AG: Pose of the tool in the arm base A: orientation, shape (3, 3).
+        p_AG: Position [m], shape (3,).
+        samples: Number of values of the free joint for an arm with a closed form. For other arms
+            the curves of solutions are sampled at most 0.2 rad apart.
+
+    Returns:
+        Joint angles [rad], shape (n, 7); n is 0 if no posture is found.
+    """
+    arm = problem.arm
+    if is_outside(arm):
+        chain = Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper)
+        return numeric_solutions(chain, R_AG, p_AG)
+    found = np.empty((samples * len(arm.branches), 7))
+    low, high = arm.lower[arm.free], arm.upper[arm.free]
+    if np.isfinite(low):
+        angles = np.linspace(low, high, samples)
+    else:
+        angles = np.linspace(-np.pi, np.pi, samples, endpoint=False)
+    count = _sampled_postures(arm, problem.chain_R, problem.chain_p, R_AG, p_AG, angles, found)
+    return found[:count]
+
+
+@jit
+def _sampled_postures(
+    arm: ArmSolver,
+    chain_R: FloatArray,
+    chain_p: FloatArray,
+    R_AG: FloatArray,
+    p_AG: FloatArray,
+    angles: FloatArray,
+    found: FloatArray,
+) -> int:
+    """Fill the solutions of the closed form at given angles of the free joint; return how many."""
+    goal, error = np.empty((4, 3)), np.empty(6)
+    link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
+    R_AT, p_AT = np.empty((3, 3)), np.empty(3)
+    wrist_goal(arm, R_AG, p_AG, goal)
+    count = 0
+    for angle in angles:
+        for b in range(len(arm.branches)):
+            q = found[count]
+            sample_joints(arm, goal, arm.branches[b], angle, q)
+            # Where there is no solution within the limits, joints are clipped: the tool misses.
+            tool_pose(chain_R, chain_p, q, link_R, link_p, R_AT, p_AT)
+            if pose_error(R_AT, p_AT, R_AG, p_AG, error) < AT_POSE:
+                count += 1
+    return count

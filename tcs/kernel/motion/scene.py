@@ -1,0 +1,182 @@
+"""The arm, everything around it and the pairs to check, at one initial configuration."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
+from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
+from tcs.kernel.problem import Problem
+
+FULL_TURN = 2.0 * np.pi
+DEPTH = 40
+"""Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
+
+
+class MotionScene(NamedTuple):
+    """One arm among fixed shapes. Frames as in `tcs.kernel.arrays`.
+
+    Shapes are numbered: those of the arm first, in the order of `links`, then those of `fixed`.
+    """
+
+    chain_R: FloatArray
+    """Rotations of the chain, shape (8, 3, 3)."""
+    chain_p: FloatArray
+    """Translations of the chain [m], shape (8, 3)."""
+    lower: FloatArray
+    """Lower joint limits [rad], shape (7,); -inf where continuous."""
+    upper: FloatArray
+    """Upper joint limits [rad], shape (7,); +inf where continuous."""
+    period: FloatArray
+    """A full turn for each continuous joint, 0 for the others [rad], shape (7,)."""
+    links: FloatArray
+    """The arm's shapes, packed, in link frames, shape (n_arm, 17)."""
+    link_frame: IntArray
+    """Link of each shape in `links`, 1 .. 7, shape (n_arm,)."""
+    fixed: FloatArray
+    """Environment and rest of the robot within reach, packed, in A, shape (n_fixed, 17)."""
+    pair: IntArray
+    """Checked pairs: shape of the arm, other shape, and link that carries the other shape, 0 if it
+    is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
+    first_pair: IntArray
+    """First pair of each shape of the arm, and the number of pairs, shape (n_arm + 1,)."""
+    gap: FloatArray
+    """Distance that each pair must keep [m], shape (n_pairs,)."""
+    body: IntArray
+    """Body of each shape, shape (n_arm + n_fixed,): index among the bodies of the environment, or
+    that of a robot body plus the number of bodies of the environment."""
+
+
+class MotionWorkspace(NamedTuple):
+    """Scratch of one worker, reused from curve to curve."""
+
+    q: FloatArray
+    """Joint angles of the current posture [rad], shape (7,)."""
+    link_R: FloatArray
+    """Orientations of A, L1..L7 in A, shape (8, 3, 3)."""
+    link_p: FloatArray
+    """Origins of A, L1..L7 in A [m], shape (8, 3)."""
+    shapes: FloatArray
+    """All shapes in A at the current posture, packed, shape (n_arm + n_fixed, 17)."""
+    placed: IntArray
+    """Number of the posture for which each shape of the arm was placed, shape (n_arm,)."""
+    posture: IntArray
+    """Number of the current posture, shape (1,)."""
+    delta: FloatArray
+    """Greatest distance of each joint from the current posture on the current piece [rad],
+    shape (7,)."""
+    motion: FloatArray
+    """Bound on how far any point of a shape moves on the current piece, relative to each link
+    0 .. 7 before its own [m], shape (n_arm, 8)."""
+    control: FloatArray
+    """Control points of the current curve [rad], shape (4, 7)."""
+    pairs: IntArray
+    """Stack of lists of pairs that are not certified yet, shape (DEPTH * n_pairs,)."""
+    span: FloatArray
+    """Stack of pieces of the curve: begin and end, in [0, 1], shape (2 * DEPTH, 2)."""
+    stretch: IntArray
+    """First pair and one after the last pair of each piece in `span`, shape (2 * DEPTH, 2)."""
+    contact: IntArray
+    """The pair found in contact last, -1 for none, shape (1,)."""
+    hits: IntArray
+    """How often each pair blocked a curve, shape (n_pairs,)."""
+
+
+def motion_scene(problem: Problem, configuration: int) -> MotionScene:
+    """Return a scene at one initial configuration of its grid, prepared for motions.
+
+    Args:
+        problem: The scene and its grid.
+        configuration: Flat index of the initial configuration.
+    """
+    sizes = (problem.base_x.size, problem.base_y.size, problem.base_yaw.size, problem.torso_levels)
+    state, x, y, yaw, torso = (
+        int(i) for i in np.unravel_index(configuration, (problem.environment_states, *sizes))
+    )
+    angle = problem.base_yaw[yaw]
+    R_WB = np.array(
+        [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0, 0, 1.0]]
+    )
+    p_WB = np.array([problem.base_x[x], problem.base_y[y], 0.0])
+    R_WA = R_WB @ problem.base_R[torso]
+    p_WA = p_WB + R_WB @ problem.base_p[torso]
+    environment = _moved(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
+    fixed = np.concatenate([environment, problem.body_A[torso]])
+    gap_fixed = np.concatenate([problem.gap_environment, problem.gap_body], axis=1)
+    body = np.concatenate(
+        [problem.environment_body, problem.body_body + problem.environment_bodies]
+    )
+    within = _within_reach(problem, fixed, gap_fixed)
+    near = np.flatnonzero(within.any(axis=0))
+    arm, other = np.nonzero(within[:, near])
+    count = len(problem.links)
+    apart = problem.link_frame[:, None] != problem.link_frame[None]
+    first, second = np.nonzero(np.tril((problem.gap_arm > 0.0) & apart))
+    # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
+    pair = np.concatenate(
+        [
+            np.stack([arm, count + other, np.zeros_like(arm)], axis=1),
+            np.stack([second, first, problem.link_frame[first]], axis=1),
+        ]
+    )
+    gap = np.concatenate([gap_fixed[:, near][arm, other], problem.gap_arm[first, second]])
+    order = np.argsort(pair[:, 0], kind="stable")
+    lower, upper = problem.arm.lower, problem.arm.upper
+    return MotionScene(
+        chain_R=problem.chain_R,
+        chain_p=problem.chain_p,
+        lower=lower,
+        upper=upper,
+        period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
+        links=problem.links,
+        link_frame=problem.link_frame,
+        fixed=np.ascontiguousarray(fixed[near]),
+        pair=np.ascontiguousarray(pair[order].astype(np.int64)),
+        first_pair=np.searchsorted(pair[order, 0], np.arange(count + 1)).astype(np.int64),
+        gap=np.ascontiguousarray(gap[order]),
+        body=np.concatenate([problem.link_body + problem.environment_bodies, body[near]]),
+    )
+
+
+def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
+    """Return scratch memory for one worker."""
+    arm, pairs = len(scene.links), len(scene.pair)
+    shapes = np.zeros((arm + len(scene.fixed), COLUMNS))
+    shapes[arm:] = scene.fixed
+    return MotionWorkspace(
+        q=np.empty(7),
+        link_R=np.empty((8, 3, 3)),
+        link_p=np.empty((8, 3)),
+        shapes=shapes,
+        placed=np.zeros(arm, np.int64),
+        posture=np.zeros(1, np.int64),
+        delta=np.zeros(7),
+        motion=np.zeros((arm, 8)),
+        control=np.empty((4, 7)),
+        pairs=np.empty((DEPTH + 1) * pairs, np.int64),
+        span=np.empty((2 * DEPTH, 2)),
+        stretch=np.empty((2 * DEPTH, 2), np.int64),
+        contact=np.full(1, -1, np.int64),
+        hits=np.zeros(pairs, np.int64),
+    )
+
+
+def _moved(rows: FloatArray, R: FloatArray, p: FloatArray) -> FloatArray:
+    """Return packed shapes moved by the pose (R, p)."""
+    moved = rows.copy()
+    moved[:, CENTRE : CENTRE + 3] = rows[:, CENTRE : CENTRE + 3] @ R.T + p
+    turned = R @ rows[:, ROTATION:].reshape(-1, 3, 3)
+    moved[:, ROTATION:] = turned.reshape(-1, 9)
+    return moved
+
+
+def _within_reach(problem: Problem, fixed: FloatArray, gap: FloatArray) -> BoolArray:
+    """Return whether each shape of the arm may come near each fixed shape, (n_arm, n_fixed)."""
+    links = problem.links
+    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(problem.chain_p[:7], axis=1))])
+    reach = spans[problem.link_frame] + np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
+    away = np.linalg.norm(fixed[:, CENTRE : CENTRE + 3], axis=1) - fixed[:, BOUND]
+    meets = away[None] <= (reach + links[:, BOUND])[:, None] + gap
+    return np.asarray((gap > 0.0) & meets)

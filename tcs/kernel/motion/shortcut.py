@@ -1,0 +1,112 @@
+"""Shortcuts of a path: straight certified edges in place of detours."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import inner, jit
+from tcs.kernel.motion.connect import MOST_POINTS, Trees
+from tcs.kernel.motion.edges import edge_is_free
+from tcs.kernel.motion.random import uniform
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.views import unowned
+
+LEAST_GAIN = 0.01
+"""Fraction of the length between two points of a path that a shortcut must save."""
+
+
+@jit
+def shorten(
+    owned_scene: MotionScene,
+    owned_work: MotionWorkspace,
+    owned_trees: Trees,
+    count: int,
+    attempts: int,
+) -> int:
+    """Shorten `path` in place; its ends stay, and all edges remain certified.
+
+    Args:
+        owned_scene: The scene.
+        owned_work: Scratch.
+        owned_trees: Holds path and random state.
+        count: Number of postures of the path.
+        attempts: Number of random shortcuts to try.
+
+    Returns:
+        Number of postures of the shorter path.
+    """
+    scene, work, trees = unowned(owned_scene), unowned(owned_work), unowned(owned_trees)
+    count = _drop_postures(scene, work, trees, count)
+    for _ in range(attempts):
+        if count < 3 or count + 2 > MOST_POINTS:
+            break
+        count = _cut(scene, work, trees, count)
+    return _drop_postures(scene, work, trees, count)
+
+
+@inner
+def _length(a: FloatArray, b: FloatArray) -> float:
+    """Return the length of a straight edge [rad, norm of the joints]."""
+    square = 0.0
+    for k in range(7):
+        square += (b[k] - a[k]) ** 2
+    return np.sqrt(square)
+
+
+@inner
+def _drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
+    """Drop postures between which an edge is free, the longest runs first; return how many stay."""
+    path, begin = trees.path, 0
+    while begin < count - 2:
+        end = count - 1
+        while end > begin + 1 and not edge_is_free(scene, work, path[begin], path[end]):
+            end -= 1
+        dropped = end - begin - 1
+        for n in range(end, count):
+            for k in range(7):
+                path[n - dropped, k] = path[n, k]
+        count -= dropped
+        begin += 1
+    return count
+
+
+@inner
+def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
+    """Try one shortcut between two random points of the path; return the number of postures."""
+    path, ends, spare = trees.path, trees.target, trees.spare
+    total = 0.0
+    for n in range(count - 1):
+        total += _length(path[n], path[n + 1])
+    first, second = uniform(trees.random) * total, uniform(trees.random) * total
+    early, late = min(first, second), max(first, second)
+    m, n = _take_point(path, count, early, ends[0]), _take_point(path, count, late, ends[1])
+    if m == n or _length(ends[0], ends[1]) > (1.0 - LEAST_GAIN) * (late - early):
+        return count
+    if not edge_is_free(scene, work, ends[0], ends[1]):
+        return count
+    kept = count - (n + 1)
+    for i in range(kept):
+        for k in range(7):
+            spare[i, k] = path[n + 1 + i, k]
+    for k in range(7):
+        path[m + 1, k], path[m + 2, k] = ends[0, k], ends[1, k]
+    for i in range(kept):
+        for k in range(7):
+            path[m + 3 + i, k] = spare[i, k]
+    return m + 3 + kept
+
+
+@inner
+def _take_point(path: FloatArray, count: int, along: float, point: FloatArray) -> int:
+    """Fill the point at a distance along the path [rad]; return the number of its edge."""
+    n = 0
+    length = _length(path[0], path[1])
+    while along > length and n < count - 2:
+        along -= length
+        n += 1
+        length = _length(path[n], path[n + 1])
+    fraction = min(along / length, 1.0) if length > 0.0 else 0.0
+    for k in range(7):
+        point[k] = path[n, k] + fraction * (path[n + 1, k] - path[n, k])
+    return n

@@ -1,0 +1,245 @@
+"""Straight motions of the tool at constant orientation, as certified curves in joint space."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import inner, jit
+from tcs.kernel.kinematics import fill_jacobian, link_poses, place_tool, pose_error
+from tcs.kernel.motion.edges import curve_is_free_until
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.numeric.newton import (
+    NewtonWorkspace,
+    factorise,
+    new_newton_workspace,
+    step_to_goal,
+)
+from tcs.kernel.views import unowned
+
+DONE, LIMITS, BLOCKED = 0, 1, 2
+"""Outcome of a straight motion: complete, ended by joint or velocity limits or at a singularity, or
+by a contact."""
+ON_LINE = 1e-9
+"""Greatest error of a posture on the line [rad and m]."""
+ITERATIONS = 6
+"""Greatest number of Newton iterations from one posture to the next; 3 are typical."""
+LONGEST_STEP = 0.3
+"""Greatest joint motion between two postures [rad, norm of the joints]: a longer one would leave
+the branch."""
+OFF_LINE = 5e-4
+"""Greatest error of the spline between its points [rad and m]; it is above 1e-5 next to
+singularities, and where a joint arrives at its limit."""
+MOST_LOCKED = 1
+"""Number of joints that may rest at a limit: a pose takes six."""
+
+
+class StraightWorkspace(NamedTuple):
+    """Scratch of straight motions, and their result."""
+
+    newton: NewtonWorkspace
+    """Kinematics at one posture."""
+    R_AT: FloatArray
+    """Orientation of the tool in A, the same all along, shape (3, 3)."""
+    p_AT: FloatArray
+    """Position of the tool in A where the line begins [m], shape (3,)."""
+    target: FloatArray
+    """Next position of the tool in A [m], shape (3,)."""
+    locked: IntArray
+    """1 for each joint that rests at a limit, shape (7,)."""
+    q: FloatArray
+    """Trial posture [rad], shape (7,)."""
+
+
+@jit
+def new_straight_workspace() -> StraightWorkspace:
+    """Return scratch memory for one worker."""
+    return StraightWorkspace(
+        new_newton_workspace(),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty(3),
+        np.zeros(7, np.int64),
+        np.empty(7),
+    )
+
+
+@jit
+def straight_motion(
+    owned_scene: MotionScene,
+    owned_work: MotionWorkspace,
+    owned_line: StraightWorkspace,
+    q: FloatArray,
+    offset: FloatArray,
+    fastest: FloatArray,
+    points: FloatArray,
+    tangents: FloatArray,
+) -> int:
+    """Follow a straight line with the tool from a posture, and certify the motion.
+
+    Of all joint motions that move the tool along the line the shortest is taken; a joint that
+    arrives at a limit rests there.
+
+    Args:
+        owned_scene: The scene.
+        owned_work: Scratch; `contact` is the pair that blocks the motion if one does.
+        owned_line: Scratch.
+        q: Joint angles to start from [rad], shape (7,).
+        offset: Motion of the tool from the first posture to the last, in A [m], shape (3,).
+        fastest: Greatest motion of each joint for the whole line at constant rate, which is what
+            the velocity limits allow at the tool's speed [rad], shape (7,).
+        points: Filled with joint angles [rad], shape (n + 1, 7), at equal distances of the tool.
+        tangents: Filled with derivatives of the joints by the fraction of the line [rad], shape
+            (n + 1, 7). Points and tangents define a cubic Hermite spline.
+
+    Returns:
+        DONE, LIMITS or BLOCKED.
+    """
+    scene, work, line = unowned(owned_scene), unowned(owned_work), unowned(owned_line)
+    newton, last = line.newton, len(points) - 1
+    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
+    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, line.R_AT, line.p_AT)
+    for k in range(7):
+        points[0, k], line.locked[k] = q[k], 0
+    for n in range(last + 1):
+        if n > 0 and not _follow(scene, line, offset, n / last, points[n - 1], points[n]):
+            return LIMITS
+        if not _tangent(scene, line, offset, points[n], tangents[n]):
+            return LIMITS
+        for k in range(7):
+            if abs(tangents[n, k]) > fastest[k]:
+                return LIMITS
+    _keep_within_limits(scene, points, tangents)
+    for k in range(7):
+        line.locked[k] = 0
+    for n in range(last):
+        _take_piece(work, points, tangents, n)
+        if _error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
+            return LIMITS
+    for n in range(last):
+        _take_piece(work, points, tangents, n)
+        if curve_is_free_until(scene, work) < 1.0:
+            return BLOCKED
+    return DONE
+
+
+@inner
+def _take_piece(work: MotionWorkspace, points: FloatArray, tangents: FloatArray, n: int) -> None:
+    """Make piece n of a spline the current curve."""
+    third = 1.0 / (3.0 * (len(points) - 1))
+    for k in range(7):
+        work.control[0, k], work.control[3, k] = points[n, k], points[n + 1, k]
+        work.control[1, k] = points[n, k] + third * tangents[n, k]
+        work.control[2, k] = points[n + 1, k] - third * tangents[n + 1, k]
+
+
+@inner
+def _error_between(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    line: StraightWorkspace,
+    offset: FloatArray,
+    fraction: float,
+) -> float:
+    """Return the error of the tool in the middle of the current curve [rad and m]."""
+    c = work.control
+    for k in range(7):
+        line.q[k] = 0.125 * (c[0, k] + c[3, k]) + 0.375 * (c[1, k] + c[2, k])
+    for r in range(3):
+        line.target[r] = line.p_AT[r] + fraction * offset[r]
+    return _evaluate(scene, line, line.q)
+
+
+@inner
+def _evaluate(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
+    """Fill pose error and Jacobian at joint angles q, with the columns of locked joints at 0."""
+    newton = line.newton
+    link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
+    place_tool(scene.chain_R, scene.chain_p, newton.link_R, newton.link_p, newton.R_AT, newton.p_AT)
+    fill_jacobian(newton.link_R, newton.link_p, newton.p_AT, newton.J)
+    for k in range(7):
+        if line.locked[k] == 1:
+            for i in range(6):
+                newton.J[i, k] = 0.0
+    return pose_error(newton.R_AT, newton.p_AT, line.R_AT, line.target, newton.error)
+
+
+@inner
+def _follow(
+    scene: MotionScene,
+    line: StraightWorkspace,
+    offset: FloatArray,
+    fraction: float,
+    before: FloatArray,
+    after: FloatArray,
+) -> bool:
+    """Fill the posture at a fraction of the line, from the one before it; False if there is none.
+
+    A joint that would exceed a limit is set to it and locked, and the posture solved again.
+    """
+    for r in range(3):
+        line.target[r] = line.p_AT[r] + fraction * offset[r]
+    while True:
+        for k in range(7):
+            # Joints locked in this step start at their limit.
+            line.q[k] = after[k] if line.locked[k] == 1 else before[k]
+        arrived = False
+        for _ in range(ITERATIONS):
+            if _evaluate(scene, line, line.q) < ON_LINE:
+                arrived = True
+                break
+            factorise(line.newton, 0.0)
+            step_to_goal(line.newton, line.q, LONGEST_STEP)
+        square, worst, beyond = 0.0, 0.0, -1
+        locked = 0
+        for k in range(7):
+            square += (line.q[k] - before[k]) ** 2
+            over = max(line.q[k] - scene.upper[k], scene.lower[k] - line.q[k])
+            if over > worst:
+                worst, beyond = over, k
+            locked += line.locked[k]
+        if not arrived or square > LONGEST_STEP * LONGEST_STEP:
+            return False
+        if beyond < 0:
+            break
+        if locked >= MOST_LOCKED:
+            return False
+        line.locked[beyond] = 1
+        low, high = scene.lower[beyond], scene.upper[beyond]
+        after[beyond] = low if line.q[beyond] < low else high
+    for k in range(7):
+        after[k] = line.q[k]
+    return True
+
+
+@inner
+def _tangent(
+    scene: MotionScene,
+    line: StraightWorkspace,
+    offset: FloatArray,
+    q: FloatArray,
+    tangent: FloatArray,
+) -> bool:
+    """Fill the derivative of the joints by the fraction of the line; False at a singularity."""
+    newton = line.newton
+    _evaluate(scene, line, q)
+    factorise(newton, 0.0)
+    for r in range(3):
+        newton.error[r], newton.error[3 + r] = 0.0, offset[r]
+    for k in range(7):
+        tangent[k] = 0.0
+    return np.isfinite(step_to_goal(newton, tangent, np.inf))
+
+
+@inner
+def _keep_within_limits(scene: MotionScene, points: FloatArray, tangents: FloatArray) -> None:
+    """Shorten tangents such that the control points of every piece are within the joint limits."""
+    steps = 3.0 * (len(points) - 1)
+    for n in range(len(points)):
+        for k in range(7):
+            if scene.period[k] == 0.0:
+                below, above = points[n, k] - scene.lower[k], scene.upper[k] - points[n, k]
+                most = steps * max(min(below, above), 0.0)
+                tangents[n, k] = min(max(tangents[n, k], -most), most)

@@ -1,0 +1,117 @@
+"""Straight motions of the tool, and postures that hold it at a pose."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from tcs.kernel.arrays import BOX
+from tcs.kernel.collide import SIZE
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact
+from tcs.kernel.motion.postures import postures_at
+from tcs.kernel.motion.straight import (
+    BLOCKED,
+    DONE,
+    LIMITS,
+    OFF_LINE,
+    new_straight_workspace,
+    straight_motion,
+)
+from tcs.kernel.problem import build_problem
+from tcs.kernel.verification.clutter import arm_base
+from tcs.kernel.verification.reference import link_poses
+from tests.kernel.arms import drake_arm
+from tests.kernel.motion.toys import HERE, SWING, bare, prepared, within_limits
+from tests.kernel.shapes import placed
+from tests.kernel.toy import toy_grid, with_obstacle
+
+UNLIMITED = np.full(7, np.inf)
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return drake_arm("pr2 left").chain
+
+
+def follow(ready, work, q, offset, *, pieces=20, fastest=UNLIMITED):
+    """Return outcome, points and tangents of a straight motion."""
+    points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
+    line = new_straight_workspace()
+    outcome = straight_motion(ready, work, line, q, offset, fastest, points, tangents)
+    return outcome, points, tangents
+
+
+def test_the_tool_stays_on_the_line_between_the_points_too(chain, rng):
+    ready, work, _ = prepared(bare(chain))
+    done = 0
+    for _ in range(40):
+        q = within_limits(rng, chain)
+        if posture_contact(ready, work, q) != NO_PAIR:
+            continue
+        direction = rng.normal(size=3)
+        offset = 0.1 * direction / np.linalg.norm(direction)
+        outcome, points, tangents = follow(ready, work, q, offset)
+        if outcome != DONE:
+            continue
+        done += 1
+        R0, p0 = link_poses(chain, q)[-1]
+        spline = CubicHermiteSpline(np.linspace(0, 1, 21), points, tangents)
+        for s in np.linspace(0, 1, 77):
+            R, p = link_poses(chain, spline(s))[-1]
+            np.testing.assert_allclose(p, p0 + s * offset, atol=2 * OFF_LINE)
+            np.testing.assert_allclose(R, R0, atol=2 * OFF_LINE)
+            assert np.all((spline(s) > ready.lower - 1e-9) & (spline(s) < ready.upper + 1e-9))
+    assert done > 5
+
+
+def test_a_plate_blocks_the_line_and_is_named(chain):
+    scene = bare(chain)
+    R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
+    q = np.array([0.6, 0.0, 0.0, -1.2, 0.0, -0.3, 0.0])
+    R, p = link_poses(chain, q)[-1]
+    ahead = 0.1 * R[:, 0]
+    free, scratch, _ = prepared(scene)
+    assert follow(free, scratch, q, ahead)[0] == DONE
+    plate = placed(BOX, [0.0005, 0.1, 0.1], R_WA @ R, R_WA @ (p + 0.8 * ahead) + p_WA)
+    ready, work, _ = prepared(with_obstacle(scene, plate))
+    assert posture_contact(ready, work, q) == NO_PAIR
+    assert follow(ready, work, q, ahead)[0] == BLOCKED
+    arm, other, carrier = ready.pair[work.contact[0]]
+    assert ready.link_frame[arm] == 7
+    assert carrier == 0
+    assert ready.fixed[other - len(ready.links), SIZE] == 0.0005
+
+
+def test_joint_limits_and_velocity_limits_end_a_line(chain):
+    ready, work, _ = prepared(bare(chain))
+    q = SWING[0]
+    R = link_poses(chain, q)[-1][0]
+    # The arm is not a metre longer.
+    assert follow(ready, work, q, 1.0 * R[:, 0])[0] == LIMITS
+    outcome, points, tangents = follow(ready, work, q, -0.1 * R[:, 0])
+    assert outcome == DONE
+    fastest = np.abs(tangents).max(axis=0)
+    assert follow(ready, work, q, -0.1 * R[:, 0], fastest=fastest * 1.001)[0] == DONE
+    assert follow(ready, work, q, -0.1 * R[:, 0], fastest=fastest * 0.999)[0] == LIMITS
+    assert np.abs(np.diff(points, axis=0)).max() < 0.1
+
+
+@pytest.mark.parametrize("name", ["pr2 left", "panda", "baxter"])
+def test_postures_hold_the_tool_at_the_pose(name, rng):
+    chain = drake_arm(name).chain
+    problem = build_problem(bare(chain), toy_grid())
+    q = within_limits(rng, chain)
+    R, p = link_poses(chain, q)[-1]
+    found = postures_at(problem, R, p, 64)
+    assert len(found) > 3
+    assert np.all((found >= chain.lower) & (found <= chain.upper))
+    for posture in found:
+        R_AT, p_AT = link_poses(chain, posture)[-1]
+        np.testing.assert_allclose(R_AT, R, atol=1e-6)
+        np.testing.assert_allclose(p_AT, p, atol=1e-6)
+
+
+def test_out_of_reach_there_is_no_posture(chain):
+    problem = build_problem(bare(chain), toy_grid())
+    assert len(postures_at(problem, np.eye(3), np.array([5.0, 0.0, 0.0]), 64)) == 0
