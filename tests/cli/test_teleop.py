@@ -72,3 +72,32 @@ def test_a_small_experiment(tcs_command, tmp_path):
     ran = tcs_command("teleop", "experiment", *words[:-1], "--out", tmp_path / "again")
     assert ran.code == 0
     assert "3 scripted operators, not people" in ran.out
+
+
+def test_pick_and_place_prints_the_measures_of_each_base_pose(tcs_command):
+    words = ["--operators", 1, "--repetitions", 1, "--training", 0, "--jobs", 1]
+    words += ["--condition", "ITCM-high", "--base", 0.7, 0.1, 5]
+    ran = tcs_command("teleop", "pick-and-place", *words, "--json")
+    assert ran.code == 0
+    assert set(ran.json["conditions"]) == {"ITCM-high", "given"}
+    one = ran.json["conditions"]["given"]
+    assert set(one["tct"]) == {"mean", "std"}
+    assert {"tct", "csa", "cst", "sal", "failures"} <= set(one)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        (["--operators", 0], 2, "--operators"),
+        (["--condition", "Exprt"], 1, "Did you mean 'Expert'?"),
+        (["--base", 0.2, 0, 0], 1, "Move the base away from the table."),
+        (["--base", "nan", 0, 0], 1, "base pose 'given'"),
+        (["--latency", 11], 2, "--latency"),
+    ],
+)
+def test_pick_and_place_refuses_in_a_line(tcs_command, words, code, text):
+    ran = tcs_command("teleop", "pick-and-place", *words)
+    assert ran.code == code
+    assert text in ran.err
+    if code == 1:
+        assert len(ran.err.strip().splitlines()) == 1

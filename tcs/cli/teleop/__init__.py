@@ -1,10 +1,11 @@
-"""The commands `tcs teleop ...`: teleoperate an arm, play a run back, run the experiment."""
+"""The commands `tcs teleop ...`: teleoperate an arm, play a run back, run the experiments."""
 
 from __future__ import annotations
 
 import typer
 
 from tcs.cli.teleop.driving import live
+from tcs.cli.teleop.picking import pick_and_place
 from tcs.cli.teleop.replaying import replay
 from tcs.cli.teleop.trials import experiment
 
@@ -12,5 +13,6 @@ app = typer.Typer()
 app.callback(invoke_without_command=True)(live)
 app.command()(replay)
 app.command()(experiment)
+app.command("pick-and-place")(pick_and_place)
 
 __all__ = ["app"]

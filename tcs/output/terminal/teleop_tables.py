@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from tcs.output.terminal.console import results_console
 from tcs.output.terminal.tables import new_table
-from tcs.output.words.teleop import NAMES, SCALE
+from tcs.output.words import p_value
+from tcs.output.words.teleop import NAMES, PICK_AND_PLACE, SCALE
 
 if TYPE_CHECKING:
     from tcs.teleop.experiment.trial import LineResult
@@ -54,3 +55,30 @@ def report_experiment(result: dict[str, Any]) -> None:
     out.print(f"wrote {', '.join(result['files'])}")
     if result["runs"]:
         out.print(f"runs in {result['runs']}")
+
+
+def report_pick_and_place(result: dict[str, Any]) -> None:
+    """Print the measures of each base pose beside those of the thesis, and the tests."""
+    out = results_console()
+    out.print(
+        f"{result['operators']} scripted operators, not people, {result['repetitions']} "
+        f"repetitions after {result['training']} of training, control {result['control']}, seed "
+        f"{result['seed']}"
+    )
+    table = new_table("mean (std)", *(f">{name}" for name in result["conditions"]), ">F", ">p")
+    for name, text in PICK_AND_PLACE.items():
+        cells = [_mean_std(one[name]) for one in result["conditions"].values()]
+        test = result["variance"].get(name)
+        cells += ["", ""] if test is None else [f"{test['f']:.3g}", p_value(test["p"])]
+        table.add_row(text, *cells)
+    for key, text in (("failures", "failed"), ("training_failures", "failed in training")):
+        counts = [str(one[key]) for one in result["conditions"].values()]
+        table.add_row(f"{text} repetitions", *counts, "", "")
+    out.print(table)
+
+
+def _mean_std(spread: dict[str, float | None]) -> str:
+    mean, std = spread["mean"], spread["std"]
+    if mean is None:
+        return "–"
+    return f"{mean:.3g}" if std is None else f"{mean:.3g} ({std:.3g})"

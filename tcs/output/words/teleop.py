@@ -28,6 +28,21 @@ NAMES = {
 SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
 """Factors from SI units to those of `NAMES`."""
 
+PICK_AND_PLACE = {
+    "tct": "completion time tct [s]",
+    "csa": "cumulative steering angle csa [rad]",
+    "cst": "cumulative steering translation cst [m]",
+    "sal": "spectral arc length sal [-]",
+    "csa_rate": "csa / tct [rad/s]",
+    "cst_rate": "cst / tct [m/s]",
+    "approach": "approach [s]",
+    "transfer": "transfer [s]",
+    "retreat": "retreat [s]",
+    "actions": "gripper actions",
+    "corrections": "corrections of the place",
+}
+"""Name of each measure of the pick-and-place experiment, in the unit of its value."""
+
 
 def trial_words(measures: TrialMeasures, time_limit: float) -> str:
     """Return the result of a trial in a few words."""

@@ -108,6 +108,30 @@ def shapiro_francia(sample: FloatArray) -> tuple[float, float]:
     return w, float(stats.norm.sf((math.log1p(-w) - mean) / std))
 
 
+def kolmogorov_smirnov(sample: FloatArray) -> float:
+    """Return the p value of the Kolmogorov-Smirnov test of normality; 1 if all values are equal.
+
+    Args:
+        sample: The values, shape (n,), n >= 3.
+
+    Raises:
+        DataFileError: If there are fewer than three values, or one is not finite.
+
+    Source:
+        ITCM thesis, III.C.5: the sample is standardised by its own mean and standard deviation.
+        The p value is therefore too large (Lilliefors 1967); `group_statistics` has Shapiro-Wilk.
+
+    >>> kolmogorov_smirnov(np.array([1.0, 1.0, 1.0]))
+    1.0
+    """
+    from scipy import stats
+
+    values = _checked(sample)
+    if np.ptp(values) == 0.0:
+        return 1.0
+    return float(stats.kstest((values - values.mean()) / values.std(ddof=1), "norm").pvalue)
+
+
 @dataclass(frozen=True, slots=True)
 class SignedRankTest:
     """Comparison of two conditions over the same operators: a row of the paper's Table III."""
