@@ -12,6 +12,7 @@
     │   ├── StoreFormatError      truncated, of another program, or of an unknown version
     │   ├── UnsafeStoreError      a pickle that refers to a name outside the allow-list
     │   └── StoreMismatchError    made from models that have changed since
+    ├── PerceptionError       scans in which no table is found, or that cannot be used
     ├── SelectionError        no set to choose from, or a state that is not stored
     └── OutputError           a file or folder that cannot be written
 
@@ -100,6 +101,10 @@ class UnsafeStoreError(StoreError):
 
 class StoreMismatchError(StoreError):
     """A file made from models that differ from the current ones."""
+
+
+class PerceptionError(TcsError):
+    """Scans in which no table is found, or that cannot be used."""
 
 
 class SelectionError(TcsError):

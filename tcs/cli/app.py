@@ -9,6 +9,7 @@ import typer
 from tcs.cli import (
     arplace,
     capability,
+    locate,
     options,
     pictures,
     report,
@@ -71,6 +72,7 @@ for command in (
     robustness.evaluate,
     robustness.robustify,
     view.view,
+    locate.locate,
 ):
     app.command()(command)
 app.command("map")(pictures.draw_map)

@@ -15,6 +15,7 @@ from tcs.model.scene.environment import (
     environment_names,
     load_environment,
 )
+from tcs.model.scene.environment_shapes import environment_shapes
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
@@ -40,6 +41,7 @@ __all__ = [
     "body_frame_positions",
     "environment_at",
     "environment_names",
+    "environment_shapes",
     "estimate_joints",
     "goal_poses",
     "load_environment",
