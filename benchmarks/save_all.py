@@ -40,6 +40,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "capability": (),
     "itcm_task": ("--pictures", "out/pictures"),
     "arplace": (),
+    "locating": ("--runs", "60"),
     "robustness": ("--scores", SCORES),
     "printed_grid": (),
     "row_measures": (),

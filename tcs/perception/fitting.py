@@ -260,7 +260,7 @@ def _silhouettes(
     ):
         other = beam + beyond
         if 0 <= other < scanner.beams and ranges[other] > ranges[beam]:
-            found.append((side, float(scanner.angles[beam] + 0.5 * beyond * scanner.step)))
+            found.append((side, scanner.first + (beam + 0.5 * beyond) * scanner.step))
     return found
 
 

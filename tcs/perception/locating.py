@@ -26,7 +26,7 @@ _MOST_BLOBS = 40
 _MOST_FITS = 150
 """Most first estimates that are fitted, those with most blobs near legs first."""
 _MOST_PARTIAL = 12
-"""Most first estimates that are fitted to all but one of the blobs near legs."""
+"""Most first estimates that are fitted with one of the blobs near legs left out."""
 _ALIKE = 0.08, math.radians(8.0)
 """First estimates closer than this lead to one fit [m, rad]."""
 _SAME = 0.02, math.radians(3.0)
@@ -68,10 +68,16 @@ def locate(
         return _by_two_blobs(scans, table)
     view = View.of(scans)
     candidates = _candidates(view.blobs, table)
-    starts = _first_estimates(candidates, table)
-    sound = [found for start in starts if (found := fit(view, table, start)) is not None]
-    if not sound:
-        fits = [fit_without_one(view, table, start) for start in starts[:_MOST_PARTIAL]]
+    estimates = _first_estimates(candidates, table)
+    sound: list[Fit] = []
+    # A fit to more legs explains more of the scan than any fit to fewer.
+    for _, group in itertools.groupby(estimates, key=lambda estimate: estimate[0]):
+        fits = [fit(view, table, start) for _, start in group]
+        sound = [found for found in fits if found is not None]
+        if sound:
+            break
+    else:
+        fits = [fit_without_one(view, table, start) for _, start in estimates[:_MOST_PARTIAL]]
         sound = [found for found in fits if found is not None]
     if not sound:
         raise PerceptionError(_not_found(view, candidates, table))
@@ -94,8 +100,11 @@ def _candidates(blobs: tuple[Blob, ...], table: TableFile) -> list[Blob]:
     return sorted(small, key=lambda blob: blob.range)[:_MOST_BLOBS]
 
 
-def _first_estimates(candidates: list[Blob], table: TableFile) -> list[PlanarPose]:
-    """Return poses that bring two legs to two blobs, those with most legs near blobs first."""
+def _first_estimates(candidates: list[Blob], table: TableFile) -> list[tuple[int, PlanarPose]]:
+    """Return poses that bring two legs to two blobs, each with the number of legs not near a blob.
+
+    Those with most legs near blobs come first.
+    """
     if len(candidates) < 2:
         return []
     centres = np.array([blob.centre for blob in candidates])
@@ -110,7 +119,9 @@ def _first_estimates(candidates: list[Blob], table: TableFile) -> list[PlanarPos
             gaps = np.hypot(*(pose.points(legs)[:, None] - centres).transpose(2, 0, 1)).min(axis=1)
             ranked.append((int(np.count_nonzero(gaps > _TOLERANCE)), float(gaps.sum()), pose))
     ranked.sort(key=lambda entry: entry[:2])
-    return _distinct([pose for _, _, pose in ranked], _ALIKE)[:_MOST_FITS]
+    lacking = {id(pose): count for count, _, pose in ranked}
+    distinct = _distinct([pose for _, _, pose in ranked], _ALIKE)[:_MOST_FITS]
+    return [(lacking[id(pose)], pose) for pose in distinct]
 
 
 def _through(
@@ -226,7 +237,7 @@ def _front_legs(table: TableFile) -> tuple[Leg, Leg]:
     if wide.size[1] == narrow.size[1]:
         raise PerceptionError(
             f"table '{table.name}': its front legs are equally wide, and the method '{TWO_BLOBS}' "
-            f"tells them apart by their width. Use the method '{LEGS}'."
+            f"distinguishes them by their width. Use the method '{LEGS}'."
         )
     return wide, narrow
 

@@ -73,4 +73,4 @@ def _capsule_distances(
         enter = (-b - np.sqrt(np.maximum(square, 0.0))) / a
         on_side = np.abs(start[2] + enter * along[:, 2]) <= half_length
     met = (square >= 0.0) & (enter >= 0.0) & on_side
-    return np.minimum(nearest, np.where(met, enter, np.inf))
+    return np.asarray(np.minimum(nearest, np.where(met, enter, np.inf)))

@@ -40,7 +40,7 @@ def test_errors_are_as_the_covariance_predicts():
         found = locate(scanned(*legs_of(THESIS, pose), run=run), THESIS)
         squares.append(found.error(pose)["mahalanobis"] ** 2)
     # Chi-square of three degrees of freedom has mean 3; that of 12 has a deviation of 0.71. The
-    # lower bound leaves room for silhouettes, whose deviation is that of beams with a width.
+    # lower bound allows for silhouettes, whose deviation is that of beams with a width.
     assert 0.3 < np.mean(squares) < 3.0 + 4 * 0.71
 
 
@@ -89,7 +89,7 @@ def test_two_blobs_take_a_chair_for_the_table_or_refuse():
         locate(scans, THESIS, method="two-blobs")
 
 
-def test_an_empty_room_a_single_leg_and_a_leg_that_is_missing():
+def test_an_empty_scene_a_single_leg_and_a_leg_that_is_missing():
     with pytest.raises(PerceptionError, match="0 blobs"):
         locate(scanned(), THESIS)
     boxes = legs_of(THESIS, HIGH)
