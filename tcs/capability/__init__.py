@@ -13,6 +13,7 @@ from tcs.capability.from_recording import RecordedMap, map_from_recording
 from tcs.capability.grid import MapGrid
 from tcs.capability.map import CapabilityMap
 from tcs.capability.merge import BasePose, TaskMap, merge
+from tcs.capability.pose_errors import PoseErrors, TaskSuccess, success_under_error
 from tcs.capability.reach import Reach
 from tcs.capability.recording import Recording, read_csv, recording_of, write_csv
 from tcs.capability.sequence import Stop, split
@@ -38,6 +39,7 @@ __all__ = [
     "MapCheck",
     "MapGrid",
     "MapVolume",
+    "PoseErrors",
     "Reach",
     "RecordedMap",
     "Recording",
@@ -45,6 +47,7 @@ __all__ = [
     "Surroundings",
     "TaskMap",
     "TaskShape",
+    "TaskSuccess",
     "check_file",
     "check_map",
     "check_stored",
@@ -61,6 +64,7 @@ __all__ = [
     "recording_of",
     "save_map",
     "split",
+    "success_under_error",
     "visibility",
     "write_base_poses",
     "write_csv",

@@ -21,7 +21,7 @@ from tcs.kernel.scores import BODY_BLOCKED, REACHED, Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.grid import Axis, Grid
 from tcs.model.robots import RobotFile, load_robot
-from tcs.model.scene import EnvironmentFile, Scene, SceneSpec, load_environment, lower
+from tcs.model.scene import EnvironmentFile, LoweredScene, Scene, SceneSpec, load_environment, lower
 
 MOST_TRIED = 2000
 """Greatest number of base poses that are checked, best first."""
@@ -67,6 +67,8 @@ class Surroundings:
         ANGLE.check(task_pose[2], "the task: the heading of its frame", TaskError)
         self._scene = Scene(SceneSpec(robot, environment))
         self._task_pose = task_pose
+        self._arrays: tuple[float, LoweredScene] | None = None
+        """The torso height that was used last [m], and the arrays at it."""
 
     @classmethod
     def load(
@@ -142,6 +144,15 @@ class Surroundings:
             "the environment. Move the task or the obstacles."
         )
 
+    def _lowered(self, torso_height: float) -> LoweredScene:
+        """Return the scene as arrays, which the base pose does not affect."""
+        if self._arrays is None or self._arrays[0] != torso_height:
+            fixed = (("base_x", "m"), ("base_y", "m"), ("base_yaw", "deg"))
+            axes = (Axis(name, unit, 0.0, 0.0, 1) for name, unit in fixed)
+            grid = Grid((*axes, Axis("torso", "m", torso_height, 0.0, 1)))
+            self._arrays = torso_height, lower(self._scene, None, grid)
+        return self._arrays[1]
+
     def _solve(
         self,
         base_pose: tuple[float, float, float],
@@ -150,16 +161,11 @@ class Surroundings:
         p_WT: FloatArray,
     ) -> tuple[bool, BoolArray]:
         """Return whether the body is in contact at a base pose in W, and the reached tool poses."""
-        x, y, yaw = base_pose
-        axes = (
-            Axis("base_x", "m", x, 0.0, 1),
-            Axis("base_y", "m", y, 0.0, 1),
-            Axis("base_yaw", "deg", math.degrees(yaw), 0.0, 1),
-            Axis("torso", "m", torso_height, 0.0, 1),
-        )
-        lowered = lower(self._scene, None, Grid(axes))
+        lowered = self._lowered(torso_height)
+        x, y, yaw = (np.array([value]) for value in base_pose)
+        grid = lowered.grid._replace(base_x=x, base_y=y, base_yaw=yaw)
         arrays = lowered.arrays._replace(goal_R=R_WT[None], goal_p=p_WT[None])
-        problem = build_problem(arrays, lowered.grid)
+        problem = build_problem(arrays, grid)
         count = len(p_WT)
         scores: Any = Scores(
             np.empty((1, count), np.uint8),

@@ -47,10 +47,11 @@ def evaluate(
     select: Annotated[
         str,
         typer.Option(
-            metavar="best|single|robust|uniform",
+            metavar="best|single|robust|uniform|equal",
             help="Set to evaluate: the best set, the best single configuration, the most robust "
             "set (greatest lower confidence bound on success, by `tcs robustify`), or another set "
-            "in each sample, drawn from all with P_R of at least 98 % of the greatest.",
+            "in each sample, drawn from all with P_R of at least 98 % of the greatest (uniform) or "
+            "equal to it (equal).",
         ),
     ] = "best",
     members: Annotated[
@@ -66,8 +67,8 @@ def evaluate(
     as_json: options.Json = False,
 ) -> None:
     """Evaluate the success of a set in randomly perturbed environments."""
-    if members is not None and select != "uniform":
-        raise typer.BadParameter("requires --select uniform.", param_hint="--members")
+    if members is not None and select not in ("uniform", "equal"):
+        raise typer.BadParameter("requires --select uniform or equal.", param_hint="--members")
     import tcs
 
     loaded = tcs.load(file)

@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.model.random_streams import check_draws
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
-from tcs.placement.robustness.pairs import uniform_sets
+from tcs.placement.robustness.pairs import EQUAL_REACHABILITY, uniform_sets
 from tcs.placement.robustness.statistics import Mean, mean_of
 from tcs.placement.robustness.trials import Errors, Progress, Trials
 from tcs.placement.store import ScoreFile, StateTables, state_to_json
 from tcs.placement.tables import tc_reachability
 
-SELECTIONS = ("best", "single", "robust", "uniform")
+SELECTIONS = ("best", "single", "robust", "uniform", "equal")
 """Sets to evaluate: the set with the greatest P_R + P_M; the best single configuration; the most
 robust set (greatest lower confidence bound on success, estimated by `robustify`); or, as the
 paper's "without TC-manipulability", another set in every sample, drawn uniformly from those whose
-P_R is at least 0.98 of the greatest."""
+P_R is at least 0.98 of the greatest, as in hrl_base_selection, or equal to it, as printed."""
+
+_DRAWN = {"uniform": EQUAL_REACHABILITY, "equal": 1.0}
+"""Selections that draw sets: the fraction of the greatest P_R that these have at least."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,7 +37,7 @@ class Evaluation:
     select: str
     """One of `SELECTIONS`, or "given"."""
     sets: NDArray[np.int64]
-    """Flat configuration indices of the members, shape (1, m), or (samples, m) if "uniform"."""
+    """Flat configuration indices of the members, shape (1, m), or (samples, m) if drawn."""
     offsets: Offsets
     """Error of each joint in each sample [m or rad], shapes (samples,)."""
     reached: NDArray[np.bool_]
@@ -42,11 +45,11 @@ class Evaluation:
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (goals,)."""
     reachability: float
-    """P_R without error; the mean over the drawn sets if "uniform"."""
+    """P_R without error; the mean over the sets if they are drawn."""
     manipulability: float
     """P_M without error; likewise."""
     choices: int
-    """Number of sets to draw from; 1 unless "uniform"."""
+    """Number of sets to draw from; 1 unless sets are drawn."""
     clipped: int
     """Number of samples in which an error is limited at a joint limit."""
     errors: ErrorModel
@@ -62,7 +65,7 @@ class Evaluation:
     about: Mapping[str, str]
     """Names of task, environment and robot."""
     members: tuple[dict[str, float], ...]
-    """The configurations of the set as plain numbers; () if "uniform"."""
+    """The configurations of the set as plain numbers; () if sets are drawn."""
 
     @cached_property
     def fractions(self) -> NDArray[np.float64]:
@@ -142,7 +145,7 @@ def evaluate(
         errors: Path of an error file, or errors by joint, in place of those of the environment.
             Not for trials, which include their errors.
         select: One of `SELECTIONS`, or flat configuration indices of the members of a set.
-        members: Number of members of the sets of "uniform", 1 or 2.
+        members: Number of members of the sets of "uniform" and "equal", 1 or 2.
         table: Number of the file's table; by default the nominal one. Not for trials.
         body_collisions: Collisions of the robot's body that count, one of `BODY_COLLISIONS`; by
             default `paper`. Not for trials.
@@ -186,7 +189,7 @@ def evaluate(
         compiling = trials.compile_seconds
     offsets = trials.errors.draw(samples, seed, stream=stream)
     sets, choices = _chosen(trials.scored, select, members, samples, seed)
-    is_drawn = select == "uniform"
+    is_drawn = isinstance(select, str) and select in _DRAWN
     if is_drawn:
         # Set i is evaluated on sample i only, with all of its members.
         tiled = {name: np.tile(values, sets.shape[1]) for name, values in offsets.items()}
@@ -239,8 +242,8 @@ def _chosen(
         # Raises an error if the indices are not a set of candidates.
         sets.scores_of(tuple(given.tolist()))
         return given[None], 1
-    if select == "uniform":
-        return uniform_sets(sets, members, samples, seed)
+    if select in _DRAWN:
+        return uniform_sets(sets, members, samples, seed, _DRAWN[select])
     if select not in SELECTIONS:
         raise UnknownNameError("selection", select, SELECTIONS, where="evaluate")
     if select == "robust" and scored.success is None:

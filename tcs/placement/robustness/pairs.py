@@ -126,15 +126,19 @@ def _kept(
     return Pairs(first[kept], second[kept], reachability[kept], manipulability[kept])
 
 
-def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[IntArray, int]:
+def uniform_sets(
+    sets: SetTable, members: int, count: int, seed: int, fraction: float = EQUAL_REACHABILITY
+) -> tuple[IntArray, int]:
     """Return sets drawn uniformly from those equal in P_R to the best, and how many there are.
 
     Args:
         sets: The table.
-        members: 1 or 2: singles with P_R of at least 0.98 of the greatest of a single, or kept
-            pairs with P_R of at least 0.98 of the greatest of any set.
+        members: 1 or 2: singles with at least a fraction of the greatest P_R of a single, or kept
+            pairs with at least that fraction of the greatest P_R of any set.
         count: Number of sets to draw, with replacement.
         seed: Seed of the draw.
+        fraction: Fraction of the greatest P_R from which sets count as equal; with 1, sums that
+            differ by rounding still do.
 
     Returns:
         Flat configuration indices, shape (count, members); the number of sets to draw from.
@@ -149,17 +153,15 @@ def uniform_sets(sets: SetTable, members: int, count: int, seed: int) -> tuple[I
     greatest = float(singles.max(initial=0.0))
     rng = named_generator(seed, f"sets of {members}")
     if members == 1:
-        pool = np.flatnonzero(singles >= EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE)[
-            :, None
-        ]
+        pool = np.flatnonzero(singles >= fraction * greatest - FRACTION_TOLERANCE)[:, None]
     else:
         greatest = max(greatest, float(sets.pair_reachability.max(initial=0.0)))
-        least = EQUAL_REACHABILITY * greatest - FRACTION_TOLERANCE
+        least = fraction * greatest - FRACTION_TOLERANCE
         pairs = Pairs.joined(kept_pairs(sets, least_reachability=least))
         pool = np.stack([pairs.first, pairs.second], axis=1)
     if not len(pool):
         raise SelectionError(
-            f"No set of {members} has P_R of at least {EQUAL_REACHABILITY} of the greatest, so "
+            f"No set of {members} has P_R of at least {fraction:g} of the greatest, so "
             "none can be drawn. Draw sets of 1, or evaluate the best set."
         )
     return sets.candidates[pool[rng.integers(len(pool), size=count)]].astype(np.int64), len(pool)

@@ -123,6 +123,22 @@ def test_other_tables_have_other_observed_states(bed_file):
     assert there.reachability == bed_file.tables[1].sets.scores_of(best)[0]
 
 
+@pytest.mark.parametrize("members", [1, 2])
+def test_equal_sets_have_the_greatest_reachability(bed_trials, members):
+    found = evaluate(bed_trials, samples=40, select="equal", members=members)
+    sets = bed_trials.scored.sets
+    of_single = sets.single_reachability
+    greatest = (
+        of_single.max() if members == 1 else max(of_single.max(), sets.pair_reachability.max())
+    )
+    for drawn in {tuple(row) for row in found.sets.tolist()}:
+        assert sets.scores_of(drawn)[0] == pytest.approx(greatest, abs=1e-9)
+    if members == 1:
+        assert found.choices == np.count_nonzero(np.abs(of_single - greatest) < 1e-9)
+    loose = evaluate(bed_trials, samples=40, select="uniform", members=members)
+    assert 0 < found.choices <= loose.choices
+
+
 def test_one_and_two_with_and_without(bed_trials):
     table = compare_methods(bed_trials, samples=60)
     assert tuple(table.paired) == METHODS
