@@ -21,6 +21,7 @@ from tcs.output.report.teleop_tables import (
     signed_rank_table,
     trials_table,
 )
+from tcs.output.report.teleop_work import phase_table
 from tcs.teleop.arm import load_arm, torso_height_of
 from tcs.teleop.experiment.course import find_course
 from tcs.teleop.experiment.within_subject import ExperimentPlan, run_experiment
@@ -53,12 +54,13 @@ def main() -> None:
     comparison = experiment.comparison()
     tables = dict(
         zip(
-            ("groups", "tests", "motion", "pairs", "trials", "learning"),
+            ("groups", "tests", "motion", "pairs", "trials", "phases", "learning"),
             (
                 group_table(comparison),
                 signed_rank_table(comparison),
                 *motion_tables(comparison),
                 trials_table(comparison),
+                phase_table(experiment),
                 learning_table(comparison),
             ),
             strict=True,

@@ -263,6 +263,25 @@ def test_every_condition_opens(tcs_command, condition):
     assert f", {condition}, limits as in clamped" in ran.err
 
 
+def test_the_work_in_a_run_is_divided_into_phases(tcs_command, saved, tmp_path):
+    picture = tmp_path / "work.svg"
+    assert refused(tcs_command("teleop", "work", saved), "no line", "--line --save")
+    arm = load_arm("iiwa7")
+    session = Teleoperation(arm, np.radians(READY_DEG))
+    rng = np.random.default_rng(0)
+    commands = [Command(linear=(0.1, *(0.01 * rng.normal(size=2)))) for _ in range(150)]
+    rows = [(command, session.step(command)) for command in commands]
+    ends = {"line_start": rows[0][1].p.tolist(), "line_end": rows[-1][1].p.tolist()}
+    save_run(tmp_path / "line.csv", run_from_steps(arm, rows, ends))
+    ran = tcs_command("teleop", "work", tmp_path / "line.csv", "--picture", picture, "--json")
+    assert ran.code == 0
+    assert ran.json["solution"] is None
+    assert ran.json["phases"]["start"]["work"] == pytest.approx(ran.json["work"])
+    assert ran.json["phases"]["solution"] == {"seconds": 0.0, "work": 0.0, "steps": 0}
+    assert picture.read_text().startswith("<?xml")
+    assert "did not stop" in tcs_command("teleop", "work", tmp_path / "line.csv").out
+
+
 def test_latency_is_stated_and_its_range_checked(tcs_command):
     words = ["teleop", "--start-deg", *READY_DEG, "--no-browser", "--duration", 0.1]
     ran = tcs_command(*words, "--latency", 0.3, "--latency-of", "command")

@@ -8,11 +8,13 @@ from tcs.cli.teleop.driving import live
 from tcs.cli.teleop.picking import pick_and_place
 from tcs.cli.teleop.replaying import replay
 from tcs.cli.teleop.trials import experiment
+from tcs.cli.teleop.working import work
 
 app = typer.Typer()
 app.callback(invoke_without_command=True)(live)
 app.command()(replay)
 app.command()(experiment)
 app.command("pick-and-place")(pick_and_place)
+app.command()(work)
 
 __all__ = ["app"]

@@ -80,7 +80,7 @@ def live(
     delay: LatencyOptions,
     window: options.WindowOptions,
 ) -> None:
-    """Teleoperate an arm in the browser by keys, sliders or gamepad; `experiment` and `replay`."""
+    """Teleoperate an arm in the browser by keys, sliders or gamepad."""
     if ctx.invoked_subcommand is not None:
         sources = {name: ctx.get_parameter_source(name) for name in ctx.params}
         given = [name for name, one in sources.items() if one and one.name == "COMMANDLINE"]

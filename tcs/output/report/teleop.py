@@ -36,6 +36,7 @@ from tcs.output.report.teleop_tables import (
     title_of,
     trials_table,
 )
+from tcs.output.report.teleop_work import work_blocks
 from tcs.output.words import p_value
 from tcs.output.words.teleop import NAMES
 from tcs.teleop.experiment.comparison import Comparison
@@ -81,6 +82,7 @@ def experiment_page(
             Section("Findings", [Bullets(findings(experiment))]),
             Section("Accuracy, time, effort", _compared(comparison)),
             Section("Paths of the tool", _paths(experiment)),
+            Section("Work over time", work_blocks(experiment)),
             Section("Motion of the hand", [*motion_tables(comparison), Text(_STEERING)]),
             Section("Trials", [trials_table(comparison), learning_table(comparison)]),
             *([] if maps is None else [Section("Capability maps", maps_blocks(experiment, maps))]),

@@ -27,6 +27,23 @@ def line_text(result: LineResult) -> str:
     )
 
 
+def report_work(result: dict[str, Any]) -> None:
+    """Print the work on the device by phase."""
+    out = results_console()
+    table = new_table("phase", ">time [s]", ">work [mJ]", ">of the total [%]")
+    total = result["work"]
+    for name, part in result["phases"].items():
+        fraction = 100.0 * part["work"] / total if total else 0.0
+        cells = (f"{part['seconds']:.2f}", f"{1e3 * part['work']:.3g}", f"{fraction:.1f}")
+        table.add_row(name.upper(), *cells)
+    table.add_row("total", f"{result['seconds']:.2f}", f"{1e3 * total:.3g}", "")
+    out.print(table)
+    if result["solution"] is None:
+        out.print("the arm did not stop: there is no solution phase")
+    if result["picture"]:
+        out.print(f"wrote {result['picture']}")
+
+
 def report_experiment(result: dict[str, Any]) -> None:
     """Print medians, tests and files."""
     from tcs.teleop.experiment.within_subject import SCRIPTED

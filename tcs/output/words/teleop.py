@@ -19,13 +19,26 @@ NAMES = {
     "turned": "rotation of joint 1 by its group [rad]",
     "finished": "fraction of completed trials",
     "planes_met": "normal planes crossed, of 30",
+    "start_time": "START: time until the arm first stops [s]",
+    "start_work": "START: absolute work on the device [mJ]",
+    "solution_time": "SOLUTION: time until all stops are passed [s]",
+    "solution_work": "SOLUTION: absolute work on the device [mJ]",
+    "finish_time": "FINISH: time on the rest of the line [s]",
+    "finish_work": "FINISH: absolute work on the device [mJ]",
     "usefulness": "usefulness, van der Laan [-2 to 2]",
     "satisfaction": "satisfaction, van der Laan [-2 to 2]",
     "workload": "weighted workload, NASA-TLX [0 to 100]",
     "difficulty": "difficulty of the task, agreement [1 to 5]",
 }
 """Name of each measure, with the unit in which it is printed."""
-SCALE = {"accuracy": 1e3, "effort": 1e6, "work": 1e3}
+SCALE = {
+    "accuracy": 1e3,
+    "effort": 1e6,
+    "work": 1e3,
+    "start_work": 1e3,
+    "solution_work": 1e3,
+    "finish_work": 1e3,
+}
 """Factors from SI units to those of `NAMES`."""
 
 PICK_AND_PLACE = {

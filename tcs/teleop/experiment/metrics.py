@@ -122,16 +122,35 @@ def effort(time: FloatArray, hand: FloatArray, *, mass: float = DEVICE_MASS) -> 
         DataFileError: If there are fewer than three samples.
 
     Source:
-        Null-space paper, eq. (16): W = m (dv / dt) . ds, absolute value, mean over the run. The
-        paper does not specify the time of v between two samples; here v is the mean over a step,
-        and ds the mean of the two steps between which v changes.
+        Null-space paper, eq. (16): the mean of `work_steps`.
+    """
+    return float(work_steps(time, hand, mass=mass).mean())
+
+
+def work_steps(time: FloatArray, hand: FloatArray, *, mass: float = DEVICE_MASS) -> FloatArray:
+    """Return the absolute work on the device from one sample to the next [J], shape (n - 2,).
+
+    Step i belongs to sample i + 1: the velocity changes there.
+
+    Args:
+        time: Times of the samples [s], equally spaced, shape (n,), n >= 3.
+        hand: Positions of the device [m], shape (n, 3).
+        mass: Mass of the device [kg].
+
+    Raises:
+        DataFileError: If there are fewer than three samples.
+
+    Source:
+        Null-space paper, eq. (16): W = m (dv / dt) . ds, absolute value. The paper does not specify
+        the time of v between two samples; here v is the mean over a step, and ds the mean of the
+        two steps between which v changes.
     """
     _at_least(len(time), 3)
     steps = np.diff(np.asarray(hand, dtype=np.float64), axis=0)
     dt = np.diff(time)[:, None]
     force = mass * np.diff(steps / dt, axis=0) / (0.5 * (dt[1:] + dt[:-1]))
     displacement = 0.5 * (steps[1:] + steps[:-1])
-    return float(np.abs((force * displacement).sum(axis=1)).mean())
+    return np.asarray(np.abs((force * displacement).sum(axis=1)))
 
 
 def steering_angle(roll_pitch_yaw: FloatArray) -> float:

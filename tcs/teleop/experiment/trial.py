@@ -25,6 +25,7 @@ from tcs.teleop.experiment.metrics import (
     steering_translation,
     trajectory_accuracy,
 )
+from tcs.teleop.experiment.phases import work_over_time
 from tcs.teleop.line import Line
 from tcs.teleop.operators.scripted import Experience, OperatorTraits, Recovery, ScriptedOperator
 from tcs.teleop.runs.recorder import last_attempt, run_from_steps
@@ -94,6 +95,18 @@ class TrialMeasures:
     """1 if the end was reached in time, else 0."""
     planes_met: float
     """Number of planes with samples, of 30."""
+    start_time: float
+    """Time until the arm first stopped: the START phase [s]."""
+    start_work: float
+    """Absolute work on the device in that phase [J]."""
+    solution_time: float
+    """Time from the first stop until the tool has passed all stops: the SOLUTION phase [s]."""
+    solution_work: float
+    """Absolute work on the device in that phase [J]."""
+    finish_time: float
+    """Time on the rest of the line: the FINISH phase [s]."""
+    finish_work: float
+    """Absolute work on the device in that phase [J]."""
 
 
 MEASURES = tuple(TrialMeasures.__dataclass_fields__)
@@ -208,6 +221,7 @@ def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> Tria
     stops = np.flatnonzero(np.diff(run.stopped.astype(int)) == 1)
     turning = (run.group == 0) & ~run.clutch
     mean_work = effort(run.time, hand)
+    phases = work_over_time(run, line).phases()
     return TrialMeasures(
         accuracy=path.worst,
         time=time_limit if took is None else took,
@@ -220,6 +234,8 @@ def measure(run: Run, course: Course, *, time_limit: float = TIME_LIMIT) -> Tria
         turned=float(np.abs(run.rates[turning, 0]).sum() * run.step),
         finished=0.0 if took is None else 1.0,
         planes_met=float(path.planes_met),
+        **{f"{phase}_time": part.seconds for phase, part in phases.items()},
+        **{f"{phase}_work": part.work for phase, part in phases.items()},
     )
 
 

@@ -21,6 +21,7 @@ from tcs.teleop.control.latency import Latency
 from tcs.teleop.experiment.comparison import Comparison
 from tcs.teleop.experiment.course import Course
 from tcs.teleop.experiment.order import counterbalanced_orders
+from tcs.teleop.experiment.phases import WorkOverTime, work_over_time
 from tcs.teleop.experiment.statistics import RepeatedMeasures, SignedRankTest
 from tcs.teleop.experiment.trial import (
     CONDITIONS,
@@ -115,6 +116,8 @@ class ControllerTrials:
     """Path of the tool in each counted trial [m], shapes (k, 3)."""
     postures: tuple[FloatArray, ...]
     """Postures of the arm in each counted trial, ten per second [rad], shapes (k, 7)."""
+    work: tuple[WorkOverTime, ...]
+    """Work on the device over time in each counted trial."""
 
     @property
     def mean(self) -> TrialMeasures:
@@ -241,7 +244,7 @@ def _drive(
 ) -> ControllerTrials:
     """Return the trials of one operator with one controller."""
     habits = Experience()
-    measured, paths, postures = [], [], []
+    measured, paths, postures, work = [], [], [], []
     number = plan.conditions.index(condition)
     for trial in range(plan.training + plan.trials):
         counts = trial >= plan.training
@@ -260,6 +263,7 @@ def _drive(
         measured.append(measure(run, course, time_limit=plan.time_limit))
         if counts:
             paths.append(sampled_path(run))
+            work.append(work_over_time(run, course.line))
             postures.append(run.joints[:: max(1, round(0.1 / run.step))].copy())
             if runs is not None:
                 save_run(runs / run_name(run, runs_as), run)
@@ -270,6 +274,7 @@ def _drive(
         tuple(measured[plan.training :]),
         tuple(paths),
         tuple(postures),
+        tuple(work),
     )
 
 
@@ -290,6 +295,12 @@ def median_ratio(experiment: Experiment, measure: str) -> float:
     """Return the novel controller's median of a measure over that of end-effector control."""
     novel, there = (experiment.sample(one.name, measure) for one in (NOVEL, END_EFFECTOR))
     return float(np.median(novel) / np.median(there))
+
+
+def median_operator(experiment: Experiment, condition: str, measure: str) -> int:
+    """Return the operator, from 0, whose measure is the median, or the next above it."""
+    sample = experiment.sample(condition, measure)
+    return int(np.argsort(sample, kind="stable")[len(sample) // 2])
 
 
 def trial_rows(experiment: Experiment, names: Sequence[str]) -> list[list[object]]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tcs.errors import DataFileError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.teleop.control.settings import Mode
+from tcs.teleop.line import Line
 
 IntArray = NDArray[np.int64]
 NO_GROUP = -1
@@ -132,6 +133,14 @@ class Run:
     def step(self) -> float:
         """Mean time from one sample to the next [s]."""
         return float(self.time[-1] - self.time[0]) / (len(self) - 1)
+
+    @property
+    def line(self) -> Line | None:
+        """The line to follow, in the robot's base; None if the metadata contain none."""
+        try:
+            return Line(*(tuple(self.metadata[name]) for name in ("line_start", "line_end")))
+        except (KeyError, TypeError, ValueError, DataFileError):
+            return None
 
     def hand(self) -> tuple[FloatArray, FloatArray]:
         """Return the path of the operator's hand while it was coupled to the tool.

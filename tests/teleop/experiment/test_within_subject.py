@@ -154,7 +154,7 @@ def test_every_table_and_picture_says_that_no_people_took_part(saved):
     assert SCRIPTED in page.lead
     assert SCRIPTED in page.foot
     html, markdown = as_html(page), as_markdown(page)
-    assert html.count("<svg") == 4
+    assert html.count("<svg") == 6
     assert "r = z/√(2N)" in markdown
 
 

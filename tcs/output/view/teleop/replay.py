@@ -57,17 +57,8 @@ class RunView:
     @property
     def course(self) -> tuple[FloatArray, FloatArray] | None:
         """Start and end of the line to follow [m]; None if the metadata contain none."""
-        found = []
-        for name in ("line_start", "line_end"):
-            try:
-                place = np.array(self.run.metadata.get(name), dtype=np.float64)
-            except (TypeError, ValueError):
-                return None
-            if place.shape != (3,) or not np.isfinite(place).all():
-                return None
-            found.append(place)
-        start, end = found
-        return (start, end) if (start != end).any() else None
+        line = self.run.line
+        return None if line is None else (np.array(line.start), np.array(line.end))
 
     def draw(self, meshcat: Meshcat) -> None:
         """Draw the path of the tool, and the line to follow."""
