@@ -103,25 +103,31 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
     R_WA = R_WB @ problem.base_R[torso]
     p_WA = p_WB + R_WB @ problem.base_p[torso]
     environment = _moved(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
-    fixed = np.concatenate([environment, problem.body_A[torso]])
-    gap_fixed = np.concatenate([problem.gap_environment, problem.gap_body], axis=1)
+    # The boxes around groups of shapes come after the shapes, and are left out.
+    count, others = len(problem.link_body), len(problem.body_body)
+    fixed = np.concatenate([environment, problem.body_A[torso, :others]])
+    gap_fixed = np.concatenate(
+        [problem.gap_environment[:count], problem.gap_body[:count, :others]], axis=1
+    )
+    links = np.ascontiguousarray(problem.links[:count])
+    link_frame = np.ascontiguousarray(problem.link_frame[:count])
+    gap_arm = problem.gap_arm[:count, :count]
     body = np.concatenate(
         [problem.environment_body, problem.body_body + problem.environment_bodies]
     )
-    within = _within_reach(problem, fixed, gap_fixed)
+    within = _within_reach(problem.chain_p, links, link_frame, fixed, gap_fixed)
     near = np.flatnonzero(within.any(axis=0))
     arm, other = np.nonzero(within[:, near])
-    count = len(problem.links)
-    apart = problem.link_frame[:, None] != problem.link_frame[None]
-    first, second = np.nonzero(np.tril((problem.gap_arm > 0.0) & apart))
+    apart = link_frame[:, None] != link_frame[None]
+    first, second = np.nonzero(np.tril((gap_arm > 0.0) & apart))
     # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
     pair = np.concatenate(
         [
             np.stack([arm, count + other, np.zeros_like(arm)], axis=1),
-            np.stack([second, first, problem.link_frame[first]], axis=1),
+            np.stack([second, first, link_frame[first]], axis=1),
         ]
     )
-    gap = np.concatenate([gap_fixed[:, near][arm, other], problem.gap_arm[first, second]])
+    gap = np.concatenate([gap_fixed[:, near][arm, other], gap_arm[first, second]])
     order = np.argsort(pair[:, 0], kind="stable")
     lower, upper = problem.arm.lower, problem.arm.upper
     return MotionScene(
@@ -130,8 +136,8 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
         lower=lower,
         upper=upper,
         period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
-        links=problem.links,
-        link_frame=problem.link_frame,
+        links=links,
+        link_frame=link_frame,
         fixed=np.ascontiguousarray(fixed[near]),
         pair=np.ascontiguousarray(pair[order].astype(np.int64)),
         first_pair=np.searchsorted(pair[order, 0], np.arange(count + 1)).astype(np.int64),
@@ -172,11 +178,12 @@ def _moved(rows: FloatArray, R: FloatArray, p: FloatArray) -> FloatArray:
     return moved
 
 
-def _within_reach(problem: Problem, fixed: FloatArray, gap: FloatArray) -> BoolArray:
+def _within_reach(
+    chain_p: FloatArray, links: FloatArray, link_frame: IntArray, fixed: FloatArray, gap: FloatArray
+) -> BoolArray:
     """Return whether each shape of the arm may come near each fixed shape, (n_arm, n_fixed)."""
-    links = problem.links
-    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(problem.chain_p[:7], axis=1))])
-    reach = spans[problem.link_frame] + np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
+    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain_p[:7], axis=1))])
+    reach = spans[link_frame] + np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
     away = np.linalg.norm(fixed[:, CENTRE : CENTRE + 3], axis=1) - fixed[:, BOUND]
     meets = away[None] <= (reach + links[:, BOUND])[:, None] + gap
     return np.asarray((gap > 0.0) & meets)
