@@ -129,6 +129,7 @@ def random_command(rng: np.random.Generator, mode: Mode | None) -> Command:
         group=int(rng.integers(4)),
         sign=int(rng.choice([-1, 1])),
         mode=mode,
+        joints=tuple(rng.uniform(-np.pi, np.pi, size=7)),
     )
 
 

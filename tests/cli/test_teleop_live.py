@@ -253,7 +253,7 @@ def test_a_line_excludes_a_start_posture(tcs_command):
     assert ran.code == 2
 
 
-@pytest.mark.parametrize("condition", ["end-effector", "novel", "assisted", "drake"])
+@pytest.mark.parametrize("condition", ["end-effector", "novel", "assisted", "drake", "joint"])
 def test_every_condition_opens(tcs_command, condition):
     ran = tcs_command(
         "teleop", "--condition", condition, "--start-deg", *READY_DEG, "--no-browser",

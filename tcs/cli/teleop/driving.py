@@ -35,6 +35,7 @@ class Condition(StrEnum):
     NOVEL = "novel"
     ASSISTED = "assisted"
     DRAKE = "drake"
+    JOINT = "joint"
 
 
 @expand_options
@@ -53,7 +54,8 @@ def live(
         Condition,
         typer.Option(
             help="Control of the tool alone (end-effector), or with manual null-space control "
-            "(novel); assisted and drake avoid joint limits automatically."
+            "(novel); assisted and drake avoid joint limits automatically; joint has a slider for "
+            "each joint."
         ),
     ] = Condition.NOVEL,
     start_deg: Annotated[

@@ -16,10 +16,6 @@ def rate_bounds(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the rates from which every joint can still stop within its limits.
 
-    At its greatest rate v, a joint that slows down by a T in every step of length T from the next
-    step on comes to rest at its limit: with v = (n + f) a T, n whole and 0 <= f < 1, it travels
-    ((n + 1) f + n (n + 1) / 2) a T^2.
-
     Args:
         arm: The arm.
         joints: Joint positions [rad], shape (7,), within the limits.
@@ -31,13 +27,33 @@ def rate_bounds(
     """
     distance = np.array([joints - arm.lower, arm.upper - joints])
     np.maximum(distance, 0.0, out=distance)
+    fastest = stopping_rates(distance, period, acceleration)
+    return -fastest[0], fastest[1]
+
+
+def stopping_rates(
+    distance: FloatArray, period: float, acceleration: float | FloatArray
+) -> FloatArray:
+    """Return the greatest rates from which joints come to rest within distances.
+
+    At its greatest rate v, a joint that slows down by a T in every step of length T from the next
+    step on comes to rest at the end of its distance: with v = (n + f) a T, n whole and 0 <= f < 1,
+    it travels ((n + 1) f + n (n + 1) / 2) a T^2.
+
+    Args:
+        distance: Distances [rad], at least 0, shape (..., 7); may be infinite.
+        period: Time of one step [s].
+        acceleration: Greatest change of a rate [rad/s^2], one for all joints or shape (7,).
+
+    Returns:
+        Rates [rad/s], shape (..., 7).
+    """
     steps = distance / (acceleration * period * period)
     # Continuous joints: a finite bound that is never reached.
     np.minimum(steps, 1e12, out=steps)
     whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * steps) - 1.0))
     part = (steps - 0.5 * whole * (whole + 1.0)) / (whole + 1.0)
-    fastest = (whole + part) * (acceleration * period)
-    return -fastest[0], fastest[1]
+    return np.asarray((whole + part) * (acceleration * period))
 
 
 def stops_in_time(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from tcs.teleop.control.assistance import assisted, drake
+from tcs.teleop.control.joint_mode import joint
 from tcs.teleop.control.null_space_modes import null_space, pose
 from tcs.teleop.control.settings import Command, Mode
 from tcs.teleop.control.state import ControlState, RateCommand
@@ -16,6 +17,7 @@ _MODES: Mapping[Mode, Callable[[Command, ControlState], RateCommand]] = {
     Mode.POSE: pose,
     Mode.ASSISTED: assisted,
     Mode.DRAKE: drake,
+    Mode.JOINT: joint,
 }
 
 

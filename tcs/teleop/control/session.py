@@ -202,6 +202,7 @@ class Teleoperation:
             arm=self.arm,
             settings=settings,
             joints=self._joints,
+            rates=self._rates,
             jacobian=middle.jacobian,
             error=pose_error(self._target_R, self._target_p, self._now.R, self._now.p),
             lower=lower,
@@ -251,14 +252,15 @@ class Teleoperation:
         Args:
             command: The executed part of the command.
             stays: Whether the target is set to the tool pose instead: while the tool comes to rest,
-                so that no error moves it back, and where its motion ends.
+                so that no error moves it back, and where its motion ends. In joint mode it always
+                is, because no pose is commanded.
         """
         settings, now = self.settings, self._now
         if self._mode in NULL_SPACE_MODES and not self._switching:
             if self._mode is Mode.NULL_SPACE:
                 self._target_R = now.R
             return
-        if stays:
+        if stays or self._mode is Mode.JOINT:
             self._target_R, self._target_p = now.R, now.p
             return
         twist = commanded_twist(command)

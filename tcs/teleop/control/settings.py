@@ -29,6 +29,8 @@ class Mode(StrEnum):
     """The tool, while the redundancy avoids limits and singularities."""
     DRAKE = "drake"
     """The tool, by Drake's differential inverse kinematics: the baseline."""
+    JOINT = "joint"
+    """Every joint on its own, to a set-point; the tool is not held (eq. 9)."""
 
 
 NULL_SPACE_MODES = (Mode.NULL_SPACE, Mode.POSE)
@@ -50,6 +52,8 @@ class Command:
         sign: Direction of the group, -1, 0 or 1: k of eq. (13). In `Mode.POSE` the direction of the
             elbow.
         mode: The control mode; None keeps the current one.
+        joints: Set-point of the joints in `Mode.JOINT` [rad], shape (7,); None for the present
+            posture, in which the joints come to rest.
         clutch: Whether the clutch decouples master and slave: the arm comes to rest and holds the
             target, whatever the rest of the command.
     """
@@ -59,6 +63,7 @@ class Command:
     group: int | None = None
     sign: float = 0
     mode: Mode | None = None
+    joints: FloatArray | tuple[float, ...] | None = None
     clutch: bool = False
 
     def fault(self, groups: int) -> str:
@@ -83,6 +88,8 @@ class Command:
             return f"there is no joint group {self.group}, only 0 to {groups - 1}"
         if self.mode not in (None, *Mode):
             return f"there is no mode {self.mode!r}, only {', '.join(Mode)}"
+        if self.joints is not None and not _is_posture(self.joints):
+            return f"its set-point must be {JOINTS} finite numbers [rad]"
         return ""
 
 
@@ -99,6 +106,7 @@ class Settings:
         target_lead_angle: Target lead limit of the orientation [rad].
         acceleration: Greatest change of a joint's rate [rad/s^2].
         group_rate: Rate of a group's lead joint at k = 1 [rad/s].
+        joint_rate: Greatest rate of a joint on its way to a set-point [rad/s].
         groups: The joint groups of eq. (12), counted from 0, each with its lead joint first.
         damping: Damping of the pseudo-inverse at a singularity [m/rad]; 0 for none. None is 0.01
             with "clamped" limits, and 0 with "paper", as in eq. (7).
@@ -120,6 +128,7 @@ class Settings:
     target_lead_angle: float = 0.05
     acceleration: float = 10.0
     group_rate: float = 0.4
+    joint_rate: float = 0.5
     groups: tuple[tuple[int, ...], ...] = ((0, 1, 2), (1, 3, 5), (0, 3, 4), (6,))
     damping: float | None = None
     singular: float = 0.01
@@ -142,6 +151,7 @@ class Settings:
             "target_lead_angle",
             "acceleration",
             "group_rate",
+            "joint_rate",
         )
         for name in (*positive, "singular", "length", "assist_lead_angle", "timeout"):
             _check(name, getattr(self, name), above_zero=True)
@@ -171,6 +181,15 @@ class Settings:
         if self.damping is not None:
             return self.damping
         return _DAMPING if self.limits == "clamped" else 0.0
+
+
+def _is_posture(joints: FloatArray | tuple[float, ...]) -> bool:
+    """Return whether a set-point is one finite number for each joint."""
+    try:
+        values = np.asarray(joints, dtype=np.float64)
+    except (TypeError, ValueError):
+        return False
+    return values.shape == (JOINTS,) and bool(np.isfinite(values).all())
 
 
 def _check(name: str, value: float, *, above_zero: bool) -> None:

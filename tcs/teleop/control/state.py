@@ -26,6 +26,8 @@ class ControlState(NamedTuple):
     settings: Settings
     joints: FloatArray
     """Joint positions [rad], shape (7,)."""
+    rates: FloatArray
+    """Joint rates of the previous step [rad/s], shape (7,)."""
     jacobian: FloatArray
     """Jacobian of the tool in the middle of the step, shape (6, 7)."""
     error: FloatArray

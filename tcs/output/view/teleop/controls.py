@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tcs.output.view.teleop.gamepad import DOWN as PAD_DOWN
 from tcs.output.view.teleop.gamepad import UP, A, Gamepad, GamepadCommand, GamepadState
+from tcs.output.view.teleop.set_point import SetPoint
 from tcs.teleop import Command, Mode
 from tcs.teleop.control.settings import NULL_SPACE_MODES
 
@@ -107,6 +108,10 @@ class Source(Protocol):
         """Reset every slider of a rate to zero."""
         ...
 
+    def set_slider(self, name: str, value: float) -> float:
+        """Set a slider, and return the value that it has then."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class OperatorCommand:
@@ -134,6 +139,8 @@ class OperatorInput:
     """The selected joint group, counted from 0."""
     clutch: bool = False
     """Whether the clutch is engaged by key or button."""
+    set_point: SetPoint | None = None
+    """The set-point of joint mode; None where the mode is not offered."""
     _mode: int = 0
     _gamepad: Gamepad = field(default_factory=Gamepad)
     _counts: dict[str, int] = field(default_factory=dict)
@@ -167,6 +174,11 @@ class OperatorInput:
             self._until.clear()
             if any(reading.sliders[name] for name in RATE_SLIDERS):
                 self.source.zero()
+        clutch = self.clutch or pad.clutch
+        if self.set_point is not None and (
+            lost or back or STOP in pressed or clutch or self.mode is not Mode.JOINT
+        ):
+            self.set_point.drop()
         if lost or back or STOP in pressed:
             command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
             return OperatorCommand(command, lost, back=back, watched=reading.watched)
@@ -210,6 +222,9 @@ class OperatorInput:
         moves = any(name in pressed for name in MOVES)
         turns = TURN_DOWN in pressed or TURN_UP in pressed
         if len(self.modes) > 1:
+            if self.mode is Mode.JOINT and (moves or turns):
+                self._hint = ("joints are set by their sliders: M selects the tool.", now + 2.0)
+                return
             if in_null_space and moves:
                 self._hint = ("this mode holds the tool: M selects the next mode.", now + 2.0)
             if not in_null_space and turns:
@@ -217,6 +232,9 @@ class OperatorInput:
 
     def _command(self, reading: Reading, pad: GamepadCommand, now: float) -> Command:
         clutch = self.clutch or pad.clutch
+        if self.mode is Mode.JOINT and self.set_point is not None:
+            wanted = None if clutch else self.set_point.read(reading, self.source)
+            return Command(mode=self.mode, joints=wanted, clutch=clutch)
         if self.mode in NULL_SPACE_MODES:
             down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
             sign = int(np.sign(int(up) - int(down) + pad.turn))

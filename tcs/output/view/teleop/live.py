@@ -21,6 +21,7 @@ from tcs.output.view.teleop.controls import (
 from tcs.output.view.teleop.gamepad import gamepad_state
 from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
 from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
+from tcs.output.view.teleop.set_point import SetPoint, joint_sliders
 from tcs.output.view.teleop.timing import Durations, StepClock
 from tcs.teleop import Arm, Command, Mode, Settings, Step, Teleoperation
 from tcs.teleop.control.latency import DelayLine, Latency
@@ -39,15 +40,18 @@ _CHECK_EVERY = 7
 class MeshcatControls:
     """Sliders, buttons and gamepad of a Meshcat."""
 
-    def __init__(self, meshcat: Meshcat, groups: int) -> None:
+    def __init__(self, meshcat: Meshcat, groups: int, set_points_of: Arm | None = None) -> None:
         """Add the controls to Meshcat.
 
         Args:
             meshcat: The Meshcat.
             groups: Number of joint groups.
+            set_points_of: Arm whose joints have a slider each; None for none.
         """
         self._meshcat = meshcat
         self._sliders = sliders()
+        if set_points_of is not None:
+            self._sliders |= joint_sliders(set_points_of.lower, set_points_of.upper)
         self._buttons = buttons(groups)
         for name, key in self._buttons.items():
             meshcat.AddButton(f"{name} ({key_name(key)})", key)
@@ -72,6 +76,10 @@ class MeshcatControls:
         """Reset every slider of a rate to zero."""
         for name in RATE_SLIDERS:
             self._meshcat.SetSliderValue(name, 0.0)
+
+    def set_slider(self, name: str, value: float) -> float:
+        """Set a slider, and return the value that it has then: in its range, at a step of it."""
+        return float(self._meshcat.SetSliderValue(name, value))
 
 
 def key_name(key: str) -> str:
@@ -118,9 +126,11 @@ class LivePage:
             TcsError: If the start posture is not seven finite numbers.
         """
         self.session = Teleoperation(arm, start, settings, modes[0])
+        groups, of_joints = len(settings.groups), Mode.JOINT in modes
         self.operator = OperatorInput(
-            MeshcatControls(meshcat, len(settings.groups)), modes, len(settings.groups)
-        )
+            MeshcatControls(meshcat, groups, arm if of_joints else None), modes, groups,
+            set_point=SetPoint(lambda: self.seen.joints) if of_joints else None,
+        )  # fmt: skip
         self.steps, self.pictures, self.worked = Durations(), Durations(), Durations()
         self.dropped = 0
         self._meshcat, self._display, self._arm = meshcat, display, arm

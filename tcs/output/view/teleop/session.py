@@ -26,12 +26,13 @@ from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
-LiveCondition = Literal["end-effector", "novel", "assisted", "drake"]
+LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
     "novel": (Mode.END_EFFECTOR, Mode.NULL_SPACE, Mode.POSE),
     "assisted": (Mode.ASSISTED, Mode.NULL_SPACE, Mode.POSE),
     "drake": (Mode.DRAKE, Mode.NULL_SPACE, Mode.POSE),
+    "joint": (Mode.JOINT, Mode.END_EFFECTOR),
 }
 """Modes between which the operator can switch, by condition."""
 

@@ -8,6 +8,7 @@ import pytest
 from tcs.output.view import open_meshcat
 from tcs.output.view.teleop import LivePage, RobotDisplay
 from tcs.output.view.teleop.controls import Reading, buttons, sliders
+from tcs.output.view.teleop.set_point import JOINT_STEP
 from tcs.teleop import Command, Mode, Settings, Teleoperation, load_arm
 from tcs.teleop.runs.recorder import run_from_steps
 
@@ -74,9 +75,13 @@ class Desk:
     def read(self):
         return Reading(dict(self.sliders), dict(self.clicks), self.pad, self.watched)
 
+    def set_slider(self, name, value):
+        self.sliders[name] = value = round(value / JOINT_STEP) * JOINT_STEP
+        return value
+
     def zero(self):
         for name in self.sliders:
-            if "key" not in name:
+            if "/s]" in name and "key" not in name:
                 self.sliders[name] = 0.0
 
 
