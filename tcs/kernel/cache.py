@@ -8,6 +8,7 @@ that `tcs.kernel.machine_code` checks before they are loaded.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import platform
 from collections.abc import Callable
@@ -82,7 +83,10 @@ def jit(function: _Function) -> _Function:
     Division by zero gives inf or nan as in numpy. No `fastmath`: results must not depend on how
     a compiler reorders sums. Contraction to fused multiply-add is off for the same reason.
     """
-    return cast(_Function, _compiled(function))
+    compiled = _compiled(function)
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = _Entry
+    return cast(_Function, compiled)
 
 
 def inner(function: _Function) -> _Function:
@@ -94,6 +98,20 @@ def inner(function: _Function) -> _Function:
     if isinstance(compiled, CPUDispatcher):
         compiled.__class__ = _Inner
     return cast(_Function, compiled)
+
+
+class _Entry(CPUDispatcher):
+    """Dispatcher that compiles without garbage collection, which takes an eighth of the time."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, with everything that the function calls."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if collects:
+                gc.enable()
 
 
 class _Inner(CPUDispatcher):

@@ -17,6 +17,13 @@ SMALL_ANGLE_COSINE = 0.9
 
 
 @inner
+def copy_joints(q: FloatArray, to_q: FloatArray) -> None:
+    """Copy seven joint angles; numba takes two seconds to compile `to_q[:] = q`."""
+    for k in range(7):
+        to_q[k] = q[k]
+
+
+@inner
 def link_poses(
     chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, link_R: FloatArray, link_p: FloatArray
 ) -> None:

@@ -8,10 +8,10 @@ the code of its own solver only.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
-from numba.extending import overload
+from numba.core import types
+from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from tcs.kernel.analytic import pairs as analytic
 from tcs.kernel.analytic.scratch import Search, new_search
@@ -64,20 +64,38 @@ def score_pair(
     return numeric.score_pair(problem, work, body_A, solver)
 
 
-# Not strict: a strict overload would compare the annotations of the arguments too.
-@overload(out_of_reach, strict=False)
-def _compiled_out_of_reach(problem: Any, work: Any, solver: Any) -> Callable[..., int]:
-    if tuple_class(solver) is Search:
-        return lambda problem, work, solver: analytic.out_of_reach(problem, work, solver)
-    return lambda problem, work, solver: numeric.out_of_reach(problem, work, solver)
+class _OfSolver(AbstractTemplate):
+    """Types a call by the type of its last argument, the solver.
+
+    As `numba.extending.overload` does, without a function in between: everything that a function
+    calls is optimised anew together with it, which takes a second for `score_pair`.
+    """
+
+    implementations: ClassVar[tuple[Any, Any]]
+    """For an arm with a closed form, and for any other."""
+    entries: ClassVar[dict[Any, Any]]
+    """Compiled implementations by the types of the arguments."""
+
+    def generic(self, args: Any, kws: Any) -> Any:
+        """Return the signature of the implementation that fits the types of the arguments."""
+        implementation = self.implementations[tuple_class(args[-1]) is not Search]
+        dispatcher = types.Dispatcher(implementation)
+        signature: Any = dispatcher.get_call_type(self.context, args, kws)
+        self.entries[signature.args] = dispatcher.get_overload(signature)
+        return signature
+
+    def get_impl_key(self, signature: Any) -> Any:
+        """Return the compiled implementation of a signature from `generic`."""
+        return self.entries[signature.args]
 
 
-@overload(score_pair, strict=False)
-def _compiled_score_pair(
-    problem: Any, work: Any, body_A: Any, solver: Any
-) -> Callable[..., tuple[int, int]]:
-    if tuple_class(solver) is Search:
-        return lambda problem, work, body_A, solver: analytic.score_pair(
-            problem, work, body_A, solver
-        )
-    return lambda problem, work, body_A, solver: numeric.score_pair(problem, work, body_A, solver)
+@infer_global(out_of_reach)
+class _OutOfReach(_OfSolver):
+    implementations = analytic.out_of_reach, numeric.out_of_reach
+    entries: ClassVar[dict[Any, Any]] = {}
+
+
+@infer_global(score_pair)
+class _ScorePair(_OfSolver):
+    implementations = analytic.score_pair, numeric.score_pair
+    entries: ClassVar[dict[Any, Any]] = {}

@@ -24,7 +24,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant
 from tcs.kernel.collide import CENTRE, ROTATION, SIZE, TYPE, closer, move
 from tcs.kernel.contacts import ARM, ENVIRONMENT, NO_CONTACT, Workspace, arm_contact, at_goal
-from tcs.kernel.kinematics import link_poses
+from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.problem import Problem
 
 PATH = 1.25
@@ -39,7 +39,7 @@ END_HALVINGS = 12
 SAME_STRETCH = 1.01
 """Candidates closer than this many sample spacings have no infeasible sample between them; the
 excess over 1 allows for rounding."""
-ONE, NOWHERE = int_constant(1), int_constant(-1)
+ZERO, ONE, THREE, NOWHERE = int_constant(0), int_constant(1), int_constant(3), int_constant(-1)
 
 
 @inner
@@ -106,7 +106,7 @@ def _add_end(problem: Problem, search: Search, n: int, side: int, found: int) ->
         return found
     is_feasible(problem, search, b, angle + side * inside)
     measure_feasible(problem.arm, search, ONE)
-    return add_candidate(search, b, 0, inside, found)
+    return add_candidate(search, b, ZERO, inside, found)
 
 
 @inner
@@ -144,7 +144,7 @@ def free_between(
             problem, work, body_A, search, search.found_branch[n], search.found_angle[n]
         ):
             search.angle[0], search.measure[0] = search.found_angle[n], search.found_measure[n]
-            found = add_candidate(search, search.found_branch[n], 0, search.found_step[n], found)
+            found = add_candidate(search, search.found_branch[n], ZERO, search.found_step[n], found)
             search.found_pair[n, 0] = NO_PAIR
         elif search.found_pair[n, 0] == UNCHECKED_PAIR:
             _keep(search.q, work.last, search.found_q[n], search.found_pair[n])
@@ -172,11 +172,11 @@ def free_between(
             middle = 0.5 * (first + last)
             if not first < middle < last or top + 2 > MAX_STACK:
                 continue
-            work.last[:] = end_pair[top, 0]
+            _keep_pair(end_pair[top, 0], work.last)
             if _is_free_at(problem, work, body_A, search, b, middle):
                 if is_feasible(problem, search, b, middle):
                     measure_feasible(problem.arm, search, ONE)
-                    found = add_candidate(search, b, 0, 0.5 * (last - first), found)
+                    found = add_candidate(search, b, ZERO, 0.5 * (last - first), found)
                     break
                 work.last[0] = NO_PAIR
             # The right half goes on top of the left one, which takes the place of the whole.
@@ -196,8 +196,13 @@ def free_between(
 @inner
 def _keep(q: FloatArray, pair: IntArray, to_q: FloatArray, to_pair: IntArray) -> None:
     """Copy joints and the pair in contact there."""
-    for k in range(7):
-        to_q[k] = q[k]
+    copy_joints(q, to_q)
+    _keep_pair(pair, to_pair)
+
+
+@inner
+def _keep_pair(pair: IntArray, to_pair: IntArray) -> None:
+    """Copy a pair in contact."""
     for k in range(3):
         to_pair[k] = pair[k]
 
@@ -258,15 +263,15 @@ def _motion(
             break
         i = pair[side]
         frame, rows = problem.link_frame[i], search.moved
-        move(R[0, frame], p[0, frame], problem.links, i, rows, 0)
-        move(R[1, frame], p[1, frame], problem.links, i, rows, 1)
-        total += np.sqrt(_square(rows, CENTRE, 1))
+        move(R[0, frame], p[0, frame], problem.links, i, rows, ZERO)
+        move(R[1, frame], p[1, frame], problem.links, i, rows, ONE)
+        total += np.sqrt(_square(rows, CENTRE, ONE))
         shape = int(rows[0, TYPE])
         if shape == CAPSULE:
-            total += rows[0, SIZE + 1] * np.sqrt(_square(rows, ROTATION + 2, 3))
+            total += rows[0, SIZE + 1] * np.sqrt(_square(rows, ROTATION + 2, THREE))
         elif shape == BOX:
             for k in range(3):
-                total += rows[0, SIZE + k] * np.sqrt(_square(rows, ROTATION + k, 3))
+                total += rows[0, SIZE + k] * np.sqrt(_square(rows, ROTATION + k, THREE))
     return total
 
 

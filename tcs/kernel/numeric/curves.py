@@ -14,6 +14,7 @@ from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
 from tcs.kernel.dexterity import ISOTROPY
 from tcs.kernel.dexterity.measures import inverse_condition
+from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.newton import (
     NewtonWorkspace,
@@ -235,7 +236,7 @@ def _trace_side(
         part = null_space_direction(newton, curves.trial, newton.step)
         if part > best:
             best = part
-            tangent[:] = newton.step
+            copy_joints(newton.step, tangent)
     _append_point(arm, curves, start, start, det, of)
     n = start + 1
     h = 0.5 * stride
@@ -276,11 +277,11 @@ def _trace_side(
         if slack < -beyond:
             break
         if travelled > 2.0 * stride and _has_closed(curves, start, n - 1):
-            curves.q_now[:] = curves.q[start]
+            copy_joints(curves.q[start], curves.q_now)
             return n, True
         angle = np.arccos(min(cosine, 1.0))
         h = min(stride, h * min(max(EASY_ANGLE / max(angle, 1e-3), 0.5), 1.6))
-    curves.q_now[:] = curves.q[start]
+    copy_joints(curves.q[start], curves.q_now)
     return n, False
 
 

@@ -16,7 +16,7 @@ from tcs.kernel.contacts import (
     pair_touches,
 )
 from tcs.kernel.dexterity.measures import measure_at
-from tcs.kernel.kinematics import link_poses
+from tcs.kernel.kinematics import copy_joints, link_poses
 from tcs.kernel.numeric.arm import NumericArm
 from tcs.kernel.numeric.curves import correct, point_between, slack_of
 from tcs.kernel.numeric.search import (
@@ -207,7 +207,7 @@ def refine(
     best one, and reduces the spacing.
     """
     curves = search.curves
-    search.best[:] = curves.q_now
+    copy_joints(curves.q_now, search.best)
     value = measure_at(problem, search.best)
     point = int(centre)
     low, high = 0.0, 0.0
@@ -223,7 +223,7 @@ def refine(
             contact = contact_at(problem, arm, work, body_A, search, at, SOLVED, SOLVED, value)
             if contact == NO_CONTACT:
                 value, best_at = measure_at(problem, curves.q_now), at
-                search.best[:] = curves.q_now
+                copy_joints(curves.q_now, search.best)
         centre, step = best_at, fine
 
 
