@@ -148,3 +148,23 @@ def _walk(session: StudySession, window: options.WindowOptions) -> None:
     session.record(
         Screen(show=show, note=terminal.note, port=window.port, duration=window.duration)
     )
+
+
+@app.command()
+def report(
+    folder: Folder,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="PAGE", help="Page to write.", show_default="FOLDER/report.html"),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Compare the conditions: the papers' tables and pictures, with every table as CSV."""
+    from tcs.output.report.study_files import write_study_report
+    from tcs.output.terminal import study_tables
+    from tcs.teleop.study.study_file import load_study
+
+    study = load_study(folder)
+    with terminal.progress_bar("participants") as on_progress:
+        result = write_study_report(study, out, on_progress=on_progress)
+    terminal.print_result(result, study_tables.report_study, as_json=as_json)

@@ -17,7 +17,7 @@ from tcs.teleop.study.participants import load_participant, new_participant
 from tcs.teleop.study.recording import StudyRecording
 from tcs.teleop.study.steps import form_of, steps_of
 from tcs.teleop.study.study_file import load_study
-from tests.teleop.study.example import answers_to, run_on, small_study
+from tests.teleop.study.example import answers_to, complete, run_on, small_study
 
 
 @pytest.fixture
@@ -156,6 +156,18 @@ def test_a_folder_without_a_study_is_refused(tcs_command, tmp_path):
 def test_skip_and_drop_exclude_each_other(tcs_command, study):
     ran = tcs_command("study", "record", study.folder, "--skip", "a", "--drop", "b")
     assert ran.code == 2
+
+
+def test_a_report(tcs_command, study):
+    assert refused(tcs_command("study", "report", study.folder), "no participants")
+    complete(study, 1)
+    ran = tcs_command("study", "report", study.folder)
+    assert ran.code == 0
+    assert "Small study: 1 of 1 participants" in ran.out
+    assert (study.folder / "report.html").stat().st_size > 10_000
+    ran = tcs_command("study", "report", study.folder, "--json", "--out", study.folder / "b.html")
+    assert ran.json["participants"][0]["included"] is True
+    assert (study.folder / "b-tables" / "trials.csv").exists()
 
 
 @pytest.mark.slow

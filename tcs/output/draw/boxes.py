@@ -13,9 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
-"""Blue, orange, green, purple of Okabe and Ito: distinct in grey and under colour
-vision deficiency."""
+COLOURS = (
+    *("#0072B2", "#E69F00", "#009E73", "#CC79A7"),
+    *("#D55E00", "#56B4E9", "#F0E442", "#777777"),
+)
+"""The colours of Okabe and Ito, distinct under colour vision deficiency; the first four (blue,
+orange, green, purple) are also distinct in grey. The last one is lighter than theirs, which is
+black: the median must be visible."""
 _INK = "#222222"
 _HEIGHT = 0.26
 """Height of a box in inches."""

@@ -7,8 +7,6 @@ from dataclasses import fields
 
 import numpy as np
 
-from tcs.output.draw import as_svg
-from tcs.output.draw.tool_paths import PathGroup, draw_tool_paths
 from tcs.output.report.blocks import (
     Block,
     Bullets,
@@ -17,15 +15,14 @@ from tcs.output.report.blocks import (
     Column,
     Facts,
     Page,
-    Picture,
     Section,
     Table,
     Text,
 )
 from tcs.output.report.machine import machine, today, versions
+from tcs.output.report.teleop_pictures import box_pictures, paths_picture
 from tcs.output.report.teleop_tables import (
     PAPER,
-    box_pictures,
     group_table,
     learning_table,
     maps_blocks,
@@ -40,7 +37,6 @@ from tcs.output.report.teleop_work import work_blocks
 from tcs.output.words import p_value
 from tcs.output.words.teleop import NAMES
 from tcs.teleop.experiment.comparison import Comparison
-from tcs.teleop.experiment.course import BLOCKED_AFTER
 from tcs.teleop.experiment.maps import ControllerMaps
 from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.experiment.within_subject import (
@@ -125,24 +121,11 @@ def _compared(comparison: Comparison) -> list[Block]:
 
 
 def _paths(experiment: Experiment) -> list[Block]:
-    groups = [
-        PathGroup(title_of(experiment, name), [path for drive in drives for path in drive.paths])
+    paths = {
+        name: [path for drive in drives for path in drive.paths]
         for name, drives in experiment.drives.items()
-    ]
-    line = experiment.course.line
-    figure = draw_tool_paths(
-        groups, np.asarray(line.start), np.asarray(line.end), blocked=BLOCKED_AFTER
-    )
-    return [
-        Picture(
-            as_svg(figure, "teleop-paths"),
-            "svg",
-            "Paths of the tool with each controller, from above and from the side.",
-            "Every evaluated trial, from above (top) and from the side (bottom). Dashed: the "
-            "line, from the disc to the square; cross: the point at which, without noise, the "
-            f"joint meets its limit. {SCRIPTED[0].upper()}{SCRIPTED[1:]}.",
-        )
-    ]
+    }
+    return [paths_picture(experiment.comparison(), paths, experiment.course.line)]
 
 
 def _operators(experiment: Experiment) -> list[Block]:

@@ -7,8 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tcs.output.draw import BoxGroup, BoxPlot, as_svg, draw_boxes
-from tcs.output.report.blocks import Block, Column, Picture, Table, Text
+from tcs.output.report.blocks import Block, Column, Table, Text
 from tcs.output.words import p_value
 from tcs.output.words.teleop import NAMES, SCALE
 from tcs.teleop.experiment.comparison import Comparison, hypothesis
@@ -183,28 +182,6 @@ def learning_table(comparison: Comparison) -> Table:
         [Column("controller", False), Column("measure", False), *(Column(n) for n in numbered)],
         rows,
     )
-
-
-def box_pictures(comparison: Comparison) -> list[Picture]:
-    """Return the paper's Figure 8: a box plot of each measure with a hypothesis."""
-    pictures = []
-    for name in comparison.hypotheses:
-        samples = [SCALE.get(name, 1.0) * comparison.sample(c, name) for c in comparison.titles]
-        boxes = [BoxPlot(i, sample) for i, sample in enumerate(samples) if len(sample)]
-        if not boxes:
-            continue
-        titles = list(comparison.titles.values())
-        figure = draw_boxes([BoxGroup("", boxes)], titles, label=NAMES[name])
-        pictures.append(
-            Picture(
-                as_svg(figure, f"teleop-{name}"),
-                "svg",
-                f"Box plots of {NAMES[name]} with each controller.",
-                f"{NAMES[name]}: one value for each operator ({comparison.operators}). Box: first "
-                "to third quartile; line: median; whiskers: 5th and 95th percentile; dot: mean.",
-            )
-        )
-    return pictures
 
 
 def maps_blocks(experiment: Experiment, maps: ControllerMaps) -> list[Block]:

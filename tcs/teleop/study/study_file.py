@@ -36,7 +36,7 @@ DRIVEN: dict[str, tuple[str, Limits]] = {
     "drake": ("Drake's differential inverse kinematics", "clamped"),
 }
 """Title and behaviour at joint limits of the conditions that `tcs teleop` can drive."""
-_MOST_CONDITIONS, _MOST_TRIALS = 12, 100
+_MOST_CONDITIONS, _MOST_TRIALS = 8, 100
 
 
 class LineEntry(Document):

@@ -49,7 +49,8 @@ def run_on(study, condition, /, *, seconds=3.0, off=0.01, seed=0, reached=1.0, *
     )
     # The hand trembles once it moves.
     jitter = rng.normal(scale=1e-3, size=(n, 3)) * (going > 0.0)[:, None]
-    position = study.line.at(going) + np.where(going > 0.0, off, 0.0)[:, None] * [0, 0, 1]
+    above = np.where((going > 0.0) & (going < 0.9), off, 0.0)
+    position = study.line.at(going) + above[:, None] * [0, 0, 1]
     joints = np.array(LINE["joints"]) + going[:, None] * 0.1
     rates = np.diff(joints, axis=0, prepend=joints[:1]) * 50
     return Run(
