@@ -26,12 +26,14 @@ from tcs.capability.task_shapes import (
 )
 from tcs.capability.tasks import Grasp, GraspPosition, GraspTask
 from tcs.capability.text import export_text, import_text, write_base_poses
+from tcs.capability.tolerant_base import ErrorTolerantBase, best_under_error
 from tcs.capability.visibility import visibility
 from tcs.capability.volume import MapVolume
 
 __all__ = [
     "BasePose",
     "CapabilityMap",
+    "ErrorTolerantBase",
     "Feasibility",
     "Grasp",
     "GraspPosition",
@@ -48,6 +50,7 @@ __all__ = [
     "TaskMap",
     "TaskShape",
     "TaskSuccess",
+    "best_under_error",
     "check_file",
     "check_map",
     "check_stored",

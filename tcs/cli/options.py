@@ -35,6 +35,9 @@ HERE = typer.Option(
     metavar="X Y YAW_DEG",
     help="Current base pose in the environment frame (m, m, deg).",
 )
+LOCATED = typer.Option(
+    metavar="FILE", help="Pose of a table and its covariance, made by `tcs locate --out`."
+)
 Torso = Annotated[float, typer.Option(help="Current torso height, in metres.")]
 At = Annotated[
     list[str] | None,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Annotated
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +14,9 @@ from tcs.cli import options, robustness
 from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
+
+if TYPE_CHECKING:
+    from tcs.kernel.arrays import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +31,48 @@ class _ChangeCosts(options.TravelCosts):
     travel: options.Travel = "around"
 
 
+@dataclass(frozen=True, kw_only=True)
+class _StartOptions:
+    """The current base pose, known or relative to a table that was found."""
+
+    here: Annotated[tuple[float, float, float] | None, options.HERE] = None
+    located: Annotated[Path | None, options.LOCATED] = None
+    task_at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y YAW_DEG",
+            help="With --located, in place of --here: pose in the environment frame of the frame "
+            "that was located (m, m, deg).",
+        ),
+    ] = None
+
+    def base(self) -> tuple[tuple[float, float, float], FloatArray | None]:
+        """Return the base pose in m, m and deg, and its covariance in m and rad if it was located.
+
+        Raises:
+            typer.BadParameter: If the options do not determine it.
+            DataFileError: If the file cannot be used.
+        """
+        if (self.here is None) == (self.located is None):
+            raise typer.BadParameter("give --here or --located.", param_hint="--here")
+        if self.here is not None:
+            if self.task_at is not None:
+                raise typer.BadParameter("requires --located.", param_hint="--task-at")
+            return self.here, None
+        if self.located is None or self.task_at is None:
+            raise typer.BadParameter("requires --task-at.", param_hint="--located")
+        from tcs.cli.locate import pose_of
+        from tcs.perception import load_located
+
+        base, covariance = load_located(self.located).base_in(pose_of(self.task_at))
+        return (base.x, base.y, math.degrees(base.yaw)), covariance
+
+
 @expand_options
 def select(
     file: options.File,
     *,
-    here: Annotated[tuple[float, float, float], options.HERE],
+    start: _StartOptions,
     torso: options.Torso = 0.0,
     at: options.At = None,
     alpha: Annotated[float, typer.Option(help="Weight of the goals reached, P_R.")] = 1.0,
@@ -54,11 +97,14 @@ def select(
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.placement.constraints import constraint_texts
+    from tcs.placement.selection import same_set
 
+    base, covariance = start.base()
     loaded = tcs.load(file)
-    choice = tcs.select(
+    here = current_state(base, torso, at or ())
+    choose = partial(
+        tcs.select,
         loaded,
-        current_state(here, torso, at or ()),
         weights=tcs.UtilityWeights(
             reachability=alpha,
             manipulability=beta,
@@ -75,9 +121,17 @@ def select(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
+    choice = choose(here)
     for warning in choice.warnings:
         terminal.note(warning)
     result = choice.to_json(loaded.metadata["measure"])
+    if covariance is not None:
+        x, y, yaw_deg = base
+        result["located"] = {
+            "here": {"x": x, "y": y, "yaw_deg": yaw_deg},
+            "covariance": covariance.tolist(),
+            "same_set": same_set(choose, here, covariance),
+        }
     if scored := constraint_texts(loaded):
         result["scored_constraints"] = scored
     terminal.print_result(result, tables.report_choice, as_json=as_json)

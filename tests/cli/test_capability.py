@@ -9,6 +9,7 @@ import pytest
 
 from tcs.capability import load_map
 from tcs.files.paths import data_folder
+from tcs.perception import Located, PlanarPose
 
 COARSE = ("--step", 0.1, "--yaw-bins", 8, "--torso-height", 0.15)
 
@@ -105,6 +106,19 @@ def test_an_environment_makes_base_poses_infeasible(made, tcs_command, tmp_path)
     assert ran.json["best"] == best
     assert ran.json["rejected"] >= 1
     assert ran.json["best_in_environment"]["score"] <= best["score"]
+
+
+def test_merge_at_a_located_task(tcs_command, made, tmp_path):
+    path = tmp_path / "table.json"
+    Located("thesis", PlanarPose(1.0, 0.2, 0.1), np.diag([0.02, 0.02, 0.02]) ** 2).save(path)
+    words = ("capability", "merge", made[0], "--task", "pick-and-place", "--height", 0.65)
+    result = tcs_command(*words, "--located", path, "--json").json
+    best = result["best_under_error"]
+    assert best["expected_score"] <= best["score"]
+    assert 0.0 < best["feasible"] <= 1.0
+    base = PlanarPose(best["x"], best["y"], np.radians(best["yaw_deg"]))
+    assert result["drive_to"] == pytest.approx((PlanarPose(1.0, 0.2, 0.1) @ base).to_json())
+    assert "drive to x" in tcs_command(*words, "--located", path).out
 
 
 def test_split_gives_stops_in_order(made, tcs_command):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from tcs.perception import load_located
+from tcs.perception import Located, PlanarPose, load_located
+from tests.capability.arplace.example import discs, model
 
 
 def test_a_simulated_table_is_found(tcs_command, tmp_path):
@@ -38,3 +40,42 @@ def test_what_cannot_be_done_is_refused(tcs_command, tmp_path):
     assert tcs_command("locate", tmp_path / "none.csv", "--seed", 1).code == 2
     assert tcs_command("locate", "--table", "round").code == 1
     assert tcs_command("locate", "--table-at", 1, 0, 1e9).code == 1
+
+
+@pytest.fixture
+def located(tmp_path):
+    """A table 1 m before the base with an error of some centimetres."""
+    path = tmp_path / "table.json"
+    Located("thesis", PlanarPose(1.0, 0.2, 0.1), np.diag([0.03, 0.02, 0.02]) ** 2).save(path)
+    return path
+
+
+def test_selection_from_a_located_table(tcs_command, small_file, located):
+    words = ("select", small_file, "--located", located, "--task-at", 2, 0.5, 0)
+    result = tcs_command(*words, "--json").json
+    base = PlanarPose(2.0, 0.5, 0.0) @ PlanarPose(1.0, 0.2, 0.1).inverse()
+    assert result["located"]["here"] == pytest.approx(
+        {"x": base.x, "y": base.y, "yaw_deg": np.degrees(base.yaw)}
+    )
+    assert 0.0 <= result["located"]["same_set"] <= 1.0
+    there = result["located"]["here"]
+    given = tcs_command("select", small_file, "--here", *there.values(), "--json").json
+    assert given["members"] == result["members"]
+    assert "located at x" in tcs_command(*words).out
+    assert tcs_command("select", small_file, "--located", located).code == 2
+    assert tcs_command("select", small_file).code == 2
+    assert tcs_command("select", small_file, "--here", 1, 0, 0, "--task-at", 0, 0, 0).code == 2
+
+
+def test_arplace_at_a_located_table(tcs_command, located, tmp_path):
+    from tcs.capability.arplace import save_arplace
+
+    path = tmp_path / "made-up.arp"
+    save_arplace(path, model(discs()))
+    words = ("arplace", "query", path, "--samples", 1)
+    result = tcs_command(*words, "--located", located, "--json").json
+    best = result["best"]
+    target = PlanarPose(1.0, 0.2, 0.1) @ PlanarPose(best["x"], best["y"], 0.0)
+    assert result["drive_to"] == pytest.approx(target.to_json())
+    assert result["success"] < tcs_command(*words, "--json").json["success"]
+    assert "drive to x" in tcs_command(*words, "--located", located).out

@@ -13,6 +13,7 @@ import numpy as np
 from tcs.capability.arplace.model import Arplace
 from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap
 from tcs.capability.arplace.shapes import is_inside
+from tcs.capability.arplace.table_error import displaced, displacement_covariance
 from tcs.capability.arplace.task import PARAMETERS
 from tcs.errors import SelectionError
 from tcs.files.quantities import ANGLE, DEVIATION, POSITION, RADIUS
@@ -151,6 +152,7 @@ def query(
     clearance: float | None = None,
     samples: int = 1000,
     seed: int = 0,
+    table_covariance: FloatArray | None = None,
 ) -> Query:
     """Return the probability of success over base positions, and the best of them.
 
@@ -168,6 +170,9 @@ def query(
             of the base.
         samples: Number of samples; one suffices without error.
         seed: Seed of the random numbers.
+        table_covariance: Covariance of x, y and yaw of the table along the axes of F [m, rad],
+            shape (3, 3); the object and the base positions relative to it are displaced with it.
+            None is no error.
 
     Raises:
         SelectionError: If the pose is outside the learned parameters, a parameter of a single
@@ -186,26 +191,33 @@ def query(
         RADIUS.check(clearance, "the clearance", SelectionError)
     poses = _draw(pose, spread, samples, seed, "arplace map")
     found = _map(arplace, poses)
+    displacement = np.zeros((2, 2))
+    if table_covariance is not None:
+        displacement = displacement_covariance(arplace, table_covariance, pose.y)
+        found = displaced(found, displacement)
     if obstacles:
         radius = arplace.base_radius if clearance is None else clearance
         found = found.without(obstacles, radius)
     i, j = found.best(_INDISTINCT / samples if samples > _INDISTINCT else _ROUNDING)
     fresh = _draw(pose, spread, samples, seed, "arplace success")
-    count = _count(arplace, fresh, (found.x[i : i + 1], found.y[j : j + 1]))[0, 0]
-    success = count / samples
+    if displacement.any():
+        success = float(displaced(_map(arplace, fresh), displacement).probability[i, j])
+    else:
+        at = (found.x[i : i + 1], found.y[j : j + 1])
+        success = float(_count(arplace, fresh, at)[0, 0]) / samples
     return Query(
         map=found,
         x=float(found.x[i]),
         y=float(found.y[j]),
-        success=float(success),
-        interval=wilson_interval(int(count), samples),
+        success=success,
+        interval=wilson_interval(success * samples, samples),
         outside=float(1.0 - _are_learned(arplace, poses).mean()),
         samples=samples,
         seconds=time.perf_counter() - begun,
     )
 
 
-def wilson_interval(count: int, samples: int) -> tuple[float, float]:
+def wilson_interval(count: float, samples: int) -> tuple[float, float]:
     """Return the 95 % interval of a probability by Wilson's formula.
 
     >>> [round(end, 3) for end in wilson_interval(90, 100)]

@@ -26,6 +26,7 @@ Model = Annotated[Path, typer.Argument(metavar="FILE", help="A model made by `tc
 def query(
     model: Model,
     pose: PoseOptions,
+    located: Annotated[Path | None, options.LOCATED] = None,
     obstacle: Annotated[
         list[str] | None,
         typer.Option(
@@ -51,6 +52,7 @@ def query(
     """Return the base position of the greatest probability of success under pose errors."""
     from tcs.capability.arplace import load_arplace, save_probability_map
     from tcs.capability.arplace import query as query_arplace
+    from tcs.perception import PlanarPose, load_located
 
     if clearance is not None and not obstacle:
         raise typer.BadParameter("requires --obstacle.", param_hint="--clearance")
@@ -60,15 +62,19 @@ def query(
     # The first query prepares what all queries of a model share.
     at = pose.pose(arplace)
     _ = arplace.window
+    table = None if located is None else load_located(located)
     found = query_arplace(
         arplace, at, pose.error(), obstacles=obstacles, clearance=clearance, samples=samples,
-        seed=seed,
+        seed=seed, table_covariance=None if table is None else table.in_task_frame(),
     )  # fmt: skip
     if out is not None:
         save_probability_map(out, found.map)
     if picture is not None:
         draw_map(picture, found.map, (found.x, found.y), f"success {found.success:.3f}")
     result = {"file": str(model), **found.to_json()}
+    if table is not None:
+        target = table.pose @ PlanarPose(found.x, found.y, found.map.base_yaw)
+        result["drive_to"] = target.to_json()
     terminal.print_result(result, arplace_tables.report_query, as_json=as_json)
 
 

@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ from tcs.output import terminal
 from tcs.output.terminal import capability_tables
 
 if TYPE_CHECKING:
-    from tcs.capability import TaskShape
+    from tcs.capability import TaskMap, TaskShape
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +96,7 @@ def merge_maps(
             show_default="that of the map",
         ),
     ] = None,
+    located: Annotated[Path | None, options.LOCATED] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -109,9 +110,9 @@ def merge_maps(
     from tcs.capability import Surroundings, load_map, merge, write_base_poses
     from tcs.capability import split as split_task
 
-    if split and (out, picture, environment) != (None, None, None):
+    if split and (out, picture, environment, located) != (None, None, None, None):
         raise typer.BadParameter(
-            "makes no single task map; leave out --out, --picture and --environment.",
+            "makes no single task map; leave out --out, --picture, --environment and --located.",
             param_hint="--split",
         )
     for option, value in (("--task-at", task_at), ("--robot", robot)):
@@ -145,7 +146,20 @@ def merge_maps(
         )
         base, rejected = around.best(task_map)
         result |= {"best_in_environment": base.to_json(), "rejected": rejected}
+    if located is not None:
+        result |= _at_located(located, task_map)
     terminal.print_result(result, capability_tables.report_merged, as_json=as_json)
+
+
+def _at_located(path: Path, task_map: TaskMap) -> dict[str, Any]:
+    """Return the best base pose for a task whose pose has an error, and where it is."""
+    from tcs.capability import best_under_error
+    from tcs.perception import PlanarPose, load_located
+
+    found = load_located(path)
+    best = best_under_error(task_map, found.in_task_frame())
+    target = found.pose @ PlanarPose(best.base.x, best.base.y, best.base.yaw)
+    return {"best_under_error": best.to_json(), "drive_to": target.to_json()}
 
 
 def _shape(task: TaskOptions) -> TaskShape:

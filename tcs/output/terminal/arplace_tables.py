@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import typer
 
+from tcs.output.terminal.perception_tables import report_drive
+
 if TYPE_CHECKING:
     from tcs.capability.arplace import Arplace, ProbabilityMap
 
@@ -90,6 +92,7 @@ def report_query(result: dict[str, Any]) -> None:
             f"{100.0 * result['outside']:.1f} % of the samples are outside the learned parameters "
             "and count as failures"
         )
+    report_drive(result)
     typer.echo(f"{result['samples']:,} samples in {1e3 * result['seconds']:.1f} ms")
 
 

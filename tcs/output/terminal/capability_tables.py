@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from tcs.output.terminal.perception_tables import report_drive
+
 if TYPE_CHECKING:
     from tcs.capability import CapabilityMap, MapCheck, MapGrid, TaskMap
 
@@ -83,6 +85,13 @@ def report_merged(result: dict[str, Any]) -> None:
             f"best in the environment {_base_pose(result['best_in_environment'])}; "
             f"{result['rejected']} better ones are infeasible there"
         )
+    if "best_under_error" in result:
+        best = result["best_under_error"]
+        typer.echo(
+            f"best under the error of the located task {_base_pose(best)}; expected score "
+            f"{best['expected_score']:.3f}, feasible with probability {best['feasible']:.3f}"
+        )
+    report_drive(result)
     offset, angle = result["position_offset"], result["angle_offset"]
     if offset or angle:
         typer.echo(f"tool poses differ from grid cells by up to {offset:.4f} m, {angle:.4f} rad")

@@ -140,6 +140,13 @@ def report_choice(result: Mapping[str, Any]) -> None:
         if "solutions" in constraint:
             left += f" with {constraint['solutions']:,} solutions"
         out.print(f"{constraint['constraint']}: {left} left")
+    if "located" in result:
+        here = result["located"]["here"]
+        out.print(
+            f"located at x {here['x']:.3f} m, y {here['y']:.3f} m, yaw {here['yaw_deg']:.2f} deg; "
+            f"the same set from {result['located']['same_set']:.0%} of the base poses within the "
+            "error"
+        )
     if result["unreachable"]:
         out.print(
             f"unreachable from here: {result['unreachable']:,} configurations, not considered"

@@ -11,6 +11,7 @@ from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
+from tcs.placement.selection.uncertain_base import same_set
 from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utility
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "TravelWeights",
     "UtilityWeights",
     "nearest_table",
+    "same_set",
     "select",
     "shortest_tour",
     "utility",
