@@ -48,6 +48,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "row_measures": (),
     "experiment": (),
     "lines": (),
+    "pick_and_place": (),
     "faults": (),
     "edges": (),
     "fuzz": ("--mutants", "5000"),

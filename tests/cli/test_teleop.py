@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import pytest
 
@@ -74,15 +75,34 @@ def test_a_small_experiment(tcs_command, tmp_path):
     assert "3 scripted operators, not people" in ran.out
 
 
+SHORT = ("--operators", 1, "--repetitions", 1, "--training", 0, "--jobs", 1)
+
+
 def test_pick_and_place_prints_the_measures_of_each_base_pose(tcs_command):
-    words = ["--operators", 1, "--repetitions", 1, "--training", 0, "--jobs", 1]
-    words += ["--condition", "ITCM-high", "--base", 0.7, 0.1, 5]
-    ran = tcs_command("teleop", "pick-and-place", *words, "--json")
+    words = ["--condition", "ITCM-high", "--base", 0.7, 0.1, 5]
+    ran = tcs_command("teleop", "pick-and-place", *SHORT, *words, "--json")
     assert ran.code == 0
     assert set(ran.json["conditions"]) == {"ITCM-high", "given"}
     one = ran.json["conditions"]["given"]
     assert set(one["tct"]) == {"mean", "std"}
     assert {"tct", "csa", "cst", "sal", "failures"} <= set(one)
+    assert ran.json["files"] == []
+
+
+@pytest.mark.slow
+def test_pick_and_place_writes_page_table_and_pictures(tcs_command, tmp_path):
+    words = ["--operators", 3, "--repetitions", 1, "--training", 0]
+    ran = tcs_command("teleop", "pick-and-place", *words, "--out", tmp_path / "out", "--json")
+    assert ran.code == 0
+    assert set(ran.json["variance"]) >= {"tct", "csa"}
+    assert all(Path(name).stat().st_size > 100 for name in ran.json["files"])
+    with (tmp_path / "out" / "repetitions.csv").open() as stream:
+        rows = [row for row in csv.DictReader(stream) if row["part"] == "experiment"]
+    times = [float(row["tct"]) for row in rows if row["condition"] == "Expert" and row["tct"]]
+    mean = ran.json["conditions"]["Expert"]["tct"]["mean"]
+    assert sum(times) / len(times) == pytest.approx(mean)
+    page = (tmp_path / "out" / "pick-and-place.md").read_text()
+    assert "scripted operators, not people" in page
 
 
 @pytest.mark.parametrize(
@@ -95,9 +115,10 @@ def test_pick_and_place_prints_the_measures_of_each_base_pose(tcs_command):
         (["--latency", 11], 2, "--latency"),
     ],
 )
-def test_pick_and_place_refuses_in_a_line(tcs_command, words, code, text):
-    ran = tcs_command("teleop", "pick-and-place", *words)
+def test_pick_and_place_refuses_in_a_line(tcs_command, tmp_path, words, code, text):
+    ran = tcs_command("teleop", "pick-and-place", *words, "--out", tmp_path / "out")
     assert ran.code == code
+    assert list(tmp_path.iterdir()) == []
     assert text in ran.err
     if code == 1:
         assert len(ran.err.strip().splitlines()) == 1

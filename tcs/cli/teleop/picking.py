@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -81,6 +83,10 @@ def pick_and_place(
         ),
     ] = LatencyOf.BOTH,
     seed: options.Seed = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder to write: page, table of all repetitions, pictures."),
+    ] = None,
     jobs: Annotated[
         int,
         typer.Option(min=1, max=1024, help="Number of processes; does not change the results."),
@@ -88,11 +94,11 @@ def pick_and_place(
     as_json: options.Json = False,
 ) -> None:
     """Pick and place a cup from three base poses of TIAGo: the experiment of the ITCM thesis."""
+    from tcs.output.report.pick_and_place_files import write_pick_and_place
     from tcs.teleop.control.latency import Latency
     from tcs.teleop.pick_and_place.master import Coupling
-    from tcs.teleop.pick_and_place.protocol import Plan, run_pick_and_place
+    from tcs.teleop.pick_and_place.protocol import Plan
     from tcs.teleop.pick_and_place.slave import Control
-    from tcs.teleop.pick_and_place.summary import summary
     from tcs.teleop.pick_and_place.task import Condition, conditions_named
 
     given = () if base is None else (Condition("given", *base),)
@@ -102,6 +108,15 @@ def pick_and_place(
         control=Control(control.value),
         coupling=Coupling(latency=Latency(latency, latency_of.value)),
     )  # fmt: skip
+    words = ["tcs", "teleop", "pick-and-place", "--operators", str(operators)]
+    words += ["--repetitions", str(repetitions), "--training", str(plan.practice)]
+    for name in condition or ():
+        words += ["--condition", name]
+    words += [] if base is None else ["--base", *(f"{value:g}" for value in base)]
+    words += ["--control", control, "--latency", f"{latency:g}", "--latency-of", latency_of]
+    words += ["--seed", str(seed)]
     with terminal.progress_bar("operators") as on_progress:
-        result = summary(run_pick_and_place(plan, jobs=jobs, on_progress=on_progress))
+        result = write_pick_and_place(
+            plan, out, command=shlex.join(words), jobs=jobs, on_progress=on_progress
+        )
     terminal.print_result(result, teleop_tables.report_pick_and_place, as_json=as_json)

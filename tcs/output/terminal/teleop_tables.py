@@ -92,6 +92,8 @@ def report_pick_and_place(result: dict[str, Any]) -> None:
         counts = [str(one[key]) for one in result["conditions"].values()]
         table.add_row(f"{text} repetitions", *counts, "", "")
     out.print(table)
+    if result["files"]:
+        out.print(f"wrote {', '.join(result['files'])}")
 
 
 def _mean_std(spread: dict[str, float | None]) -> str:

@@ -62,7 +62,7 @@ def assisted(command: Command, state: ControlState) -> RateCommand:
     hessian.flat[:: JOINTS + 1] += _POSTURE**2
     slope = wanted @ J
     # Without a command the assistance does not move the arm.
-    if twist.any():
+    if twist.any() and settings.assist_rate > 0.0:
         slope += _POSTURE**2 * posture_rates(
             state.arm, state.joints, state.jacobian, settings.assist_rate
         )

@@ -47,6 +47,24 @@ def complete(result: PickAndPlace) -> FloatArray:
     return np.asarray(np.flatnonzero(np.isfinite(times).all(axis=0)))
 
 
+def time_with_failures(result: PickAndPlace, condition: str) -> float:
+    """Return the mean time of the recorded repetitions of all operators [s].
+
+    A failed repetition counts with the time limit, so that base poses from which few or no
+    repetitions succeed can be ranked with the others.
+
+    Args:
+        result: The experiment.
+        condition: Name of the base pose.
+    """
+    times: list[float] = []
+    for operator in result.operators:
+        part = operator.recorded[condition]
+        times += [one.tct for one in part.successes]
+        times += [result.plan.time_limit] * len(part.failures)
+    return float(np.mean(times))
+
+
 def compared(result: PickAndPlace) -> dict[str, RepeatedMeasures]:
     """Return the analysis of variance of each measure over the base poses.
 

@@ -94,6 +94,8 @@ _TOLERANCE = {
 """Perceived distance from the target at which a phase ends [m]."""
 _ORIENTED = (Phase.ALIGN, Phase.REACH)
 """Phases that need the orientation of the grasp."""
+_FREE = (Phase.BACK, Phase.RETREAT)
+"""Phases in which the orientation does not matter."""
 
 
 class Seen(NamedTuple):
@@ -226,7 +228,7 @@ class Operator:
         """Begin the next submovement, or the next phase where the target is reached."""
         traits = self._traits
         off = self._perceived(now, seen)
-        turn = self._perceived_turn(seen)
+        turn = np.zeros(3) if self.phase in _FREE else self._perceived_turn(seen)
         distance, angle = (math.sqrt(part @ part) for part in (off, turn))
         oriented = angle <= _LEVEL or self.phase not in _ORIENTED or self._accepted
         there = distance <= _TOLERANCE[self.phase]
@@ -253,7 +255,7 @@ class Operator:
         pause = 0.0
         if (1.0 - part) * distance < _NEAR:
             pause = traits.reaction + self._round_trip
-            pause += traits.mental_rotation * abs(self._camera.pan)
+            pause += traits.mental_rotation * abs(self._camera.angle)
         self._wait = now + self._lasts + pause
 
     def _move(
@@ -261,8 +263,8 @@ class Operator:
     ) -> None:
         """Begin a submovement of the hand, misdirected and with noise."""
         traits, rng = self._traits, self._rng
-        misdirection = self._camera.pan - self._experience.turn
-        self._experience.learn(traits, self._camera.pan)
+        misdirection = self._camera.angle - self._experience.turn
+        self._experience.learn(traits, self._camera.angle)
         extent = 1.0 + traits.extent_noise * rng.standard_normal(2)
         tilt = traits.direction_noise * rng.standard_normal(3)
         by = extent[0] * _misdirected(off, misdirection)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +15,7 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import load_robot
 from tcs.teleop.arm import Arm, load_arm
+from tcs.teleop.experiment.order import counterbalanced_orders
 from tcs.teleop.pick_and_place.master import Coupling
 from tcs.teleop.pick_and_place.measures import Measures, measure
 from tcs.teleop.pick_and_place.operator import Experience
@@ -102,15 +102,9 @@ class Plan:
         return self.repetitions if self.training is None else self.training
 
     def order(self, operator: int) -> tuple[Condition, ...]:
-        """Return the order of the conditions for an operator, counted from 0.
-
-        Operators take all orders in turn where there are at most three conditions, else rotations.
-        """
-        if len(self.conditions) <= 3:
-            orders = list(itertools.permutations(self.conditions))
-            return orders[operator % len(orders)]
-        first = operator % len(self.conditions)
-        return self.conditions[first:] + self.conditions[:first]
+        """Return the order of the conditions for an operator, counted from 0."""
+        orders = counterbalanced_orders(self.conditions)
+        return orders[operator % len(orders)]
 
 
 @dataclass(frozen=True, eq=False)

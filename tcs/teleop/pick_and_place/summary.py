@@ -46,7 +46,7 @@ def _condition(result: PickAndPlace, name: str) -> dict[str, Any]:
         "x": setting.condition.x,
         "y": setting.condition.y,
         "yaw_deg": setting.condition.yaw_deg,
-        "camera_yaw_deg": math.degrees(setting.camera.pan),
+        "camera_yaw_deg": math.degrees(setting.camera.angle),
         **{measure: spread(result.sample(name, measure)) for measure in MEASURES},
         "failures": result.failures(name),
         "failure_types": failure_counts([one for part in recorded for one in part.failures]),

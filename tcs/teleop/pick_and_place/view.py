@@ -23,8 +23,9 @@ class HeadCamera:
 
     Attributes:
         p: Position in the base [m], shape (3,).
-        pan: Yaw of the view in the base, left positive [rad]: the angle from the master's frame to
-            the camera's.
+        pan: Yaw of the view in the base, left positive [rad].
+        angle: Angle from the master's frame to the image [rad]: that of the view, since the master
+            commands in the base.
         tilt: Pitch of the view, up positive [rad].
         half_width: Half of the horizontal field of view [rad].
         half_height: Half of the vertical field of view [rad].
@@ -32,6 +33,7 @@ class HeadCamera:
 
     p: FloatArray
     pan: float
+    angle: float
     tilt: float
     half_width: float
     half_height: float
@@ -78,9 +80,11 @@ def aimed_at(condition: Condition, view: View, field_of_view: tuple[float, float
     half_width, half_height = (0.5 * angle for angle in field_of_view)
     pan = math.atan2(y, x)
     tilt = math.atan2(z, math.hypot(x, y))
+    pan = min(max(pan, view.yaw[0] + half_width), view.yaw[1] - half_width)
     return HeadCamera(
         p,
-        min(max(pan, view.yaw[0] + half_width), view.yaw[1] - half_width),
+        pan,
+        pan,
         min(max(tilt, view.pitch[0] + half_height), view.pitch[1] - half_height),
         half_width,
         half_height,

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from tcs.errors import TcsError
-from tcs.teleop.pick_and_place.analysis import compared, learning_curve, normality
+from tcs.teleop.pick_and_place.analysis import (
+    compared,
+    learning_curve,
+    normality,
+    time_with_failures,
+)
 from tcs.teleop.pick_and_place.measures import MEASURES, Measures
 from tcs.teleop.pick_and_place.protocol import (
     OperatorResult,
@@ -117,11 +122,14 @@ def test_an_operator_without_a_success_is_left_out_of_the_tests():
     assert np.isnan(result.sample("ITCM-low", "tct")[3])
     shorter = made({name: rows[:3] for name, rows in TIMES.items()}, Plan(operators=3))
     assert compared(result)["tct"].f == pytest.approx(compared(shorter)["tct"].f)
-    assert summary_failures(result) == 6
+    assert result.failures("ITCM-low") == 9
 
 
-def summary_failures(result):
-    return result.failures("ITCM-low") - 3
+def test_a_failure_counts_with_the_time_limit():
+    result = made(TIMES, Plan(operators=4, time_limit=100.0))
+    rows = [time for row in TIMES["ITCM-low"] for time in row]
+    failures = [100.0] * result.failures("ITCM-low")
+    assert time_with_failures(result, "ITCM-low") == pytest.approx(np.mean(rows + failures))
 
 
 def test_the_learning_curve_recovers_a_power_law():
