@@ -91,6 +91,7 @@ def main() -> None:
             name: BasePose(*base_of(pose), TORSO_HEIGHT, 0.0)
             for name, pose in (("Expert", EXPERT), ("ITCM-high", HIGH), ("ITCM-low", LOW))
         }
+        bases["Expert, torso lowered"] = BasePose(*base_of(EXPERT), 0.0, 0.0)
         try:
             bases["IHCM, best feasible"], _ = around.best(the_merge(ihcm, direction))
         except SelectionError as error:
@@ -135,7 +136,7 @@ def written(task: GraspTask, folder: Path) -> tuple[Path, Path, Path]:
     goals = [
         {
             "body_frame": "object",
-            "position": [one.x - back * R[0, 0], one.y - back * R[1, 0], 0.0],
+            "position": [float(one.x - back * R[0, 0]), float(one.y - back * R[1, 0]), 0.0],
             "quaternion_wxyz": [math.cos(grasp.heading / 2), 0.0, 0.0, math.sin(grasp.heading / 2)],
             "weight": 1,
         }

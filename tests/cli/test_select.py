@@ -199,6 +199,30 @@ def test_the_observed_shift_is_reported(tcs_command, tmp_path):
     assert "scored for person y 0 m; observed person y is the scored one" in exact.out
 
 
+def test_limbs_observed_one_by_one(tcs_command, tmp_path):
+    path = tmp_path / "limbs.tcs"
+    shifts = (-0.05, 0.0, 0.05)
+    place = {name: [(x, y, 0.7) for y in shifts for _ in range(2)] for name, x in (("head", 0.0),
+             ("arm_left", 1.0))}  # fmt: skip
+    goals = [{"body_frame": name} for name in ("head", "head", "head", "arm_left", "arm_left")]
+    tcs.save(path, score_file(
+        tables=3, observed=[SHIFT], task={"name": "bathing", "goals": goals},
+        body_frames={name: np.ravel(at).tolist() for name, at in place.items()},
+    ))  # fmt: skip
+    words = ("select", path, *HERE, "--frames", "head=0,0.04,0.7", "--frames")
+    result = tcs_command(*words, "arm_left=1,-0.04,0.7", "--json").json
+    assert [(one["frame"], one["observed"]["person_y"]) for one in result["frames"]] == [
+        ("head", 0.05),
+        ("arm_left", -0.05),
+    ]
+    shown = tcs_command(*words, "arm_left=1,-0.04,0.7").out
+    assert "goals on arm left also as scored for person y -0.05 m, 0.010 m from it" in shown
+    ran = tcs_command(*words, "arm_right=1,-0.04,0.7")
+    assert ran.code == 1
+    assert "'arm_right'" in ran.err
+    assert "Known: arm_left, head." in ran.err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -17,6 +17,7 @@ from tcs.output.words import (
     axis_title,
     axis_value,
     deviation_text,
+    frame_name,
     percentage,
     reason_of,
     scores_text,
@@ -159,6 +160,11 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(
             f"scored for {state}" + (f"; {', '.join(errors)}" if errors else ", not observed")
         )
+        for one in result.get("frames", ()):
+            out.print(
+                f"goals on {frame_name(one['frame'])} also as scored for "
+                f"{settings_text(one['observed'])}, {one['position_error']:.3f} m from it"
+            )
 
 
 def _alternatives_table(result: Mapping[str, Any]) -> Table:

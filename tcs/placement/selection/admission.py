@@ -62,10 +62,8 @@ class Admitted:
     footprint: Footprint | None
     """The floor that the robot covers; None without forbidden regions."""
 
-    @property
-    def has_fewer_solutions(self) -> bool:
-        """Whether obstacles were given, so that `reached` may differ from the scores."""
-        return any(left.solutions is not None for left in self.left)
+    has_lower_scores: bool = False
+    """Whether `reached` and `dexterity` may be less than those of the sets."""
 
 
 def admitted_candidates(
@@ -115,7 +113,10 @@ def admitted_candidates(
         remaining &= reached.any(axis=1)
         found = Left(f"blocked {obstacle.name}", _count(remaining), _count(reached[remaining]))
         _note(left, found, remaining.size)
-    return Admitted(remaining, reached, dexterity, tuple(left), tuple(warnings), footprint)
+    return Admitted(
+        remaining, reached, dexterity, tuple(left), tuple(warnings), footprint,
+        has_lower_scores=bool(constraints.blocked),
+    )  # fmt: skip
 
 
 def _bases(

@@ -20,6 +20,7 @@ from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.coverage import warning_outside
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
+from tcs.placement.selection.limbs import admitted_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.search import best_set
@@ -66,7 +67,8 @@ def select(
             the greatest stored size.
         observed: Observed state of the person: values of the file's observed axes [m or rad]. The
             table scored for the nearest values is used; an axis that is not given counts as zero.
-        frames: Positions of body frames in W [m], by name, in place of `observed`.
+        frames: Positions of body frames in W [m], by name, in place of `observed`. With several,
+            each goal also has to be reached in the table nearest to its own frame.
 
     Raises:
         SelectionError: If no configuration reaches a goal, the current state is not finite, is out
@@ -104,6 +106,8 @@ def select(
     found = None
     if constraints.exclude:
         found = admitted_candidates(constraints, here, tables)
+    if match is not None and match.by_frame and isinstance(scores, ScoreFile):
+        found = admitted_at_limbs(scores, match, constraints, found)
     query = _Query(
         tables, here, legs, weights, max_members, found, _disliked(constraints.prefer, tables)
     )
@@ -222,7 +226,7 @@ class _Query:
         """Utility less penalties of each candidate, -inf where it is not admitted, shape (C,)."""
         sets = self.tables.sets
         reachability, manipulability = sets.single_reachability, sets.single_manipulability
-        if self.found is not None and self.found.has_fewer_solutions:
+        if self.found is not None and self.found.has_lower_scores:
             reachability = tc_reachability(self.found.reached, sets.weights)
             manipulability = tc_manipulability(self.found.dexterity, sets.weights)
         singles = utility(reachability, manipulability, self.legs.from_here, self.weights)

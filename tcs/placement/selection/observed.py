@@ -27,6 +27,25 @@ MAX_SINGLE_ERROR = 0.10
 range the value covers, and 0.10 rad moves a point one metre from the joint by as much."""
 
 
+SAME_ERROR = 1e-9
+"""Difference of errors [m] below which a frame is equally near in two tables, as one that does not
+move with the person."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameMatch:
+    """The table that is nearest to one of several observed frames."""
+
+    frame: str
+    """Name of the body frame."""
+    index: int
+    """Number of the table in the file."""
+    state: dict[str, float]
+    """Values of the observed axes this table was scored for [m or rad]."""
+    position_error: float
+    """Distance of the frame from its scored position there [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Match:
     """A table of a score file and its distance from the observation."""
@@ -42,14 +61,26 @@ class Match:
     without frames."""
     axes: tuple[Axis, ...]
     """The observed axes."""
+    by_frame: tuple[FrameMatch, ...] = ()
+    """The nearest table of each frame by itself, if several are observed."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the match as plain containers, angles in degrees under `..._deg` names."""
-        return {
+        plain: dict[str, Any] = {
             "observed": state_to_json(self.axes, self.state),
             "observed_error": state_to_json(self.axes, self.observed_error),
             "frame_position_error": self.frame_position_error,
         }
+        if self.by_frame:
+            plain["frames"] = [
+                {
+                    "frame": one.frame,
+                    "observed": state_to_json(self.axes, one.state),
+                    "position_error": one.position_error,
+                }
+                for one in self.by_frame
+            ]
+        return plain
 
 
 def nearest_table(
@@ -124,7 +155,7 @@ def _nearest_to_frames(
 ) -> Match:
     """Return the table whose scored frame positions are nearest to the observed ones."""
     known = file.body_frames
-    squares = np.zeros((len(file.tables), _states(file)))
+    squares_of: dict[str, NDArray[np.float64]] = {}
     for name, position in frames.items():
         if name not in known:
             raise UnknownNameError("body frame", name, known, where="score file")
@@ -134,8 +165,10 @@ def _nearest_to_frames(
                 f"Position of frame '{name}' is {position!r}; must be three finite numbers "
                 "(x y z, m)."
             )
-        squares += np.sum((_scored_positions(file, name) - p_WH) ** 2, axis=-1)
-    error = np.sqrt(squares / len(frames))[:, _possible_states(file, here)]
+        squares_of[name] = np.sum((_scored_positions(file, name) - p_WH) ** 2, axis=-1)
+    possible = _possible_states(file, here)
+    squares = np.sum(list(squares_of.values()), axis=0)
+    error = np.sqrt(squares / len(frames))[:, possible]
     index = int(np.argmin(error.min(axis=1)))
     least = float(error[index].min())
     if least > MAX_FRAME_ERROR:
@@ -144,19 +177,29 @@ def _nearest_to_frames(
             f"more than {MAX_FRAME_ERROR:.2f} m. Check the frames and the state of the "
             "environment, or score the scene as it is."
         )
-    return Match(index, file.observed_states[index], {}, least, file.observed_axes)
+    by_frame: tuple[FrameMatch, ...] = ()
+    if len(frames) > 1:
+        # All frames are seen in one state of the environment: the one that fits them best.
+        state = int(np.argmin(error[index]))
+        by_frame = tuple(
+            _frame_match(file, name, np.sqrt(of_frame[:, possible][:, state]), index)
+            for name, of_frame in squares_of.items()
+        )
+    return Match(index, file.observed_states[index], {}, least, file.observed_axes, by_frame)
 
 
-def _states(file: ScoreFile) -> int:
-    """Return how many states of the environment the grid has."""
-    return math.prod(Grid.from_dict(file.grid).environment_shape)
+def _frame_match(file: ScoreFile, name: str, error: NDArray[np.float64], index: int) -> FrameMatch:
+    """Return the nearest table of a frame, given its error in each [m]; `index` if equally near."""
+    nearest = int(np.argmin(error))
+    if error[index] <= error[nearest] + SAME_ERROR:
+        nearest = index
+    return FrameMatch(name, nearest, file.observed_states[nearest], float(error[nearest]))
 
 
 def _scored_positions(file: ScoreFile, name: str) -> NDArray[np.float64]:
     """Return a frame's position in each table and state [m], shape (tables, states, 3)."""
-    return np.asarray(file.body_frames[name], dtype=np.float64).reshape(
-        len(file.tables), _states(file), 3
-    )
+    positions = np.asarray(file.body_frames[name], dtype=np.float64)
+    return positions.reshape(len(file.tables), -1, 3)
 
 
 def _possible_states(file: ScoreFile, here: InitialConfiguration | None) -> NDArray[np.bool_]:

@@ -204,7 +204,7 @@ def _best_of(
     members = tuple(member[kept] for member in members)
     reachability, manipulability = scores[0][kept], scores[1][kept]
     admitted = bounds.admitted
-    if admitted is not None and admitted.has_fewer_solutions:
+    if admitted is not None and admitted.has_lower_scores:
         # Stored sets are compared, so the rule applies to their stored scores.
         reachability, manipulability = _scores(
             admitted.dexterity.T, admitted.reached.T, every.sets.weights, members

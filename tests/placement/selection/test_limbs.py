@@ -1,0 +1,136 @@
+"""Goals on limbs that are observed one by one, against a plain loop over all kept sets."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.errors import SelectionError
+from tcs.model.grid import InitialConfiguration
+from tcs.placement.constraints import Constraints, Obstacle
+from tcs.placement.selection import TravelWeights, UtilityWeights, select
+from tcs.placement.selection.limbs import admitted_at_limbs, tables_of_goals
+from tcs.placement.selection.observed import nearest_table
+from tcs.placement.tables import ScoreTable
+from tests.placement.selection.test_choice import brute_force
+from tests.placement.store.example import score_file
+from tests.placement.tables.small import all_sets, set_scores, small_grid
+
+GRID = small_grid(nx=5, ny=3, bed=2)
+SHIFTS = {"name": "person_y", "unit": "m", "start": -0.1, "step": 0.05, "count": 5}
+HERE = InitialConfiguration(
+    base_x=-1.0,
+    base_y=0.3,
+    base_yaw=0.0,
+    torso=0.0,
+    environment=(("bed_height", 0.0),),
+    environment_units=("m",),
+)
+WEIGHTS = UtilityWeights(places=0.0, environment=0.0)
+SPREAD = {"head": (0.3, 0.06, 0.7), "arm": (0.0, -0.04, 0.7)}
+"""The head is nearest to the shift of 5 cm, the arm to that of -5 cm, both together to 0."""
+
+
+@pytest.fixture(scope="module")
+def file():
+    """Head and arm shift with the person; the heel stays."""
+    shifts = np.arange(-0.1, 0.11, 0.05)
+    place = {
+        "head": [[(0.3, y, 0.7 + z) for z in (0.0, 0.1)] for y in shifts],
+        "arm": [[(0.0, y, 0.7 + z) for z in (0.0, 0.1)] for y in shifts],
+        "heel": [[(-0.8, 0.0, 0.5)] * 2 for _ in shifts],
+    }
+    frames = {name: np.ravel(at).tolist() for name, at in place.items()}
+    goals = [{"body_frame": name} for name in ("head", "arm", "heel", "head", "arm")]
+    return score_file(
+        grid=GRID,
+        tables=5,
+        observed=[SHIFTS],
+        body_frames=frames,
+        task={"name": "bathing", "goals": goals},
+    )
+
+
+def test_each_goal_has_the_table_of_its_frame(file):
+    match = nearest_table(file, HERE, frames={**SPREAD, "heel": (-0.8, 0.0, 0.5)})
+    assert match.index == 2
+    assert tables_of_goals(file, match) == (3, 1, 2, 3, 1)
+    found = match.to_json()["frames"]
+    assert [one["frame"] for one in found] == ["head", "arm", "heel"]
+    assert [one["observed"]["person_y"] for one in found] == pytest.approx([0.05, -0.05, 0.0])
+    assert [one["position_error"] for one in found] == pytest.approx([0.01, 0.01, 0.0])
+
+
+@pytest.mark.parametrize("members", [1, 2])
+def test_equals_a_loop_over_all_kept_sets(file, members):
+    choice = select(file, HERE, weights=WEIGHTS, frames=SPREAD, max_members=members)
+    whole, head, arm = (file.tables[i].scores for i in (2, 3, 1))
+    dexterity, reason = whole.dexterity.copy(), whole.reason.copy()
+    for table, goals in ((head, (0, 3)), (arm, (1, 4))):
+        for h in range(GRID.size):
+            for g in goals:
+                if not table.reached[h, g]:
+                    dexterity[h, g], reason[h, g] = 0.0, max(reason[h, g], 1)
+                elif whole.reached[h, g]:
+                    dexterity[h, g] = min(dexterity[h, g], table.dexterity[h, g])
+    reached = reason == 0
+    less = ScoreTable(
+        dexterity=dexterity,
+        reason=reason,
+        pair=np.full(reason.shape, -1, np.int32),
+        pair_names=(),
+        arm_joints=np.zeros((int(reached.sum()), 7), np.float32),
+        weights=whole.weights,
+    )
+    kept = {
+        one: set_scores(less, one)
+        for one in all_sets(whole, GRID, 0.4)
+        if len(one) <= members and all(reached[h].any() for h in one)
+    }
+    indices, value, cost = brute_force(kept, GRID, HERE, WEIGHTS, TravelWeights())
+    assert (choice.indices, choice.cost) == (indices, cost)
+    assert choice.utility == pytest.approx(value, abs=1e-12)
+    assert (choice.reachability, choice.manipulability) == pytest.approx(kept[indices])
+    # The spread costs something, so that the test is not empty.
+    together = select(file, HERE, weights=WEIGHTS, frames={"heel": (-0.8, 0, 0.5)})
+    assert choice.utility < together.utility
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [{"head": (0.3, 0.06, 0.7)}, {"head": (0.3, 0.06, 0.7), "arm": (0.0, 0.05, 0.7)}],
+    ids=["one frame", "two that agree"],
+)
+def test_one_frame_or_frames_that_agree_use_one_table(file, frames):
+    choice = select(file, HERE, frames=frames)
+    same = select(file, HERE, observed={"person_y": 0.05})
+    assert choice.match.index == 3
+    assert ("frames" in choice.match.to_json()) == (len(frames) > 1)
+    assert (choice.indices, choice.utility) == (same.indices, same.utility)
+    np.testing.assert_equal(dataclasses.astuple(choice)[3:7], dataclasses.astuple(same)[3:7])
+
+
+def test_constraints_hold_too_and_obstacles_are_refused(file):
+    only = Constraints(only=("base_x <= 0 m",))
+    choice = select(file, HERE, frames=SPREAD, constraints=only)
+    assert all(member.base_x <= 1e-9 for member in choice.members)
+    assert choice.constraints[0].constraint == "only base_x <= 0 m"
+    box = Constraints(blocked=(Obstacle(x=9.0, y=9.0, width=0.1, depth=0.1),))
+    match = nearest_table(file, HERE, frames=SPREAD)
+    with pytest.raises(SelectionError, match=r"obstacles cannot be tested .* tcs score TASK"):
+        admitted_at_limbs(file, match, box, None)
+
+
+def test_limbs_from_which_nothing_is_reached_are_refused(file):
+    none = file.tables[3]
+    empty = dataclasses.replace(file, task={"name": "x", "goals": [{"body_frame": "arm"}] * 5})
+    assert none.sets.reached.any()
+    low = score_file(
+        grid=GRID, tables=5, share=0.0, observed=[SHIFTS], body_frames=empty.body_frames
+    )
+    tables = (low.tables[0], low.tables[1], file.tables[2], file.tables[3], file.tables[4])
+    empty = dataclasses.replace(empty, tables=tables)
+    with pytest.raises(SelectionError, match=r"limbs where they are observed, no initial"):
+        select(empty, HERE, frames=SPREAD)
