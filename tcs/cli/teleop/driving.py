@@ -79,6 +79,10 @@ def live(
         Path | None,
         typer.Option(metavar="RUN", help="Write the run at the end: .csv or .parquet."),
     ] = None,
+    cameras: Annotated[
+        bool,
+        typer.Option("--cameras", help="Show pictures of the head and wrist cameras on the page."),
+    ] = False,
     delay: LatencyOptions,
     window: options.WindowOptions,
 ) -> None:
@@ -111,7 +115,7 @@ def live(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
             start_deg=start_deg, torso_height=torso_height, line=line,
-            latency=latency,
+            latency=latency, cameras=cameras,
         ),
         port=window.port, on_stop=typer.echo, record=save is not None,
     )  # fmt: skip
@@ -126,6 +130,7 @@ def live(
     except KeyboardInterrupt:
         terminal.note(f"closed after {time.perf_counter() - begun:.0f} s.")
     finally:
+        session.close()
         run = session.run()
         if save is not None and run is None:
             terminal.note(f"no browser was connected, so '{save}' is not written.")

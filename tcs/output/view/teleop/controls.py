@@ -189,6 +189,8 @@ class OperatorInput:
         self.group, self.clutch, self._mode = 0, False, 0
         self._until.clear()
         self.source.zero()
+        if self.set_point is not None:
+            self.set_point.drop()
 
     def _pressed(self, reading: Reading, now: float) -> dict[str, int]:
         """Return the buttons pressed since the last reading, and how often."""

@@ -106,6 +106,7 @@ class LivePage:
         latency: Latency | None = None,
         on_stop: Callable[[str], None],
         on_step: Callable[[Command, Step], None] | None = None,
+        on_show: Callable[[FloatArray], None] | None = None,
     ) -> None:
         """Set up the page.
 
@@ -121,6 +122,7 @@ class LivePage:
             on_stop: Called with the reason whenever the arm stops, or its reason changes.
             on_step: Called after each step with the command that the arm executes and the step,
                 once a browser has connected.
+            on_show: Called at each frame with the joint positions that it shows [rad], shape (7,).
 
         Raises:
             TcsError: If the start posture is not seven finite numbers.
@@ -135,7 +137,7 @@ class LivePage:
         self.dropped = 0
         self._meshcat, self._display, self._arm = meshcat, display, arm
         self._start = np.array(start, dtype=np.float64)
-        self._on_stop, self._on_step = on_stop, on_step
+        self._on_stop, self._on_step, self._on_show = on_stop, on_step, on_show
         self._message, self._message_until = "", 0.0
         self._touching = ""
         self._watched = False
@@ -212,6 +214,8 @@ class LivePage:
         self._trail.add(seen.p)
         mode, message = self.mode_line(), self.message(time.perf_counter())
         self._panel.show(readout(self._arm, seen.joints, seen.limits, seen.singular, mode, message))
+        if self._on_show is not None:
+            self._on_show(seen.joints)
         self.pictures.add(time.perf_counter() - begun)
 
     def run(self, duration: float | None = None) -> None:

@@ -14,7 +14,9 @@ from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import load_robot
 from tcs.output.view.live import open_meshcat
+from tcs.output.view.teleop.cameras import Cameras
 from tcs.output.view.teleop.live import LivePage
+from tcs.output.view.teleop.operator_page import OperatorPage, operator_html
 from tcs.output.view.teleop.robot_display import RobotDisplay, draw_course
 from tcs.output.view.teleop.start import start_posture
 from tcs.teleop import Arm, Command, Mode, Settings, Step, load_arm
@@ -26,6 +28,8 @@ from tcs.teleop.experiment.trial import GOAL_RADIUS, NO_LATENCY
 from tcs.teleop.runs.recorder import Recorder
 from tcs.teleop.runs.run import Run
 
+_PAGE_PORT = 100
+"""Port of the operator's page above that of Meshcat, where no port is given."""
 LiveCondition = Literal["end-effector", "novel", "assisted", "drake", "joint"]
 CONDITION_MODES: Mapping[LiveCondition, tuple[Mode, ...]] = {
     "end-effector": (Mode.END_EFFECTOR,),
@@ -50,6 +54,7 @@ class LiveOptions:
         line: Whether to search for the experiment's line, show it and start there.
         course: The line to show and its start posture; None to search for one if `line`.
         latency: Latency between the operator and the arm.
+        cameras: Whether the page shows pictures of the head and wrist cameras.
     """
 
     robot: str
@@ -60,6 +65,7 @@ class LiveOptions:
     line: bool = False
     course: Course | None = None
     latency: Latency = NO_LATENCY
+    cameras: bool = False
 
 
 class LiveSession:
@@ -70,7 +76,11 @@ class LiveSession:
         course: The line to follow and its start posture; None without a line.
         page: The live page.
         url: Address of the page.
+        cameras: The camera pictures; None without.
     """
+
+    cameras: Cameras | None
+    _server: OperatorPage | None
 
     def __init__(
         self,
@@ -99,29 +109,59 @@ class LiveSession:
         robot = load_robot(options.robot)
         self.arm = load_arm(robot, torso_height=torso_height_of(robot, options.torso_height))
         start = None if options.start_deg is None else _start(self.arm, options.start_deg)
-        meshcat = open_meshcat(port)
+        meshcat = self._meshcat = open_meshcat(port)
         display = RobotDisplay(self.arm, meshes=True)
         self.course = options.course
         if self.course is None and options.line:
             self.course = find_course(self.arm)
         if self.course is not None:
             start = self.course.joints
+        if start is None:
+            start = start_posture(self.arm, display)
         self._recorder, self._on_step = Recorder(self.arm), on_step
+        self._on_stop, self._fault = on_stop, ""
+        self._open_page(start, port)
         self.page = LivePage(
             meshcat,
             display,
             self.arm,
-            start_posture(self.arm, display) if start is None else start,
+            start,
             settings=Settings(limits=options.behaviour),
             modes=CONDITION_MODES[options.condition],
             latency=options.latency,
             on_stop=on_stop,
             on_step=self._record if record or self.course is not None else None,
+            on_show=None if self.cameras is None else self._show_cameras,
         )
         if self.course is not None:
             ends = np.array(self.course.line.start), np.array(self.course.line.end)
             draw_course(meshcat, *ends, GOAL_RADIUS)
-        self.url = str(meshcat.web_url())
+
+    def _open_page(self, start: FloatArray, port: int | None) -> None:
+        """Set the address, that of the operator's page where Meshcat's own is not enough."""
+        self.url, self.cameras, self._server = str(self._meshcat.web_url()), None, None
+        if not self._options.cameras:
+            return
+        self.cameras = Cameras(self.arm, start)
+        page = operator_html(self._meshcat.port(), cameras=True)
+        page_port = self._meshcat.port() + _PAGE_PORT if port is None else port + 1
+        self._server = OperatorPage(page, self.cameras.pictures, page_port)
+        self.url = self._server.url
+
+    def _show_cameras(self, joints: FloatArray) -> None:
+        """Request pictures of a posture, or report once why there are none."""
+        assert self.cameras is not None
+        if self.cameras.fault and not self._fault:
+            self._fault = self.cameras.fault
+            self._on_stop(self._fault)
+        self.cameras.show(joints)
+
+    def close(self) -> None:
+        """End the camera process and the server of the operator's page."""
+        if self._server is not None:
+            self._server.close()
+        if self.cameras is not None:
+            self.cameras.close()
 
     def begin(self) -> None:
         """Put the arm back to the start, in the first mode, and begin a new run."""
