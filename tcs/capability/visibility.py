@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tcs.capability.head import View
 from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from tcs.capability.head import View
 
 YAW_GOAL = 0.0
 """Straight ahead: hand motions at the master then agree with motions in the image."""

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+import tcs.capability
+import tcs.capability.arplace
+from tcs.capability.arplace import save_arplace
+from tests.capability.arplace.example import discs, model
+
 HEAVY = ("pydrake", "numba", "scipy", "matplotlib", "pandas", "trimesh")
 # Printed at exit on stderr, where these commands print nothing else.
 REPORT = (
@@ -33,3 +38,22 @@ def test_reading_a_robot_loads_nothing_that_only_fitting_needs(process):
     )
     assert ran.code == 0
     assert ran.err.strip() == "[]"
+
+
+def test_a_query_of_arplace_needs_neither_simulator_nor_compiler(process, tmp_path):
+    path = tmp_path / "made-up.arp"
+    save_arplace(path, model(discs()))
+    ran = process("arplace", "query", path, "--samples", 1, before=REPORT)
+    assert ran.code == 0
+    loaded = ran.err.strip()
+    assert "pydrake" not in loaded
+    assert "numba" not in loaded
+
+
+@pytest.mark.parametrize("package", [tcs.capability, tcs.capability.arplace])
+def test_names_loaded_on_first_use_are_there(package):
+    for name in package.__all__:
+        assert getattr(package, name)
+    assert set(package.__all__) <= set(dir(package))
+    with pytest.raises(AttributeError, match="no attribute 'merg'"):
+        _ = package.merg

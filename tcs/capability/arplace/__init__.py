@@ -6,6 +6,8 @@ a model, its file, and maps of the probability of success with the best base pos
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from tcs.capability.arplace.boundary import Classifier
 from tcs.capability.arplace.files import (
     load_arplace,
@@ -13,13 +15,15 @@ from tcs.capability.arplace.files import (
     save_arplace,
     save_probability_map,
 )
-from tcs.capability.arplace.learning import ModelOptions, learn
 from tcs.capability.arplace.model import Arplace, Errors, reconstruction_errors
 from tcs.capability.arplace.point_distribution import PointDistribution
 from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap, merge_maps
 from tcs.capability.arplace.query import ObjectPose, Query, covariance_of, query
 from tcs.capability.arplace.success_model import SuccessModel
 from tcs.capability.arplace.task import TableTask
+
+if TYPE_CHECKING:
+    from tcs.capability.arplace.learning import ModelOptions, learn
 
 __all__ = [
     "Arplace",
@@ -43,3 +47,17 @@ __all__ = [
     "save_arplace",
     "save_probability_map",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return a name of the module that learns, which needs Drake and the kernel."""
+    if name not in ("ModelOptions", "learn"):
+        raise AttributeError(f"module 'tcs.capability.arplace' has no attribute '{name}'")
+    from tcs.capability.arplace import learning
+
+    value = globals()[name] = getattr(learning, name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

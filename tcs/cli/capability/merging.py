@@ -107,7 +107,7 @@ def merge_maps(
     as_json: options.Json = False,
 ) -> None:
     """Merge a map over the grasps of a task, and print its best base pose."""
-    from tcs.capability import Surroundings, load_map, merge, write_base_poses
+    from tcs.capability import load_map, merge
     from tcs.capability import split as split_task
 
     if split and (out, picture, environment, located) != (None, None, None, None):
@@ -134,12 +134,16 @@ def merge_maps(
     task_map = merge(loaded, grasps, torso_height=torso_height, scale=scale)
     result = capability_tables.task_map_result(task_map, time.perf_counter() - begun)
     if out is not None:
+        from tcs.capability import write_base_poses
+
         write_base_poses(out, task_map)
     if picture is not None:
         from tcs.output.view.base_poses import save_task_map
 
         save_task_map(picture, task_map)
     if environment is not None:
+        from tcs.capability import Surroundings
+
         x, y, yaw_deg = task_at or (0.0, 0.0, 0.0)
         around = Surroundings.load(
             capability, loaded, environment, (x, y, math.radians(yaw_deg)), robot=robot
