@@ -40,8 +40,8 @@ def new(
         str,
         typer.Option(
             metavar="NAME,NAME,...",
-            help="Conditions to compare: end-effector, novel, assisted, drake are driven in the "
-            "browser; NAME=TITLE is another one, whose trials are given as run files.",
+            help="Conditions to compare: end-effector, novel, assisted, drake, joint are driven in "
+            "the browser; NAME=TITLE is another one, whose trials are given as run files.",
         ),
     ] = "end-effector,novel",
     training: Annotated[

@@ -34,6 +34,7 @@ Limits = Literal["paper", "clamped"]
 DRIVEN: dict[str, tuple[str, Limits]] = {
     **{one.name: (one.title, one.settings.limits) for one in CONDITIONS},
     "drake": ("Drake's differential inverse kinematics", "clamped"),
+    "joint": ("joint set-points", "clamped"),
 }
 """Title and behaviour at joint limits of the conditions that `tcs teleop` can drive."""
 _MOST_CONDITIONS, _MOST_TRIALS = 8, 100
