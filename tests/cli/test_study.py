@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tcs.output.terminal.study_tables import report_study
 from tcs.teleop.runs.files import save_run
 from tcs.teleop.study.participants import load_participant, new_participant
 from tcs.teleop.study.recording import StudyRecording
@@ -105,6 +106,20 @@ def test_runs_that_are_not_due_are_refused(tcs_command, study, tmp_path):
     assert refused(ran, "no trial is due", "all steps are recorded")
 
 
+def test_odd_values_are_refused_in_a_line(tcs_command, study, tmp_path):
+    for words in (
+        ("--run", tmp_path / "none.csv"), ("--answers", tmp_path), ("--skip", "a" * 5000),
+        ("--drop", "a" * 5000), ("--participant", "a\0b"), ("--participant", "a" * 5000, "--new"),
+    ):  # fmt: skip
+        ran = tcs_command("study", "record", study.folder, "--no-browser", *words)
+        assert ran.code == 1, words
+        assert len(ran.err.strip().splitlines()) == 1, (words, ran.err)
+    for folder in ("a" * 5000, "/dev/null"):
+        for command in ("record", "report"):
+            assert refused(tcs_command("study", command, folder), "study.yaml")
+    assert load_participant(study, "P01").steps == {}
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -158,16 +173,17 @@ def test_skip_and_drop_exclude_each_other(tcs_command, study):
     assert ran.code == 2
 
 
-def test_a_report(tcs_command, study):
+def test_a_report(tcs_command, study, capsys):
     assert refused(tcs_command("study", "report", study.folder), "no participants")
     complete(study, 1)
-    ran = tcs_command("study", "report", study.folder)
-    assert ran.code == 0
-    assert "Small study: 1 of 1 participants" in ran.out
-    assert (study.folder / "report.html").stat().st_size > 10_000
-    ran = tcs_command("study", "report", study.folder, "--json", "--out", study.folder / "b.html")
+    ran = tcs_command("study", "report", study.folder, "--json")
     assert ran.json["participants"][0]["included"] is True
-    assert (study.folder / "b-tables" / "trials.csv").exists()
+    assert (study.folder / "report.html").stat().st_size > 10_000
+    assert (study.folder / "report-tables" / "trials.csv").exists()
+    report_study(ran.json)
+    out = capsys.readouterr().out
+    assert "Small study: 1 of 1 participants" in out
+    assert "14 tables as CSV" in out
 
 
 @pytest.mark.slow

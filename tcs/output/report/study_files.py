@@ -50,7 +50,7 @@ def write_study_report(
         "trials": _csv(_trial_rows(results)),
         "answers": _csv(_answer_rows(results)),
         "values": _csv(_value_rows(results)),
-        **{name: _csv([_titles(table), *table.texts()]) for name, table in named_tables(page)},
+        **{name: table_csv(table) for name, table in named_tables(page)},
     }
     paths = [page_path, *(folder / f"{name}.csv" for name in contents)]
     for path, content in zip(paths, [as_html(page).encode(), *contents.values()], strict=True):
@@ -131,8 +131,9 @@ def _tables(blocks: Sequence[Block]) -> Iterable[Table]:
             yield from _tables(block.blocks)
 
 
-def _titles(table: Table) -> list[str]:
-    return [column.title for column in table.columns]
+def table_csv(table: Table) -> bytes:
+    """Return a table as CSV, with the texts of the page."""
+    return _csv([[column.title for column in table.columns], *table.texts()])
 
 
 def _trial_rows(results: StudyResults) -> list[list[object]]:

@@ -13,6 +13,7 @@ from tcs.errors import DataFileError
 from tcs.output.study.server import FormServer
 from tcs.output.words.teleop import trial_words
 from tcs.teleop.experiment.trial import TrialMeasures
+from tcs.teleop.runs.files import load_run
 from tcs.teleop.study.answers_file import load_answers
 from tcs.teleop.study.participants import (
     ParticipantFile,
@@ -165,6 +166,9 @@ class StudySession:
         order = ", ".join(recording.study.titles[one] for one in recording.participant.order)
         self._report(f"{self.name}: {order}")
         answers = None if given.answers is None else load_answers(recording, given.answers)
+        for path in given.runs:
+            # Refused before a page is opened.
+            load_run(path)
         runs = deque(given.runs)
         while (step := recording.next_step) is not None:
             if step.form is None and runs:

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictInt, StringConstraints, model_validator
 
-from tcs.errors import DataFileError, OutputError, UnknownNameError
+from tcs.errors import DataFileError, OutputError, UnknownNameError, one_line
 from tcs.files.documents import MAX_BYTES, Document, checked
 from tcs.files.reading import read_text
 from tcs.files.writing import make_folder, whole_file
@@ -28,7 +28,8 @@ VERSION = 1
 ParticipantName = Annotated[
     str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=40)
 ]
-Reason = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+_LONGEST_REASON = 500
+Reason = Annotated[str, StringConstraints(min_length=1, max_length=_LONGEST_REASON)]
 
 
 class StepRecord(Document):
@@ -81,6 +82,20 @@ class ParticipantFile(Document):
 def now() -> str:
     """Return the time in UTC to the second, as ISO 8601."""
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def checked_reason(text: str) -> str:
+    """Return the reason of a missing step or a dropped participant, on one line.
+
+    Raises:
+        DataFileError: If it is blank or too long.
+    """
+    reason = one_line(text, _LONGEST_REASON + 1)
+    if not 1 <= len(reason) <= _LONGEST_REASON:
+        raise DataFileError(
+            f"the reason has {len(text):,} characters; must be 1 to {_LONGEST_REASON}, not blank."
+        )
+    return reason
 
 
 def participant_path(study: Study, name: str) -> Path:

@@ -18,6 +18,7 @@ from tcs.teleop.study.participants import (
     ParticipantFile,
     StepRecord,
     answers_record,
+    checked_reason,
     load_participants,
     now,
     save_participant,
@@ -152,23 +153,25 @@ class StudyRecording:
         """Record that there will be nothing for the next step, and return the step.
 
         Raises:
-            DataFileError: If all steps are recorded.
+            DataFileError: If all steps are recorded, or the reason is blank or too long.
             OutputError: If the file cannot be written.
         """
         step = self.next_step
         if step is None:
             raise DataFileError(f"participant '{self._participant.participant}' has no step left.")
-        self._save(step, StepRecord(recorded=now(), missing=reason))
+        self._save(step, StepRecord(recorded=now(), missing=checked_reason(reason)))
         return step
 
     def drop(self, reason: str) -> None:
         """Leave the participant out of the results; the records stay.
 
         Raises:
+            DataFileError: If the reason is blank or too long.
             OutputError: If the file cannot be written.
         """
-        self._participant = self._participant.model_copy(update={"dropped": reason})
-        save_participant(self.study, self._participant)
+        dropped = self._participant.model_copy(update={"dropped": checked_reason(reason)})
+        save_participant(self.study, dropped)
+        self._participant = dropped
 
     def _next_trial(self) -> Step:
         step = self.next_step

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import yaml
 from pydantic import Field, StringConstraints, field_validator
 
-from tcs.errors import DataFileError, OutputError
+from tcs.errors import DataFileError, OutputError, one_line
 from tcs.files.documents import Document, JointPosition, Number, Position, checked, read_document
 from tcs.files.writing import make_folder, whole_file
 from tcs.teleop.arm import Arm
@@ -144,8 +145,8 @@ def conditions_of(words: Sequence[str]) -> list[ConditionEntry]:
         known = DRIVEN.get(name)
         if known is None and not title:
             raise DataFileError(
-                f"condition '{name}': `tcs teleop` drives {', '.join(DRIVEN)}. Give another one "
-                f"with its title, e.g. '{name or 'stick'}=Joystick', and its trials as run files."
+                f"condition '{one_line(name)}': `tcs teleop` drives {', '.join(DRIVEN)}. Give "
+                "another one with its title, e.g. 'stick=Joystick', and its trials as run files."
             )
         limits = None if known is None else known[1]
         found.append({"name": name, "title": title or (known or ("",))[0], "limits": limits})
@@ -173,7 +174,7 @@ def check_new(folder: Path) -> None:
         OutputError: If it has one.
     """
     path = folder / STUDY_FILE
-    if path.exists():
+    if os.path.exists(path):
         raise OutputError(f"'{path}' exists. Name another folder, or continue that study.")
 
 
@@ -201,10 +202,11 @@ def load_study(folder: Path) -> Study:
         UnknownNameError: If a key is unknown.
     """
     path = folder / STUDY_FILE
-    if not path.exists():
+    # A path that the operating system refuses has none either.
+    if not os.path.exists(path):
         raise DataFileError(
-            f"'{folder}' has no {STUDY_FILE}. Give the folder of a study, or make one with `tcs "
-            "study new`."
+            f"'{one_line(str(folder))}' has no {STUDY_FILE}. Give the folder of a study, or make "
+            "one with `tcs study new`."
         )
     plan = read_document(path, StudyFile, f"study '{path}'", DataFileError)
     study = Study(folder, plan)

@@ -8,9 +8,11 @@ import re
 import pytest
 
 from tcs.errors import OutputError
+from tcs.output.report.blocks import Page, Section
 from tcs.output.report.html import as_html
 from tcs.output.report.study import study_page
-from tcs.output.report.study_files import named_tables, write_study_report
+from tcs.output.report.study_files import table_csv, write_study_report
+from tcs.output.report.study_tables import comments_table, preference_table
 from tcs.teleop.study.participants import new_participant
 from tcs.teleop.study.recording import StudyRecording
 from tcs.teleop.study.results import study_results
@@ -33,21 +35,25 @@ def written(study, tmp_path_factory):
     return write_study_report(study, folder / "mine.html"), folder
 
 
+@pytest.fixture(scope="module")
+def results(study):
+    return study_results(study)
+
+
 def read(path):
     with path.open(newline="") as stream:
         return list(csv.reader(stream))
 
 
-def test_every_table_is_a_file(study, written):
+def test_every_table_is_a_file(results, written):
     result, folder = written
-    page = study_page(study_results(study), command="tcs study report")
-    names = [name for name, _ in named_tables(page)]
-    assert len(names) == len({*names})
-    assert {f"{name}.csv" for name in [*names, "trials", "answers", "values"]} == {
-        path.name for path in (folder / "mine-tables").iterdir()
-    }
-    assert len(result["files"]) == len(names) + 4
-    table = dict(named_tables(page))["table-preference"]
+    names = [path.stem for path in (folder / "mine-tables").iterdir()]
+    assert len(names) == len(result["files"]) - 1
+    sections = ("participants", "preference", "workload", "difficulty", "comments")
+    assert {*(f"table-{name}" for name in sections), "trials", "answers", "values"} < {*names}
+    for title, count in (("accuracy-time-effort-acceptance", 2), ("motion-of-the-hand", 2)):
+        assert {f"table-{title}-{i + 1}" for i in range(count)} < {*names}
+    table = preference_table(results)
     assert read(folder / "mine-tables" / "table-preference.csv")[1:] == table.texts()
 
 
@@ -80,8 +86,9 @@ def test_the_summary_has_the_tests_of_the_paper(written):
     assert [one["included"] for one in result["participants"]] == [True, True, True, False]
 
 
-def test_the_page_has_tables_and_figures_of_the_paper(study):
-    text = as_html(study_page(study_results(study), command="tcs study report mine"))
+def test_the_page_has_tables_and_figures_of_the_paper(written):
+    _, folder = written
+    text = (folder / "mine.html").read_text()
     for part in ("Table II", "Table III", "Table IV", "Figure 8f", "Figure 10", "Figure 56"):
         assert part in text
     # Five box plots, the acceptance graph and the paths.
@@ -107,11 +114,11 @@ def test_comments_are_text_on_the_page_and_in_a_spreadsheet(tmp_path):
         recording.record_run(run_on(study, recording.next_step.condition))
     text = '=HYPERLINK("x") <b>bold</b>\nsecond line'
     recording.save_answers(recording.next_step, {"preferred": "novel", "comments": text})
-    write_study_report(study)
-    rows = read(tmp_path / "report-tables" / "table-comments.csv")
-    assert rows[1][3].startswith("'=HYPERLINK")
-    page = (tmp_path / "report.html").read_text()
-    assert "&lt;b&gt;bold&lt;/b&gt; second line" in page
+    table = comments_table(study_results(study))
+    assert table.texts() == [["P01", "–", "preference", '=HYPERLINK("x") <b>bold</b> second line']]
+    page = Page("Title", "Lead", [Section("Comments", [table])])
+    assert "&lt;b&gt;bold&lt;/b&gt; second line" in as_html(page)
+    assert table_csv(table).splitlines()[1].split(b",")[3].startswith(b"\"'=HYPERLINK")
 
 
 def test_a_page_that_cannot_be_written_is_refused_first(study, tmp_path):

@@ -154,6 +154,16 @@ def test_missing_steps_have_a_reason(recording):
     assert on_disk(recording).steps["end-effector/training-1"].missing == "robot failed"
 
 
+@pytest.mark.parametrize("reason", ["", " ", "x" * 501])
+def test_blank_and_long_reasons_are_refused_and_not_saved(recording, reason):
+    before = on_disk(recording)
+    with pytest.raises(DataFileError, match="the reason has"):
+        recording.skip(reason)
+    with pytest.raises(DataFileError, match="the reason has"):
+        recording.drop(reason)
+    assert on_disk(recording) == before == recording.participant
+
+
 def test_a_dropped_participant_is_not_continued(recording):
     recording.drop("ill")
     with pytest.raises(DataFileError, match="was dropped: ill"):
@@ -251,7 +261,7 @@ def test_conditions_of_the_command_line():
     known, other = conditions_of(["novel", "stick=Joystick"])
     assert (known.title, known.limits) == ("novel controller", "paper")
     assert (other.title, other.limits) == ("Joystick", None)
-    with pytest.raises(DataFileError, match="Give another one with its title"):
+    with pytest.raises(DataFileError, match="another one with its title"):
         conditions_of(["nowel"])
 
 
