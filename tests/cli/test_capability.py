@@ -106,6 +106,19 @@ def test_an_environment_makes_base_poses_infeasible(made, tcs_command, tmp_path)
     assert ran.json["best"] == best
     assert ran.json["rejected"] >= 1
     assert ran.json["best_in_environment"]["score"] <= best["score"]
+    judged = ("--judge", best["x"] + 3.0, 0.0, 0.0, "--error-samples", 20, "--task-error", 0.02)
+    words = ("capability", "merge", made[0], *task, *judged)
+    ran = tcs_command(*words, "--environment", environment, "--task-at", 1, 0, 0, "--json")
+    found, far = ran.json["success"]
+    assert found["base"] == ran.json["best_in_environment"]
+    assert (found["samples"], far["complete"], far["positions"]) == (20, 0.0, 0.0)
+    assert 0.0 < found["complete"] <= found["positions"] <= 1.0
+    assert "score" not in far["base"]
+    assert tcs_command(*words).code == 2
+    words = (*words[:-1], -0.02, "--environment", environment)
+    ran = tcs_command(*words)
+    assert ran.code == 1
+    assert ran.err.startswith("tcs: errors: task_position")
 
 
 def test_merge_at_a_located_task(tcs_command, made, tmp_path):

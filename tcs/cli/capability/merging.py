@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tcs.cli import options
+from tcs.cli.capability.errors import ErrorOptions
 from tcs.cli.capability.groups import PICTURE, TORSO, Map, check_picture
 from tcs.cli.option_groups import expand_options
 from tcs.files.writing import check_writable
@@ -97,6 +98,8 @@ def merge_maps(
         ),
     ] = None,
     located: Annotated[Path | None, options.LOCATED] = None,
+    *,
+    under_error: ErrorOptions,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -118,6 +121,10 @@ def merge_maps(
     for option, value in (("--task-at", task_at), ("--robot", robot)):
         if value is not None and environment is None:
             raise typer.BadParameter("requires --environment.", param_hint=option)
+    if under_error.given and environment is None:
+        raise typer.BadParameter(
+            "errors and --judge require --environment.", param_hint="--environment"
+        )
     if task.direction_deg % 90:
         raise typer.BadParameter("must be a multiple of 90.", param_hint="--direction-deg")
     if out is not None:
@@ -150,6 +157,8 @@ def merge_maps(
         )
         base, rejected = around.best(task_map)
         result |= {"best_in_environment": base.to_json(), "rejected": rejected}
+        if under_error.given:
+            result["success"] = under_error.judged(around, grasps, base)
     if located is not None:
         result |= _at_located(located, task_map)
     terminal.print_result(result, capability_tables.report_merged, as_json=as_json)

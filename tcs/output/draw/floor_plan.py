@@ -69,7 +69,9 @@ def draw_cells(axes: Axes, places: PlaceMap, values: NDArray[np.float64], most: 
             for j, (y0, y1) in enumerate(pairwise(edges[1]))
             if places.excluded[i, j]
         ]
-        hatched = PolyCollection(corners, facecolors=EMPTY, edgecolors=BLOCKED, hatch=_EXCLUDED)
+        hatched = PolyCollection(
+            corners, facecolors=EMPTY, edgecolors=BLOCKED, hatch=_EXCLUDED, linewidths=0.0
+        )
         axes.add_collection(hatched, autolim=False)
     scored = np.ma.masked_less_equal(values, 0.0)
     return axes.pcolormesh(*edges, scored.T, cmap=SCALE, vmin=0.0, vmax=most, rasterized=True)

@@ -85,6 +85,14 @@ def report_merged(result: dict[str, Any]) -> None:
             f"best in the environment {_base_pose(result['best_in_environment'])}; "
             f"{result['rejected']} better ones are infeasible there"
         )
+    for one in result.get("success", ()):
+        low, high = one["complete_ci95"]
+        base = one["base"]
+        typer.echo(
+            f"base x {base['x']:.2f} m, y {base['y']:.2f} m, yaw {base['yaw_deg']:.1f} deg under "
+            f"error: the whole task in {one['complete']:.1%} of {one['samples']} samples (95 % "
+            f"between {low:.1%} and {high:.1%}), {one['positions']:.1%} of the positions"
+        )
     if "best_under_error" in result:
         best = result["best_under_error"]
         typer.echo(

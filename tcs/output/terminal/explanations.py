@@ -94,8 +94,9 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
     )
     out.print(f"Cost {fix['cost']:.2f}, at {_weights(result['weights'], fix)}.")
     if fix["route"] != result["weights"]["route"]:
+        start = "in collision" if explained["reason"] != "excluded" else "where nothing was scored"
         out.print(
-            "Travel is measured in straight lines: the base starts in collision, so no path exists."
+            f"Travel is measured in straight lines: the base starts {start}, so no path exists."
         )
 
 

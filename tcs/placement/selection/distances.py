@@ -196,8 +196,8 @@ class LatticeDistances(Distances):
             if not len(entries):
                 raise SelectionError(
                     f"Current state: by the scores, the base is in collision at ({x:.2f}, {y:.2f}) "
-                    "m, or was not to stand there, so no path around the furniture starts there. "
-                    "Check the position, or use straight lines."
+                    "m, or a constraint excluded the position, so no path around the furniture "
+                    "starts there. Check the position, or use straight lines."
                 )
         else:
             i, j = np.indices((nx, ny))
