@@ -67,10 +67,14 @@ def kept_conditions(keep: tuple[str, ...], now: Mapping[str, float], grid: Grid)
         grid: The grid.
 
     Raises:
-        UnknownNameError: If the grid has no such axis.
+        UnknownNameError: If the grid has no such axis, or no axis with a present value.
         SelectionError: As of `axis_constraints`.
     """
     conditions = []
+    if keep:
+        for name in now:
+            # A misspelt name would leave its axis without a value.
+            axis_named(grid, name, where="present values")
     for name in keep:
         axis = axis_named(grid, name, where="keep")
         index, _ = _present(axis, now)

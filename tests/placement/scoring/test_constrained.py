@@ -9,13 +9,19 @@ import numpy as np
 import pytest
 
 import tcs
-from tcs.errors import SelectionError, StoreError
+from tcs.errors import SelectionError, StoreError, UnknownNameError
 from tcs.model.grid import Grid
-from tcs.placement.constraints import Footprint, constraint_texts, scored_constraints
+from tcs.placement.constraints import (
+    Footprint,
+    constraint_texts,
+    excluded_configurations,
+    scored_constraints,
+)
 from tcs.placement.scoring import rebuild_scene, sweep
 from tcs.placement.scoring.sweep import SHORT_GAP, _scored_runs
 from tcs.placement.tables import Reason
 from tcs.placement.tables.place_map import PlaceMap
+from tests.placement.tables.small import small_grid
 
 CORNER = tcs.Region(((0.4, 0.3), (0.85, 0.3), (0.85, 1.2), (0.4, 1.2)))
 """A part of the strip on the left of the wheelchair."""
@@ -146,6 +152,21 @@ def test_an_axis_to_keep_has_one_value(small_environment):
     assert rebuild_scene(file)[0].grid == Grid.from_dict(file.grid)
     with pytest.raises(SelectionError, match=r"keep torso: the current state lacks its value"):
         tcs.score("shaving", small_environment, constraints=keep)
+    with pytest.raises(UnknownNameError, match=r"present values: .*'tors'.*Did you mean 'torso'"):
+        tcs.score("shaving", small_environment, constraints=keep, now={"tors": 0.2})
+
+
+def test_all_states_and_torso_levels_of_a_base_pose_are_excluded():
+    grid, shapes = small_grid(bed=2, head=3, yaws=3), Footprint((-0.1, -0.3), (0.3, 0.1), 0.0)
+    region = tcs.Region(((-0.4, 0.2), (-0.1, 0.2), (-0.1, 0.6)))
+    excluded = excluded_configurations((region,), shapes, grid)
+    for h in range(grid.size):
+        at = grid.configuration(h)
+        base = np.array([[at.base_x, at.base_y, at.base_yaw]])
+        assert excluded[h] == shapes.overlaps(region, base)[0]
+    assert 0 < excluded.sum() < grid.size
+    far = tcs.Region(((9, 9), (9, 10), (10, 9)))
+    assert excluded_configurations((far,), shapes, grid) is None
 
 
 def test_forbidding_everything_is_refused(small_environment):
