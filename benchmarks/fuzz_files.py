@@ -347,12 +347,12 @@ def _urdf(path: Path, number: int) -> Scored:
 
 def _mesh(path: Path, number: int) -> None:
     """Convert a mesh for Drake, and fit primitives to one in ten."""
-    from tcs.model.robots.fitting.division import Target, fit_triangles
+    from tcs.model.robots.fitting.covering import Target, fit_triangles
     from tcs.model.robots.urdf.meshes import as_obj
 
     for body, triangles in _read_mesh(path).items():
         if number % 10 == 0:
-            fit_triangles(body, triangles, Target(excess=1.4, max_shapes=2))
+            fit_triangles(body, triangles, Target(protrusion=0.01, max_shapes=8))
     as_obj(path)
 
 

@@ -1,12 +1,14 @@
 """Fit the collision primitives of a robot, or find the pairs of bodies that need no check.
 
     python scripts/fit_primitives.py pr2            rewrites the primitives file of its YAML file
-    python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry
+    python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry,
+                                                    and keeps groups made by hand
     python scripts/fit_primitives.py tiago base_link=6 ...     fits these bodies again, with up to
                                                     so many shapes, and keeps those of the others
 
 The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
-With `--pairs` the last line says how many postures the shapes block although the surfaces are free.
+The last lines say how many postures the shapes block although the surfaces are free of
+self-collision, and of random boxes.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, write_primitives
 from tcs.model.robots.fitting import fit_robot, refit
-from tcs.model.robots.self_collision import blocked_by_shapes, propose_disabled_pairs
+from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
 
 
 def main() -> int:
@@ -40,9 +42,10 @@ def main() -> int:
         elif more:
             shapes = refit(robot, {body: int(most) for body, most in more})
             write_primitives(Path(robot.primitives), shapes)
-            print(blocked_by_shapes(robot).text())
+            print_blocked(robot)
         else:
             rewrite_primitives(robot)
+            print_blocked(robot)
     except TcsError as error:
         print(error, file=sys.stderr)
         return 1
@@ -65,21 +68,28 @@ def rewrite_primitives(robot: RobotFile) -> None:
 
 def rewrite_pairs(robot: RobotFile, path: Path) -> None:
     """Find the pairs, write them into the YAML file, and print what the shapes block."""
-    proposed = propose_disabled_pairs(robot)
+    renewed = renewed_groups(robot)
     groups = [
         {
             "reason": group.reason,
             "limits": group.limits,
+            **({"ranges": {n: list(r) for n, r in group.ranges.items()}} if group.ranges else {}),
             "pairs": [list(pair) for pair in group.pairs],
         }
-        for group in proposed
+        for group in renewed
     ]
     kept, _, _ = path.read_text(encoding="utf-8").partition("\ndisabled_groups:")
     entry = yaml.safe_dump(
         {"disabled_groups": groups}, sort_keys=False, width=95, default_flow_style=None
     )
     path.write_text(f"{kept.rstrip()}\n\n{entry}", encoding="utf-8")
-    print(blocked_by_shapes(robot.model_copy(update={"disabled_groups": proposed})).text())
+    print_blocked(robot.model_copy(update={"disabled_groups": renewed}))
+
+
+def print_blocked(robot: RobotFile) -> None:
+    """Print what the shapes block although the surfaces are free."""
+    print(blocked_by_shapes(robot).text())
+    print(blocked_at_boxes(robot).text())
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ one; where none is free, it halves the intervals in which joints move far, by a 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tcs.kernel.analytic.pairs import REFINE_SAMPLES, REFINEMENTS
-from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
+from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, SceneArrays
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.scores import (
     ARM_BLOCKED,
@@ -64,6 +65,10 @@ class Verdict:
     that rounding decides."""
 
 
+FAR = 0.01
+"""Distance of bounding spheres beyond the required one [m] at which shapes are not compared."""
+
+
 @dataclass
 class PlacedScene:
     """A scene with the robot at one configuration; all poses are in the arm base A."""
@@ -84,11 +89,32 @@ class PlacedScene:
         """
         required = max(margin, a.pad + b.pad)
         # Bounding spheres well apart make the exact distance unnecessary.
-        if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + 0.01:
+        if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + FAR:
             return False
         excess = distance(a, b) - required
         self.clearance = min(self.clearance, abs(excess))
         return excess < 0.0
+
+    def any_touch(
+        self, first: list[Placed], others: list[Placed], checked: BoolArray, margin: float
+    ) -> bool:
+        """Return whether any checked pair of shapes collides.
+
+        Args:
+            first: n shapes.
+            others: m shapes.
+            checked: Whether each pair is checked, shape (n, m).
+            margin: Distance that they must keep without paddings [m].
+        """
+        if not (first and others):
+            return False
+        p, sphere, pad = (_column(first, name)[:, None] for name in ("p", "sphere", "pad"))
+        q, reach, more = (_column(others, name)[None] for name in ("p", "sphere", "pad"))
+        near = (
+            np.linalg.norm(p - q, axis=2) - sphere - reach <= np.maximum(margin, pad + more) + FAR
+        )
+        pairs = np.argwhere(near & checked)
+        return any(self.touches(first[i], others[j], margin) for i, j in pairs)
 
     def arm_at(self, q: FloatArray) -> list[Placed]:
         """Return the arm's shapes in A at joint angles q [rad]."""
@@ -102,39 +128,29 @@ class PlacedScene:
         others = self.body if with_body else self.environment
         checked = self.scene.arm_vs_body if with_body else self.scene.arm_vs_environment
         margin = self.scene.self_margin if with_body else self.scene.margin
-        shapes = shapes_of(self.scene.arm, 0)
-        return any(
-            self.touches(shapes[i].moved(X_A7), others[j], margin)
-            for i in range(len(shapes))
-            if self.scene.arm.frame[i] == 7
-            for j in range(len(others))
-            if checked[i, j]
-        )
+        held = self.scene.arm.frame == 7
+        shapes = [s.moved(X_A7) for s in itertools.compress(shapes_of(self.scene.arm, 0), held)]
+        return self.any_touch(shapes, others, checked[held], margin)
 
     def arm_touches(self, q: FloatArray) -> bool:
         """Return whether the arm at joint angles q touches the environment, the body or itself.
 
         Contacts of the gripper with environment and body are left to `gripper_touches`.
         """
-        arm, frame, scene = self.arm_at(q), self.scene.arm.frame, self.scene
-        pairs = [
-            (arm[i], other, margin)
-            for i in range(len(arm))
-            if frame[i] < 7
-            for others, checked, margin in (
-                (self.environment, scene.arm_vs_environment, scene.margin),
-                (self.body, scene.arm_vs_body, scene.self_margin),
-            )
-            for j, other in enumerate(others)
-            if checked[i, j]
-        ]
-        pairs += [
-            (arm[i], arm[j], scene.self_margin)
-            for i in range(len(arm))
-            for j in range(i)
-            if scene.arm_vs_arm[i, j] and min(frame[i], frame[j]) < 7
-        ]
-        return any(self.touches(a, b, margin) for a, b, margin in pairs)
+        arm, scene = self.arm_at(q), self.scene
+        free = scene.arm.frame < 7
+        links = list(itertools.compress(arm, free))
+        once = np.tril(scene.arm_vs_arm, -1) & (free[:, None] | free[None])
+        return (
+            self.any_touch(links, self.environment, scene.arm_vs_environment[free], scene.margin)
+            or self.any_touch(links, self.body, scene.arm_vs_body[free], scene.self_margin)
+            or self.any_touch(arm, arm, once, scene.self_margin)
+        )
+
+
+def _column(shapes: list[Placed], name: str) -> FloatArray:
+    """Return one attribute of shapes, shape (n, ...)."""
+    return np.array([getattr(shape, name) for shape in shapes])
 
 
 def placed_scene(
@@ -159,11 +175,8 @@ def placed_scene(
         body=[s.moved(X_AB) for s in shapes_of(scene.body, torso)],
         X_AG=compose(X_AW, (scene.goal_R[state, goal], scene.goal_p[state, goal])),
     )
-    blocked = any(
-        placed.touches(placed.body[i], placed.environment[j], scene.margin)
-        for i in range(len(placed.body))
-        for j in range(len(placed.environment))
-        if scene.body_vs_environment[i, j]
+    blocked = placed.any_touch(
+        placed.body, placed.environment, scene.body_vs_environment, scene.margin
     )
     return placed, blocked
 

@@ -20,6 +20,7 @@ from tcs.model.robots.primitives import Primitive, write_primitives
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.self_collision import (
     DRAWS,
+    blocked_at_boxes,
     blocked_by_shapes,
     free_posture,
     propose_disabled_pairs,
@@ -129,12 +130,13 @@ def draft_robot(
         if rest is None:
             remarks.append(f"rest: all of {DRAWS} postures of the arm are in self-collision")
         robot = robot.model_copy(update={"rest": rest or {}})
-        blocked = blocked_by_shapes(robot)
+        blocked, at_boxes = blocked_by_shapes(robot), blocked_at_boxes(robot)
     worst = max(fits, key=lambda found: found.fit.excess)
     remarks += [
         f"primitives: {len(primitives)}; those of '{worst.body}' exceed its hull most, "
         f"{worst.fit.excess:.2f} times",
         f"self-collision: {blocked.text()}",
+        f"obstacles: {at_boxes.text()}",
         "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
         "check that the gripper is open and a second arm out of the way",
         f"root: '{model.root}' must be on the floor, z up, x forward",

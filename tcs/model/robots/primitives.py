@@ -17,6 +17,7 @@ from tcs.errors import RobotError
 from tcs.files.quantities import POSITION, PRIMITIVES, SIZE
 from tcs.files.reading import read_text
 from tcs.files.writing import whole_file
+from tcs.model.robots.cutting import halved, longest_edges
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -25,6 +26,8 @@ Kind = Literal["sphere", "capsule", "box"]
 SIZES: dict[str, int] = {"sphere": 1, "capsule": 2, "box": 3}
 """Length of `size` for each type of shape."""
 
+FINEST = 1e-4
+"""Edge of the pieces at which the cutting of triangles ends [m]."""
 MAX_BYTES = 10 * 1024**2
 """Most bytes of a file of primitives: a hundred times the largest that ships."""
 
@@ -173,10 +176,11 @@ def quaternion_of_rpy(rpy: Iterable[float]) -> tuple[float, float, float, float]
 
 
 def enclosed(primitives: Iterable[Primitive], triangles: FloatArray) -> BoolArray:
-    """Return which triangles lie wholly in at least one of the primitives.
+    """Return which triangles lie wholly in the union of the primitives.
 
-    A triangle whose corners lie in different primitives does not count: its middle could protrude
-    between them.
+    A triangle does if it can be cut into pieces that each lie in one primitive, which is convex. It
+    is not sufficient that its corners do: its middle could protrude between two primitives. Cutting
+    ends with a corner that is in no primitive, or with pieces of FINEST, which do not count.
 
     Args:
         primitives: Primitives of one body.
@@ -185,9 +189,20 @@ def enclosed(primitives: Iterable[Primitive], triangles: FloatArray) -> BoolArra
     Returns:
         Booleans, shape (n,).
     """
-    inside = np.zeros(len(triangles), dtype=np.bool_)
-    for primitive in primitives:
-        inside |= primitive.contains_triangles(triangles)
+    shapes = tuple(primitives)
+    inside = np.ones(len(triangles), dtype=np.bool_)
+    pieces, triangle = triangles, np.arange(len(triangles))
+    while len(pieces):
+        whole = np.zeros(len(pieces), dtype=np.bool_)
+        touched = np.zeros(pieces.shape[:2], dtype=np.bool_)
+        for shape in shapes:
+            corners = shape.contains(pieces)
+            whole |= corners.all(axis=1)
+            touched |= corners
+        out = ~whole & (~touched.all(axis=1) | (longest_edges(pieces) < FINEST))
+        inside[triangle[out]] = False
+        left = ~whole & inside[triangle]
+        pieces, triangle = halved(pieces[left]), np.tile(triangle[left], 2)
     return inside
 
 
@@ -195,12 +210,12 @@ def union_volume(primitives: Iterable[Primitive], samples: int = 20_000, seed: i
     """Return the volume of the union of the primitives of one body [m^3].
 
     Each primitive is sampled uniformly; a point that lies in m of them counts 1/m. The volume of
-    one primitive is exact; the standard error of a union is at most half the summed volume over the
-    square root of the samples per primitive.
+    one primitive is exact; the standard error of a union of primitives of one size is at most
+    half the summed volume over the square root of twice the samples.
 
     Args:
         primitives: Primitives of one body.
-        samples: Points per primitive.
+        samples: Points in each of two primitives; more than two share twice as many.
         seed: Seed of the points; the same seed gives the same volume.
     """
     shapes = tuple(primitives)
@@ -209,7 +224,7 @@ def union_volume(primitives: Iterable[Primitive], samples: int = 20_000, seed: i
     rng = np.random.default_rng(seed)
     total = 0.0
     for shape in shapes:
-        points = _points_in(shape, samples, rng)
+        points = _points_in(shape, 2 * samples // max(2, len(shapes)), rng)
         count = sum(other.contains(points).astype(np.int64) for other in shapes if other != shape)
         total += shape.volume * float(np.mean(1.0 / (1.0 + count)))
     return total

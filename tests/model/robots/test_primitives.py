@@ -5,7 +5,8 @@ import pytest
 
 from tcs.errors import RobotError
 from tcs.model.robots import Primitive, read_primitives, union_volume, write_primitives
-from tcs.model.robots.primitives import quaternion_of_rpy, rotation_of
+from tcs.model.robots.cutting import cut, longest_edges
+from tcs.model.robots.primitives import enclosed, quaternion_of_rpy, rotation_of
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
@@ -72,6 +73,40 @@ def test_triangle_needs_all_corners():
     triangle = np.array([[[0.0, 0, 0], [0.9, 0, 0], [1.1, 0, 0]]])
     assert not shape().contains_triangles(triangle)[0]
     assert shape().shrunk(-0.2).contains_triangles(triangle)[0]
+
+
+def test_triangle_may_be_enclosed_piece_by_piece():
+    first, second = shape(size=(2.2, 1.0, 1.0)), shape(size=(2.2, 1.0, 1.0), xyz=(2.0, 0.0, 0.0))
+    triangle = np.array([[[-1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [1.0, 0.4, 0.0]]])
+    assert not first.contains_triangles(triangle)[0]
+    assert not second.contains_triangles(triangle)[0]
+    assert enclosed([first, second], triangle)[0]
+
+
+def test_a_gap_between_primitives_is_found():
+    """The corners of the triangle are enclosed; its middle protrudes through a gap of 2 mm."""
+    first, second = shape(size=(1.998, 1.0, 1.0)), shape(size=(1.998, 1.0, 1.0), xyz=(2.0, 0, 0))
+    triangle = np.array([[[-0.9, 0.0, 0.0], [2.9, 0.0, 0.0], [0.5, 0.4, 0.0]]])
+    assert all(np.any([s.contains(corner) for s in (first, second)]) for corner in triangle[0])
+    assert not enclosed([first, second], triangle)[0]
+
+
+def test_primitives_that_only_just_touch_do_not_enclose_what_crosses():
+    first, second = shape(size=(2.0, 1.0, 1.0)), shape(size=(2.0, 1.0, 1.0), xyz=(2.0, 0.0, 0.0))
+    triangle = np.array([[[-0.9, 0.0, 0.0], [2.7, 0.0, 0.0], [0.4, 0.3, 0.0]]])
+    assert not enclosed([first, second], triangle)[0]
+
+
+def test_cutting_keeps_the_surface():
+    triangles = np.random.default_rng(0).normal(size=(5, 3, 3))
+    pieces = cut(triangles, 0.3)
+    assert longest_edges(pieces).max() <= 0.3
+
+    def area(corners):
+        sides = corners[:, 1:] - corners[:, :1]
+        return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
+
+    assert area(pieces) == pytest.approx(area(triangles), rel=1e-12)
 
 
 def test_file_round_trip(tmp_path):

@@ -250,18 +250,26 @@ def test_the_pr2s_wrist_grazes_its_forearm_in_the_middle_of_its_range_only(pr2):
     assert -0.6 < crossing.min() < crossing.max() < -0.24
 
 
-@pytest.mark.parametrize("body", ["panda_hand", "panda_leftfinger"])
-def test_pandas_hand_clears_its_forearm_within_the_range_of_its_wrist(body):
+def test_pandas_wrist_keeps_its_range_because_the_hand_is_checked_against_the_forearm():
+    """The hand folded back meets link 5 below 0.24 rad of joint 6, at most angles of joint 7."""
     robot = load_robot("panda")
-    assert {body, "panda_link5"} in [set(pair) for pair in robot.disabled_pairs]
-    lower, _ = robot.joint_limits()["panda_joint6"]
-    assert lower > robot.without_ranges.joint_limits()["panda_joint6"][0]
-    turns = np.linspace(*robot.joint_limits()["panda_joint7"], 8)
-    opened = robot.grippers["open"]
-    rest = robot.with_mimics(opened)
-    postures = [rest | {"panda_joint6": lower, "panda_joint7": q} for q in turns]
-    # Measured 3.2 mm over 600 postures; farther up the range they are farther apart.
-    assert mesh_distances(robot, (body, "panda_link5"), postures).min() > 0.003
+    assert robot.joint_limits() == robot.without_ranges.joint_limits()
+    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    fingers = ("panda_leftfinger", "panda_rightfinger")
+    assert not off & {frozenset((body, "panda_link5")) for body in ("panda_hand", *fingers)}
+    pair, judge = ("panda_hand", "panda_link5"), SelfCollision(robot)
+    rest = robot.with_mimics(robot.joint_positions() | robot.rest)
+    postures = [
+        rest | {"panda_joint6": bend, "panda_joint7": turn}
+        for bend in (0.0, 0.25, 0.45)
+        for turn in np.linspace(*robot.joint_limits()["panda_joint7"], 5)
+    ]
+    distances = mesh_distances(robot, pair, postures)
+    touching = np.array([tuple(sorted(pair)) in judge.touching(at) for at in postures])
+    assert np.all(touching[distances < robot.self_margin])
+    assert np.any(distances <= 0.0)
+    # The boxes around both would touch up to 0.67 rad.
+    assert not touching[-5:].any()
 
 
 @pytest.mark.parametrize(("name", "side"), [("pr2", "l"), ("pr2_right", "r")])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,6 +158,48 @@ def enclose(body: str, points: FloatArray, kind: str, R: FloatArray) -> Primitiv
         size=size,
         xyz=(float(centre[0]), float(centre[1]), float(centre[2])),
         quaternion=(w, x, y, z),
+    )
+
+
+def enclose_axis(body: str, first: FloatArray, last: FloatArray, radius: float) -> Primitive:
+    """Return the capsule around an axis, its figures rounded.
+
+    Args:
+        body: Name of the body.
+        first: One end of the axis [m], shape (3,).
+        last: The other end [m], shape (3,); the same for a sphere.
+        radius: [m].
+    """
+    length = float(np.linalg.norm(last - first))
+    along = (last - first) / length if length else np.eye(3)[2]
+    w, x, y, z = _rounded_quaternion(_frame_with_z(along))
+    centre = np.round((first + last) / 2, _DECIMALS) + 0.0
+    return Primitive(
+        body=body,
+        kind="capsule",
+        size=(_rounded_up(radius), max(_rounded_up(length), _THINNEST)),
+        xyz=(float(centre[0]), float(centre[1]), float(centre[2])),
+        quaternion=(w, x, y, z),
+    )
+
+
+def moved(shape: Primitive, body: str, R: FloatArray, p: FloatArray) -> Primitive:
+    """Return a primitive in the frame of another body, grown by what rounding may take off.
+
+    Args:
+        shape: The primitive P on a body B.
+        body: Name of the other body C.
+        R: R_CB, shape (3, 3).
+        p: p_CoBo_C [m], shape (3,).
+    """
+    if np.allclose(R, np.eye(3), rtol=0, atol=1e-12) and not p.any():
+        return replace(shape, body=body)
+    centre = np.round(R @ np.array(shape.xyz) + p, _DECIMALS) + 0.0
+    return replace(
+        shape.shrunk(-2 * _STEP),
+        body=body,
+        xyz=(float(centre[0]), float(centre[1]), float(centre[2])),
+        quaternion=_rounded_quaternion(R @ shape.rotation),
     )
 
 

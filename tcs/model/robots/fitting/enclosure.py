@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.model.robots.cutting import cut
 from tcs.model.robots.fitting.bounding import hull_volume
 from tcs.model.robots.primitives import Primitive, enclosed, union_volume
 from tcs.model.robots.robot_file import RobotFile
@@ -15,6 +16,9 @@ from tcs.model.robots.urdf import Urdf
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 
 FloatArray = NDArray[np.float64]
+
+_SPACING = 0.01
+"""Spacing of the points that measure how far a surface protrudes [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +30,9 @@ class BodyEnclosure:
         members: Bodies whose surface they must enclose: the body itself, and bodies that are welded
             to it and have no primitives of their own.
         triangles: Number of triangles of those surfaces.
-        outside: Number of triangles that do not lie wholly in one primitive.
-        farthest: Largest distance of such a triangle from the primitive nearest to it [m];
-            infinite if the body has no primitive.
+        outside: Number of triangles that do not lie wholly in the union of the primitives.
+        farthest: Largest distance of a point of such a triangle from the primitive nearest to it,
+            with points at most a centimetre apart [m]; infinite if the body has no primitive.
         hull: Volume of the convex hull of the surfaces [m^3].
         union: Volume of the primitives together [m^3].
     """
@@ -113,8 +117,8 @@ def _body_enclosure(
     out = surface[~enclosed(shapes, surface)]
     farthest = 0.0
     if len(out):
-        # The shapes are convex, so the farthest corner of a triangle decides.
-        beyond = [shape.distance(out).max(axis=1) for shape in shapes]
+        points = np.unique(cut(out, _SPACING).reshape(-1, 3), axis=0)
+        beyond = [shape.distance(points) for shape in shapes]
         farthest = float(np.min(beyond, axis=0).max()) if beyond else float("inf")
     return BodyEnclosure(
         body=body,

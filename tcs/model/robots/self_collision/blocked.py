@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from tcs.model.robots.extras import model_with_extras
@@ -18,7 +19,7 @@ from tcs.model.robots.self_collision.postures import sample_positions
 
 @dataclass(frozen=True)
 class Blocked:
-    """Postures that are free of self-collision by the surfaces, and those that shapes block.
+    """Postures that are free of contact by the surfaces, and those that shapes block.
 
     Attributes:
         free: Number of random postures whose surfaces are free of contact.
@@ -26,11 +27,13 @@ class Blocked:
             group of disabled pairs keeps it.
         pairs: The pairs of bodies whose shapes touch, and in how many of these postures, most
             frequent first.
+        partner: What the arm may touch: the robot itself, or random boxes.
     """
 
     free: int
     blocked: int
     pairs: tuple[tuple[BodyPair, int], ...]
+    partner: str = "self-collision"
 
     @property
     def fraction(self) -> float:
@@ -44,7 +47,7 @@ class Blocked:
             for (first, second), count in self.pairs[:3]
         )
         found = (
-            f"of {self.free:,} random postures whose surfaces are free of self-collision, the "
+            f"of {self.free:,} random postures whose surfaces are free of {self.partner}, the "
             f"shapes block {self.fraction:.1%}"
         )
         return f"{found}: {worst}" if worst else found
@@ -72,12 +75,10 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     limits, off = robot.joint_limits(), {frozenset(pair) for pair in robot.disabled_pairs}
     narrowed = {frozenset(p) for g in robot.disabled_groups if g.ranges for p in g.pairs}
-    plant, others = SelfCollision(robot), robot.with_mimics(robot.joint_positions())
-    scored = [*robot.arm_joints, *([robot.torso_joint] if robot.torso_joint else [])]
+    plant = SelfCollision(robot)
     free = blocked = 0
     pairs = Counter[BodyPair]()
-    for sample in sample_positions(robot.without_ranges, postures, seed):
-        positions = others | {name: sample[name] for name in scored}
+    for positions in drawn_positions(robot, postures, seed):
         is_within = all(limits[n][0] <= positions[n] <= limits[n][1] for n in robot.arm_joints)
         exempt = off if is_within else off - narrowed
         touching = [
@@ -90,5 +91,23 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
         free += 1
         blocked += bool(touching) or not is_within
         pairs.update(touching)
-    ranked = sorted(pairs.items(), key=lambda item: (-item[1], item[0]))
-    return Blocked(free, blocked, tuple(ranked))
+    return Blocked(free, blocked, ranked(pairs))
+
+
+def drawn_positions(robot: RobotFile, postures: int, seed: int) -> Iterator[Mapping[str, float]]:
+    """Yield random positions of arm and torso, all other joints at those of the robot file.
+
+    Args:
+        robot: The robot; ranges of its disabled groups are ignored.
+        postures: Number of postures.
+        seed: Seed of the draws.
+    """
+    others = robot.with_mimics(robot.joint_positions())
+    scored = [*robot.arm_joints, *([robot.torso_joint] if robot.torso_joint else [])]
+    for sample in sample_positions(robot.without_ranges, postures, seed):
+        yield others | {name: sample[name] for name in scored}
+
+
+def ranked(pairs: Counter[BodyPair]) -> tuple[tuple[BodyPair, int], ...]:
+    """Return pairs with their counts, the most frequent first."""
+    return tuple(sorted(pairs.items(), key=lambda item: (-item[1], item[0])))

@@ -132,18 +132,18 @@ class SurfaceDistance:
             # A finer point has a rough point of its surface within the usual spacing.
             far = rough + SPACING
         # The body with more points goes into the tree; each point of the other is one query.
-        many, few = sorted(pair, key=lambda body: -len(self._of(body)))
+        many, few = sorted(pair, key=lambda body: -len(self.points(body)))
         if many not in self._trees:
-            self._trees[many] = cKDTree(self._of(many))
+            self._trees[many] = cKDTree(self.points(many))
         tree = self._trees[many]
         R_AB, p_AB = _relative_pose(self._model, (many, few), positions)
-        points = self._of(few) @ R_AB.T + p_AB
+        points = self.points(few) @ R_AB.T + p_AB
         # Queries of far points are the slowest, and do not change the result.
         points = points[((points > tree.mins - far) & (points < tree.maxes + far)).all(axis=1)]
         near, _ = tree.query(points, distance_upper_bound=far)
         return min(float(near.min(initial=far)), far)
 
-    def _of(self, body: str) -> FloatArray:
+    def points(self, body: str) -> FloatArray:
         """Return points on the surface of a body, corners included, in its frame [m], (n, 3)."""
         if body not in self._points:
             triangles = self._triangles[body]

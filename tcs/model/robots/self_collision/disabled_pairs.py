@@ -24,6 +24,9 @@ from tcs.model.robots.self_collision.postures import sample_positions
 
 FloatArray = NDArray[np.float64]
 
+_NEIGHBOURS = "neighbours: one joint connects them"
+_APART = "cannot meet: within the {} joint limits"
+_ALWAYS = "primitives overlap in each of"
 _MOST_JOINTS = 3
 """Most joints between two bodies for which the closest approach is searched."""
 
@@ -86,6 +89,27 @@ def propose_disabled_pairs(
     return found.groups(postures)
 
 
+def renewed_groups(robot: RobotFile) -> tuple[DisabledGroup, ...]:
+    """Return the proposed groups of a robot, after those of its file that were made by hand.
+
+    A group whose reason is not one of `propose_disabled_pairs` was made by hand. Its pairs are left
+    out of the others.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    found = (_NEIGHBOURS, *(_APART.format(limits) for limits in ("hard", "soft")), _ALWAYS)
+    kept = tuple(g for g in robot.disabled_groups if not g.reason.startswith(found))
+    by_hand = {frozenset(pair) for group in kept for pair in group.pairs}
+    proposed = (
+        group.model_copy(
+            update={"pairs": tuple(p for p in group.pairs if frozenset(p) not in by_hand)}
+        )
+        for group in propose_disabled_pairs(robot)
+    )
+    return (*kept, *(group for group in proposed if group.pairs))
+
+
 def _closest_approach(
     surfaces: tuple[SurfaceDistance, SurfaceDistance], pair: BodyPair, robot: RobotFile, seed: int
 ) -> float:
@@ -114,16 +138,16 @@ class _Found:
     def groups(self, postures: int) -> tuple[DisabledGroup, ...]:
         """Return the groups that are not empty."""
         apart = (
-            "cannot meet: within the {} joint limits their surfaces stay {:.0f} mm apart or more; "
+            _APART + " their surfaces stay {:.0f} mm apart or more; "
             "only the volume that primitives add to them touches"
         )
         hard, soft = (
             apart.format(limits, np.floor(min(pairs.values(), default=0.0) * 1e3))
             for limits, pairs in (("hard", self.apart_hard), ("soft", self.apart_soft))
         )
-        neighbours = "neighbours: one joint connects them, and its limits keep them apart"
+        neighbours = _NEIGHBOURS + ", and its limits keep them apart"
         always = (
-            f"primitives overlap in each of {postures} postures: parts of one joint assembly, so a "
+            f"{_ALWAYS} {postures} postures: parts of one joint assembly, so a "
             "check would forbid every posture"
         )
         groups = (

@@ -1,0 +1,147 @@
+"""Boxes and capsules that grow from inside a solid until they protrude as far as they may."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tcs.model.robots.fitting.bounding import hull_corners
+from tcs.model.robots.fitting.solid import Solid
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+_STEPS = (8, 4, 2, 1)
+"""Cells by which a side of a box moves, in one round after the other."""
+_BORDER = 3
+"""Cells around the space that a grid covers."""
+_SAMPLE = 20_000
+"""Points of a solid that give its extent along other axes."""
+_AXIS_SAMPLES = 24
+"""Points of a capsule's axis at which its radius is measured."""
+_DRAWN = 8
+"""Capsules drawn for each one that is kept."""
+
+
+def boxes_in(
+    solid: Solid, protrusion: float, R: FloatArray, seeds: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Return boxes along given axes that reach no farther out of a solid than allowed.
+
+    Each grows from a seed, side after side in an order of its own, until no side can move.
+
+    Args:
+        solid: The solid.
+        protrusion: Greatest distance of a point of a box from the solid [m].
+        R: Axes of the boxes as columns, shape (3, 3).
+        seeds: Points to start from [m], shape (n, 3); those outside are left out.
+        rng: Source of the orders.
+
+    Returns:
+        Least and greatest coordinates along the axes [m], shape (m, 2, 3).
+    """
+    allowed = solid.outside <= protrusion
+    points = solid.points(allowed)
+    if len(points) > _SAMPLE:
+        points = points[rng.choice(len(points), _SAMPLE, replace=False)]
+    seen, border = hull_corners(points) @ R, _BORDER * solid.pitch
+    low, high = seen.min(axis=0) - border, seen.max(axis=0) + border
+    count = np.ceil((high - low) / solid.pitch).astype(np.int64) + 1
+    ticks = [
+        (low[k] + solid.pitch * np.arange(count[k]))[:, None] * R[:, k] / solid.pitch
+        for k in range(3)
+    ]
+    start = -solid.origin / solid.pitch
+    index = (
+        ticks[0][:, None, None] + ticks[1][None, :, None] + (ticks[2] + start)[None, None]
+    ).astype(np.float32)
+    outside = ndimage.map_coordinates(
+        solid.outside, np.moveaxis(index, 3, 0), order=1, mode="nearest"
+    )
+    free = outside <= protrusion
+    cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)
+    cells = cells[free[tuple(cells.T)]]
+    grown = np.unique(_grown(~free, cells, rng).reshape(-1, 6), axis=0).reshape(-1, 2, 3)
+    return np.asarray(low + grown * solid.pitch)
+
+
+def _grown(blocked: BoolArray, seeds: IntArray, rng: np.random.Generator) -> IntArray:
+    """Return the first and last cells of boxes without blocked cells, shape (n, 2, 3).
+
+    Args:
+        blocked: Cells that a box must not contain, shape (nx, ny, nz).
+        seeds: Cells from which the boxes grow, shape (n, 3).
+        rng: Source of the order in which the sides of each box move.
+    """
+    counts = np.pad(blocked.astype(np.int32), ((1, 0),) * 3)
+    for k in range(3):
+        np.cumsum(counts, axis=k, out=counts)
+    last, rows = np.array(blocked.shape) - 1, np.arange(len(seeds))
+    boxes = np.stack([seeds, seeds], axis=1)
+    sides = np.argsort(rng.random((len(seeds), 6)), axis=1)
+    for step in _STEPS:
+        growing = np.ones(len(seeds), np.bool_)
+        while growing.any():
+            moved = np.zeros(len(seeds), np.bool_)
+            for turn in range(6):
+                end, axis = np.divmod(sides[:, turn], 3)
+                tried = boxes.copy()
+                tried[rows, end, axis] += np.where(end == 0, -step, step)
+                inside = (tried[:, 0] >= 0).all(axis=1) & (tried[:, 1] <= last).all(axis=1)
+                inside &= growing
+                inside[inside] = _blocked_cells(counts, tried[inside]) == 0
+                boxes[inside] = tried[inside]
+                moved |= inside
+            growing = moved
+    return boxes
+
+
+def _blocked_cells(counts: NDArray[np.int32], boxes: IntArray) -> IntArray:
+    """Return the number of blocked cells in boxes, from sums over all cells before each, (n,)."""
+    (a, b, c), (d, e, f) = boxes[:, 0].T, boxes[:, 1].T + 1
+    return np.asarray(
+        counts[d, e, f]
+        - counts[a, e, f]
+        - counts[d, b, f]
+        - counts[d, e, c]
+        + counts[a, b, f]
+        + counts[a, e, c]
+        + counts[d, b, c]
+        - counts[a, b, c]
+    )
+
+
+def capsules_in(
+    solid: Solid, protrusion: float, count: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return large capsules that reach no farther out of a solid than allowed.
+
+    Args:
+        solid: The solid.
+        protrusion: Greatest distance of a point of a capsule from the solid [m].
+        count: Number of capsules.
+        rng: Source of the axes, which connect random points, mostly deep inside.
+
+    Returns:
+        Ends of the axes, shapes (n, 3), and radii, shape (n,) [m]; n is at most `count`.
+    """
+    depth = ndimage.distance_transform_edt(solid.outside <= protrusion) * solid.pitch
+    cells = np.argwhere(depth > 2 * solid.pitch)
+    if not len(cells):
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
+    weight = depth[tuple(cells.T)] ** 3
+    drawn = [rng.choice(len(cells), count * _DRAWN, p=weight / weight.sum()) for _ in range(2)]
+    first, last = cells[drawn[0]], cells[drawn[1]]
+    # Some have no length: spheres.
+    last[: len(last) // 6] = first[: len(first) // 6]
+    along = np.linspace(0.0, 1.0, _AXIS_SAMPLES)[None, :, None]
+    axis = np.rint(first[:, None] * (1 - along) + last[:, None] * along).astype(np.int64)
+    radius = depth[tuple(np.moveaxis(axis, 2, 0))].min(axis=1) - solid.pitch
+    length = np.linalg.norm(last - first, axis=1) * solid.pitch
+    volume = np.where(radius > 2 * solid.pitch, radius**2 * (length + 4 / 3 * radius), 0.0)
+    kept = np.argsort(-volume, kind="stable")[:count]
+    kept = kept[volume[kept] > 0.0]
+    ends = (cell[kept] * solid.pitch + solid.origin for cell in (first, last))
+    return *ends, radius[kept]

@@ -1,0 +1,70 @@
+"""The space that a body fills, on a grid: how far any point lies outside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tcs.model.robots.cutting import cut
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+CLOSING = 0.015
+"""Radius of the smallest ball that the space outside admits [m]: narrower hollows are filled, and
+so is whatever is behind openings narrower than twice this."""
+_BORDER = 3
+"""Cells beyond the space that may be of interest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """The space within the surface of a body, on a grid of points.
+
+    Attributes:
+        outside: Distance of each point from the solid [m], 0 inside, shape (nx, ny, nz).
+        depth: Distance of each point from the space outside [m], 0 there, shape (nx, ny, nz).
+        origin: First point of the grid in the body's frame [m], shape (3,).
+        pitch: Distance of neighbouring points [m].
+    """
+
+    outside: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    origin: FloatArray
+    pitch: float
+
+    def points(self, chosen: BoolArray) -> FloatArray:
+        """Return the positions of chosen points of the grid [m], shape (n, 3)."""
+        return np.asarray(np.argwhere(chosen) * self.pitch + self.origin)
+
+
+def solid_of(triangles: FloatArray, pitch: float, reach: float) -> Solid:
+    """Return the space within triangles, which need not form a closed surface.
+
+    Whatever a ball of radius CLOSING can touch from far away without crossing the surface is
+    outside.
+
+    Args:
+        triangles: Corners [m], shape (n, 3, 3).
+        pitch: Distance of the points of the grid [m].
+        reach: Distance from the surface that the grid must cover [m].
+    """
+    points = np.unique(np.round(cut(triangles, pitch).reshape(-1, 3) / pitch), axis=0)
+    border = int(np.ceil((CLOSING + reach) / pitch)) + _BORDER
+    first = points.min(axis=0) - border
+    size = (points.max(axis=0) - first).astype(np.int64) + border + 1
+    surface = np.zeros(size, np.bool_)
+    surface[tuple((points - first).astype(np.int64).T)] = True
+    fits = ndimage.distance_transform_edt(~surface) * pitch > CLOSING
+    parts, _ = ndimage.label(fits)
+    reached = ndimage.distance_transform_edt(parts != parts[0, 0, 0]) * pitch <= CLOSING
+    empty = reached & ~surface
+    return Solid(
+        outside=(ndimage.distance_transform_edt(empty) * pitch).astype(np.float32),
+        depth=(ndimage.distance_transform_edt(~empty) * pitch).astype(np.float32),
+        origin=first * pitch,
+        pitch=pitch,
+    )

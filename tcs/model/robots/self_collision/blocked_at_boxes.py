@@ -1,0 +1,155 @@
+"""How many postures the shapes of an arm block at boxes that its surface clears."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
+
+from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, Shapes
+from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, closer, pack
+from tcs.model.robots.extras import model_with_extras
+from tcs.model.robots.primitives import Primitive
+from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.self_collision.blocked import Blocked, drawn_positions, ranked
+from tcs.model.robots.self_collision.clearance import (
+    SPACING,
+    SurfaceDistance,
+    carried_triangles,
+)
+from tcs.model.robots.self_collision.plant import BodyPair
+from tcs.model.robots.urdf.pose import pose_in_root
+
+FloatArray = NDArray[np.float64]
+Pose = tuple[FloatArray, FloatArray]
+"""Orientation, shape (3, 3), and position [m], shape (3,)."""
+
+_PARTNER = "box"
+_BOXES = 3
+"""Random boxes around the arm in each posture."""
+_EDGES = (0.02, 0.4)
+"""Least and greatest edge of a box [m]."""
+_MARGIN = 0.001
+"""Distance that shapes and boxes must keep [m], the default of an environment."""
+_TYPES = {"sphere": SPHERE, "capsule": CAPSULE, "box": BOX}
+_FACTORS = {"sphere": (1.0, 1.0, 1.0), "capsule": (1.0, 0.5, 1.0), "box": (0.5, 0.5, 0.5)}
+"""The kernel's half sizes over the sizes of a primitive."""
+
+
+def blocked_at_boxes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -> Blocked:
+    """Return how many postures the arm's shapes block at random boxes that its surface clears.
+
+    Three boxes with edges of 2 to 40 cm are anywhere within reach of the arm, others in each
+    posture. The surface is sampled as points: a box closer to one than their spacing counts as
+    touching, and so does a box whose centre is within the convex hull of a body.
+
+    Args:
+        robot: The robot.
+        postures: Number of random postures.
+        seed: Seed of the draws.
+
+    Raises:
+        RobotError: If the robot's model cannot be used.
+    """
+    model = model_with_extras(robot)
+    surfaces = SurfaceDistance(model, carried_triangles(robot, model))
+    moved = model.links_moved_by(robot.arm_joints[0])
+    shapes = {
+        body: _packed([shape for shape in robot.load_primitives() if shape.body == body])
+        for body in {shape.body for shape in robot.load_primitives()} & moved
+        if surfaces.has(body)
+    }
+    first, last = (model.joints[robot.arm_joints[i]].child for i in (0, -1))
+    drawn = [
+        {body: pose_in_root(model, body, positions) for body in {*shapes, first, last}}
+        for positions in drawn_positions(robot, postures, seed)
+    ]
+    starts = [poses[first][1] for poses in drawn]
+    reach = max(float(np.linalg.norm(poses[last][1] - poses[first][1])) for poses in drawn)
+    rng = np.random.default_rng(seed)
+    free = blocked = 0
+    pairs = Counter[BodyPair]()
+    for poses, start in zip(drawn, starts, strict=True):
+        found = set[str]()
+        for _ in range(_BOXES):
+            box = _random_box(rng, start, reach)
+            struck = {body for body in shapes if _touch(shapes[body], poses[body], box)}
+            if any(_surface_touches(surfaces.points(body), poses[body], box) for body in struck):
+                break
+            found |= struck
+        else:
+            free += 1
+            blocked += bool(found)
+            pairs.update((body, _PARTNER) for body in found)
+    return Blocked(free, blocked, ranked(pairs), "random boxes")
+
+
+def _random_box(rng: np.random.Generator, centre: FloatArray, reach: float) -> FloatArray:
+    """Return a box within reach of a point, packed, shape (17,)."""
+    out = rng.normal(size=3)
+    out *= reach * np.cbrt(rng.random()) / np.linalg.norm(out)
+    half = rng.uniform(*_EDGES, 3) / 2
+    R = Rotation.random(rng=rng).as_matrix()
+    return np.asarray(pack(_shapes([BOX], [half], [R], [centre + out]))[0, 0])
+
+
+def _packed(primitives: list[Primitive]) -> FloatArray:
+    """Return primitives of one body in its frame, packed, shape (n, 17)."""
+    sizes = []
+    for shape in primitives:
+        size = np.zeros(3)
+        size[: len(shape.size)] = shape.size
+        sizes.append(size * np.array(_FACTORS[shape.kind]))
+    types = [_TYPES[shape.kind] for shape in primitives]
+    R, p = ([getattr(s, name) for s in primitives] for name in ("rotation", "xyz"))
+    return np.asarray(pack(_shapes(types, sizes, R, p))[0])
+
+
+def _shapes(types: list[int], sizes: list[FloatArray], R: list[FloatArray], p: list[Any]) -> Shapes:
+    n = len(types)
+    return Shapes(
+        type=np.array(types, np.int8),
+        size=np.array(sizes),
+        pad=np.zeros(n),
+        body=np.zeros(n, np.int16),
+        frame=np.zeros(n, np.int8),
+        R=np.array(R)[None],
+        p=np.array(p, np.float64)[None],
+    )
+
+
+def _touch(shapes: FloatArray, pose: Pose, box: FloatArray) -> bool:
+    """Return whether any of the packed shapes of a body at a pose is closer to a box than 1 mm."""
+    R, p = pose
+    centres = shapes[:, CENTRE : CENTRE + 3] @ R.T + p
+    away = np.linalg.norm(centres - box[CENTRE : CENTRE + 3], axis=1)
+    near = away < shapes[:, BOUND] + box[BOUND] + _MARGIN
+    rows = shapes[near]
+    rows[:, CENTRE : CENTRE + 3] = centres[near]
+    rows[:, ROTATION:] = (R @ rows[:, ROTATION:].reshape(-1, 3, 3)).reshape(-1, 9)
+    return any(closer(rows, i, box[None], 0, _MARGIN) for i in range(len(rows)))
+
+
+def _surface_touches(points: FloatArray, pose: Pose, box: FloatArray) -> bool:
+    """Return whether points of a surface at a pose are close to a box, or enclose its centre.
+
+    Args:
+        points: Points of the surface of a body in its frame [m], shape (n, 3).
+        pose: Pose of the body.
+        box: Packed, shape (17,).
+    """
+    R, p = pose
+    centre, R_box = box[CENTRE : CENTRE + 3], box[ROTATION:].reshape(3, 3)
+    seen = (points @ R.T + p - centre) @ R_box
+    away = np.linalg.norm(np.maximum(np.abs(seen) - box[SIZE : SIZE + 3], 0.0), axis=1)
+    if away.min() < SPACING:
+        return True
+    try:
+        faces = ConvexHull(points).equations
+    except QhullError:
+        return False
+    return bool(np.all(faces[:, :3] @ (R.T @ (centre - p)) + faces[:, 3] <= 0.0))
