@@ -22,6 +22,7 @@ from tcs.model.robots.fitting.bounding import (
     hull_volume,
     tightest_orientation,
 )
+from tcs.model.robots.fitting.filling import fillers
 from tcs.model.robots.fitting.growth import boxes_in, capsules_in
 from tcs.model.robots.fitting.solid import Solid, solid_of
 from tcs.model.robots.primitives import Primitive, union_volume
@@ -46,7 +47,9 @@ _CHOOSING = 4_000
 _COVERED = 0.99
 """Fraction of those pieces at which no further shape is added: the nearest one grows."""
 _DEEP = 0.012
-"""Depth [m] from which on the inside has to be covered too, and spacing of the points there."""
+"""Depth [m] from which on the inside has to be covered too, and least spacing of points there."""
+_SPACINGS = 20
+"""Most points inside along a body."""
 _INSIDE_WEIGHT = 0.05
 """Weight of a point inside, that of a piece of the surface being 1."""
 _SLACK = 0.25
@@ -60,7 +63,7 @@ class Target:
     Attributes:
         protrusion: Distance by which shapes may protrude from the surface [m]. If `max_shapes` do
             not suffice, some protrude farther.
-        max_shapes: Largest number of shapes on one body.
+        max_shapes: Largest number of shapes on one body; a few more may fill its inside.
     """
 
     protrusion: float
@@ -105,6 +108,7 @@ def fit_triangles(body: str, triangles: FloatArray, target: Target) -> Fit:
     shapes = [enclose(body, points, single.kind, single.R)]
     if _mean_protrusion(points, single.volume - hull) > _SLACK * target.protrusion:
         shapes = _covering(body, triangles, points, target)
+    shapes += fillers(body, tuple(shapes), triangles)
     return Fit(primitives=tuple(shapes), hull=hull, union=union_volume(shapes))
 
 
@@ -125,7 +129,8 @@ def _covering(
     pitch = max(target.protrusion / _PER_PROTRUSION, size / _ACROSS)
     solid = solid_of(triangles, pitch, target.protrusion)
     pieces = cut(triangles, max(_PIECE, 2 * pitch))
-    inside = _thinned(solid.points(solid.depth > max(_DEEP, 4 * pitch)), max(_DEEP, size / 20))
+    inside = solid.points(solid.depth > max(_DEEP, 4 * pitch))
+    inside = _thinned(inside, max(_DEEP, size / _SPACINGS))
     sample = _sample(pieces, max(_PIECE, 2 * pitch), rng)
     candidates = _Candidates(body, solid, target.protrusion, points, sample, inside, rng)
     return _reduced(body, candidates.chosen(target.max_shapes), pieces, inside)

@@ -63,11 +63,11 @@ def boxes_in(
     free = outside <= protrusion
     cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)
     cells = cells[free[tuple(cells.T)]]
-    grown = np.unique(_grown(~free, cells, rng).reshape(-1, 6), axis=0).reshape(-1, 2, 3)
-    return np.asarray(low + grown * solid.pitch)
+    boxes = np.unique(grown(~free, cells, rng).reshape(-1, 6), axis=0).reshape(-1, 2, 3)
+    return np.asarray(low + boxes * solid.pitch)
 
 
-def _grown(blocked: BoolArray, seeds: IntArray, rng: np.random.Generator) -> IntArray:
+def grown(blocked: BoolArray, seeds: IntArray, rng: np.random.Generator) -> IntArray:
     """Return the first and last cells of boxes without blocked cells, shape (n, 2, 3).
 
     Args:
