@@ -183,7 +183,7 @@ def test_a_report(tcs_command, study, capsys):
     report_study(ran.json)
     out = capsys.readouterr().out
     assert "Small study: 1 of 1 participants" in out
-    assert "14 tables as CSV" in out
+    assert "15 tables as CSV" in out
 
 
 @pytest.mark.slow

@@ -132,7 +132,8 @@ def _workload(results: StudyResults) -> list[Section]:
         )
         sections.append(Section("Workload", [table]))
     if "difficulty" in values:
-        sections.append(Section("Difficulty", [difficulty_table(results)]))
+        table = scores_table(results, "difficulty", "Agreement of each participant, 1 to 5")
+        sections.append(Section("Difficulty", [difficulty_table(results), table]))
     return sections
 
 

@@ -74,7 +74,7 @@ def summary(results: StudyResults) -> dict[str, Any]:
                 None if test is None else test.to_json()
             )
     variance = {name: comparison.varied(name) for name in comparison.anova_measures}
-    return {
+    found = {
         "title": results.study.plan.title,
         "scripted": any(trial.is_scripted for trial in results.trials),
         "participants": [
@@ -94,6 +94,16 @@ def summary(results: StudyResults) -> dict[str, Any]:
         "preferred": {condition: results.preferred()[condition] for condition in conditions},
         "notes": list(results.notes),
     }
+    return {key: _finite(value) for key, value in found.items()}
+
+
+def _finite(value: Any) -> Any:
+    """Return plain containers with None for numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _group(results: StudyResults, measure: str, condition: str) -> dict[str, Any]:
@@ -107,7 +117,7 @@ def _group(results: StudyResults, measure: str, condition: str) -> dict[str, Any
         "shapiro_w": None if found is None else found.shapiro_w,
         "shapiro_p": None if found is None else found.shapiro_p,
         "francia_w": None if found is None else found.francia_w,
-        "francia_p": None if found is None or np.isnan(found.francia_p) else found.francia_p,
+        "francia_p": None if found is None else found.francia_p,
     }
     return {"count": len(sample), **values}
 

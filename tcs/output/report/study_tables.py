@@ -9,6 +9,7 @@ from tcs.output.draw.acceptance import AcceptanceScores, draw_acceptance
 from tcs.output.report.blocks import Cell, Column, Picture, Table
 from tcs.output.report.teleop_tables import NONE, number
 from tcs.output.words import percent
+from tcs.teleop.experiment.trial import END_EFFECTOR, NOVEL
 from tcs.teleop.study.forms import COMMENTS, Answer, difficulty_form
 from tcs.teleop.study.participants import ParticipantFile
 from tcs.teleop.study.results import StudyResults
@@ -49,9 +50,11 @@ def preference_table(results: StudyResults) -> Table:
         f"{percent(counts[name] / total, 0)} ({counts[name]}/{total})" if total else NONE
         for name in results.study.conditions
     ]
+    paper = ""
+    if {END_EFFECTOR.name, NOVEL.name} == {*results.study.conditions}:
+        paper = " (there 19 % end-effector control, 81 % novel controller)"
     return Table(
-        "Preferred condition, as in the paper's Table IV (there 19 % end-effector control, 81 % "
-        f"novel controller); {results.comparison.operators}.",
+        f"Preferred condition, as in the paper's Table IV{paper}; {results.comparison.operators}.",
         [Column("measure", False), *(Column(title) for title in results.study.titles.values())],
         [["preferred condition [%]", *cells]],
     )

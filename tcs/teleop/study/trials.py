@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tcs.errors import DataFileError
+from tcs.errors import DataFileError, one_line
 from tcs.teleop.experiment.course import Course
 from tcs.teleop.experiment.trial import GOAL_RADIUS, SCRIPTED_TYPE, TrialMeasures, measure
 from tcs.teleop.runs.recorder import last_attempt
@@ -35,11 +35,21 @@ def check_run(study: Study, step: Step, run: Run, where: str) -> None:
         DataFileError: If it is not.
     """
     metadata = run.metadata
-    for key, expected in (("robot", study.plan.robot), ("condition", step.condition)):
-        if metadata.get(key) != expected:
+    entry = study.condition(step.condition or "")
+    expected = {"robot": study.plan.robot, "condition": entry.name, "limits": entry.limits}
+    if entry.limits is None:
+        # Another program, or a mode of the live page with another device, drives this condition.
+        del expected["limits"]
+        if metadata.get("condition") not in study.conditions:
+            del expected["condition"]
+    elif is_scripted(run):
+        # The settings of a scripted operator belong to its condition.
+        del expected["limits"]
+    for key, value in expected.items():
+        if metadata.get(key) != value:
             raise DataFileError(
-                f"{where}: its {key} is '{metadata.get(key)}', but the next trial needs "
-                f"'{expected}'. Give the run of that trial."
+                f"{where}: its {key} is '{one_line(str(metadata.get(key)))}', but the next trial "
+                f"needs '{value}'. Give the run of that trial."
             )
     if not _is_on(metadata, study):
         raise DataFileError(

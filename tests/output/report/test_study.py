@@ -49,7 +49,7 @@ def test_every_table_is_a_file(results, written):
     result, folder = written
     names = [path.stem for path in (folder / "mine-tables").iterdir()]
     assert len(names) == len(result["files"]) - 1
-    sections = ("participants", "preference", "workload", "difficulty", "comments")
+    sections = ("participants", "preference", "workload", "difficulty-1", "comments")
     assert {*(f"table-{name}" for name in sections), "trials", "answers", "values"} < {*names}
     for title, count in (("accuracy-time-effort-acceptance", 2), ("motion-of-the-hand", 2)):
         assert {f"table-{title}-{i + 1}" for i in range(count)} < {*names}

@@ -72,6 +72,7 @@ def run_on(study, condition, /, *, seconds=3.0, off=0.01, seed=0, reached=1.0, *
         metadata={
             "robot": study.plan.robot,
             "condition": condition,
+            "limits": "paper",
             "operator_type": "live",
             "line_start": list(study.line.start),
             "line_end": list(study.line.end),

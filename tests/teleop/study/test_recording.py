@@ -115,6 +115,7 @@ def test_a_run_that_does_not_reach_the_end_counts_with_the_time_limit(recording)
     ("metadata", "message"),
     [
         ({"condition": "novel"}, r"its condition is 'novel', but the next trial needs 'end-eff"),
+        ({"limits": "clamped"}, r"its limits is 'clamped', but the next trial needs 'paper'"),
         ({"robot": "panda"}, r"its robot is 'panda', but the next trial needs 'iiwa7'"),
         ({"line_end": [1.0, 0, 0]}, r"not recorded on the line of the study"),
         ({"line_start": "here"}, r"not recorded on the line of the study"),
@@ -124,6 +125,27 @@ def test_runs_of_other_trials_are_refused(recording, metadata, message):
     with pytest.raises(DataFileError, match=message):
         recording.record_run(run_on(recording.study, "end-effector", **metadata))
     assert list(on_disk(recording).steps) == ["background"]
+
+
+@pytest.mark.parametrize(
+    ("condition", "accepted"), [("stick", True), ("joystick 2", True), (None, True), ("a", False)]
+)
+def test_a_condition_that_is_driven_elsewhere_has_any_run_but_those_of_others(
+    tmp_path, condition, accepted
+):
+    conditions = [
+        {"name": "stick", "title": "Joystick"},
+        {"name": "a", "title": "A", "limits": "paper"},
+    ]
+    study = small_study(tmp_path, conditions=conditions)
+    recording = StudyRecording(study, new_participant(study))
+    recording.skip("none")
+    run = run_on(study, condition, limits="clamped")
+    if accepted:
+        assert recording.record_run(run).finished == 1.0
+    else:
+        with pytest.raises(DataFileError, match="its condition is 'a'"):
+            recording.record_run(run)
 
 
 def test_a_hand_that_did_not_move_is_refused(recording):
