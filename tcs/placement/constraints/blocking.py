@@ -30,17 +30,18 @@ def blocked_bodies(obstacle: Obstacle, postures: Postures) -> BoolArray:
     reach += shapes.margin + ROUNDING
     near = np.flatnonzero(point_distance(obstacle.half[:2], frames.base[:, :2]) <= reach)
     torso_shift = shapes.torso_shift[postures.level[first[near]]]
-    p_B = body.p + (body.frame == 1)[:, None] * torso_shift[:, None]
-    p_O = frames.to_obstacle(near, p_B)
+    on_torso = (body.frame == 1).astype(np.float64)
+    p_B = body.p.T[:, None] + on_torso * torso_shift.T[:, :, None]
     clearance = np.maximum(shapes.margin, body.pad) + ROUNDING
     blocked = np.zeros(len(first), dtype=np.bool_)
-    distance = point_distance(obstacle.half, p_O)
-    # A shape whose centre is in the obstacle needs no closer test, nor do others of that pose.
+    distance = frames.distances(near, p_B.astype(np.float32))
+    # A shape whose centre is well in the obstacle needs no closer test, nor do others of that pose.
     inside = np.any(distance == 0.0, axis=1)
     blocked[near[inside]] = True
-    pose, shape = np.nonzero((distance <= body.bound + clearance) & ~inside[:, None])
+    pose, shape = np.nonzero((distance <= body.bound + clearance + ROUNDING) & ~inside[:, None])
+    p_O = frames.to_obstacle(near[pose], p_B[:, pose, shape].T)
     R_OB = frames.rotation(near[pose])
-    touching = _touching(obstacle, body, shape, R_OB @ body.R[shape], p_O[pose, shape], clearance)
+    touching = _touching(obstacle, body, shape, R_OB @ body.R[shape], p_O, clearance)
     blocked[near[pose[touching]]] = True
     return np.asarray(blocked[inverse])
 
@@ -57,28 +58,29 @@ def blocked_solutions(obstacle: Obstacle, postures: Postures, admitted: BoolArra
     candidate, _ = postures.pairs
     middle, radius = postures.spheres
     frames = _Frames(obstacle, postures.base)
-    examined = np.flatnonzero(admitted[candidate])
-    at = frames.to_obstacle(candidate[examined], middle[examined, None])[:, 0]
+    # The arm of a candidate stays within a circle about its base, so that far ones are left out.
+    to_base = point_distance(obstacle.half[:2], frames.base[:, :2])
+    examined = np.flatnonzero((admitted & (to_base <= postures.reach + shapes.margin))[candidate])
+    at = frames.to_obstacle(candidate[examined], middle[examined])
     near = examined[point_distance(obstacle.half, at) <= radius[examined] + shapes.margin]
     clearance = np.maximum(shapes.margin, arm.pad) + ROUNDING
-    distance = frames.distances(candidate[near], postures.centres[near])
+    distance = frames.distances(candidate[near], postures.centres[:, near])
     blocked = np.zeros(len(candidate), dtype=np.bool_)
     inside = np.any(distance == 0.0, axis=1)
     blocked[near[inside]] = True
     close = (distance <= arm.bound + clearance + ROUNDING) & ~inside[:, None]
     row, shape = np.nonzero(close)
-    some, index = np.unique(row, return_inverse=True)
-    links_R, links_p = postures.links(near[some])
-    link = arm.frame[shape] - 1
-    R_BL = links_R[index, link]
-    p_B = links_p[index, link] + np.einsum("nij,nj->ni", R_BL, arm.p[shape])
-    of_pair = candidate[near[row]]
+    links_R, links_p = postures.link_poses
+    solution, link = near[row], arm.frame[shape] - 1
+    R_BL = links_R[solution, link]
+    p_B = links_p[solution, link] + np.einsum("nij,nj->ni", R_BL, arm.p[shape])
+    of_pair = candidate[solution]
     touching = _touching(
         obstacle,
         arm,
         shape,
         frames.rotation(of_pair) @ R_BL @ arm.R[shape],
-        frames.to_obstacle(of_pair, p_B[:, None])[:, 0],
+        frames.to_obstacle(of_pair, p_B),
         clearance,
     )
     blocked[near[row[touching]]] = True
@@ -116,27 +118,23 @@ class _Frames:
         self._sin = np.sin(base[:, 2] - obstacle.yaw)
 
     def to_obstacle(self, which: IntArray, p_B: FloatArray) -> FloatArray:
-        """Return points (m, k, 3) of bases `which` (m,) in the obstacle's frame."""
-        cos, sin = self._cos[which, None], self._sin[which, None]
-        x, y, z = p_B[..., 0], p_B[..., 1], p_B[..., 2]
-        base = self.base[which, None]
-        return np.stack(
-            [
-                base[..., 0] + cos * x - sin * y,
-                base[..., 1] + sin * x + cos * y,
-                base[..., 2] + z,
-            ],
-            axis=-1,
-        )
+        """Return points (m, 3) of bases `which` (m,) in the obstacle's frame."""
+        cos, sin = self._cos[which], self._sin[which]
+        x, y, z = p_B.T
+        p_O = self.base[which]
+        p_O[:, 0] += cos * x - sin * y
+        p_O[:, 1] += sin * x + cos * y
+        p_O[:, 2] += z
+        return p_O
 
     def distances(self, which: IntArray, p_B: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the distance of points (m, k, 3) of bases `which` from the obstacle, (m, k).
+        """Return the distance of points (3, m, k) of bases `which` from the obstacle, (m, k).
 
         In single precision, for a first test of many points.
         """
         base, half = self.base[which].astype(np.float32), self._half.astype(np.float32)
         cos, sin = (c[which, None].astype(np.float32) for c in (self._cos, self._sin))
-        x, y, z = p_B[..., 0], p_B[..., 1], p_B[..., 2]
+        x, y, z = p_B
         squares = np.zeros(x.shape, dtype=np.float32)
         for axis, p in enumerate((cos * x - sin * y, sin * x + cos * y, z.copy())):
             p += base[:, axis, None]

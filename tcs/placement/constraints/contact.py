@@ -102,7 +102,6 @@ def boxes_overlap(
         p: Their centres [m], shape (n, 3).
         clearance: Enlargement of the box at the origin for each [m], shape (n,).
     """
-    one, two = [1, 2, 0], [2, 0, 1]
     enlarged = half + clearance[:, None]
     extent = np.abs(R)
     separated = np.any(np.abs(p) > enlarged + _product(extent, size) + SEPARATED, axis=1)
@@ -110,12 +109,23 @@ def boxes_overlap(
     separated |= np.any(
         along > size + _product(np.swapaxes(extent, 1, 2), enlarged) + SEPARATED, axis=1
     )
+    # Few boxes pass the faces and are separated by edges only.
+    rest = np.flatnonzero(~separated)
+    separated[rest] = _separated_by_edges(enlarged[rest], size[rest], R[rest], p[rest])
+    return np.asarray(~separated)
+
+
+def _separated_by_edges(
+    enlarged: FloatArray, size: FloatArray, R: FloatArray, p: FloatArray
+) -> BoolArray:
+    """Return which pairs of boxes a product of two edges separates, shape (n,)."""
+    one, two = [1, 2, 0], [2, 0, 1]
+    extent = np.abs(R)
     # Axis e_i x r_j. Of parallel edges it vanishes, which separates nothing.
     across = p[:, two, None] * R[:, one] - p[:, one, None] * R[:, two]
     reach = enlarged[:, one, None] * extent[:, two] + enlarged[:, two, None] * extent[:, one]
     reach += size[:, None, one] * extent[:, :, two] + size[:, None, two] * extent[:, :, one]
-    separated |= np.any(np.abs(across) > reach + SEPARATED, axis=(1, 2))
-    return np.asarray(~separated)
+    return np.asarray(np.any(np.abs(across) > reach + SEPARATED, axis=(1, 2)))
 
 
 def _product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:

@@ -72,32 +72,41 @@ class Postures:
 
     @cached_property
     def centres(self) -> NDArray[np.float32]:
-        """Centre of each arm shape in B in each solution [m], shape (R, n, 3).
+        """Centre of each arm shape in B in each solution [m], by coordinate, shape (3, R, n).
 
         Float32, which is enough to find the shapes near an obstacle.
         """
-        links_R, links_p = self.links(np.arange(len(self.joints)))
+        links_R, links_p = self.link_poses
         arm = self.shapes.arm
-        centres = np.empty((len(links_p), len(arm.type), 3), dtype=np.float32)
+        centres = np.empty((3, len(links_p), len(arm.type)), dtype=np.float32)
         for shape, link in enumerate(arm.frame - 1):
-            centres[:, shape] = links_p[:, link] + links_R[:, link] @ arm.p[shape]
+            centres[:, :, shape] = (links_p[:, link] + links_R[:, link] @ arm.p[shape]).T
         return centres
 
     @cached_property
     def spheres(self) -> tuple[FloatArray, FloatArray]:
         """Centre in B and radius of a sphere about the arm in each solution, (R, 3) and (R,)."""
         bound = self.shapes.arm.bound + self.shapes.arm.pad
-        low = (self.centres - bound[:, None]).min(axis=1, initial=np.inf)
-        high = (self.centres + bound[:, None]).max(axis=1, initial=-np.inf)
-        middle = (low + high) / 2.0 if len(bound) else np.zeros((len(self.joints), 3))
-        out = np.linalg.norm(self.centres - middle[:, None], axis=2) + bound
-        return middle, out.max(axis=1, initial=0.0) + ROUNDING
+        low = (self.centres - bound).min(axis=2, initial=np.inf)
+        high = (self.centres + bound).max(axis=2, initial=-np.inf)
+        middle = (low + high) / 2.0 if len(bound) else np.zeros((3, len(self.joints)))
+        out = np.linalg.norm(self.centres - middle[:, :, None], axis=0) + bound
+        return middle.T.copy(), out.max(axis=1, initial=0.0) + ROUNDING
 
-    def links(self, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the poses of the arm's links in B in some solutions, (m, 7, 3, 3), (m, 7, 3)."""
-        shapes, q = self.shapes, self.joints[pairs]
+    @cached_property
+    def reach(self) -> FloatArray:
+        """Radius of a vertical cylinder about the base that holds the arm of a candidate, (C,)."""
+        middle, radius = self.spheres
+        reach = np.zeros(len(self.sets.candidates))
+        np.maximum.at(reach, self.pairs[0], np.hypot(middle[:, 0], middle[:, 1]) + radius)
+        return reach + ROUNDING
+
+    @cached_property
+    def link_poses(self) -> tuple[FloatArray, FloatArray]:
+        """Poses of the arm's links in B in each solution, (R, 7, 3, 3) and (R, 7, 3)."""
+        shapes, q = self.shapes, self.joints
         R = np.broadcast_to(shapes.arm_base_R, (len(q), 3, 3))
-        p = shapes.arm_base_p + shapes.torso_shift[self.level[self.pairs[0][pairs]]]
+        p = shapes.arm_base_p + shapes.torso_shift[self.level[self.pairs[0]]]
         links_R, links_p = np.empty((len(q), 7, 3, 3)), np.empty((len(q), 7, 3))
         for joint in range(7):
             p = p + R @ shapes.chain_p[joint]

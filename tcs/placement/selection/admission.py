@@ -87,9 +87,10 @@ def admitted_candidates(
     reached, dexterity = sets.reached, sets.dexterity
     left: list[Left] = []
     warnings: list[str] = []
-    along = grid.indices(sets.candidates)
     now = current_values(here, grid, ()) if constraints.keep else {}
-    for name, axis, admitted, warning in axis_constraints(constraints, now, grid):
+    of_axes = list(axis_constraints(constraints, now, grid))
+    along = grid.indices(sets.candidates) if of_axes else np.empty((0, 0), np.int64)
+    for name, axis, admitted, warning in of_axes:
         remaining &= admitted[along[:, grid.axes.index(axis)]]
         warnings += [warning] if warning else []
         _note(left, Left(name, _count(remaining)), remaining.size)
