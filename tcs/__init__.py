@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
+    from tcs.motion import MotionPlan, plan
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.robustness import Evaluation, evaluate, robustify
@@ -42,6 +43,7 @@ __all__ = [
     "Explanation",
     "InitialConfiguration",
     "LiveScorer",
+    "MotionPlan",
     "Observation",
     "Obstacle",
     "Region",
@@ -55,6 +57,7 @@ __all__ = [
     "evaluate",
     "explain",
     "load",
+    "plan",
     "robustify",
     "save",
     "score",
@@ -71,6 +74,7 @@ _HOMES = {
     "Explanation": ("tcs.placement.reasons", "Explanation"),
     "InitialConfiguration": ("tcs.model.grid", "InitialConfiguration"),
     "LiveScorer": ("tcs.placement.scoring", "LiveScorer"),
+    "MotionPlan": ("tcs.motion", "MotionPlan"),
     "Observation": ("tcs.model.scene", "Observation"),
     "Obstacle": ("tcs.placement.constraints", "Obstacle"),
     "Region": ("tcs.placement.constraints", "Region"),
@@ -83,6 +87,7 @@ _HOMES = {
     "evaluate": ("tcs.placement.robustness", "evaluate"),
     "explain": ("tcs.placement.reasons", "explain"),
     "load": ("tcs.placement.store", "load_scores"),
+    "plan": ("tcs.motion", "plan"),
     "robustify": ("tcs.placement.robustness", "robustify"),
     "save": ("tcs.placement.store", "save_scores"),
     "score": ("tcs.placement.scoring", "score"),

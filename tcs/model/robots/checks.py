@@ -39,6 +39,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
             )
     _check_ranges(robot, model, where)
     _check_rest(robot, model, f"{where}, field 'rest'")
+    _check_rates(robot, where)
     for field, choices in (("postures", robot.postures), ("grippers", robot.grippers)):
         for name, positions in choices.items():
             _check_positions(robot, model, positions, f"{where}, field '{field}.{name}'")
@@ -159,6 +160,13 @@ def _check_rest(robot: RobotFile, model: Urdf, where: str) -> None:
     for name, value in robot.rest.items():
         _check_known_joint(name, robot, where)
         _check_within(model.joints[name], value, where)
+
+
+def _check_rates(robot: RobotFile, where: str) -> None:
+    """Check that velocity and acceleration limits are of joints of the arm."""
+    for field in ("velocity_limits", "acceleration_limits"):
+        for name in getattr(robot, field):
+            _check_known_joint(name, robot, f"{where}, field '{field}'")
 
 
 def _check_within(joint: Joint, value: float, where: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -17,6 +18,11 @@ from tcs.model.robots.urdf.packages import resolve_uri
 Name = Annotated[str, Field(min_length=1)]
 Range = tuple[JointPosition, JointPosition]
 Positions = Annotated[Mapping[Name, JointPosition], Entries]
+
+Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
+ACCELERATION = 2.0
+"""Acceleration limit of a joint unless the robot file gives one [rad/s^2]: URDFs have none, and
+this brings an arm to 1 rad/s in half a second, which suits motions next to a person."""
 
 
 class _OnLink(Placed):
@@ -79,6 +85,11 @@ class RobotFile(Document):
     rest: Mapping[Name, JointPosition] = {}
     """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
     nearest to 0."""
+    velocity_limits: Annotated[Mapping[Name, Rate], Entries] = {}
+    """Velocity limits of joints of the scored arm [rad/s]; those left out are of the URDF."""
+    acceleration_limits: Annotated[Mapping[Name, Rate], Entries] = {}
+    """Acceleration limits of joints of the scored arm [rad/s^2]; `ACCELERATION` for those left
+    out."""
     tool_frame: Name
     """T: the frame that moves to the goals; a link of the URDF, or an extra frame or body."""
     torso_joint: Name | None = None
@@ -132,6 +143,32 @@ class RobotFile(Document):
         """The robot with its joint limits alone, as if no disabled group narrowed them."""
         groups = tuple(g.model_copy(update={"ranges": {}}) for g in self.disabled_groups)
         return self.model_copy(update={"disabled_groups": groups})
+
+    def arm_rates(self) -> tuple[list[float], list[float]]:
+        """Return velocity limits [rad/s] and acceleration limits [rad/s^2] of the scored arm.
+
+        Raises:
+            RobotError: If the URDF cannot be used, or neither it nor the file limits a velocity.
+        """
+        joints = self.model().joints
+        velocity = [self.velocity_limits.get(n, joints[n].velocity) for n in self.arm_joints]
+        for name, value in zip(self.arm_joints, velocity, strict=True):
+            if not math.isfinite(value):
+                raise RobotError(
+                    f"robot '{self.name}': the URDF has no velocity limit of '{name}'. Add it to "
+                    "the robot file, field 'velocity_limits' [rad/s]."
+                )
+        return velocity, [self.acceleration_limits.get(n, ACCELERATION) for n in self.arm_joints]
+
+    def arm_rest(self) -> list[float]:
+        """Return the rest posture of the scored arm within the limits in force [rad].
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        limits = self.joint_limits()
+        rest = [(self.rest.get(name, 0.0), limits[name]) for name in self.arm_joints]
+        return [min(max(angle, lower), upper) for angle, (lower, upper) in rest]
 
     def urdf_path(self) -> Path:
         """Return the path of the URDF on this machine.

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles
-from tcs.model.tasks.task import Goal, Task
+from tcs.model.tasks.task import DEFAULT_APPROACH, Goal, Task, ToolLine
 
 TASKS = DataFiles("task", "tasks/*/*.yaml")
 
@@ -21,6 +21,13 @@ class _Entry(Document):
     model_config = ConfigDict(strict=True)
 
 
+class LineEntry(_Entry):
+    """A straight motion of the tool: direction in the tool frame, and length [m]."""
+
+    direction: list[float]
+    distance: float
+
+
 class GoalEntry(_Entry):
     """One goal of a task file."""
 
@@ -28,6 +35,8 @@ class GoalEntry(_Entry):
     position: list[float]
     quaternion_wxyz: list[float]
     weight: float = 1.0
+    approach: LineEntry | None = None
+    retreat: LineEntry | None = None
 
 
 class AxisEntry(_Entry):
@@ -47,6 +56,8 @@ class TaskFile(_Entry):
     environments: list[str]
     goals: list[GoalEntry]
     tool: str = ""
+    approach: LineEntry | None = None
+    retreat: LineEntry | None = None
     allowed_contacts: list[list[str]] = Field(default_factory=list)
     grids: dict[str, dict[str, AxisEntry]] = Field(default_factory=dict)
 
@@ -79,7 +90,7 @@ def _read(path: Path) -> Task:
     goals = []
     for i, entry in enumerate(written.goals):
         try:
-            goals.append(_goal(entry))
+            goals.append(_goal(entry, written))
         except TaskError as error:
             raise TaskError(f"{where}, goals[{i}]: {error}") from None
     for i, pair in enumerate(written.allowed_contacts):
@@ -111,10 +122,28 @@ def _read(path: Path) -> Task:
         ) from None
 
 
-def _goal(entry: GoalEntry) -> Goal:
+def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
+    """Return a goal; its straight motions are its own, or those of the task, or the default."""
+    approach = _line(entry.approach or task.approach, "approach") or DEFAULT_APPROACH
+    retreat = _line(entry.retreat or task.retreat, "retreat") or approach.reverse()
     return Goal(
         body_frame=entry.body_frame,
         position=np.array(entry.position, dtype=np.float64),
         quaternion=np.array(entry.quaternion_wxyz, dtype=np.float64),
         weight=entry.weight,
+        approach=approach,
+        retreat=retreat,
     )
+
+
+def _line(entry: LineEntry | None, field: str) -> ToolLine | None:
+    """Return a straight motion, None if the file names none."""
+    if entry is None:
+        return None
+    if len(entry.direction) != 3:
+        raise TaskError(f"field '{field}.direction' is {entry.direction}, but must be [x, y, z].")
+    x, y, z = entry.direction
+    try:
+        return ToolLine((x, y, z), entry.distance)
+    except TaskError as error:
+        raise TaskError(f"field '{field}': {error}") from None

@@ -19,6 +19,67 @@ MAX_DISTANCE = 2.0
 """Greatest distance of a goal from its body frame [m]; a larger number is not in metres."""
 
 
+MAX_STRAIGHT = 1.0
+"""Greatest length of a straight tool motion [m]: about the reach of an arm."""
+
+
+def _finite(field: str, numbers: ArrayLike, names: Sequence[str]) -> NDArray[np.float64]:
+    """Return the numbers as a new array; raise for a wrong count or numbers not finite."""
+    wanted = f"{len(names)} finite numbers ({', '.join(names)})"
+    try:
+        array = np.array(numbers, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TaskError(f"field '{field}' is {numbers!r}, but must be {wanted}.") from None
+    if array.shape != (len(names),) or not np.all(np.isfinite(array)):
+        raise TaskError(f"field '{field}' is {array.tolist()}, but must be {wanted}.")
+    return array
+
+
+@dataclass(frozen=True, slots=True)
+class ToolLine:
+    """A straight motion of the tool at the constant orientation of a goal."""
+
+    direction: tuple[float, float, float]
+    """Unit direction of the motion in the tool frame T at the goal."""
+    distance: float
+    """Length of the motion [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the values and normalise the direction.
+
+        Raises:
+            TaskError: If the direction has no length or the distance is out of its range.
+        """
+        direction = _finite("direction", self.direction, ("x", "y", "z"))
+        length = math.hypot(*direction)
+        if length < UNIT_TOLERANCE:
+            raise TaskError("field 'direction' has length 0. Name a direction in the tool frame.")
+        if not 0.0 < self.distance <= MAX_STRAIGHT:
+            raise TaskError(
+                f"field 'distance' is {self.distance:g} m, but must be above 0 and at most "
+                f"{MAX_STRAIGHT:g} m."
+            )
+        x, y, z = (direction / length).tolist()
+        object.__setattr__(self, "direction", (x, y, z))
+        object.__setattr__(self, "distance", float(self.distance))
+
+    @property
+    def offset(self) -> NDArray[np.float64]:
+        """Motion of the tool from begin to end, in T [m], shape (3,)."""
+        return self.distance * np.array(self.direction)
+
+    def reverse(self) -> ToolLine:
+        """Return the same line in the opposite direction."""
+        x, y, z = self.direction
+        return ToolLine((-x, -y, -z), self.distance)
+
+
+DEFAULT_APPROACH = ToolLine((1.0, 0.0, 0.0), 0.1)
+"""Straight out of the fingers: a gripper is narrowest seen from there. 10 cm is the depth of a hand
+beyond its fingers, which then clears what the tool touches before the arm swings to the side."""
+DEFAULT_RETREAT = DEFAULT_APPROACH.reverse()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
     """A goal pose of the tool frame T, fixed to a body frame H.
@@ -34,6 +95,10 @@ class Goal:
     """R_HG: orientation of the goal in H, unit quaternion wxyz, shape (4,)."""
     weight: float = 1.0
     """Weight of this goal relative to the others; `Task.weights` sums to 1."""
+    approach: ToolLine = DEFAULT_APPROACH
+    """Straight motion that ends at the goal."""
+    retreat: ToolLine = DEFAULT_RETREAT
+    """Straight motion that begins at the goal."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -74,14 +139,16 @@ class Goal:
         return hash(self._key())
 
     def _key(self) -> tuple[object, ...]:
-        return (self.body_frame, *self.position.tolist(), *self.quaternion.tolist(), self.weight)
+        position, quaternion = self.position.tolist(), self.quaternion.tolist()
+        lines = (self.approach, self.retreat)
+        return (self.body_frame, *position, *quaternion, self.weight, *lines)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
     """A task as a set of goal poses of the tool.
 
-    Goals are evaluated one by one and at rest: a task has neither paths to the goals nor an order.
+    Scoring evaluates goals one by one and at rest; `tcs.motion` plans paths to them in an order.
     """
 
     name: str
@@ -132,15 +199,3 @@ class Task:
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""
         return self.grids.get(environment, {})
-
-
-def _finite(field: str, numbers: ArrayLike, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return the numbers as a new array; raise for a wrong count or numbers not finite."""
-    wanted = f"{len(names)} finite numbers ({', '.join(names)})"
-    try:
-        array = np.array(numbers, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TaskError(f"field '{field}' is {numbers!r}, but must be {wanted}.") from None
-    if array.shape != (len(names),) or not np.all(np.isfinite(array)):
-        raise TaskError(f"field '{field}' is {array.tolist()}, but must be {wanted}.")
-    return array

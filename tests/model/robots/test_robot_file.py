@@ -1,5 +1,7 @@
 """Robot files: content of that of the PR2, and errors of invalid ones."""
 
+import dataclasses
+import math
 import pickle
 import re
 import shutil
@@ -195,6 +197,10 @@ WRONG = {
         put("postures", "wild", {"r_elbow_flex_joint": "bent"}),
         r"field 'postures\.wild\.r_elbow_flex_joint' is 'bent', but must be a valid number",
     ),
+    "velocity limit of another joint": (
+        change("velocity_limits", {"r_elbow_flex_joint": 1.0}),
+        "field 'velocity_limits': unknown joint of the arm 'r_elbow_flex_joint'",
+    ),
     "rest of another joint": (
         change("rest", {"r_elbow_flex_joint": -1.0}),
         "field 'rest': unknown joint of the arm 'r_elbow_flex_joint'.*Did you mean 'l_elbow_flex",
@@ -323,3 +329,30 @@ def test_a_size_that_no_tool_has_is_refused(content, tmp_path, size):
     )
     with pytest.raises(RobotError, match=r"primitives\[0\].size\[0\]' is .* m, but a size must be"):
         load_robot(write(tmp_path, content))
+
+
+def test_rates_of_the_arm_come_from_file_urdf_or_default(pr2):
+    velocity, acceleration = pr2.arm_rates()
+    assert velocity[0] == pytest.approx(2.088)
+    assert acceleration == [2.0] * 7
+    own = {"l_shoulder_pan_joint": 0.5}
+    slow = pr2.model_copy(update={"velocity_limits": own, "acceleration_limits": own})
+    assert [rates[0] for rates in slow.arm_rates()] == [0.5, 0.5]
+
+
+def test_a_missing_velocity_limit_is_asked_for(pr2, monkeypatch):
+    model = pr2.model()
+    joint = model.joints["l_elbow_flex_joint"]
+    joints = {**model.joints, joint.name: dataclasses.replace(joint, velocity=math.inf)}
+    unlimited = dataclasses.replace(model, joints=joints)
+    monkeypatch.setattr(type(pr2), "model", lambda _: unlimited)
+    with pytest.raises(
+        RobotError, match=r"no velocity limit of 'l_elbow_flex_joint'.*velocity_limits"
+    ):
+        pr2.arm_rates()
+
+
+def test_the_rest_posture_is_within_the_limits(pr2):
+    rest = dict(zip(pr2.arm_joints, pr2.arm_rest(), strict=True))
+    assert rest["l_shoulder_pan_joint"] == pytest.approx(np.pi / 2, abs=1e-6)
+    assert rest["l_wrist_flex_joint"] == pytest.approx(-0.1)

@@ -1,5 +1,6 @@
 import csv
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -137,7 +138,11 @@ def test_unknown_task_gets_the_nearest_name():
     ("old", "new", "expected"),
     [
         ("title:", "titel:", "unknown key 'titel'. Known: allowed_contacts"),
-        ("position:", "positoin:", "field 'goals[0]': unknown key 'positoin'. Known: body_frame"),
+        (
+            "position:",
+            "positoin:",
+            "field 'goals[0]': unknown key 'positoin'. Known: approach, body_frame",
+        ),
         ("weight: 2", "weigth: 2", "Did you mean 'weight'?"),
         ("position:", "position_mm:", "Did you mean 'position'?"),
         (
@@ -235,3 +240,33 @@ def test_shipped_files_carry_no_key_the_program_ignores(name):
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert len(content["goals"]) == len(load_task(name).goals)
     assert content["environments"] == list(load_task(name).environments)
+
+
+def test_straight_motions_of_a_goal_come_from_goal_task_or_default(tmp_path):
+    path = tmp_path / "wiping.yaml"
+    path.write_text(GOOD)
+    (goal,) = load_task(path).goals
+    assert (goal.approach.direction, goal.approach.distance) == ((1.0, 0.0, 0.0), 0.1)
+    assert goal.retreat == goal.approach.reverse()
+    path.write_text(GOOD + "approach: {direction: [0, 0, 2], distance: 0.2}\n")
+    (goal,) = load_task(path).goals
+    np.testing.assert_array_equal(goal.approach.offset, [0, 0, 0.2])
+    np.testing.assert_array_equal(goal.retreat.offset, [0, 0, -0.2])
+    own = GOOD + "    retreat: {direction: [0, 1, 0], distance: 0.05}\n"
+    path.write_text(own + "approach: {direction: [0, 0, 2], distance: 0.2}\n")
+    (goal,) = load_task(path).goals
+    assert goal.approach.direction == (0.0, 0.0, 1.0)
+    assert goal.retreat.direction == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("{direction: [1, 0, 0], distance: 0.0}", "approach.*distance.*0 m, but must be above 0"),
+        ("{direction: [0, 0, 0], distance: 0.1}", "approach.*direction.*length 0"),
+        ("{direction: [1, 0], distance: 0.1}", r"approach.direction.*must be \[x, y, z\]"),
+        ("{direction: [1, 0, 0], distance: 3.0}", "distance.*at most 1 m"),
+    ],
+)
+def test_straight_motions_out_of_range_are_refused(refused, line, message):
+    assert re.search(message, refused(GOOD + f"approach: {line}\n"))

@@ -1,0 +1,29 @@
+"""Motions: timed, certified trajectories of the arm that do a task from the stops of a set.
+
+In: a score file and the configurations of a set. Out: plans, as values and as files: at each stop
+the tour from rest through the goals and back, and for every goal without a motion the reason.
+"""
+
+from __future__ import annotations
+
+from tcs.motion.approach import Access, Accesses, accesses
+from tcs.motion.curves import Curve
+from tcs.motion.files import save_plan
+from tcs.motion.plans import GoalResult, MotionPlan, Segment, StopPlan, plan
+from tcs.motion.stops import Stop
+from tcs.motion.timing import Timed
+
+__all__ = [
+    "Access",
+    "Accesses",
+    "Curve",
+    "GoalResult",
+    "MotionPlan",
+    "Segment",
+    "Stop",
+    "StopPlan",
+    "Timed",
+    "accesses",
+    "plan",
+    "save_plan",
+]

@@ -1,0 +1,52 @@
+"""Curves in joint space: cubic Hermite splines, continuous in position and direction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A cubic Hermite spline of joint angles."""
+
+    knots: FloatArray
+    """Parameter at each knot, ascending from 0, shape (n,)."""
+    q: FloatArray
+    """Joint angles at each knot [rad], shape (n, 7)."""
+    dq: FloatArray
+    """Derivative of the joint angles by the parameter at each knot, shape (n, 7)."""
+    fastest: float = math.inf
+    """Greatest derivative of the parameter by time [1/s]."""
+
+    @property
+    def pieces(self) -> int:
+        """Number of cubic pieces."""
+        return len(self.knots) - 1
+
+    def control_points(self, piece: int) -> FloatArray:
+        """Return the Bezier control points of a piece [rad], shape (4, 7)."""
+        third = (self.knots[piece + 1] - self.knots[piece]) / 3.0
+        start, end = self.q[piece], self.q[piece + 1]
+        inner = start + third * self.dq[piece], end - third * self.dq[piece + 1]
+        return np.array([start, *inner, end])
+
+    def points(self, piece: int, fractions: FloatArray) -> FloatArray:
+        """Return points of a piece [rad], shape (n, 7), at fractions of it, shape (n,)."""
+        t = np.asarray(fractions)[:, None]
+        a, b, c, d = self.control_points(piece)
+        u = 1.0 - t
+        return np.asarray(u**3 * a + 3 * u**2 * t * b + 3 * u * t**2 * c + t**3 * d)
+
+    def reverse(self) -> Curve:
+        """Return the same curve from its end to its begin."""
+        knots = self.knots[-1] - self.knots[::-1]
+        return replace(self, knots=knots, q=self.q[::-1].copy(), dq=-self.dq[::-1])
+
+    def shifted(self, offset: FloatArray) -> Curve:
+        """Return the curve with full turns added to its joints without limits [rad]."""
+        return replace(self, q=self.q + offset)

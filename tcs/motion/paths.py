@@ -1,0 +1,102 @@
+"""Paths between postures, with rounded corners, certified free of contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.motion.connect import connect
+from tcs.kernel.motion.edges import certified
+from tcs.kernel.motion.shortcut import shorten
+from tcs.motion.curves import Curve
+from tcs.motion.stops import Stop
+
+ITERATIONS = 8000
+"""Greatest number of random postures that the planner grows towards: seconds on a slow machine."""
+SHORTCUTS = 60
+"""Number of random shortcuts that are tried."""
+WIDEST_CORNER = 0.3
+"""Greatest length of an edge that a rounded corner takes up [rad, norm of the joints]."""
+NARROWEST_CORNER = 0.005
+"""Length below which a corner is not rounded: the arm stops there."""
+
+
+def find_path(
+    stop: Stop, starts: FloatArray, goals: FloatArray, *, iterations: int = ITERATIONS
+) -> tuple[FloatArray, int] | None:
+    """Return a path from one of several postures to one of several others, None if none is found.
+
+    Args:
+        stop: The initial configuration; its random state advances.
+        starts: Joint angles at which nothing touches [rad], shape (n, 7).
+        goals: Joint angles at which nothing touches [rad], shape (m, 7).
+        iterations: Greatest number of random postures to grow towards.
+
+    Returns:
+        Postures of the path [rad], shape (k, 7), with certified straight edges, and the number of
+        the goal. Joints without limits may end full turns away from it.
+    """
+    count = connect(stop.motion, stop.work, stop.trees, starts, goals, iterations)
+    if count == 0:
+        return None
+    goal = int(stop.trees.ends[1])
+    count = shorten(stop.motion, stop.work, stop.trees, count, SHORTCUTS)
+    return stop.trees.path[:count].copy(), goal
+
+
+def rounded(stop: Stop, path: FloatArray) -> list[Curve]:
+    """Return a path as curves without corners; the arm stops between curves.
+
+    Each corner becomes a parabola that touches both edges, as wide as is certified.
+
+    Args:
+        stop: The initial configuration.
+        path: Postures with certified straight edges [rad], shape (n, 7).
+    """
+    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    path = path[np.concatenate([[True], lengths > 1e-9])]
+    lengths = lengths[lengths > 1e-9]
+    curves: list[Curve] = []
+    if len(path) < 2:
+        return curves
+    directions = np.diff(path, axis=0) / lengths[:, None]
+    knots, q, dq = [0.0], [path[0]], [directions[0]]
+    for n in range(1, len(path) - 1):
+        wide = _corner(stop, path[n], directions[n - 1 : n + 1], lengths[n - 1 : n + 1])
+        here = float(np.sum(lengths[:n]))
+        knots.append(here - wide)
+        q.append(path[n] - wide * directions[n - 1])
+        dq.append(directions[n - 1])
+        if wide == 0.0:
+            curves.append(_curve(knots, q, dq))
+            knots, q, dq = [], [], []
+        knots.append(here + wide)
+        q.append(path[n] + wide * directions[n])
+        dq.append(directions[n])
+    knots.append(float(np.sum(lengths)))
+    q.append(path[-1])
+    dq.append(directions[-1])
+    curves.append(_curve(knots, q, dq))
+    return curves
+
+
+def _corner(stop: Stop, corner: FloatArray, directions: FloatArray, lengths: FloatArray) -> float:
+    """Return how far from a corner its rounding may begin [rad], 0 if none is certified."""
+    wide = min(WIDEST_CORNER, 0.45 * float(np.min(lengths)))
+    while wide > NARROWEST_CORNER:
+        begin, end = corner - wide * directions[0], corner + wide * directions[1]
+        third = 2.0 / 3.0
+        control = np.array(
+            [begin, begin + third * (corner - begin), end + third * (corner - end), end]
+        )
+        if certified(stop.motion, stop.work, control) == 1.0:
+            return wide
+        wide /= 2.0
+    return 0.0
+
+
+def _curve(knots: list[float], q: list[FloatArray], dq: list[FloatArray]) -> Curve:
+    """Return the spline through points with given directions; its parameter begins at 0."""
+    at = np.array(knots) - knots[0]
+    kept = np.concatenate([[True], np.diff(at) > 1e-12])
+    return Curve(at[kept], np.array(q)[kept], np.array(dq)[kept])

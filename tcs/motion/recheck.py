@@ -1,0 +1,80 @@
+"""Re-check of curves with Drake, at most a millimetre of the fastest point's motion apart."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.motion.scene import MotionScene
+from tcs.model.scene import Scene
+from tcs.motion.curves import Curve
+
+LARGEST_STEP = 0.001
+"""Greatest motion of any point of the arm between two checked postures [m]."""
+CLEARANCE_ROUNDING = 2e-6
+"""Tolerance of a clearance measured by Drake [m]: its distance between boxes is accurate to
+1e-6 m."""
+COARSE = 24
+"""Parts of a piece of which the motion of the arm is measured."""
+
+
+def false_pieces(scene: Scene, motion: MotionScene, curve: Curve) -> int:
+    """Return how many pieces of a curve Drake finds in contact or beyond joint limits.
+
+    Args:
+        scene: The live scene, at the stop; the arm is moved.
+        motion: The same scene, for the motion of its shapes.
+        curve: A curve of the scored arm.
+    """
+    return sum(not _is_true(scene, motion, curve, piece) for piece in range(curve.pieces))
+
+
+def _is_true(scene: Scene, motion: MotionScene, curve: Curve, piece: int) -> bool:
+    lower, upper = scene.arm_limits
+    for q in curve.points(piece, dense_fractions(motion, curve, piece)):
+        # Control points are within the limits; sums of them round.
+        if np.any(q < lower - 1e-9) or np.any(q > upper + 1e-9):
+            return False
+        scene.set_arm(q)
+        for first, second, distance in scene.violations():
+            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING:
+                return False
+    return True
+
+
+def dense_fractions(motion: MotionScene, curve: Curve, piece: int) -> FloatArray:
+    """Return fractions of a piece at most LARGEST_STEP of motion apart, its ends included."""
+    coarse = np.linspace(0.0, 1.0, COARSE + 1)
+    points = shape_corners(motion, curve.points(piece, coarse))
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1)
+    # 5 % for the curvature of the points' paths and uneven speed along a part.
+    parts = np.maximum(np.ceil(1.05 * moved / LARGEST_STEP), 1).astype(int)
+    spans = zip(itertools.pairwise(coarse), parts, strict=True)
+    inner = [np.linspace(a, b, n, endpoint=False) for (a, b), n in spans]
+    return np.concatenate([*inner, [1.0]])
+
+
+def shape_corners(motion: MotionScene, q: FloatArray) -> FloatArray:
+    """Return the corners of cubes about the arm's shapes in A [m], shape (n, points, 3).
+
+    Args:
+        motion: The scene.
+        q: Postures [rad], shape (n, 7).
+    """
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
+    R, p = np.repeat(np.eye(3)[None], len(q), axis=0), np.zeros((len(q), 3))
+    corners = []
+    for link in range(1, 8):
+        p = p + R @ motion.chain_p[link - 1]
+        c, s = np.cos(q[:, link - 1]), np.sin(q[:, link - 1])
+        turn = np.zeros((len(q), 3, 3))
+        turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
+        turn[:, 2, 2] = 1.0
+        R = R @ motion.chain_R[link - 1] @ turn
+        for row in motion.links[motion.link_frame == link]:
+            # Column 1 is the radius of the bounding sphere, columns 2 to 4 are sizes.
+            local = row[5:8] + row[1] * signs
+            corners.append(p[:, None] + np.einsum("nij,kj->nki", R, local))
+    return np.concatenate(corners, axis=1)

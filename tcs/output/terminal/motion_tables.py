@@ -1,0 +1,63 @@
+"""Plans of motions as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tcs.output.terminal.console import results_console
+from tcs.output.terminal.tables import new_table
+from tcs.output.words import base_pose_text
+from tcs.output.words.bodies import pair_text
+
+_REASONS = {
+    "unreached": "no posture reaches it",
+    "rest_blocked": "something touches the robot while its arm rests",
+    "approach_limits": "joint or velocity limits prevent its approach",
+    "approach_blocked": "its approach is blocked",
+    "no_path": "no path was found",
+}
+
+
+def report_plan(result: Mapping[str, Any]) -> None:
+    """Print the tour of each stop, and why goals are not done."""
+    out = results_console()
+    for number, stop in enumerate(result["stops"]):
+        out.print(f"stop {number}: {base_pose_text(stop)}, torso {stop['torso']:.2f} m")
+        if not stop["segments"]:
+            out.print("  no goal can be done from here")
+            continue
+        table = new_table("motion", "from", "to", ">duration [s]", ">edges")
+        for segment in stop["segments"]:
+            ends = [_place(segment[key]) for key in ("from", "to")]
+            table.add_row(
+                segment["type"], *ends, f"{segment['duration']:.2f}", str(segment["edges"])
+            )
+        out.print(table)
+        out.print(f"{stop['duration']:.1f} s in all")
+        if not stop["returns"]:
+            out.print("no path back to the rest posture was found")
+    for goal in result["results"]:
+        if not goal["done"]:
+            out.print(_failure(goal))
+    verified = result["verified"]
+    out.print(
+        f"{result['goals_done']} of {result['goals']} goals done "
+        f"({result['goals_reached']} reached by a posture). Drake re-checked "
+        f"{verified['edges']:,} edges, {verified['false']} of them false. "
+        f"{result['seconds']:.1f} s."
+    )
+
+
+def _place(name: str | int) -> str:
+    return name if isinstance(name, str) else f"goal {name}"
+
+
+def _failure(goal: Mapping[str, Any]) -> str:
+    """Return why a goal is not done, as one line."""
+    text = f"goal {goal['goal']}: {_REASONS[goal['reason']]}"
+    if goal["segment"]:
+        text += f" ({goal['segment']}, tried for {goal['seconds']:.2f} s)"
+    if goal["pair"] is not None:
+        text += f"; most often {pair_text(goal['pair'])}"
+    return text
