@@ -13,9 +13,9 @@ import numpy as np
 class Traits:
     """Behaviour of one operator, the same from every base pose.
 
-    The values were set before the first run, from the sources given or to what is usual for careful
-    work, and never fitted to results. `drawn` varies them over operators. Distances and speeds are
-    those of the tool, unless they are said to be of the hand.
+    The values were set before the first run of the experiment, from the sources given or to what is
+    usual for careful work, and never fitted to results. `drawn` varies them over operators.
+    Distances and speeds are those of the tool, unless they are said to be of the hand.
 
     Attributes:
         speed: Mean speed of a submovement [m/s].

@@ -13,6 +13,7 @@ from tcs.teleop.experiment.comparison import ANOVA_MEASURES
 from tcs.teleop.experiment.statistics import (
     effect_size,
     group_statistics,
+    kolmogorov_smirnov,
     repeated_measures,
     shapiro_francia,
     signed_rank_test,
@@ -220,3 +221,17 @@ def test_the_thesis_tests_time_and_steering_with_one_tail():
 def test_invalid_samples_are_refused(table):
     with pytest.raises(DataFileError):
         repeated_measures(table)
+
+
+def test_kolmogorov_smirnov_is_the_greatest_distance_of_the_standardised_sample():
+    sample = np.array([3.0, 1.0, 4.0, 1.5, 9.0, 2.6])
+    z = np.sort((sample - sample.mean()) / sample.std(ddof=1))
+    normal = np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in z])
+    below, above = np.arange(6) / 6.0, np.arange(1, 7) / 6.0
+    distance = max((normal - below).max(), (above - normal).max())
+    assert kolmogorov_smirnov(sample) == pytest.approx(stats.kstwo.sf(distance, 6))
+    # It depends on the shape only.
+    assert kolmogorov_smirnov(5.0 - 2.0 * sample) == pytest.approx(
+        kolmogorov_smirnov(-sample), rel=1e-9
+    )
+    assert kolmogorov_smirnov(np.full(4, 2.0)) == 1.0
