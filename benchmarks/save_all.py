@@ -39,6 +39,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "null_space": (),
     "capability": (),
     "itcm_task": ("--pictures", "out/pictures"),
+    "arms": (),
     "thesis_base_poses": (),
     "arplace": (),
     "locating": ("--runs", "60"),
