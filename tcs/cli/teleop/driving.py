@@ -83,6 +83,13 @@ def live(
         bool,
         typer.Option("--cameras", help="Show pictures of the head and wrist cameras on the page."),
     ] = False,
+    xr: Annotated[
+        bool,
+        typer.Option(
+            "--xr",
+            help="Offer WebXR: the tool follows an XR controller 1:1 while its trigger is held.",
+        ),
+    ] = False,
     delay: LatencyOptions,
     window: options.WindowOptions,
 ) -> None:
@@ -115,7 +122,7 @@ def live(
         LiveOptions(
             robot=robot, behaviour=behaviour.value, condition=condition.value,
             start_deg=start_deg, torso_height=torso_height, line=line,
-            latency=latency, cameras=cameras,
+            latency=latency, cameras=cameras, xr=xr,
         ),
         port=window.port, on_stop=typer.echo, record=save is not None,
     )  # fmt: skip

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tcs.output.view.teleop.gamepad import DOWN as PAD_DOWN
 from tcs.output.view.teleop.gamepad import UP, A, Gamepad, GamepadCommand, GamepadState
+from tcs.output.view.teleop.pose_device import PoseCommand, PoseDevice, PoseState
 from tcs.output.view.teleop.set_point import SetPoint
 from tcs.teleop import Command, Mode
 from tcs.teleop.control.settings import NULL_SPACE_MODES
@@ -95,6 +96,8 @@ class Reading:
     pad: GamepadState | None
     watched: bool
     """Whether a browser is connected to the page."""
+    pose: PoseState | None = None
+    """State of an XR controller; None if there is none."""
 
 
 class Source(Protocol):
@@ -139,6 +142,8 @@ class OperatorInput:
     """The selected joint group, counted from 0."""
     clutch: bool = False
     """Whether the clutch is engaged by key or button."""
+    pose_device: PoseDevice | None = None
+    """The XR controller; None where none can be used."""
     set_point: SetPoint | None = None
     """The set-point of joint mode; None where the mode is not offered."""
     _mode: int = 0
@@ -161,20 +166,27 @@ class OperatorInput:
         reading = self.source.read()
         pressed = self._pressed(reading, now)
         pad = self._gamepad.update(reading.pad, now)
+        hand = PoseCommand()
+        if self.pose_device is not None:
+            hand = self.pose_device.update(reading.pose, now)
+            if hand.next_mode:
+                pressed[NEXT_MODE] = pressed.get(NEXT_MODE, 0) + 1
         self._apply_switches(pressed, pad, now)
         back = BACK in pressed
-        lost = pad.lost
+        lost = pad.lost or hand.lost
         if not reading.watched:
             # Meshcat keeps the state of the last browser.
             self._gamepad.reset()
             lost = "no browser is connected to this page: the arm stops until one is."
         if STOP in pressed:
             self._gamepad.dismiss()
+            if self.pose_device is not None:
+                self.pose_device.dismiss()
         if back or lost or STOP in pressed:
             self._until.clear()
             if any(reading.sliders[name] for name in RATE_SLIDERS):
                 self.source.zero()
-        clutch = self.clutch or pad.clutch
+        clutch = self.clutch or pad.clutch or hand.clutch
         if self.set_point is not None and (
             lost or back or STOP in pressed or clutch or self.mode is not Mode.JOINT
         ):
@@ -182,7 +194,12 @@ class OperatorInput:
         if lost or back or STOP in pressed:
             command = Command(mode=self.mode, clutch=bool(lost) or self.clutch)
             return OperatorCommand(command, lost, back=back, watched=reading.watched)
-        return OperatorCommand(self._command(reading, pad, now), hint=self._hint_at(now))
+        return OperatorCommand(self._command(reading, pad, hand, now), hint=self._hint_at(now))
+
+    def drop_lag(self) -> None:
+        """Drop motion of the XR controller that the arm does not follow."""
+        if self.pose_device is not None:
+            self.pose_device.drop_lag()
 
     def reset(self) -> None:
         """Return to the first mode and joint group, with nothing commanded."""
@@ -232,16 +249,20 @@ class OperatorInput:
             if not in_null_space and turns:
                 self._hint = ("groups move in null-space mode: M selects it.", now + 2.0)
 
-    def _command(self, reading: Reading, pad: GamepadCommand, now: float) -> Command:
-        clutch = self.clutch or pad.clutch
+    def _command(
+        self, reading: Reading, pad: GamepadCommand, hand: PoseCommand, now: float
+    ) -> Command:
+        clutch = self.clutch or pad.clutch or hand.clutch
         if self.mode is Mode.JOINT and self.set_point is not None:
             wanted = None if clutch else self.set_point.read(reading, self.source)
             return Command(mode=self.mode, joints=wanted, clutch=clutch)
         if self.mode in NULL_SPACE_MODES:
             down, up = (now < self._until.get(name, -1.0) for name in (TURN_DOWN, TURN_UP))
-            sign = int(np.sign(int(up) - int(down) + pad.turn))
+            sign = int(np.sign(int(up) - int(down) + pad.turn + hand.turn))
             group = self.group if self.mode is Mode.NULL_SPACE and sign else None
             return Command(group=group, sign=sign, mode=self.mode, clutch=clutch)
+        if hand.engaged:
+            return Command(linear=hand.linear, angular=hand.angular, mode=self.mode, clutch=clutch)
         wanted = np.array([reading.sliders[name] for name in RATE_SLIDERS])
         dead = np.repeat((DEAD_LINEAR, DEAD_ANGULAR), 3)
         wanted[np.abs(wanted) < dead] = 0.0

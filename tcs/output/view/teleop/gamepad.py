@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+GAMEPADS = range(16)
+"""Numbers of gamepads in a browser; greater ones mark other devices."""
 DEAD_ZONE = 0.15
 """Fraction of the range within which a stick counts as at rest."""
 STUCK_AFTER = 5.0
@@ -142,6 +144,6 @@ def gamepad_state(
     When a gamepad is removed, the browser sends an empty message; Meshcat then keeps the last index
     and reports neither axes nor buttons.
     """
-    if index is None or not (len(axes) or len(buttons)):
+    if index is None or index not in GAMEPADS or not (len(axes) or len(buttons)):
         return None
     return GamepadState(tuple(axes), tuple(buttons))

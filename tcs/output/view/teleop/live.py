@@ -20,6 +20,7 @@ from tcs.output.view.teleop.controls import (
 )
 from tcs.output.view.teleop.gamepad import gamepad_state
 from tcs.output.view.teleop.panel import Panel, mode_line, readout, state_facts
+from tcs.output.view.teleop.pose_device import PoseDevice, pose_state
 from tcs.output.view.teleop.robot_display import TARGET, TOOL, RobotDisplay, Trail, pose_of
 from tcs.output.view.teleop.set_point import SetPoint, joint_sliders
 from tcs.output.view.teleop.timing import Durations, StepClock
@@ -70,6 +71,7 @@ class MeshcatControls:
             },
             gamepad_state(pad.index, pad.axes, pad.button_values),
             meshcat.GetNumActiveConnections() > 0,
+            pose_state(pad.index, pad.axes, pad.button_values),
         )
 
     def zero(self) -> None:
@@ -131,6 +133,7 @@ class LivePage:
         groups, of_joints = len(settings.groups), Mode.JOINT in modes
         self.operator = OperatorInput(
             MeshcatControls(meshcat, groups, arm if of_joints else None), modes, groups,
+            pose_device=PoseDevice(settings.period),
             set_point=SetPoint(lambda: self.seen.joints) if of_joints else None,
         )  # fmt: skip
         self.steps, self.pictures, self.worked = Durations(), Durations(), Durations()
@@ -174,6 +177,8 @@ class LivePage:
             self._pictures.reset(self.last)
         self.seen = self._pictures.send(self.last)
         reason = operator_input.lost or self.seen.reason
+        if self.seen.reason:
+            self.operator.drop_lag()
         if reason:
             # A message that is still visible is not repeated.
             if reason != self._message or now >= self._message_until:

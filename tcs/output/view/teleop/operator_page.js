@@ -50,3 +50,72 @@ async function showCameras() {
 }
 
 if (TCS.cameras) showCameras();
+
+// XR controller: while a session runs, its pose is sent on Meshcat's socket in place of a gamepad:
+// number of the frame, position and quaternion (xyzw) with z up, trigger and side button.
+function sendDevice(gamepad) {
+  const socket = viewer.connection;
+  if (socket && socket.readyState === WebSocket.OPEN) {
+    socket.send(MeshCat.msgpack.encode({ type: "gamepad", name: "", gamepad }));
+  }
+}
+
+function rightController(session) {
+  const tracked = [...session.inputSources].filter((one) => one.gamepad);
+  return tracked.find((one) => one.handedness === "right") || tracked[0];
+}
+
+function poseOf(frame, source) {
+  const space = viewer.renderer.xr.getReferenceSpace();
+  const pose = space && source && frame.getPose(source.gripSpace || source.targetRaySpace, space);
+  // A pose that the headset guesses is none.
+  if (!pose || pose.emulatedPosition) return null;
+  const p = pose.transform.position;
+  const q = pose.transform.orientation;
+  // XR has y up and z back, the robot z up.
+  return [p.x, -p.z, p.y, q.x, -q.z, q.y, q.w];
+}
+
+function driveBySession(session) {
+  const ofBrowser = handle_gamepads;
+  handle_gamepads = () => {};
+  let number = 0;
+  let running = true;
+  const onFrame = (_, frame) => {
+    if (!running) return;
+    session.requestAnimationFrame(onFrame);
+    const source = rightController(session);
+    const pose = session.visibilityState === "visible" ? poseOf(frame, source) : null;
+    if (!pose) {
+      sendDevice({});
+      return;
+    }
+    number += 1;
+    const buttons = source.gamepad.buttons;
+    const values = [0, 1].map((i) => (buttons[i] ? buttons[i].value : 0));
+    sendDevice({ index: TCS.xr, button_values: values, axes: [number, ...pose] });
+  };
+  session.requestAnimationFrame(onFrame);
+  session.addEventListener("end", () => {
+    running = false;
+    sendDevice({});
+    handle_gamepads = ofBrowser;
+  });
+}
+
+function offerXr() {
+  if (!navigator.xr) {
+    const note = document.createElement("p");
+    note.id = "xr";
+    note.textContent = "This browser has no WebXR; keys, sliders and gamepad work.";
+    document.body.append(note);
+    return;
+  }
+  // Meshcat adds its button that starts a session, and shows the scene in the headset.
+  viewer.handle_command({ type: "enable_webxr", mode: "vr" });
+  viewer.renderer.xr.addEventListener("sessionstart", () => {
+    driveBySession(viewer.renderer.xr.getSession());
+  });
+}
+
+if (TCS.xr !== null) offerXr();

@@ -1,4 +1,4 @@
-"""The operator's page: Drake's Meshcat with camera pictures.
+"""The operator's page: Drake's Meshcat with camera pictures and XR controllers.
 
 The page is Drake's own, with a style and a script added. It is served on the loopback address and
 loads nothing from elsewhere: Meshcat's script and its socket are those of this machine.
@@ -17,6 +17,7 @@ from importlib.resources import files
 from typing import Any
 
 from tcs.errors import OutputError
+from tcs.output.view.teleop.pose_device import INDEX
 
 _HOST = "127.0.0.1"
 _PATIENCE = 10.0
@@ -31,12 +32,13 @@ _LOG = logging.getLogger(__name__)
 Pictures = Callable[[], Mapping[str, bytes]]
 
 
-def operator_html(meshcat_port: int, *, cameras: bool) -> str:
+def operator_html(meshcat_port: int, *, cameras: bool, xr: bool) -> str:
     """Return the operator's page.
 
     Args:
         meshcat_port: Port of the Meshcat, on this machine.
         cameras: Whether it shows camera pictures.
+        xr: Whether an XR controller can move the tool.
 
     Raises:
         OutputError: If the page of this version of Drake has another form.
@@ -45,14 +47,14 @@ def operator_html(meshcat_port: int, *, cameras: bool) -> str:
     if any(page.count(part) != 1 for part in (_SCRIPT, _ADDRESS, _END)):
         raise OutputError(
             "the page of Meshcat in this version of Drake cannot be extended. Drive without "
-            "--cameras."
+            "--cameras and --xr."
         )
     here = files("tcs.output.view.teleop")
     style, script = (
         here.joinpath(name).read_text(encoding="utf-8")
         for name in ("operator_page.css", "operator_page.js")
     )
-    settings = json.dumps({"cameras": cameras})
+    settings = json.dumps({"cameras": cameras, "xr": INDEX if xr else None})
     url = f"http://localhost:{meshcat_port}/"
     page = page.replace(_SCRIPT, _SCRIPT + url)
     page = page.replace(_ADDRESS, f"url = {json.dumps(url)};")

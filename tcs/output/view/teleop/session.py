@@ -55,6 +55,7 @@ class LiveOptions:
         course: The line to show and its start posture; None to search for one if `line`.
         latency: Latency between the operator and the arm.
         cameras: Whether the page shows pictures of the head and wrist cameras.
+        xr: Whether an XR controller can move the tool.
     """
 
     robot: str
@@ -66,6 +67,7 @@ class LiveOptions:
     course: Course | None = None
     latency: Latency = NO_LATENCY
     cameras: bool = False
+    xr: bool = False
 
 
 class LiveSession:
@@ -140,12 +142,15 @@ class LiveSession:
     def _open_page(self, start: FloatArray, port: int | None) -> None:
         """Set the address, that of the operator's page where Meshcat's own is not enough."""
         self.url, self.cameras, self._server = str(self._meshcat.web_url()), None, None
-        if not self._options.cameras:
+        options = self._options
+        if not (options.cameras or options.xr):
             return
-        self.cameras = Cameras(self.arm, start)
-        page = operator_html(self._meshcat.port(), cameras=True)
+        page = operator_html(self._meshcat.port(), cameras=options.cameras, xr=options.xr)
         page_port = self._meshcat.port() + _PAGE_PORT if port is None else port + 1
-        self._server = OperatorPage(page, self.cameras.pictures, page_port)
+        if options.cameras:
+            self.cameras = Cameras(self.arm, start)
+        pictures = dict if self.cameras is None else self.cameras.pictures
+        self._server = OperatorPage(page, pictures, page_port)
         self.url = self._server.url
 
     def _show_cameras(self, joints: FloatArray) -> None:

@@ -67,13 +67,14 @@ class Desk:
     )
     clicks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(buttons(4), 0))
     pad: object = None
+    pose: object = None
     watched: bool = True
 
     def press(self, name, times=1):
         self.clicks[name] += times
 
     def read(self):
-        return Reading(dict(self.sliders), dict(self.clicks), self.pad, self.watched)
+        return Reading(dict(self.sliders), dict(self.clicks), self.pad, self.watched, self.pose)
 
     def set_slider(self, name, value):
         self.sliders[name] = value = round(value / JOINT_STEP) * JOINT_STEP

@@ -61,7 +61,7 @@ def test_an_occupied_port_is_refused():
 
 
 def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(meshcat):
-    page = operator_html(meshcat.port(), cameras=True)
+    page = operator_html(meshcat.port(), cameras=True, xr=True)
     here = f"http://localhost:{meshcat.port()}/"
     assert f'src="{here}' in page
     assert f'url = "{here}";' in page
@@ -72,4 +72,4 @@ def test_the_page_is_that_of_meshcat_and_loads_nothing_from_elsewhere(meshcat):
 def test_a_page_of_another_form_is_refused(meshcat, monkeypatch):
     monkeypatch.setattr(operator_page, "_page_of_meshcat", lambda port: "<html></html>")
     with pytest.raises(OutputError, match="cannot be extended"):
-        operator_html(meshcat.port(), cameras=True)
+        operator_html(meshcat.port(), cameras=True, xr=True)
