@@ -12,7 +12,7 @@ import numpy as np
 
 from tcs.capability.arplace.model import Arplace
 from tcs.capability.arplace.probability_map import FloorObstacle, ProbabilityMap
-from tcs.capability.arplace.shapes import is_inside
+from tcs.capability.arplace.shapes import SIGNED_DISTANCE, counts_inside
 from tcs.capability.arplace.table_error import displaced, displacement_covariance
 from tcs.capability.arplace.task import PARAMETERS
 from tcs.errors import SelectionError
@@ -24,7 +24,8 @@ AXES = ("x", "y", "z", "angle")
 """Axes of the object's pose in F, in the order of a covariance."""
 _X, _Y, _Z, _ANGLE = range(4)
 _CHUNK = 250
-"""Most samples whose regions are in memory together: they fit into the processor's cache."""
+"""Most samples whose signed distances are in memory together: they fit into the processor's cache.
+"""
 _ONE_THREAD = 1 << 18
 """Multiplications up to which OpenBLAS multiplies matrices in one thread; waiting for a second
 thread takes longer than a whole query if the processor is busy."""
@@ -298,12 +299,11 @@ def _count(arplace: Arplace, poses: FloatArray, at: tuple[FloatArray, FloatArray
     window, (x, y) = arplace.window, arplace.grid
     grid = (x[window.x], y[window.y])
     total: Any = 0
-    size = max(
-        1, min(_CHUNK, _ONE_THREAD // window.model.distribution.mean.size // window.model.kept)
-    )
+    size = max(1, _ONE_THREAD // window.model.distribution.mean.size // window.model.kept)
+    if arplace.representation == SIGNED_DISTANCE:
+        size = min(size, _CHUNK)
     for start in range(0, max(len(learned), 1), size):
         part = learned[start : start + size]
         vectors = window.model.shapes(part[:, [_X, _Z, _ANGLE]])
-        inside = is_inside(arplace.representation, vectors, grid, part[:, _Y], at)
-        total = total + inside.sum(axis=0, dtype=np.int64)
+        total = total + counts_inside(arplace.representation, vectors, grid, part[:, _Y], at)
     return np.asarray(total)

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.capability.arplace.boundary import Boundary, Region, boundary_of
 from tcs.capability.arplace.landmarks import COUNT, equidistant_landmarks, landmarks_by_shape
+from tcs.capability.arplace.polygons import counts_inside as polygons_around
 from tcs.capability.arplace.polygons import winding_numbers
 from tcs.errors import SelectionError, UnknownNameError
 from tcs.kernel.arrays import BoolArray, FloatArray
@@ -85,12 +87,32 @@ def is_inside(
     x, y = grid if at is None else at
     if representation == SIGNED_DISTANCE:
         return _signed_distances(vectors, grid, shift, (x, y)) > 0.0
-    polygons = (
-        vectors.reshape(len(vectors), COUNT, 2)
-        + np.stack([np.zeros_like(shift), shift], axis=-1)[:, None]
-    )
     # Where a deformed boundary crosses itself, only points that it encloses anticlockwise count.
-    return np.asarray(winding_numbers(polygons, x, y) > 0)
+    return np.asarray(winding_numbers(_shifted(vectors, shift), x, y) > 0)
+
+
+def counts_inside(
+    representation: str,
+    vectors: FloatArray,
+    grid: tuple[FloatArray, FloatArray],
+    shift: FloatArray,
+    at: tuple[FloatArray, FloatArray],
+) -> NDArray[np.int64]:
+    """Return in how many regions base positions lie, shape (x, y).
+
+    The arguments are those of `is_inside`, whose results this counts.
+    """
+    if representation == SIGNED_DISTANCE:
+        inside = _signed_distances(vectors, grid, shift, at) > 0.0
+        return np.asarray(inside.sum(axis=0, dtype=np.int64))
+    return polygons_around(_shifted(vectors, shift), *at)
+
+
+def _shifted(vectors: FloatArray, shift: FloatArray) -> FloatArray:
+    """Return the landmarks of regions shifted along y, shape (n, landmarks, 2)."""
+    landmarks = vectors.reshape(len(vectors), COUNT, 2).copy()
+    landmarks[:, :, 1] += shift[:, None]
+    return landmarks
 
 
 def boundary_from(
