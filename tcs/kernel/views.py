@@ -69,7 +69,12 @@ def _field(context: Any, builder: Any, view: Any, address: Any, name: str) -> An
     which = view.owned.fields.index(name)
     zero, index = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.IntType(32), which)
     at = builder.gep(address, [zero, index], inbounds=True)
-    return at if isinstance(view.owned.types[which], types.BaseNamedTuple) else builder.load(at)
+    field = view.owned.types[which]
+    if isinstance(field, types.BaseNamedTuple):
+        return at
+    # The owner removed once more, because the compiler does not see that it has been: where it is
+    # a constant, it counts no references.
+    return _without_owner(context, builder, field, builder.load(at))
 
 
 def _without_owner(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
