@@ -71,7 +71,8 @@ def omitted(module: ModuleType, names: list[str], described: set[int]) -> list[s
     return [
         name
         for name in names
-        if is_code(vars(module)[name]) and id(vars(module)[name]) in described
+        # `getattr`: a package may load its names on first use.
+        if is_code(getattr(module, name)) and id(getattr(module, name)) in described
     ]
 
 

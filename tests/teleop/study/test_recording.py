@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from tcs.errors import DataFileError, OutputError, UnknownNameError
+from tcs.teleop.experiment.trial import measure
 from tcs.teleop.runs.files import load_run, save_run
 from tcs.teleop.study.forms import PAIR, background_form, difficulty_form, tlx_pairs_form
 from tcs.teleop.study.participants import (
@@ -19,6 +21,7 @@ from tcs.teleop.study.participants import (
 from tcs.teleop.study.recording import StudyRecording
 from tcs.teleop.study.steps import form_of, steps_of
 from tcs.teleop.study.study_file import conditions_of, load_study
+from tcs.teleop.study.trials import attempt_of, trial_measures
 from tests.teleop.study.example import LINE, answers_to, complete, run_on, small_study
 
 
@@ -146,6 +149,15 @@ def test_a_condition_that_is_driven_elsewhere_has_any_run_but_those_of_others(
     else:
         with pytest.raises(DataFileError, match="its condition is 'a'"):
             recording.record_run(run)
+
+
+def test_a_scripted_trial_has_the_measures_of_the_experiment(study):
+    whole = run_on(study, "novel", operator_type="scripted")
+    # A trial of the experiment ends at the first sample within the sphere at the end.
+    trial = attempt_of(whole, study.course, 120.0)
+    assert 2 < len(trial) < len(whole)
+    np.testing.assert_array_equal(trial.position, whole.position[: len(trial)])
+    assert trial_measures(study, trial) == measure(trial, study.course)
 
 
 def test_a_hand_that_did_not_move_is_refused(recording):
