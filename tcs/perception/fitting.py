@@ -41,7 +41,7 @@ _MOST_RANGE = 1.8
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ScanView:
     """The mean of some scans, and its blobs."""
 
     scans: Scans
@@ -50,7 +50,7 @@ class View:
     blobs: tuple[Blob, ...]
 
     @classmethod
-    def of(cls, scans: Scans) -> View:
+    def of(cls, scans: Scans) -> ScanView:
         """Return the view of some scans."""
         ranges = scans.mean()
         return cls(scans, ranges, blobs_of(scans.scanner, ranges, len(scans)))
@@ -112,7 +112,7 @@ class Fit:
         return self.seen >= 2 and not self.contradicted and fits
 
 
-def fit(view: View, table: TableFile, start: PlanarPose) -> Fit | None:
+def fit(view: ScanView, table: TableFile, start: PlanarPose) -> Fit | None:
     """Return the pose that fits a view best, near a first estimate; None if no pose is sound.
 
     Ranges of beams on a leg and the angles of its silhouettes are compared with those predicted for
@@ -129,7 +129,7 @@ def fit(view: View, table: TableFile, start: PlanarPose) -> Fit | None:
     return found if found is not None and found.sound else None
 
 
-def fit_without_one(view: View, table: TableFile, start: PlanarPose) -> Fit | None:
+def fit_without_one(view: ScanView, table: TableFile, start: PlanarPose) -> Fit | None:
     """Return the best fit that leaves out one blob near a leg: another thing that hides the leg.
 
     Args:
@@ -144,7 +144,9 @@ def fit_without_one(view: View, table: TableFile, start: PlanarPose) -> Fit | No
     return min(sound, key=lambda found: found.cost) if sound else None
 
 
-def _fit_to(view: View, table: TableFile, start: PlanarPose, shown: dict[int, Blob]) -> Fit | None:
+def _fit_to(
+    view: ScanView, table: TableFile, start: PlanarPose, shown: dict[int, Blob]
+) -> Fit | None:
     """Return the pose that fits the blobs of some legs best; None if they determine none."""
     pose, offset = start, 0.0
     jacobian, error = np.zeros((0, 4)), np.zeros(0)
@@ -181,7 +183,7 @@ def _rms(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(errors**2))) if len(errors) else 0.0
 
 
-def _blobs_of_legs(view: View, table: TableFile, pose: PlanarPose) -> dict[int, Blob]:
+def _blobs_of_legs(view: ScanView, table: TableFile, pose: PlanarPose) -> dict[int, Blob]:
     """Return the blob of each leg that has one near, the nearest pairs first."""
     pairs = []
     for i, leg in enumerate(table.legs):
@@ -201,7 +203,7 @@ def _blobs_of_legs(view: View, table: TableFile, pose: PlanarPose) -> dict[int, 
 
 
 def _linearised(
-    view: View, table: TableFile, pose: PlanarPose, offset: float, shown: dict[int, Blob]
+    view: ScanView, table: TableFile, pose: PlanarPose, offset: float, shown: dict[int, Blob]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives by x, y, yaw and offset, and the errors, in standard deviations.
 
@@ -236,7 +238,7 @@ def _weighted(
 
 
 def _silhouettes(
-    view: View, leg: Leg, poses: Sequence[PlanarPose], blob: Blob
+    view: ScanView, leg: Leg, poses: Sequence[PlanarPose], blob: Blob
 ) -> list[tuple[FloatArray, float]]:
     """Return the predicted and the measured angle of each side of a leg that nothing hides.
 
@@ -265,7 +267,7 @@ def _silhouettes(
 
 
 def _evidence(
-    view: View, table: TableFile, pose: PlanarPose, shown: frozenset[int]
+    view: ScanView, table: TableFile, pose: PlanarPose, shown: frozenset[int]
 ) -> tuple[tuple[int, ...], int]:
     """Return the beams that meet each leg, and how many legs should be seen but are not.
 

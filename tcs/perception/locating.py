@@ -10,7 +10,7 @@ import numpy as np
 from tcs.errors import PerceptionError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
 from tcs.perception.blobs import Blob, blobs_of
-from tcs.perception.fitting import Fit, View, fit, fit_without_one
+from tcs.perception.fitting import Fit, ScanView, fit, fit_without_one
 from tcs.perception.located import Located
 from tcs.perception.planar_pose import PlanarPose, wrapped
 from tcs.perception.scans import Scans
@@ -66,7 +66,7 @@ def locate(
         raise UnknownNameError("method", method, METHODS)
     if method == TWO_BLOBS:
         return _by_two_blobs(scans, table)
-    view = View.of(scans)
+    view = ScanView.of(scans)
     candidates = _candidates(view.blobs, table)
     estimates = _first_estimates(candidates, table)
     sound: list[Fit] = []
@@ -165,7 +165,7 @@ def _unlikeliness(pose: PlanarPose, expected: PlanarPose | None) -> float:
     return math.hypot(pose.x, pose.y)
 
 
-def _not_found(view: View, candidates: list[Blob], table: TableFile) -> str:
+def _not_found(view: ScanView, candidates: list[Blob], table: TableFile) -> str:
     """Return why no table was found, and what is known instead."""
     seen = f"{len(view.blobs)} blobs, {len(candidates)} of them small enough for a leg"
     if not candidates:
@@ -216,7 +216,7 @@ def _by_two_blobs(scans: Scans, table: TableFile) -> Located:
         covariance=np.cov(np.transpose(errors)) / len(each) if len(each) > 1 else np.zeros((3, 3)),
         legs=tuple((leg.name, beams.get(leg.name, 0)) for leg in table.legs),
         scans=len(scans),
-        blobs=len(View.of(scans).blobs),
+        blobs=len(ScanView.of(scans).blobs),
     )
 
 
