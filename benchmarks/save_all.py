@@ -26,6 +26,10 @@ PARTS: dict[str, tuple[str, ...]] = {
     "run": ("--pairs", "500", "--dense", "200"),
     "selection": (f"{SCORES}/bathing-bed-pr2.tcs", f"{SCORES}/shaving-wheelchair-pr2.tcs"),
     "constraints": (f"{SCORES}/bathing-bed-pr2.tcs",),
+    "motion": (
+        *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/bathing-bed-pr2.tcs"),
+        *("--places", "60", "--drake", "10"),
+    ),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),
