@@ -282,6 +282,16 @@ def test_the_work_in_a_run_is_divided_into_phases(tcs_command, saved, tmp_path):
     assert "did not stop" in tcs_command("teleop", "work", tmp_path / "line.csv").out
 
 
+def test_xr_opens_the_page_of_the_operator(tcs_command):
+    words = ["--start-deg", *READY_DEG, "--no-browser", "--duration", 0.1]
+    with socket.socket() as free:
+        free.bind(("localhost", 0))
+        port = free.getsockname()[1]
+    ran = tcs_command("teleop", *words, "--xr", "--port", port)
+    assert ran.code == 0
+    assert f"open http://localhost:{port + 1}/" in ran.err
+
+
 def test_latency_is_stated_and_its_range_checked(tcs_command):
     words = ["teleop", "--start-deg", *READY_DEG, "--no-browser", "--duration", 0.1]
     ran = tcs_command(*words, "--latency", 0.3, "--latency-of", "command")
