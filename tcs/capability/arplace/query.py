@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -297,13 +297,20 @@ def _count(arplace: Arplace, poses: FloatArray, at: tuple[FloatArray, FloatArray
     """
     learned = poses[_are_learned(arplace, poses)]
     window, (x, y) = arplace.window, arplace.grid
-    grid = (x[window.x], y[window.y])
+    grid, model = (x[window.x], y[window.y]), window.model
     total: Any = 0
-    size = max(1, _ONE_THREAD // window.model.distribution.mean.size // window.model.kept)
+    most = max(len(learned), 1)
     if arplace.representation == SIGNED_DISTANCE:
-        size = min(size, _CHUNK)
+        most = _CHUNK
+        if len(at[0]) == 1 and at[0][0] in grid[0]:
+            # Signed distances at other x need not be computed.
+            column = np.flatnonzero(grid[0] == at[0][0])
+            index = (np.arange(len(grid[1])) * len(grid[0]) + column).astype(np.int64)
+            model = replace(model, distribution=model.distribution.part(index))
+            grid = (at[0], grid[1])
+    size = max(1, min(most, _ONE_THREAD // model.distribution.mean.size // model.kept))
     for start in range(0, max(len(learned), 1), size):
         part = learned[start : start + size]
-        vectors = window.model.shapes(part[:, [_X, _Z, _ANGLE]])
+        vectors = model.shapes(part[:, [_X, _Z, _ANGLE]])
         total = total + counts_inside(arplace.representation, vectors, grid, part[:, _Y], at)
     return np.asarray(total)
