@@ -205,7 +205,7 @@ def correlation(
         rows.append(
             [
                 f"{one.x:.2f}, {one.y:.2f}, {one.yaw_deg:.1f}", f"{score:.2f}",
-                f"{math.degrees(result.settings[one.name].camera.angle):.0f}",
+                str(round(math.degrees(result.settings[one.name].camera.angle))),
                 f"{time:.1f}", "–" if math.isnan(steered) else f"{steered:.1f}",
                 str(sum(len(part.successes) for part in parts)),
                 str(result.failures(one.name)),
