@@ -50,7 +50,7 @@ class PoseState:
     """Orientation of the hand in the robot's base, up to a rotation on the right, shape (3, 3)."""
     trigger: bool
     """Whether the trigger, the dead-man switch, is held."""
-    squeeze: bool
+    side_button: bool
     """Whether the side button is pressed."""
 
 
@@ -135,7 +135,7 @@ class PoseDevice:
                 return self._stop("XR controller: its pose jumped, the arm stops")
         elif now - self._arrived > TIMEOUT:
             return self._stop(f"XR controller: no pose for {TIMEOUT:g} s, the arm stops")
-        next_mode = before is not None and pose.squeeze and not before.squeeze
+        next_mode = before is not None and pose.side_button and not before.side_button
         if not pose.trigger:
             if self._anchor is not None:
                 self._released = now

@@ -17,12 +17,12 @@ class Hand:
 
     def __init__(self, desk):
         self.desk, self.number = desk, 0.0
-        self.p, self.R, self.trigger, self.squeeze = np.zeros(3), np.eye(3), False, False
+        self.p, self.R, self.trigger, self.side_button = np.zeros(3), np.eye(3), False, False
 
     def frame(self):
         self.number += 1.0
         self.desk.pose = PoseState(
-            self.number, self.p.copy(), self.R.copy(), self.trigger, self.squeeze
+            self.number, self.p.copy(), self.R.copy(), self.trigger, self.side_button
         )
 
 
@@ -177,9 +177,9 @@ def test_motion_that_the_arm_cannot_follow_is_dropped(page, hand, drive):
 
 
 def test_the_side_button_selects_the_mode_and_a_roll_turns_the_group(page, hand, drive):
-    hand.squeeze = True
+    hand.side_button = True
     drive(3)
-    hand.squeeze = False
+    hand.side_button = False
     drive(20)
     assert page.last.mode is Mode.NULL_SPACE
     hand.trigger = True
@@ -210,5 +210,5 @@ def test_a_pose_is_no_gamepad():
     axes = (7.0, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0)
     assert gamepad_state(INDEX, axes, (1.0, 0.0)) is None
     found = pose_state(INDEX, axes, (1.0,))
-    assert (found.trigger, found.squeeze) == (True, False)
+    assert (found.trigger, found.side_button) == (True, False)
     np.testing.assert_array_equal(found.p, [0.1, 0.2, 0.3])
