@@ -159,6 +159,7 @@ def test_baxters_arm_is_checked_against_its_torso_and_pedestal():
 def test_baxters_torso_leaves_most_arm_postures_free():
     """Shapes as wide as its handles would forbid twice as many postures."""
     robot = load_robot("baxter")
+    hand = robot.model().links_moved_by(robot.arm_joints[-1])  # never checked within itself
     moved = {body for body in robot.model().links if body.startswith(("left_", "l_"))}
     off = {frozenset(pair) for pair in robot.disabled_pairs}
     judge, standing = SelfCollision(robot), robot.joint_positions()
@@ -166,7 +167,10 @@ def test_baxters_torso_leaves_most_arm_postures_free():
     for sample in sample_positions(robot, 300, seed=3):
         posture = standing | {name: sample[name] for name in robot.arm_joints}
         touching = judge.touching(posture)
-        free += not any(frozenset(pair) not in off and moved & set(pair) for pair in touching)
+        free += not any(
+            frozenset(pair) not in off and moved & set(pair) and not set(pair) <= hand
+            for pair in touching
+        )
     # Measured 0.67 of 600; surfaces leave 0.72. Four standard errors of 300 are 0.11.
     assert free / 300 > 0.56
 

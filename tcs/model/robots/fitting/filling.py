@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -51,6 +50,8 @@ def _slices(box: NDArray[np.int64]) -> tuple[slice, ...]:
 
 def _cells(triangles: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], float]:
     """Return the centre of the first cell, which cells are hollow, and their edge [m]."""
+    import trimesh
+
     pitch = float(np.ptp(triangles.reshape(-1, 3), axis=0).max()) / CELLS
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     mesh = trimesh.Trimesh(corners, index.reshape(-1, 3), process=False)
