@@ -75,7 +75,10 @@ class Bounds:
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
-        gain = np.minimum(self._net_gain[member], self._group_gain[group] - self._levels[member])
+        of_group = self._group_gain[group] - self._levels[member]
+        if self.penalties is not None:
+            of_group -= self.penalties.of_candidates[member]
+        gain = np.minimum(self._net_gain[member], of_group)
         return gain - (self.travel * self._driving[group] - self._slack[group])
 
     def of_two(self, group: IntArray, a: IntArray, b: IntArray) -> FloatArray:
@@ -97,7 +100,10 @@ class Bounds:
         gain = self._group_gain[group]
         for member in members:
             gain = np.minimum(gain, self._member_gain[member])
-        return gain - self.travel * cost
+        bound = gain - self.travel * cost
+        if self.penalties is not None:
+            bound -= self.penalties.of_sets(members)
+        return np.asarray(bound)
 
     @cached_property
     def _group_gain(self) -> FloatArray:
