@@ -109,9 +109,10 @@ def test_every_exported_name_is_described(site):
     for module in set(modules()) - {"tcs"}:
         if not (CHECKOUT / module.replace(".", "/") / "__init__.py").is_file():
             continue
-        there = vars(importlib.import_module(module))
+        there = importlib.import_module(module)
+        exported = {n: getattr(there, n) for n in getattr(there, "__all__", [])}
         # Sphinx does not describe constants and type aliases separately.
-        names = [n for n in there.get("__all__", []) if isinstance(there[n], (type, FunctionType))]
+        names = [n for n, value in exported.items() if isinstance(value, (type, FunctionType))]
         missing += [f"{module}.{n}" for n in names if described.isdisjoint(homes(module, n))]
     assert missing == []
 
