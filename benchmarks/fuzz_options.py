@@ -153,9 +153,23 @@ COMMANDS = (
     Command("arplace query", ("model.arp",), ("--std", "0.05", "--samples", "20")),
     Command("arplace merge", ("map.apm",)),
     Command("arplace show", ("model.arp",)),
+    Command("plan", ("scores.tcs",)),
+    Command("locate", (), ("--table-at", "1.2", "0.3", "10", "--scans", "2")),
+    Command("study new", ("out",)),
+    Command("study record", ("study",), _WINDOW),
+    Command("study report", ("study",)),
     Command("teleop", (), _WINDOW),
     Command("teleop replay", ("run.csv",), ("--export", "out.html")),
     Command("teleop replay", ("run.csv",), _WINDOW, ("--port", "--duration")),
+    Command("teleop work", ("run.csv",)),
+    Command(
+        "teleop pick-and-place",
+        (),
+        (
+            *("--operators", "2", "--repetitions", "1", "--training", "0", "--jobs", "1"),
+            *("--condition", "ITCM-high", "--out", "out"),
+        ),
+    ),
     Command(
         "teleop experiment",
         (),
@@ -272,9 +286,24 @@ def make_bag(folder: Path) -> None:
             writer.write(connection, i * 20_000_000, store.serialize_ros1(state, name))
 
 
+def make_study(folder: Path) -> None:
+    """Write the plan of a study, which `make_odd_files` puts in a folder of its own."""
+    from tcs.teleop.study.creating import new_study
+
+    plan = {
+        **{"title": "Study", "robot": "iiwa7", "torso_height": None, "training": 0, "trials": 1},
+        **{"time_limit": 60.0, "participants": 2},
+    }
+    with tempfile.TemporaryDirectory() as made:
+        study = new_study(Path(made, "study"), plan, conditions=("end-effector", "novel"))
+        shutil.copy(study.folder / "study.yaml", folder)
+
+
 def make_odd_files(folder: Path) -> None:
-    """Write what is no file of `tcs`: a folder, a pipe, a loop, an empty file and random bytes."""
+    """Write what is no file of `tcs`: folders, a pipe, a loop, an empty file and random bytes."""
     (folder / "folder").mkdir()
+    (folder / "study").mkdir()
+    shutil.copy(folder / "study.yaml", folder / "study")
     os.mkfifo(folder / "pipe")
     (folder / "loop").symlink_to("loop")
     (folder / "empty").write_bytes(b"")
@@ -416,6 +445,7 @@ def main() -> int:
         prepare(Path(folder))
         make_map(Path(folder))
         make_bag(Path(folder))
+        make_study(Path(folder))
         worker = Worker(Path(__file__), (), Path(folder), SECONDS)
         for command in COMMANDS:
             if options.only and command.name not in options.only:

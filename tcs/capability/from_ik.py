@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -64,10 +65,14 @@ def map_from_ik(
     solved = reach.solve(R_BT, p_BT, jobs=jobs, on_progress=on_progress)
     rows = np.flatnonzero(solved.reached)
     joints = solved.joints[rows]
-    return finished_map(
+    found = finished_map(
         reach, grid, map_type, cells[rows], p_BT[rows], solved.manipulability[rows], joints,
         view_rule, {"radius": float(radius), "cells_considered": len(cells)},
     )  # fmt: skip
+    # Scoring found each posture free at this torso height; the joints of the map are in single
+    # precision, which moves a posture by 1e-8 m, perhaps to within the contact margin.
+    here = np.uint32(1) << np.uint32(reach.level)
+    return replace(found, free_torso_heights=found.free_torso_heights | here)
 
 
 def finished_map(

@@ -94,6 +94,11 @@ class MapGrid:
             raise GridError(
                 f"the map has {len(self.tilts)} tilts; must be at most {(1 << _BITS[TILT]) - 1}."
             )
+        if any(abs(bins) > self.yaw_bins for tilt in self.tilts for bins in tilt):
+            raise GridError(
+                "the map has a tilt with pitch or roll beyond one turn; in yaw steps they must be "
+                f"-{self.yaw_bins} to {self.yaw_bins}."
+            )
 
     @classmethod
     def of(cls, step: float = 0.05, yaw_bins: int = 16, grasps: str = "side+top") -> MapGrid:

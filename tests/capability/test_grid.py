@@ -102,6 +102,11 @@ def test_invalid_grids_are_refused(step, yaw_bins, words):
         MapGrid.of(step, yaw_bins)
 
 
+def test_a_tilt_beyond_one_turn_is_refused():
+    with pytest.raises(GridError, match="beyond one turn"):
+        MapGrid(0.05, 16, ((0, 10**30),))
+
+
 def test_unknown_grasps_are_refused():
     with pytest.raises(UnknownNameError, match="'sides'"):
         MapGrid.of(grasps="sides")

@@ -50,15 +50,17 @@ def run_on_terminal(code: str, *words: str) -> str:
         [sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, stderr=theirs, stdin=theirs
     ) as running:
         os.close(theirs)
-        seen = b""
+        seen, sent = b"", False
         while True:
             try:
                 part = os.read(ours, 4096)
             except OSError:
                 break
             seen += part
-            if b"/200" in seen and running.poll() is None:
+            if b"/200" in seen and not sent:
+                # Once: a second Ctrl-C may come while the line about the first is written.
                 running.send_signal(signal.SIGINT)
+                sent = True
             if not part:
                 break
     os.close(ours)

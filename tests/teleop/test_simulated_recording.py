@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def reach():
 @pytest.fixture(scope="module")
 def minute(reach):
     return simulate_recording(reach, MINUTE, seed=1)
+
+
+@pytest.fixture(scope="module")
+def hindered(reach):
+    """A minute in which the hand is so low that the arm meets the robot's base."""
+    return simulate_recording(reach, replace(MINUTE, height=0.3), seed=2)
 
 
 def tool_poses(reach, joints):
@@ -63,13 +70,13 @@ def test_drake_finds_no_contact(reach, minute):
         scene.restore(before)
 
 
-def test_a_stopped_arm_goes_back_along_its_path(minute):
-    stopped, joints = minute.stopped, minute.recording.joints
+def test_a_stopped_arm_goes_back_along_its_path(hindered):
+    stopped, joints = hindered.stopped, hindered.recording.joints
     assert stopped.any()
     # The rest of the time it follows the hand: it never gets stuck.
     assert stopped.mean() < 0.6
     assert not stopped[-500:].all()
-    for i in np.flatnonzero(stopped)[::50]:
+    for i in np.flatnonzero(stopped)[::10]:
         # At the start of the path there is no sample of the start posture.
         earlier = np.any(np.all(joints[:i] == joints[i], axis=1))
         assert earlier or np.abs(joints[i] - joints[0]).max() < 0.1
