@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tcs.errors import DataFileError
+from tcs.errors import DataFileError, TcsError
 from tcs.output.study.server import FormServer
 from tcs.output.words.teleop import trial_words
 from tcs.teleop.experiment.trial import TrialMeasures
@@ -21,6 +21,8 @@ from tcs.teleop.study.participants import (
     load_participant,
     load_participants,
     new_participant,
+    participant_names,
+    withdraw,
 )
 from tcs.teleop.study.recording import StudyRecording
 from tcs.teleop.study.steps import Step
@@ -70,6 +72,8 @@ def open_session(
 ) -> Iterator[StudySession]:
     """Open the session of a participant, which no other process can open meanwhile.
 
+    A participant who is new is withdrawn if the session is refused before anything is recorded.
+
     Args:
         folder: Folder of the study.
         name: Name of the participant; None for the unfinished one, or a new one if there is none.
@@ -83,6 +87,7 @@ def open_session(
         OutputError: If the participant is recorded by another process.
     """
     study = load_study(folder)
+    before = participant_names(study)
     participant = _participant(study, name, new=new)
     with exclusive_session(study, participant.participant):
         # Another process may have recorded steps until now.
@@ -90,6 +95,10 @@ def open_session(
         session = StudySession(StudyRecording(study, present), given, report)
         try:
             yield session
+        except TcsError:
+            if session.is_untouched and session.name not in before:
+                withdraw(study, session.name)
+            raise
         finally:
             session.close()
 
@@ -136,6 +145,12 @@ class StudySession:
     def name(self) -> str:
         """Name of the participant."""
         return self._recording.participant.participant
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing has been recorded of the participant."""
+        participant = self._recording.participant
+        return participant.is_active and not participant.steps
 
     def close(self) -> None:
         """Stop the server of the forms."""

@@ -7,7 +7,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -223,6 +223,15 @@ def new_participant(study: Study, name: str | None = None) -> ParticipantFile:
     return participant
 
 
+def withdraw(study: Study, name: str) -> None:
+    """Remove a participant of whom nothing is recorded, so that the name is free again."""
+    participant_path(study, name).unlink(missing_ok=True)
+    _lock_path(study, name).unlink(missing_ok=True)
+    with suppress(OSError):
+        # Others may be in the folder.
+        (study.folder / PARTICIPANTS).rmdir()
+
+
 def with_record(participant: ParticipantFile, key: str, record: StepRecord) -> ParticipantFile:
     """Return a participant with the record of one more step."""
     return participant.model_copy(update={"steps": {**participant.steps, key: record}})
@@ -242,7 +251,7 @@ def exclusive_session(study: Study, name: str) -> Iterator[None]:
     Raises:
         OutputError: If another process records this participant, or the folder cannot be written.
     """
-    path = study.folder / PARTICIPANTS / f".{name}.lock"
+    path = _lock_path(study, name)
     try:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     except OSError as error:
@@ -257,3 +266,7 @@ def exclusive_session(study: Study, name: str) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _lock_path(study: Study, name: str) -> Path:
+    return study.folder / PARTICIPANTS / f".{name}.lock"
