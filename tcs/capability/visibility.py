@@ -43,6 +43,7 @@ def visibility(view: View, p_BT: FloatArray, rule: str = CORRECTED) -> FloatArra
         pitch 37.5 deg below the goal, at the lower bound, still scores 2/3. "corrected" uses atan2,
         is 0 if either axis is out of view, and falls to 0 at both bounds.
 
+    >>> from tcs.capability.head import View
     >>> view = View((0.0, 0.0, 1.0), (-1.8, 1.8), (-1.4, 1.2))
     >>> points = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     >>> visibility(view, points).tolist(), visibility(view, points, "thesis").tolist()
