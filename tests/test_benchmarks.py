@@ -152,7 +152,7 @@ def test_a_small_run_prints_every_part():
     assert free == "0 of 2"
     assert all(texts[name][0].startswith("skipped: ") for name in ("EAIK", "TRAC-IK"))
     # Drake's checker has a context for each thread, and finds no winner in collision.
-    assert texts["checker's contexts; winners hit"] == ["2; 0"]
+    assert texts["floor: checker's contexts; winners hit"] == ["2; 0"]
     parts = ("base check", "prefilter: too far", "inverse kinematics", "measure")
     shares = [float(texts[p][0].split(" %")[0]) for p in (*parts, "collision of arm and gripper")]
     # The parts add up to the whole within the rounding to three digits, and none is zero.
