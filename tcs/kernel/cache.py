@@ -101,7 +101,7 @@ def inner(function: _Function) -> _Function:
 
 
 class _Entry(CPUDispatcher):
-    """Dispatcher that compiles without garbage collection, which takes an eighth of the time."""
+    """Dispatcher that compiles without garbage collection."""
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, with everything that the function calls."""
