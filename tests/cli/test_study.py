@@ -117,8 +117,9 @@ def test_odd_values_are_refused_in_a_line(tcs_command, study, tmp_path):
     for folder in ("a" * 5000, "/dev/null"):
         for command in ("record", "report"):
             assert refused(tcs_command("study", command, folder), "study.yaml")
-    # Nobody is added by a command that is refused.
+    # A command that is refused adds nobody, and no folder.
     assert participant_names(study) == []
+    assert [path.name for path in study.folder.iterdir()] == ["study.yaml"]
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,13 @@ Its results prove nothing about people: they show the effect of a base pose on o
 The operator moves the hand in submovements. Each is planned from the image, which shows the tool
 late, misjudged along the view and not at all where the tool is outside of it. The operator plans in
 the camera's frame and turns the plan into the base's by the angle that it has learnt so far: what
-it has not learnt misdirects the hand. Phases follow each other as in the thesis: approach, grasp,
-lift, transfer, lower until the table is felt, release, retreat.
+it has not learnt misdirects the hand.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -22,30 +20,13 @@ from tcs.kernel.arrays import FloatArray
 from tcs.teleop.control.resolved_rate import rotation_vector
 from tcs.teleop.pick_and_place.cup import CLOSING_TIME, CupState
 from tcs.teleop.pick_and_place.master import Coupling, Master
+from tcs.teleop.pick_and_place.perception import Perception
+from tcs.teleop.pick_and_place.phases import FREE, NEXT, ORIENTED, TOLERANCE, Phase, Seen, target
 from tcs.teleop.pick_and_place.slave import Control, orientation
-from tcs.teleop.pick_and_place.task import (
-    CIRCLE_RADIUS,
-    CUP_RADIUS,
-    FARTHEST,
-    GRASP_HEIGHT,
-    START,
-    Condition,
-)
+from tcs.teleop.pick_and_place.task import CIRCLE_RADIUS, CUP_RADIUS, Condition
 from tcs.teleop.pick_and_place.traits import Traits
 from tcs.teleop.pick_and_place.view import HeadCamera
 
-GRASP = -0.02
-"""Distance from the tool frame, 2 cm behind the tips of the fingers, to the axis of a cup between
-them [m]."""
-BEFORE = 0.13
-"""Distance before the grasp at which the gripper is aligned [m]: the fingers are 3 cm from the
-cup."""
-LIFT = 0.05
-"""Height by which the cup is lifted [m]."""
-CLEARANCE = 0.05
-"""Distance beyond `FARTHEST` at which the operator aims in the retreat [m]."""
-RISE = 0.2
-"""Height above the start towards which the operator retreats [m]."""
 _FELT = 0.3
 """Force that is felt as a contact [N]."""
 _NEAR = 0.10
@@ -64,53 +45,6 @@ _GROUP_TRIES = 2
 """Motions of joint group 1 in a phase, one in each direction, before the hand tries again."""
 _HINDERED, _HINDERED_TURN = 0.03, 0.3
 """Distance [m] and rotation [rad] between hand and tool from which the tool visibly lags."""
-
-
-class Phase(StrEnum):
-    """Phase of the task."""
-
-    APPROACH = "approach"
-    ALIGN = "align"
-    REACH = "reach"
-    CLOSE = "close"
-    REOPEN = "reopen"
-    LIFT = "lift"
-    TRANSFER = "transfer"
-    LOWER = "lower"
-    OPEN = "open"
-    BACK = "back"
-    RETREAT = "retreat"
-
-
-_NEXT = {
-    Phase.APPROACH: Phase.ALIGN, Phase.ALIGN: Phase.REACH, Phase.REACH: Phase.CLOSE,
-    Phase.REOPEN: Phase.ALIGN, Phase.LIFT: Phase.TRANSFER, Phase.TRANSFER: Phase.LOWER,
-    Phase.LOWER: Phase.OPEN, Phase.BACK: Phase.RETREAT, Phase.RETREAT: Phase.RETREAT,
-}  # fmt: skip
-_TOLERANCE = {
-    Phase.APPROACH: 0.04, Phase.ALIGN: 0.012, Phase.REACH: 0.012, Phase.LIFT: 0.02,
-    Phase.TRANSFER: 0.012, Phase.LOWER: 0.004, Phase.BACK: 0.04, Phase.RETREAT: 0.0,
-}  # fmt: skip
-"""Perceived distance from the target at which a phase ends [m]."""
-_ORIENTED = (Phase.ALIGN, Phase.REACH)
-"""Phases that need the orientation of the grasp."""
-_FREE = (Phase.BACK, Phase.RETREAT)
-"""Phases in which the orientation does not matter."""
-
-
-class Seen(NamedTuple):
-    """What the image shows, and what the hand feels."""
-
-    p: FloatArray
-    """Position of the tool in the base [m], shape (3,)."""
-    R: FloatArray
-    """Orientation of the tool in the base, shape (3, 3)."""
-    cup: FloatArray
-    """Position of the cup in the base [m], shape (3,)."""
-    state: CupState
-    """State of the cup."""
-    force: float
-    """Force on the hand [N]."""
 
 
 @dataclass(slots=True)
@@ -184,7 +118,7 @@ class Operator:
         self._round_trip = coupling.latency.command + coupling.latency.picture
         x, y, _ = condition.cup - shoulder
         self._heading = math.atan2(y, x)
-        self._noise, self._noise_time = rng.standard_normal(6), 0.0
+        self._perception = Perception(traits, camera, rng)
         self._wait = traits.reaction
         self._from = self._by = (np.zeros(3), np.zeros(3))
         self._began = self._lasts = 0.0
@@ -227,11 +161,13 @@ class Operator:
     def _plan(self, now: float, seen: Seen, master: Master) -> None:
         """Begin the next submovement, or the next phase where the target is reached."""
         traits = self._traits
-        off = self._perceived(now, seen)
-        turn = np.zeros(3) if self.phase in _FREE else self._perceived_turn(seen)
+        off = self._perception.displacement(now, self._target(seen) - seen.p, seen)
+        turn = np.zeros(3)
+        if self.phase not in FREE:
+            turn = self._perception.rotation(seen, self._heading)
         distance, angle = (math.sqrt(part @ part) for part in (off, turn))
-        oriented = angle <= _LEVEL or self.phase not in _ORIENTED or self._accepted
-        there = distance <= _TOLERANCE[self.phase]
+        oriented = angle <= _LEVEL or self.phase not in ORIENTED or self._accepted
+        there = distance <= TOLERANCE[self.phase]
         if (there and oriented) or (self.phase is Phase.LOWER and self._felt):
             self._finish_phase(now, seen)
             return
@@ -278,61 +214,17 @@ class Operator:
         self._from, self._by = (master.p, master.angles), (by, angles)
         self._began, self._lasts = now, lasts
 
-    def _perceived(self, now: float, seen: Seen) -> FloatArray:
-        """Return the perceived displacement from the tool to its target [m], shape (3,)."""
-        traits = self._traits
-        kept = math.exp(-(now - self._noise_time) / traits.misjudging_memory)
-        fresh = self._rng.standard_normal(6)
-        self._noise = kept * self._noise + math.sqrt(1.0 - kept * kept) * fresh
-        self._noise_time = now
-        off = self._target(seen) - seen.p
-        noise = self._noise[:3]
-        if not self._camera.sees(seen.p):
-            return off + traits.blind * noise
-        std = traits.misjudging + traits.weber * math.sqrt(off @ off)
-        return np.asarray(off + self._camera.R @ (std * noise * (traits.depth, 1.0, 1.0)))
-
-    def _perceived_turn(self, seen: Seen) -> FloatArray:
-        """Return the perceived rotation from the tool to its orientation [rad], shape (3,)."""
-        wanted = orientation(0.0, 0.0, self._heading)
-        turn = rotation_vector(wanted @ seen.R.T)
-        return turn + self._traits.misjudging_angle * self._noise[3:]
-
     def _target(self, seen: Seen) -> FloatArray:
         """Return where the tool should be [m], shape (3,)."""
         ahead = np.array([math.cos(self._heading), math.sin(self._heading), 0.0])
         if self._accepted or self.phase is Phase.BACK:
             ahead = np.array([seen.R[0, 0], seen.R[1, 0], 0.0])
             ahead /= max(math.hypot(ahead[0], ahead[1]), 1e-9)
-        phase, cup, place = self.phase, seen.cup, self._condition.place
-        if phase in (Phase.APPROACH, Phase.ALIGN, Phase.REACH):
-            back = GRASP + (0.0 if phase is Phase.REACH else BEFORE)
-            target = cup - back * ahead
-            target[2] = START[2] if phase is Phase.APPROACH else GRASP_HEIGHT
-        elif phase in (Phase.LIFT, Phase.TRANSFER):
-            over = place if phase is Phase.TRANSFER else cup
-            target = seen.p + over - cup
-            target[2] = seen.p[2] + GRASP_HEIGHT + LIFT - cup[2]
-        elif phase is Phase.LOWER:
-            target = seen.p + place - cup
-            target[2] = seen.p[2] + GRASP_HEIGHT - cup[2]
-        elif phase is Phase.BACK:
-            target = cup - (GRASP + BEFORE) * ahead
-            target[2] = seen.p[2]
-        else:
-            target = self._away()
-        return target
-
-    def _away(self) -> FloatArray:
-        """Return the aim of the retreat: from the place towards the start, and up."""
-        off = np.array(START) - self._condition.place
-        off[2] += RISE
-        far = (FARTHEST + CLEARANCE) / math.sqrt(off @ off)
-        return np.asarray(self._condition.place + far * off)
+        return target(self.phase, seen, self._condition.place, ahead)
 
     def _finish_phase(self, now: float, seen: Seen) -> None:
         """Begin the next phase."""
-        self._begin_phase(_NEXT[self.phase])
+        self._begin_phase(NEXT[self.phase])
         self._wait = now
         if self.phase is Phase.CLOSE:
             self._press(now, closing=True)

@@ -20,7 +20,8 @@ from tcs.teleop.pick_and_place.cup import (
     CupState,
 )
 from tcs.teleop.pick_and_place.master import PERIOD, Coupling, Master, drawn_tremor
-from tcs.teleop.pick_and_place.operator import Experience, Operator, Phase, Seen
+from tcs.teleop.pick_and_place.operator import Experience, Operator
+from tcs.teleop.pick_and_place.phases import Phase, Seen
 from tcs.teleop.pick_and_place.slave import PERIOD as SLAVE_PERIOD
 from tcs.teleop.pick_and_place.slave import Control, Slave, orientation
 from tcs.teleop.pick_and_place.task import FARTHEST, TABLE_HEIGHT, Condition

@@ -21,7 +21,7 @@ from tcs.files.writing import make_folder, whole_file
 from tcs.teleop.experiment.order import counterbalanced_orders
 from tcs.teleop.study.forms import Answer
 from tcs.teleop.study.steps import Step, form_of, steps_of
-from tcs.teleop.study.study_file import PARTICIPANTS, Study
+from tcs.teleop.study.study_file import PARTICIPANTS, RUNS, Study
 
 VERSION = 1
 """Version of the keys of the file of a participant."""
@@ -227,9 +227,10 @@ def withdraw(study: Study, name: str) -> None:
     """Remove a participant of whom nothing is recorded, so that the name is free again."""
     participant_path(study, name).unlink(missing_ok=True)
     _lock_path(study, name).unlink(missing_ok=True)
-    with suppress(OSError):
-        # Others may be in the folder.
-        (study.folder / PARTICIPANTS).rmdir()
+    for folder in (PARTICIPANTS, RUNS):
+        with suppress(OSError):
+            # Files of others may be in the folder.
+            (study.folder / folder).rmdir()
 
 
 def with_record(participant: ParticipantFile, key: str, record: StepRecord) -> ParticipantFile:
