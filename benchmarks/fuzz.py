@@ -32,7 +32,7 @@ from fuzz_mutations import damaged
 from worker import Worker
 
 SECONDS = 60.0
-"""Longest time for one mutant [s]; on a busy machine, scoring one takes some seconds."""
+"""Most processor time for one mutant [s]; scoring one takes some seconds."""
 MEMORY = 2 * 1024**3
 """Most memory that a mutant may take beyond that of a started worker [bytes]."""
 DAMAGED = 0.2

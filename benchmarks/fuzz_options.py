@@ -31,7 +31,7 @@ from fuzz_files import prepare
 from worker import Worker
 
 SECONDS = 300.0
-"""Longest time for one call [s]; an experiment with another line takes 15 s of an idle core."""
+"""Most processor time for one call [s]; an experiment with another line takes 15 s."""
 
 NUMBERS = ("0", "-0.0", "-1", "nan", "inf", "-inf", "1e308", "1e-300", "1e400", "", "x", "1,5")
 INTEGERS = ("0", "-1", "2147483648", "9" * 23, "9" * 5000, "nan", "1.5", "1e3", "", "x", "٣")

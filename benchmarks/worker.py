@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import select
 import subprocess
 import sys
@@ -14,7 +15,11 @@ from pathlib import Path
 from typing import Any
 
 START_SECONDS = 300.0
-"""Longest time for a worker to start, which may have to compile the kernel [s]."""
+"""Most processor time for a worker to start, which may have to compile the kernel [s]."""
+WAITING = 10.0
+"""Longest time for an answer, as a multiple of the processor time: others use the processor too."""
+LOOK_SECONDS = 0.5
+"""Longest time between two looks at the processor time of a worker [s]."""
 
 
 class Worker:
@@ -28,7 +33,8 @@ class Worker:
                 with `--worker FOLDER` and the words.
             words: Further arguments of the script.
             master: Folder whose files are copied into that of each process.
-            seconds: Longest time for one answer [s].
+            seconds: Most processor time for one answer [s]. A process that waits rather than
+                computes gets WAITING times as long.
         """
         self._script = script
         self._words = words
@@ -50,7 +56,8 @@ class Worker:
         if line:
             answer: dict[str, Any] = json.loads(line)
             return answer
-        outcome, text = "hang", f"no answer within {self._seconds:g} s"
+        limits = f"{self._seconds:g} s of processor time or {WAITING * self._seconds:g} s"
+        outcome, text = "hang", f"no answer within {limits}"
         if line is not None:
             outcome, text = "abort", f"the process ended with code {self._process.wait()}"
         self.close()
@@ -74,11 +81,24 @@ class Worker:
             raise SystemExit(f"the worker '{' '.join(self._words)}' does not start")
 
     def _line(self, seconds: float) -> bytes | None:
-        """Return the next line of the worker, b"" if it ended, None if there is none in time."""
+        """Return the next line of the worker, b"" if it ended, None if there is none in time.
+
+        Args:
+            seconds: Most processor time until then [s].
+        """
         assert self._process is not None
         assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], seconds)
-        return self._process.stdout.readline() if ready else None
+        latest = time.monotonic() + WAITING * seconds
+        most = processor_seconds(self._process.pid) + seconds
+        while (left := latest - time.monotonic()) > 0:
+            ready, _, _ = select.select(
+                [self._process.stdout], [], [], min(left, seconds, LOOK_SECONDS)
+            )
+            if ready:
+                return self._process.stdout.readline()
+            if processor_seconds(self._process.pid) > most:
+                break
+        return None
 
     def close(self) -> None:
         """End the process."""
@@ -93,3 +113,14 @@ class Worker:
         if self._folder is not None:
             self._folder.cleanup()
         self._process = self._folder = None
+
+
+def processor_seconds(process: int) -> float:
+    """Return the processor time of a process by its number [s]; 0 where the system has no /proc."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return 0.0
+    # User and system time are fields 14 and 15; the second is a name that may contain spaces.
+    user, system = stat.rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")

@@ -107,23 +107,42 @@ def test_defects_differ(scripts, folder):
     assert judged(MemoryError()) == "traceback"
 
 
+@pytest.fixture
+def worker(scripts, tmp_path):
+    """Return a function that starts a worker which does an action when asked."""
+    made = []
+
+    def start(action, seconds):
+        script = tmp_path / "script.py"
+        code = f"import os, sys, time\nprint('ready', flush=True)\nsys.stdin.readline()\n{action}"
+        script.write_text(code)
+        made.append(scripts[0].Worker(script, (), FOLDER / "figures", seconds))
+        return made[-1]
+
+    yield start
+    for one in made:
+        one.close()
+
+
 @pytest.mark.parametrize(
-    ("action", "outcome"),
-    [("os.abort()", "abort"), ("time.sleep(60)", "hang")],
-    ids=["abort", "hang"],
+    ("action", "outcome", "seconds"),
+    [
+        # Long enough for a process to die, short enough for a test.
+        ("os.abort()", "abort", 5.0),
+        ("time.sleep(60)", "hang", 0.02),
+        ("while True: pass", "hang", 0.1),
+    ],
+    ids=["abort", "waits", "computes"],
 )
-def test_a_dead_or_silent_worker_is_reported_and_replaced(scripts, tmp_path, action, outcome):
-    script = tmp_path / "script.py"
-    code = f"import os, sys, time\nprint('ready', flush=True)\nsys.stdin.readline()\n{action}"
-    script.write_text(code)
-    # Long enough for a process to die, short enough for a test.
-    seconds = 5.0 if outcome == "abort" else 0.2
-    worker = scripts[0].Worker(script, (), FOLDER / "figures", seconds)
-    try:
-        assert worker.judge(0)["outcome"] == outcome
-        assert not worker.runs
-    finally:
-        worker.close()
+def test_a_dead_or_silent_worker_is_reported_and_replaced(worker, action, outcome, seconds):
+    started = worker(action, seconds)
+    assert started.judge(0)["outcome"] == outcome
+    assert not started.runs
+
+
+def test_only_processor_time_of_the_worker_counts(worker):
+    started = worker('time.sleep(0.8)\nprint(\'{"outcome": "accepted"}\')', 0.4)
+    assert started.judge(0) == {"outcome": "accepted"}
 
 
 def test_every_command_and_option_gets_odd_values(scripts):
