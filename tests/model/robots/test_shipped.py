@@ -1,7 +1,7 @@
 """The suite for robots that ship: a new robot file in `models/robots` runs through every test.
 
 The IK round trip and the remaining checks of `check_up` are in tests/model/checkup/test_report.py,
-stricter properties of the primitives in fitting/test_enclosure.py, and a scored task in
+the proof that primitives enclose the meshes in fitting/test_enclosure.py, and a scored task in
 tests/placement/scoring/test_robots.py; all of them run over every robot as well.
 """
 
@@ -16,7 +16,6 @@ from pydrake.multibody.tree import RevoluteJoint
 
 from tcs.model.robots import load_robot, robot_names, robot_urdf
 from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.fitting import enclosure
 from tcs.model.robots.self_collision import SelfCollision, sample_positions
 from tcs.model.robots.urdf.pose import pose_in_root
 
@@ -66,10 +65,6 @@ def test_postures_and_openings_are_within_limits(robot):
                 # The figures of a file are rounded to a microradian.
                 lower, upper = limits[name]
                 assert lower - 1e-6 <= positions[name] <= upper + 1e-6, (posture, name)
-
-
-def test_primitives_enclose_the_meshes(robot):
-    assert {body.body: body.outside for body in enclosure(robot) if body.outside} == {}
 
 
 def test_kinematics_agree_with_drake(robot, model):

@@ -20,6 +20,9 @@ PR2_ARM = (
     "gripper_r_finger_tip_link"
 ).split()
 
+PARTS = 20
+"""Parts of a surface of which one after the other is looked at."""
+
 
 @pytest.fixture(scope="module", params=robot_names())
 def robot(request):
@@ -29,6 +32,11 @@ def robot(request):
 @pytest.fixture(scope="module")
 def surfaces(robot):
     return surfaces_to_enclose(robot)
+
+
+@pytest.fixture(scope="module")
+def found(robot):
+    return {body.body: body for body in enclosure(robot)}
 
 
 def moved_by(robot, joint):
@@ -50,16 +58,20 @@ def test_pr2_has_all_its_surfaces(pr2):
     assert len(body_triangles(pr2.model())) == 1 + 4 + 8 + 1 + 2 + 3 + 1 + 2 * len(PR2_ARM)
 
 
-def test_every_triangle_lies_inside_the_primitives(surfaces):
-    outside = {body: int((~enclosed(shapes, s)).sum()) for body, (_, shapes, s) in surfaces.items()}
+def test_every_triangle_lies_inside_the_primitives(surfaces, found):
+    outside = {name: body.outside for name, body in found.items()}
     assert outside == dict.fromkeys(surfaces, 0)
+    triangles = {name: len(surface) for name, (_, _, surface) in surfaces.items()}
+    assert {name: body.triangles for name, body in found.items()} == triangles
 
 
 def test_primitives_could_not_be_a_millimetre_smaller(surfaces):
     """The proof can fail: if the primitives of a body are shrunk, some triangle protrudes."""
     for body, (_, shapes, surface) in surfaces.items():
         smaller = [shape.shrunk(0.001) for shape in shapes if min(shape.size) > 0.002]
-        assert not enclosed(smaller, surface).all(), body
+        # In parts, as the first triangle that protrudes decides.
+        parts = (surface[start::PARTS] for start in range(PARTS))
+        assert any(not enclosed(smaller, part).all() for part in parts), body
 
 
 def test_inside_of_closed_surfaces_is_enclosed_too(surfaces):
@@ -77,9 +89,9 @@ def test_inside_of_closed_surfaces_is_enclosed_too(surfaces):
         assert inside.all(), body
 
 
-def test_excess_of_arm_and_hand_is_at_most_two(robot):
+def test_excess_of_arm_and_hand_is_at_most_two(robot, found):
     moved = moved_by(robot, robot.arm_joints[0])
-    excess = {found.body: found.excess for found in enclosure(robot)}
+    excess = {name: body.excess for name, body in found.items()}
     assert {body: e for body, e in excess.items() if body in moved and e > 2.0} == {}
     assert moved & excess.keys()
 
