@@ -7,9 +7,10 @@ STAMP := $(VENV)/.installed
 OUT := out
 # Temporary files of the tests stay in the checkout too.
 PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
-# Processes that share the tests, a file at a time: what a file sets up is made once.
+# Processes that share the tests, a file at a time: what a file sets up is made once. The order is
+# that of `tests/conftest.py`: by number of tests, the longest files would come last.
 PROCESSES ?= 2
-SHARED := --numprocesses=$(PROCESSES) --dist=loadfile
+SHARED := --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

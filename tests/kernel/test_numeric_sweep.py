@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ from tests.kernel.toy import goal_in_base, scores_of, size_of, toy_grid, toy_sce
 ROOT = Path(__file__).parents[2]
 
 
+@cache
 def offset_scene(seed, *, obstacles=4):
     """Return a toy scene around Baxter's arm or one none of whose axes meet, and its scores."""
     chain = drake_arm("baxter").chain if seed == 0 else offset_arm(np.random.default_rng(seed))
