@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tcs.errors import TcsError
     from tcs.model.grid import InitialConfiguration
     from tcs.model.scene import Observation
-    from tcs.motion import MotionPlan, plan
+    from tcs.motion import MotionPlan, examine, plan
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.robustness import Evaluation, evaluate, robustify
@@ -55,6 +55,7 @@ __all__ = [
     "Verification",
     "__version__",
     "evaluate",
+    "examine",
     "explain",
     "load",
     "plan",
@@ -85,6 +86,7 @@ _HOMES = {
     "UtilityWeights": ("tcs.placement.selection", "UtilityWeights"),
     "Verification": ("tcs.placement.scoring", "Verification"),
     "evaluate": ("tcs.placement.robustness", "evaluate"),
+    "examine": ("tcs.motion", "examine"),
     "explain": ("tcs.placement.reasons", "explain"),
     "load": ("tcs.placement.store", "load_scores"),
     "plan": ("tcs.motion", "plan"),

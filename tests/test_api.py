@@ -27,6 +27,7 @@ PROMISED = [
     "Verification",
     "__version__",
     "evaluate",
+    "examine",
     "explain",
     "load",
     "plan",

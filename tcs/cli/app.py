@@ -69,6 +69,7 @@ for command in (
     select.select,
     select.explain,
     motion.plan,
+    motion.motions,
     score.verify,
     score.export,
     robustness.evaluate,

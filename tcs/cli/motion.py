@@ -1,4 +1,4 @@
-"""The command `tcs plan`: the motions that do a task from the stops of a set."""
+"""The commands `tcs plan` and `tcs motions`: motions that do a task, and what can be done."""
 
 from __future__ import annotations
 
@@ -84,3 +84,62 @@ def plan(
         save_plan(out, found)
         terminal.note(f"wrote {out}")
     terminal.print_result(found.to_json(), report_plan, as_json=as_json)
+
+
+def motions(
+    file: options.File,
+    within: Annotated[
+        float,
+        typer.Option(
+            help="Examine the configurations of sets whose P_R + P_M is at most this fraction "
+            "below the best one."
+        ),
+    ] = 0.05,
+    most: Annotated[
+        int | None,
+        typer.Option(
+            help="Greatest number of configurations, those of the best sets first.",
+            show_default="no bound",
+        ),
+    ] = None,
+    pairs: Annotated[
+        bool,
+        typer.Option(
+            "--pairs", help="Examine every configuration that reaches a goal, not only the best."
+        ),
+    ] = False,
+    observed: options.Observed = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write.", show_default="FILE.motions")
+    ] = None,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = 2,
+    as_json: options.Json = False,
+) -> None:
+    """Find which goals can be done, in and out and back to rest, for `tcs select --executable`."""
+    import tcs
+    from tcs.files.writing import check_writable
+    from tcs.motion.examine import examination
+    from tcs.output.terminal.motion_tables import report_motions
+    from tcs.placement.selection import nearest_table
+    from tcs.placement.store import motion_path, save_motions
+
+    path = out or motion_path(file)
+    check_writable(path, [file])
+    loaded = tcs.load(file)
+    settings = observed_settings(observed or (), loaded.observed_axes)
+    table = nearest_table(loaded, None, settings).index
+    with terminal.progress_bar("configurations") as on_progress:
+        found = tcs.examine(
+            loaded,
+            within=None if pairs else within,
+            most=most,
+            table=table,
+            seed=seed,
+            jobs=jobs,
+            on_progress=on_progress,
+            on_compile=terminal.note_compiling,
+        )
+    save_motions(path, found)
+    result = {"file": str(path), **examination(loaded, found, table)}
+    terminal.print_result(result, report_motions, as_json=as_json)

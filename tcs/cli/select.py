@@ -91,13 +91,22 @@ def select(
             "--observed."
         ),
     ] = None,
+    executable: Annotated[
+        bool,
+        typer.Option(
+            "--executable",
+            help="Count only goals to which `tcs motions` found a motion, and choose among the "
+            "configurations that it examined.",
+        ),
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Select the set with the greatest utility from the current state."""
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.placement.constraints import constraint_texts
-    from tcs.placement.selection import same_set
+    from tcs.placement.selection import Executability, same_set
+    from tcs.placement.store import motions_of
 
     base, covariance = start.base()
     loaded = tcs.load(file)
@@ -121,16 +130,20 @@ def select(
         observed=observed_settings(observed or (), loaded.observed_axes),
         frames=frame_values(frames or ()),
     )
-    choice = choose(here)
+    motions = motions_of(loaded, file) if executable else None
+    choice = choose(here, motions=motions)
     for warning in choice.warnings:
         terminal.note(warning)
     result = choice.to_json(loaded.metadata["measure"])
+    if motions is not None:
+        compared = Executability.of(loaded, motions, choice, choose(here))
+        result["executable"] = compared.to_json(choice)
     if covariance is not None:
         x, y, yaw_deg = base
         result["located"] = {
             "here": {"x": x, "y": y, "yaw_deg": yaw_deg},
             "covariance": covariance.tolist(),
-            "same_set": same_set(choose, here, covariance),
+            "same_set": same_set(partial(choose, motions=motions), here, covariance),
         }
     if scored := constraint_texts(loaded):
         result["scored_constraints"] = scored

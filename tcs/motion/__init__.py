@@ -1,13 +1,15 @@
 """Motions: timed, certified trajectories of the arm that do a task from the stops of a set.
 
 In: a score file and the configurations of a set. Out: plans, as values and as files: at each stop
-the tour from rest through the goals and back, and for every goal without a motion the reason.
+the tour from rest through the goals and back, and for every goal without a motion the reason; and,
+for all configurations worth it, which goals can be done.
 """
 
 from __future__ import annotations
 
 from tcs.motion.approach import Access, Accesses, accesses
 from tcs.motion.curves import Curve
+from tcs.motion.examine import examine
 from tcs.motion.files import save_plan
 from tcs.motion.plans import GoalResult, MotionPlan, Segment, StopPlan, plan
 from tcs.motion.stops import Stop
@@ -24,6 +26,7 @@ __all__ = [
     "StopPlan",
     "Timed",
     "accesses",
+    "examine",
     "plan",
     "save_plan",
 ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.postures import postures_at
 from tcs.kernel.motion.straight import (
     BLOCKED,
@@ -15,7 +17,7 @@ from tcs.kernel.motion.straight import (
     new_straight_workspace,
     straight_motion,
 )
-from tcs.model.tasks import Goal, ToolLine
+from tcs.model.tasks import ToolLine
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair, Stop
 
@@ -74,45 +76,84 @@ def accesses(stop: Stop, goal: int) -> Accesses:
         stop: The initial configuration.
         goal: Number of the goal.
     """
-    search = _Search(stop, stop.job.task.goals[goal], *_goal_in_arm_base(stop, goal))
+    search = _Search(stop, goal)
     for samples in SAMPLES:
         for forwards in (False, True):
-            search.follow(samples, forwards=forwards)
-            if search.found:
-                return Accesses(_spread(stop, search.found), "", None)
+            found = list(search.follow(samples, forwards=forwards))
+            if found:
+                return Accesses(_spread(stop, found), "", None)
     return search.nothing()
+
+
+def first_accesses(stop: Stop, goal: int, samples: int) -> Iterator[Access]:
+    """Yield postures at a goal that can be approached and left, as soon as each is found.
+
+    Args:
+        stop: The initial configuration.
+        goal: Number of the goal.
+        samples: Number of angles of the free joint at which postures are solved.
+    """
+    search = _Search(stop, goal)
+    for forwards in (False, True):
+        yield from search.follow(samples, forwards=forwards)
 
 
 class _Search:
     """The search for the accesses of one goal."""
 
-    def __init__(self, stop: Stop, goal: Goal, R_AG: FloatArray, p_AG: FloatArray) -> None:
-        self.stop, self.goal, self.R_AG, self.p_AG = stop, goal, R_AG, p_AG
-        self.found: list[Access] = []
+    def __init__(self, stop: Stop, goal: int) -> None:
+        self.stop, self.goal = stop, stop.job.task.goals[goal]
+        self.R_AG, self.p_AG = stop.goal_in_arm_base(goal)
+        self.line = new_straight_workspace()
         self.outcomes = {DONE: 0, LIMITS: 0, BLOCKED: 0}
-        self.at_goal: dict[BodyPair, int] = {}
-        """How often each pair of bodies touches at a posture at the goal."""
+        self.at_goal: dict[int, int] = {}
+        """How often each pair of shapes touches at a posture at the goal."""
         stop.forget_contacts()
 
-    def follow(self, samples: int, *, forwards: bool) -> None:
+    def follow(self, samples: int, *, forwards: bool) -> Iterator[Access]:
         """Follow the approach from many postures, at its begin (forwards) or at the goal."""
         stop, goal = self.stop, self.goal
         begin = self.p_AG - self.R_AG @ goal.approach.offset if forwards else self.p_AG
         line = goal.approach if forwards else goal.approach.reverse()
         for q in postures_at(stop.problem, self.R_AG, begin, samples):
-            pair = stop.contact_at(q)
-            if pair is not None and not forwards:
-                self.at_goal[pair] = self.at_goal.get(pair, 0) + 1
-            if pair is not None:
+            pair = posture_contact(stop.motion, stop.work, q)
+            if pair != NO_PAIR:
+                if not forwards:
+                    self.at_goal[pair] = self.at_goal.get(pair, 0) + 1
                 continue
-            outcome, curve = _straight(stop, q, line, self.R_AG)
-            curve = curve if forwards else curve.reverse()
-            away = curve.reverse()
-            if outcome == DONE and goal.retreat != goal.approach.reverse():
-                outcome, away = _straight(stop, curve.q[-1], goal.retreat, self.R_AG)
+            outcome, curve = self._straight(q, line)
+            if curve is not None:
+                curve = curve if forwards else curve.reverse()
+                outcome, away = self._retreat(curve)
             self.outcomes[outcome] += 1
-            if outcome == DONE:
-                self.found.append(Access(approach=curve, retreat=away))
+            if curve is not None and away is not None:
+                yield Access(approach=curve, retreat=away)
+
+    def _retreat(self, approach: Curve) -> tuple[int, Curve | None]:
+        """Return the outcome of the retreat from the end of an approach, and its curve if DONE."""
+        goal = self.goal
+        if goal.retreat == goal.approach.reverse():
+            return DONE, approach.reverse()
+        return self._straight(approach.q[-1], goal.retreat)
+
+    def _straight(self, q: FloatArray, line: ToolLine) -> tuple[int, Curve | None]:
+        """Return the outcome of a straight motion from posture q, and its curve if it is DONE."""
+        pieces = max(2, int(np.ceil(line.distance / SPACING)))
+        points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
+        outcome = straight_motion(
+            self.stop.motion,
+            self.stop.work,
+            self.line,
+            q,
+            np.ascontiguousarray(self.R_AG @ line.offset),
+            self.stop.velocity * (line.distance / TOOL_SPEED),
+            points,
+            tangents,
+        )
+        if outcome != DONE:
+            return outcome, None
+        knots = np.linspace(0.0, 1.0, pieces + 1)
+        return DONE, Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
 
     def nothing(self) -> Accesses:
         """Return why nothing was found."""
@@ -120,40 +161,12 @@ class _Search:
             return Accesses((), "approach_blocked", self.stop.most_frequent_contact())
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
-        pair = max(self.at_goal, key=lambda names: self.at_goal[names], default=None)
-        return Accesses((), "unreached", pair)
-
-
-def _goal_in_arm_base(stop: Stop, goal: int) -> tuple[FloatArray, FloatArray]:
-    """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m]."""
-    problem = stop.problem
-    yaw = problem.base_yaw[0]
-    R_WB = np.array(
-        [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
-    )
-    p_WB = np.array([problem.base_x[0], problem.base_y[0], 0.0])
-    R_WA = R_WB @ problem.base_R[0]
-    p_WA = p_WB + R_WB @ problem.base_p[0]
-    R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[0, goal])
-    return R_AG, R_WA.T @ (problem.goal_p[0, goal] - p_WA)
-
-
-def _straight(stop: Stop, q: FloatArray, line: ToolLine, R_AG: FloatArray) -> tuple[int, Curve]:
-    """Return the outcome of a straight motion from posture q, and its curve if it is DONE."""
-    pieces = max(2, int(np.ceil(line.distance / SPACING)))
-    points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
-    outcome = straight_motion(
-        stop.motion,
-        stop.work,
-        new_straight_workspace(),
-        q,
-        np.ascontiguousarray(R_AG @ line.offset),
-        stop.velocity * (line.distance / TOOL_SPEED),
-        points,
-        tangents,
-    )
-    knots = np.linspace(0.0, 1.0, pieces + 1)
-    return outcome, Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
+        counts: dict[BodyPair, int] = {}
+        for pair, count in self.at_goal.items():
+            names = self.stop.bodies(pair)
+            counts[names] = counts.get(names, 0) + count
+        most = max(counts, key=lambda names: counts[names], default=None)
+        return Accesses((), "unreached", most)
 
 
 def _spread(stop: Stop, found: list[Access]) -> tuple[Access, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,18 +27,16 @@ BodyPair = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
-    """One initial configuration of a job, with the memory of one planner."""
+class StopGrid:
+    """Initial configurations of a job, lowered once for the stops at any of them."""
 
     job: Job
     scene: Scene
-    """The live scene, in the state of this stop."""
-    at: InitialConfiguration
+    """The job's live scene."""
+    configurations: Grid
     lowered: LoweredScene
+    """Scene and configurations as arrays."""
     problem: Problem
-    motion: MotionScene
-    work: MotionWorkspace
-    trees: Trees
     rest: FloatArray
     """Rest posture of the arm [rad], shape (7,)."""
     velocity: FloatArray
@@ -46,12 +45,60 @@ class Stop:
     """Acceleration limits [rad/s^2], shape (7,)."""
 
     @classmethod
-    def of(cls, job: Job, scene: Scene, configuration: int, seed: int) -> Stop:
-        """Prepare an initial configuration.
+    def of(cls, job: Job, scene: Scene, grid: Grid, lowered: LoweredScene) -> StopGrid:
+        """Prepare configurations.
 
         Args:
             job: Task, robot, environment and grid.
-            scene: The job's live scene; set to the configuration.
+            scene: The job's live scene.
+            grid: The configurations.
+            lowered: Scene and configurations as arrays.
+
+        Raises:
+            RobotError: If a velocity limit is unknown.
+        """
+        velocity, acceleration = job.spec.robot.arm_rates()
+        return cls(
+            job=job,
+            scene=scene,
+            configurations=grid,
+            lowered=lowered,
+            problem=build_problem(lowered.arrays, lowered.grid),
+            rest=np.array(job.spec.robot.arm_rest()),
+            velocity=np.array(velocity),
+            acceleration=np.array(acceleration),
+        )
+
+    def stop(self, configuration: int, trees: Trees) -> Stop:
+        """Return the stop at a configuration; the live scene stays as it is.
+
+        Args:
+            configuration: Flat index among those that are lowered.
+            trees: Memory of the planner, with its random state.
+        """
+        motion = motion_scene(self.problem, configuration)
+        work = new_motion_workspace(motion)
+        return Stop(self, configuration, motion, work, trees)
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """One initial configuration of a job, with the memory of one planner."""
+
+    grid: StopGrid
+    number: int
+    """Flat index of the configuration in `grid`."""
+    motion: MotionScene
+    work: MotionWorkspace
+    trees: Trees
+
+    @classmethod
+    def of(cls, job: Job, scene: Scene, configuration: int, seed: int) -> Stop:
+        """Prepare an initial configuration, and set the live scene to it.
+
+        Args:
+            job: Task, robot, environment and grid.
+            scene: The job's live scene.
             configuration: Flat index in the job's scored grid.
             seed: Seed of the planner.
 
@@ -60,31 +107,86 @@ class Stop:
         """
         axes = job.scored_grid.axes
         values = job.scored_grid.values(np.array([configuration]))
+        return cls.at_values(job, scene, [float(values[axis.name][0]) for axis in axes], seed)
+
+    @classmethod
+    def at_values(cls, job: Job, scene: Scene, values: Sequence[float], seed: int) -> Stop:
+        """Prepare an initial configuration on or off the grid, and set the live scene to it.
+
+        Args:
+            job: Task, robot, environment and grid.
+            scene: The job's live scene.
+            values: Value of each axis of the job's scored grid [m or rad].
+            seed: Seed of the planner.
+
+        Raises:
+            RobotError: If a velocity limit is unknown.
+        """
+        axes = job.scored_grid.axes
         single = []
-        for axis in axes:
-            value = float(values[axis.name][0])
+        for axis, value in zip(axes, values, strict=True):
             start = math.degrees(value) if axis.unit == "deg" else value
             single.append(Axis(axis.name, axis.unit, start, 0.0, 1))
         grid = Grid(tuple(single))
-        lowered = lower(scene, job.task, grid)
-        problem = build_problem(lowered.arrays, lowered.grid)
-        motion = motion_scene(problem, 0)
-        velocity, acceleration = job.spec.robot.arm_rates()
-        stop = cls(
-            job=job,
-            scene=scene,
-            at=grid.configuration(0),
-            lowered=lowered,
-            problem=problem,
-            motion=motion,
-            work=new_motion_workspace(motion),
-            trees=new_trees(seed),
-            rest=np.array(job.spec.robot.arm_rest()),
-            velocity=np.array(velocity),
-            acceleration=np.array(acceleration),
-        )
-        stop.place({name: float(value[0]) for name, value in values.items()})
+        stops = StopGrid.of(job, scene, grid, lower(scene, job.task, grid))
+        stop = stops.stop(0, new_trees(seed))
+        stop.place({axis.name: value for axis, value in zip(axes, values, strict=True)})
         return stop
+
+    @property
+    def job(self) -> Job:
+        """The job."""
+        return self.grid.job
+
+    @property
+    def scene(self) -> Scene:
+        """The live scene."""
+        return self.grid.scene
+
+    @property
+    def problem(self) -> Problem:
+        """The scene as arrays."""
+        return self.grid.problem
+
+    @property
+    def rest(self) -> FloatArray:
+        """Rest posture of the arm [rad], shape (7,)."""
+        return self.grid.rest
+
+    @property
+    def velocity(self) -> FloatArray:
+        """Velocity limits [rad/s], shape (7,)."""
+        return self.grid.velocity
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """Acceleration limits [rad/s^2], shape (7,)."""
+        return self.grid.acceleration
+
+    @property
+    def at(self) -> InitialConfiguration:
+        """The initial configuration."""
+        return self.grid.configurations.configuration(self.number)
+
+    def goal_in_arm_base(self, goal: int) -> tuple[FloatArray, FloatArray]:
+        """Return the pose of a goal in the arm base A: orientation (3, 3), position (3,) [m]."""
+        problem = self.problem
+        sizes = (
+            problem.environment_states,
+            problem.base_x.size,
+            problem.base_y.size,
+            problem.base_yaw.size,
+            problem.torso_levels,
+        )
+        state, x, y, yaw, torso = (int(i) for i in np.unravel_index(self.number, sizes))
+        angle = problem.base_yaw[yaw]
+        c, s = np.cos(angle), np.sin(angle)
+        R_WB = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        p_WB = np.array([problem.base_x[x], problem.base_y[y], 0.0])
+        R_WA = R_WB @ problem.base_R[torso]
+        p_WA = p_WB + R_WB @ problem.base_p[torso]
+        R_AG = np.ascontiguousarray(R_WA.T @ problem.goal_R[state, goal])
+        return R_AG, R_WA.T @ (problem.goal_p[state, goal] - p_WA)
 
     def place(self, values: dict[str, float]) -> None:
         """Set the live scene to this stop, the arm to its rest posture.
@@ -111,8 +213,8 @@ class Stop:
     def _body(self, number: int) -> str:
         environment = self.problem.environment_bodies
         if number < environment:
-            return self.lowered.environment_bodies[number]
-        return self.lowered.robot_bodies[number - environment]
+            return self.grid.lowered.environment_bodies[number]
+        return self.grid.lowered.robot_bodies[number - environment]
 
     def forget_contacts(self) -> None:
         """Start counting anew which pairs block edges."""

@@ -1,4 +1,4 @@
-"""Plans of motions as text."""
+"""Plans of motions, and what can be done, as text."""
 
 from __future__ import annotations
 
@@ -46,6 +46,25 @@ def report_plan(result: Mapping[str, Any]) -> None:
         f"({result['goals_reached']} reached by a posture). Drake re-checked "
         f"{verified['edges']:,} edges, {verified['false']} of them false. "
         f"{result['seconds']:.1f} s."
+    )
+
+
+def report_motions(result: Mapping[str, Any]) -> None:
+    """Print which goals can be done from the examined configurations."""
+    out = results_console()
+    table = new_table("goal", ">reached", ">can be done", ">not")
+    for one in result["goals"]:
+        reached, done = one["pairs"], one["done"]
+        share = f"{1.0 - done / reached:.1%}" if reached else ""
+        table.add_row(str(one["goal"]), f"{reached:,}", f"{done:,}", share)
+    out.print(table)
+    for reason, count in result["not_done"].items():
+        if count:
+            out.print(f"{count:,} pairs: {_REASONS[reason]}")
+    out.print(
+        f"{result['done']:,} of {result['pairs']:,} reached pairs can be done, from "
+        f"{result['configurations']:,} of {result['candidates']:,} configurations. "
+        f"{result['seconds']:.1f} s. Wrote {result['file']}"
     )
 
 

@@ -132,6 +132,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
         )
     if result["moves"]:
         out.print(f"moves the environment: {', '.join(axis_name(n) for n in result['moves'])}")
+    if "executable" in result:
+        out.print(_executable_text(result["executable"]))
     if "alternatives" in result:
         out.print(_alternatives_table(result))
     if "scored_constraints" in result:
@@ -165,6 +167,20 @@ def report_choice(result: Mapping[str, Any]) -> None:
                 f"goals on {frame_name(one['frame'])} also as scored for "
                 f"{settings_text(one['observed'])}, {one['position_error']:.3f} m from it"
             )
+
+
+def _executable_text(found: Mapping[str, Any]) -> str:
+    """Return which goals can be done, and what it costs to count those alone."""
+    other, goals = found["by_postures"], ", ".join(map(str, found["goals_done"]))
+    text = (
+        f"goals with motions: {goals}; motions were planned for {found['examined']:,} of "
+        f"{found['candidates']:,} configurations\n"
+        f"by postures alone: P_R {other['reachability']:.3f}, P_M {other['manipulability']:.3f}, "
+        f"utility {other['utility']:.3f}"
+    )
+    if not other["examined"]:
+        return f"{text}; not examined"
+    return f"{text}; with motions P_R {other['reachability_done']:.3f}"
 
 
 def _alternatives_table(result: Mapping[str, Any]) -> Table:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
+from tcs.placement.selection.executable import Executability
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.uncertain_base import same_set
@@ -17,6 +18,7 @@ from tcs.placement.selection.utility import PAPER_WEIGHTS, UtilityWeights, utili
 __all__ = [
     "PAPER_WEIGHTS",
     "Choice",
+    "Executability",
     "Match",
     "SelectionTables",
     "Top",

@@ -20,13 +20,14 @@ from tcs.placement.selection.bounds import Bounds
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.coverage import warning_outside
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
+from tcs.placement.selection.executable import admitted_executable, motions_at
 from tcs.placement.selection.limbs import admitted_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import MotionFile, ScoreFile
 from tcs.placement.tables import tc_manipulability, tc_reachability
 from tcs.placement.tables.sets import MOST_MEMBERS
 
@@ -46,6 +47,7 @@ def select(
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
+    motions: MotionFile | None = None,
 ) -> Choice:
     """Return the stored set with the greatest utility from the current state.
 
@@ -69,8 +71,11 @@ def select(
             table scored for the nearest values is used; an axis that is not given counts as zero.
         frames: Positions of body frames in W [m], by name, in place of `observed`. With several,
             each goal also has to be reached in the table nearest to its own frame.
+        motions: The motions of the score file, by `tcs.examine`: only goals to which one was found
+            count, and only configurations that were examined are selected.
 
     Raises:
+        StoreMismatchError: If the motions were planned for other scores.
         SelectionError: If no configuration reaches a goal, the current state is not finite, is out
             of range or lacks an axis with a weight, `max_members` is not stored, no set is
             reachable around the furniture or satisfies the constraints, or delta is above 0 and no
@@ -108,6 +113,11 @@ def select(
         found = admitted_candidates(constraints, here, tables)
     if match is not None and match.by_frame and isinstance(scores, ScoreFile):
         found = admitted_at_limbs(scores, match, constraints, found)
+    if motions is not None:
+        if match is None or not isinstance(scores, ScoreFile):
+            raise SelectionError("Motions belong to a score file, not to a single table of it.")
+        planned = motions_at(scores, motions, match)
+        found = admitted_executable(planned, sets, constraints, found)
     query = _Query(
         tables, here, legs, weights, max_members, found, _disliked(constraints.prefer, tables)
     )

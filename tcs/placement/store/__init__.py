@@ -1,9 +1,19 @@
-"""Score files: joblib files of plain containers and arrays, read through an allow-list."""
+"""Score files and motion files: joblib files of plain containers and arrays.
+
+They are read through an allow-list.
+"""
 
 from __future__ import annotations
 
 from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION
 from tcs.placement.store.files import load_scores, save_scores
+from tcs.placement.store.motion_file import (
+    MotionFile,
+    load_motions,
+    motion_path,
+    motions_of,
+    save_motions,
+)
 from tcs.placement.store.score_file import (
     REQUIRED_METADATA,
     ScoreFile,
@@ -16,10 +26,15 @@ __all__ = [
     "FORMAT",
     "FORMAT_VERSION",
     "REQUIRED_METADATA",
+    "MotionFile",
     "ScoreFile",
     "StateTables",
     "check_scene",
+    "load_motions",
     "load_scores",
+    "motion_path",
+    "motions_of",
+    "save_motions",
     "save_scores",
     "state_to_json",
 ]

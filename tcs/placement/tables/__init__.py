@@ -1,4 +1,4 @@
-"""Tables of placement: scores, sets, success under error, the base lattice, place maps.
+"""Tables of placement: scores, sets, success under error, motions, the base lattice, place maps.
 
 In: arrays from scoring, estimation or a score file. Out: frozen tables with checked, read-only
 arrays, and the equations over them; numpy only.
@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.motions import MotionOutcome, MotionTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import SetTable
 from tcs.placement.tables.success import SuccessTable
 
 __all__ = [
     "BaseLattice",
+    "MotionOutcome",
+    "MotionTable",
     "Reason",
     "ScoreTable",
     "SetTable",

@@ -1,0 +1,291 @@
+"""Examination of a score file: which goals can be done from which configurations.
+
+A goal can be done from a configuration if a motion leads from rest to its approach, straight in,
+straight out and back to rest. The goals that can be done one by one can be done on one tour, as
+every motion between two of them may lead past the rest posture.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.errors import TcsError
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.cache import is_compiled
+from tcs.kernel.motion.connect import Trees, connect, new_trees
+from tcs.kernel.motion.random import random_state
+from tcs.motion.approach import Access, accesses, first_accesses
+from tcs.motion.plans import ENTRY
+from tcs.motion.stops import BodyPair, Stop, StopGrid
+from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.store import MotionFile, ScoreFile
+from tcs.placement.tables import MotionOutcome, MotionTable, SetTable
+
+FIRST_SAMPLES = 24
+"""Number of angles of the free joint at which postures are solved first: most goals that can be
+approached at all can be so from one of these."""
+FIRST_ACCESSES = 3
+"""Number of postures with which paths are tried before all postures are searched."""
+FIRST_ITERATIONS = 200
+"""Greatest number of random postures that the planner grows towards with each of these."""
+ITERATIONS = 5000
+"""The same with all postures."""
+SLICE = 16
+"""Number of configurations that a thread examines at a time."""
+
+Outcomes = list[tuple[MotionOutcome, BodyPair | None]]
+
+
+def examine(
+    file: ScoreFile,
+    *,
+    within: float | None = 0.05,
+    most: int | None = None,
+    table: int | None = None,
+    seed: int = 0,
+    jobs: int = 2,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> MotionFile:
+    """Return which goals can be done from the candidates of a score file.
+
+    Args:
+        file: A score file.
+        within: Examine the candidates that are in a set whose P_R + P_M is at most this fraction
+            below the best one; None for all candidates.
+        most: Greatest number of candidates, those of the best sets first; None for no bound.
+        table: Number of the table, by default the nominal one.
+        seed: Seed of the planner.
+        jobs: Number of threads; the outcomes do not depend on it.
+        on_progress: Called with the number of examined configurations and their total.
+        on_compile: Called before the planner compiles, if it has to.
+
+    Raises:
+        StoreMismatchError: If the models differ from those the file was made from.
+        RobotError: If a velocity limit of the arm is unknown.
+        TcsError: If `within`, `most` or `jobs` is out of range.
+    """
+    if jobs < 1:
+        raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
+    begun, processor = time.perf_counter(), time.process_time()
+    number = file.nominal_index if table is None else table
+    job, scene, lowered = rebuild_scene(file)
+    if on_compile is not None and not is_compiled(ENTRY):
+        on_compile()
+    sets = file.tables[number].sets
+    rows = worth_examining(sets, within, most)
+    stops = StopGrid.of(job, scene, job.scored_grid, lowered)
+    first = number * job.grid.size
+    slices = [rows[start : start + SLICE] for start in range(0, len(rows), SLICE)]
+    work = (delayed(_examine_slice)(stops, sets, slice_, first, seed) for slice_ in slices)
+    outcomes: list[Outcomes] = []
+    for found in Parallel(jobs, prefer="threads", return_as="generator")(work):
+        outcomes += found
+        if on_progress is not None:
+            on_progress(len(outcomes), len(rows))
+    examined = _table_of(sets.candidates[rows], outcomes, sets.weights.size)
+    tables: list[MotionTable | None] = [None] * len(file.tables)
+    tables[number] = examined
+    metadata = {
+        "program_version": version("tcs"),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "scene_digest": file.metadata["scene_digest"],
+        "seed": seed,
+        "within": within,
+        "most": most,
+        "seconds": time.perf_counter() - begun,
+        "processor_seconds": time.process_time() - processor,
+    }
+    return MotionFile(metadata=metadata, tables=tuple(tables))
+
+
+def examination(file: ScoreFile, motions: MotionFile, table: int) -> dict[str, Any]:
+    """Return what was found for a table as plain containers, as `tcs motions --json` prints it.
+
+    Args:
+        file: The score file.
+        motions: Its motions.
+        table: Number of an examined table.
+
+    Raises:
+        TcsError: If the table was not examined.
+    """
+    examined = motions.tables[table]
+    if examined is None:
+        raise TcsError(f"No motions were planned for table {table}.")
+    sets = file.tables[table].sets
+    reached = sets.reached[np.searchsorted(sets.candidates, examined.configurations)]
+    counts = examined.counts(reached)
+    done, pairs = counts.pop("done"), int(np.count_nonzero(reached))
+    return {
+        "within": motions.metadata["within"],
+        "configurations": len(reached),
+        "candidates": len(sets.candidates),
+        "pairs": pairs,
+        "done": done,
+        "not_done": counts,
+        "fraction_not_done": round(1.0 - done / pairs, 6) if pairs else 0.0,
+        "goals": [
+            {"goal": goal, "pairs": int(of_goal.sum()), "done": int(able.sum())}
+            for goal, (of_goal, able) in enumerate(zip(reached.T, examined.done.T, strict=True))
+        ],
+        "results": [
+            _result(examined, row, reached[row]) for row in range(len(examined.configurations))
+        ],
+        "seed": motions.metadata["seed"],
+        **{key: motions.metadata[key] for key in ("seconds", "processor_seconds")},
+    }
+
+
+def _result(examined: MotionTable, row: int, reached: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return what can be done from one configuration as plain containers."""
+    not_done = []
+    for goal in np.flatnonzero(reached & ~examined.done[row]):
+        pair = int(examined.pair[row, goal])
+        reason = MotionOutcome(int(examined.outcome[row, goal])).name.lower()
+        names = None if pair < 0 else list(examined.pair_names[pair])
+        not_done.append({"goal": int(goal), "reason": reason, "pair": names})
+    return {
+        "configuration": int(examined.configurations[row]),
+        "done": np.flatnonzero(examined.done[row]).tolist(),
+        "not_done": not_done,
+    }
+
+
+def worth_examining(sets: SetTable, within: float | None, most: int | None) -> NDArray[np.intp]:
+    """Return the rows of the candidates that are in one of the best sets, ascending, shape (n,).
+
+    Args:
+        sets: The sets.
+        within: Greatest fraction of the best P_R + P_M by which that of a candidate's best set may
+            be less; None for all candidates.
+        most: Greatest number of candidates, those of the best sets first; None for no bound.
+
+    Raises:
+        TcsError: If the fraction is not in [0, 1], or the number is less than 1.
+    """
+    if within is not None and not 0.0 <= within <= 1.0:
+        raise TcsError(f"within is {within:g}; must be a fraction from 0 to 1.")
+    if most is not None and most < 1:
+        raise TcsError(f"most is {most}; must be 1 or more configurations.")
+    best = np.maximum(sets.single_reachability + sets.single_manipulability, sets.member_sum)
+    if sets.triples is not None:
+        best = np.maximum(best, sets.triples.member_total)
+    order = np.argsort(-best, kind="stable")
+    if within is not None and len(order):
+        order = order[best[order] >= (1.0 - within) * best[order[0]]]
+    return np.sort(order[:most])
+
+
+def _examine_slice(
+    stops: StopGrid, sets: SetTable, rows: NDArray[np.intp], first: int, seed: int
+) -> list[Outcomes]:
+    """Examine some candidates; `first` is the number of the first configuration of their table."""
+    trees = new_trees(seed)
+    return [
+        _examine_stop(stops, first + int(sets.candidates[row]), sets.reached[row], trees, seed)
+        for row in rows
+    ]
+
+
+def _examine_stop(
+    stops: StopGrid, configuration: int, reached: NDArray[np.bool_], trees: Trees, seed: int
+) -> Outcomes:
+    """Return the outcome at each goal from one configuration.
+
+    Its body, torso and other arm are free of contact, as scoring checked.
+    """
+    trees.random[:] = random_state(seed)
+    stop = stops.stop(configuration, trees)
+    goals = [int(goal) for goal in np.flatnonzero(reached)]
+    outcomes: Outcomes = [(MotionOutcome.UNREACHED, None)] * len(reached)
+    blocked = stop.contact_at(stop.rest)
+    if blocked is not None:
+        for goal in goals:
+            outcomes[goal] = MotionOutcome.REST_BLOCKED, blocked
+        return outcomes
+    reachable = _Reachable(stop)
+    left = [goal for goal in goals if not reachable.has_quickly(goal)]
+    for goal in goals:
+        outcomes[goal] = MotionOutcome.DONE, None
+    for goal in left:
+        outcomes[goal] = reachable.outcome(goal)
+    return outcomes
+
+
+class _Reachable:
+    """The postures of one stop to which paths from rest were found.
+
+    A path leads back as well, so any of them may begin a path to another goal.
+    """
+
+    def __init__(self, stop: Stop) -> None:
+        self.stop = stop
+        self.postures = [stop.rest]
+
+    def has_quickly(self, goal: int) -> bool:
+        """Return whether a goal can be done with one of the first postures found."""
+        found = first_accesses(self.stop, goal, FIRST_SAMPLES)
+        return any(
+            self._includes([access], FIRST_ITERATIONS)
+            for access in itertools.islice(found, FIRST_ACCESSES)
+        )
+
+    def outcome(self, goal: int) -> tuple[MotionOutcome, BodyPair | None]:
+        """Return whether a goal can be done with any posture; if not, why."""
+        found = accesses(self.stop, goal)
+        if not found.found:
+            return MotionOutcome[found.reason.upper()], found.pair
+        self.stop.forget_contacts()
+        if self._includes(found.found, ITERATIONS):
+            return MotionOutcome.DONE, None
+        return MotionOutcome.NO_PATH, self.stop.most_frequent_contact()
+
+    def _includes(self, found: Sequence[Access], iterations: int) -> bool:
+        """Return whether a path leads to one of several approaches, and back from its retreat."""
+        left = list(found)
+        while left:
+            number = self._connected([access.begin for access in left], iterations)
+            if number is None:
+                return False
+            access = left.pop(number)
+            self.postures.append(access.begin)
+            # A retreat along the approach ends where that began.
+            if np.array_equal(access.begin, access.end):
+                return True
+            if self._connected([access.end], iterations) is not None:
+                self.postures.append(access.end)
+                return True
+        return False
+
+    def _connected(self, ends: Sequence[FloatArray], iterations: int) -> int | None:
+        """Return the number of the posture to which a path was found, None if there is none."""
+        stop, starts = self.stop, np.array(self.postures)
+        count = connect(stop.motion, stop.work, stop.trees, starts, np.array(ends), iterations)
+        return int(stop.trees.ends[1]) if count else None
+
+
+def _table_of(
+    configurations: NDArray[np.int32], outcomes: list[Outcomes], goals: int
+) -> MotionTable:
+    """Return outcomes as a table."""
+    names: dict[BodyPair, int] = {}
+    outcome = np.zeros((len(outcomes), goals), np.uint8)
+    pair = np.full((len(outcomes), goals), -1, np.int32)
+    for row, of_goals in enumerate(outcomes):
+        for goal, (result, bodies) in enumerate(of_goals):
+            outcome[row, goal] = result
+            if bodies is not None:
+                pair[row, goal] = names.setdefault(bodies, len(names))
+    return MotionTable(
+        configurations=configurations, outcome=outcome, pair=pair, pair_names=tuple(names)
+    )
