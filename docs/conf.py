@@ -23,6 +23,7 @@ extensions = [
     "code_links",
     "docstrings",
     "mathml",
+    "menu",
     "package_pages",
 ]
 exclude_patterns = ["_ext", "_static"]
