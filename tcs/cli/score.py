@@ -31,6 +31,15 @@ def score(
         ),
     ] = False,
     robot: options.Robot = "pr2",
+    arms: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ARM|both",
+            help="Arm of the robot to score, e.g. left; both: every configuration uses one of "
+            "them, and the members of a set any.",
+            show_default="that of the robot file",
+        ),
+    ] = None,
     measure: Annotated[
         str,
         typer.Option(
@@ -87,6 +96,11 @@ def score(
         raise typer.BadParameter("give a task, or --all for all tasks.", param_hint="TASK")
     if task is None and (observed or frames):
         raise typer.BadParameter("requires one task, not --all.", param_hint="--observed")
+    if arms and (observed or frames):
+        raise typer.BadParameter(
+            "is not for an observed environment. Give the robot file of one arm with --robot.",
+            param_hint="--arms",
+        )
     constraints = wanted.constraints()
     if at and not frames and not constraints.keep:
         raise typer.BadParameter(
@@ -109,17 +123,18 @@ def score(
     }
     if task is None:
         rows = files.score_all_to_files(
-            environment, robot, out or Path(), progress=_progress, **scoring_options
+            environment, robot, out or Path(), arms=arms, progress=_progress, **scoring_options
         )
         terminal.print_result({"rows": rows}, tables.report_rows, as_json=as_json)
         return
     environment = environment or "wheelchair"
-    path = out or default_path(task, environment, robot)
+    path = out or default_path(task, environment, robot, arms)
     if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(
-                task, environment, robot, path, on_progress=on_progress, **scoring_options
-            )
+                task, environment, robot, path, arms=arms, on_progress=on_progress,
+                **scoring_options,
+            )  # fmt: skip
         terminal.print_result(result, tables.report_scores, as_json=as_json)
         return
 

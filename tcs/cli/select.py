@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -172,6 +173,13 @@ def explain(
     ] = None,
     torso: options.Torso = 0.0,
     at: options.At = None,
+    arm: Annotated[
+        str | None,
+        typer.Option(
+            help="Arm to explain with --here, in a file of both arms.",
+            show_default="the first that reaches the goal",
+        ),
+    ] = None,
     costs: _ChangeCosts,
     observed: options.Observed = None,
     as_json: options.Json = False,
@@ -179,8 +187,8 @@ def explain(
     """Explain why a goal is not reached, and find the cheapest change that reaches it."""
     if configuration is not None and here is not None:
         raise typer.BadParameter("give --configuration or --here, not both.", param_hint="--here")
-    if here is None and (at or torso):
-        raise typer.BadParameter("--torso and --at require --here.", param_hint="--here")
+    if here is None and (at or torso or arm):
+        raise typer.BadParameter("--torso, --at and --arm require --here.", param_hint="--here")
 
     import tcs
     from tcs.cli.values import current_state, observed_settings
@@ -192,7 +200,9 @@ def explain(
     explanation = tcs.explain(
         loaded,
         goal,
-        current_state(here, torso, at or ()) if here is not None else configuration,
+        configuration
+        if here is None
+        else dataclasses.replace(current_state(here, torso, at or ()), arm=arm),
         weights=fix_weights(
             Grid.from_dict(loaded.grid),
             metre=costs.metre_weight,

@@ -69,14 +69,19 @@ class DataFiles:
             DataFileError: If the path starts at the home folder of an unknown user.
         """
         text = str(name_or_path)
-        # Either separator: a path copied from another system is still a path, not a name.
-        if isinstance(name_or_path, Path) or text.endswith(".yaml") or "/" in text or "\\" in text:
+        if isinstance(name_or_path, Path) or is_path(text):
             what = f"{where}: {self.noun} file" if where else f"{self.noun} file"
             return (beside or Path()) / expanded(text, what, DataFileError)
         shipped = self.shipped()
         if text not in shipped:
             raise UnknownNameError(self.noun, text, shipped, where=where)
         return shipped[text]
+
+
+def is_path(text: str) -> bool:
+    """Return whether a text is the path of a data file, not the name of one that ships."""
+    # Either separator: a path copied from another system is still a path, not a name.
+    return text.endswith(".yaml") or "/" in text or "\\" in text
 
 
 def expanded(path: str, what: str, error: type[TcsError]) -> Path:

@@ -6,6 +6,7 @@ In: a robot file (YAML), the URDF and meshes that it names, and its primitives (
 
 from __future__ import annotations
 
+from tcs.model.robots.arms import BOTH, arm_references
 from tcs.model.robots.extras import robot_urdf
 from tcs.model.robots.loading import load_robot, robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
@@ -15,9 +16,11 @@ from tcs.model.robots.urdf.kinematic import kinematic_urdf
 from tcs.model.robots.urdf.meshes import as_obj
 
 __all__ = [
+    "BOTH",
     "Primitive",
     "RobotFile",
     "Urdf",
+    "arm_references",
     "as_obj",
     "joint_limits",
     "kinematic_urdf",

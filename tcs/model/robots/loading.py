@@ -8,7 +8,7 @@ from typing import Any
 
 from tcs.errors import RobotError
 from tcs.files.documents import checked, read_mapping
-from tcs.files.paths import DataFiles, expanded
+from tcs.files.paths import DataFiles, expanded, is_path
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.robot_file import RobotFile
 
@@ -57,6 +57,13 @@ def _content(path: Path, based_on_it: tuple[Path, ...] = ()) -> dict[str, Any]:
         if isinstance(value, str) and not value.startswith("package://"):
             own = expanded(value, f"{where}, field '{key}'", RobotError)
             content[key] = os.path.realpath(file.parent / own)
+    if isinstance(content.get("arms"), dict):
+        content["arms"] = {
+            arm: os.path.realpath(file.parent / name)
+            if isinstance(name, str) and is_path(name)
+            else name
+            for arm, name in content["arms"].items()
+        }
     base = content.pop(BASED_ON, None)
     if base is None:
         return content

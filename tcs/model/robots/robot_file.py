@@ -74,6 +74,9 @@ class RobotFile(Document):
 
     name: Name
     title: str
+    arms: Annotated[Mapping[Name, Name], Entries] = {}
+    """Name or path of the robot file that scores each arm, by name of the arm; this file is one of
+    them. Empty for a robot with one arm."""
     urdf: str
     """A `package://` address or a path."""
     root_body: Name

@@ -77,7 +77,7 @@ def _print_fix(out: Console, result: Mapping[str, Any]) -> None:
     if fix is None:
         _print_unreached(out, result)
         return
-    if not fix["changes"]:
+    if fix["configuration"] == explained["configuration"] and not fix["changes"]:
         return
     out.print(f"The nearest configuration that reaches it is {fix['configuration']}:")
     out.print(f"  {fix['sentence']}")

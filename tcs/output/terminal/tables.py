@@ -12,6 +12,7 @@ from rich.table import Table
 
 from tcs.output.terminal.console import results_console
 from tcs.output.words import (
+    ARM,
     REASON_TEXTS,
     axis_name,
     axis_title,
@@ -190,7 +191,8 @@ def _alternatives_table(result: Mapping[str, Any]) -> Table:
     )
     for number, one in enumerate((result, *result["alternatives"]), 1):
         poses = "; ".join(
-            f"{m['base_x']:.2f} {m['base_y']:.2f} {m['base_yaw_deg']:.0f}" for m in one["members"]
+            f"{m['base_x']:.2f} {m['base_y']:.2f} {m['base_yaw_deg']:.0f} {m.get(ARM, '')}".rstrip()
+            for m in one["members"]
         )
         trades = one.get("trades")
         cells = []
@@ -226,7 +228,7 @@ def report_page(result: Mapping[str, Any]) -> None:
 
 
 def members_table(
-    members: Sequence[Mapping[str, float]], heading: str = "stop", names: Sequence[str] = ()
+    members: Sequence[Mapping[str, Any]], heading: str = "stop", names: Sequence[str] = ()
 ) -> Table:
     """Return configurations as a table, by name if they have names, else numbered."""
     table = new_table(heading, *(f">{axis_title(key)}" for key in members[0]))

@@ -85,12 +85,12 @@ def _values(viewed: ViewedSet, places: PlaceMap, state: int, colouring: str) -> 
         return places.reachability
     if colouring == MANIPULABILITY:
         return places.manipulability
-    rows = rows_of_state(viewed.grid, state)
-    values = np.zeros(rows.stop - rows.start)
+    rows = np.arange(viewed.grid.size)[rows_of_state(viewed.grid, state)]
+    values = np.zeros(rows.size)
     success = viewed.success
     if success is not None:
         single = success.of_size(1)
-        at = success.members[single, 0] - rows.start
-        here = (at >= 0) & (at < values.size)
-        values[at[here]] = success.success[single][here]
+        members = success.members[single, 0]
+        here = np.isin(members, rows)
+        values[np.searchsorted(rows, members[here])] = success.success[single][here]
     return np.asarray(best_per_place(viewed.grid, values, state))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
+    ARM,
     axis_name,
     axis_title,
     axis_unit,
@@ -32,6 +33,7 @@ from tcs.output.words.reasons import (
 )
 
 __all__ = [
+    "ARM",
     "REACHABILITY_LABEL",
     "REASON_COLOURS",
     "REASON_NAMES",

@@ -7,8 +7,12 @@ key ends in `_deg`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from tcs.output.words.bodies import frame_name
+
+ARM = "arm"
+"""Key of the name of the arm, where configurations use one of several."""
 
 
 def axis_name(key: str) -> str:
@@ -32,15 +36,19 @@ def axis_title(key: str) -> str:
     >>> axis_title("head_rest_deg")
     'head rest [deg]'
     """
-    return f"{axis_name(key)} [{axis_unit(key)}]"
+    return ARM if key == ARM else f"{axis_name(key)} [{axis_unit(key)}]"
 
 
-def axis_value(key: str, value: float) -> str:
+def axis_value(key: str, value: float | str) -> str:
     """Return a value without its unit: lengths in centimetres, angles in tenths of a degree.
+
+    The name of an arm is its own value.
 
     >>> axis_value("torso", 0.30000000000000004), axis_value("base_yaw_deg", -90.0)
     ('0.30', '270')
     """
+    if isinstance(value, str):
+        return value
     if axis_unit(key) == "m":
         return f"{value:.2f}"
     if key == "base_yaw_deg":
@@ -57,7 +65,7 @@ def quantity(key: str, value: float) -> str:
     return f"{axis_value(key, value)} {axis_unit(key)}"
 
 
-def base_pose_text(member: Mapping[str, float]) -> str:
+def base_pose_text(member: Mapping[str, Any]) -> str:
     """Return the pose of the base in the environment frame.
 
     Args:
@@ -72,8 +80,17 @@ def base_pose_text(member: Mapping[str, float]) -> str:
     )
 
 
-def member_text(member: Mapping[str, float]) -> str:
-    """Return the base pose, the torso height and the settings of the environment.
+def arm_text(arm: str) -> str:
+    """Return the name of an arm in words.
+
+    >>> arm_text("left")
+    'left arm'
+    """
+    return f"{arm} arm"
+
+
+def member_text(member: Mapping[str, Any]) -> str:
+    """Return the base pose, the torso height, the settings of the environment, and the arm.
 
     Args:
         member: A configuration, as `InitialConfiguration.to_json` returns it.
@@ -81,11 +98,14 @@ def member_text(member: Mapping[str, float]) -> str:
     >>> member_text({"base_x": 1.4, "base_y": -1.2, "base_yaw_deg": 0.0, "torso": 0.1})
     'x 1.40 m, y -1.20 m, heading 0 deg, torso 0.10 m'
     """
+    rest: list[str]
     rest = [
         f"{axis_name(key)} {quantity(key, value)}"
         for key, value in member.items()
-        if not key.startswith("base_")
+        if not key.startswith("base_") and key != ARM
     ]
+    if ARM in member:
+        rest.append(arm_text(member[ARM]))
     return ", ".join([base_pose_text(member), *rest])
 
 

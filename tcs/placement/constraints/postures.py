@@ -50,9 +50,8 @@ class Postures:
 
         Shapes (U,) and (C,). The body is the same in all states of the environment.
         """
-        size = int(np.prod(self.grid.shape[-4:]))
         _, first, inverse = np.unique(
-            self.sets.candidates % size, return_index=True, return_inverse=True
+            self.sets.candidates % self.grid.state_size, return_index=True, return_inverse=True
         )
         return first.astype(np.int64), inverse.astype(np.int64)
 

@@ -72,8 +72,7 @@ def disliked_candidates(
             f"prefer {text}: the environment has no body frames on this side of the person. "
             f"Known: {', '.join(frames) or 'none'}. Prefer values of an axis instead."
         )
-    states = int(np.prod(grid.environment_shape))
-    state = candidates // (grid.size // states)
+    state = grid.state_of(candidates)
     values = grid.values(candidates)
     base = np.stack([values["base_x"], values["base_y"]], axis=1)
     near, far = (np.sum((base - middle[state]) ** 2, axis=1) for middle in (wanted, other))

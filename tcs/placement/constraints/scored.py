@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -52,7 +51,7 @@ def excluded_configurations(
             "No initial configuration is left: at every base pose of the grid the robot would "
             "stand on a forbidden region. Make the regions smaller."
         )
-    states = math.prod(grid.environment_shape)
+    states = grid.size // grid.state_size
     return np.tile(np.repeat(on_region, grid.axis("torso").count), states)
 
 

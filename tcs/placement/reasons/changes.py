@@ -68,10 +68,15 @@ class Change:
 def changes_between(
     before: InitialConfiguration, after: InitialConfiguration
 ) -> tuple[Change, ...]:
-    """Return the changes between two configurations of the same axes, in the order of the axes."""
+    """Return the changes between two configurations of the same axes, in the order of the axes.
+
+    The arm is not an axis.
+    """
     start, end = before.to_json(), after.to_json()
     changes = []
     for axis, value in end.items():
+        if axis == "arm":
+            continue
         change = value - start[axis]
         if axis == "base_yaw_deg":
             change = math.remainder(change, 360.0)
@@ -125,6 +130,8 @@ def sentence(
         for change in changes_between(before, after)
         if change.axis not in ("base_x", "base_y") and change.is_noticeable
     ]
+    if before.arm is not None and after.arm != before.arm:
+        steps.append(f"use the {after.arm} arm")
     if not steps:
         return "Nothing needs to change."
     text = ", ".join(steps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +43,8 @@ class ExplainedConfiguration:
             grid: The grid that was scored.
             scores: Its scores.
             goal: Number of the goal.
-            requested: Flat index, or a configuration of which the nearest one of the grid is taken.
+            requested: Flat index, or a configuration of which the nearest one of the grid is taken:
+                by its arm, or by the first arm that reaches the goal.
 
         Raises:
             GridError: If there is no configuration of that index.
@@ -51,6 +53,11 @@ class ExplainedConfiguration:
         """
         if isinstance(requested, InitialConfiguration):
             index, stated = nearest_configuration(grid, requested)
+            if requested.arm is None and grid.arms:
+                # The first arm that reaches the goal, else the first.
+                of_arms = np.arange(index, grid.size, grid.arm_size)
+                index = int(of_arms[np.argmax(scores.reached[of_arms, goal])])
+                stated = dataclasses.replace(stated, arm=grid.arm_of(index))
         else:
             index, stated = int(requested), grid.configuration(requested)
         pair = int(scores.pair[index, goal])
@@ -98,7 +105,8 @@ def nearest_configuration(
             single value any value is accepted.
 
     Returns:
-        Its flat index, and the stated configuration with its axes in the order of the grid.
+        Its flat index, by the first arm unless one is stated, and the stated configuration with its
+        axes in the order of the grid.
 
     Raises:
         SelectionError: If a value is not finite, or an axis is missing or exceeded.
@@ -112,7 +120,8 @@ def nearest_configuration(
             "it. State its value."
         )
     values = current_values(stated, grid, ())
-    index = int(grid.flat([_nearest_value(axis, values[axis.name]) for axis in grid.axes]))
+    along = [_nearest_value(axis, values[axis.name]) for axis in grid.axes]
+    index = int(grid.flat(along, stated.arm))
     ordered = InitialConfiguration(
         base_x=values["base_x"],
         base_y=values["base_y"],
@@ -120,6 +129,7 @@ def nearest_configuration(
         torso=values["torso"],
         environment=tuple((axis.name, values[axis.name]) for axis in grid.environment_axes),
         environment_units=tuple(axis.held_unit for axis in grid.environment_axes),
+        arm=stated.arm,
     )
     return index, ordered
 

@@ -38,15 +38,17 @@ def task_environment_pairs(environment: str | None = None) -> tuple[tuple[str, s
     return found
 
 
-def default_path(task: str, environment: str, robot: str) -> Path:
+def default_path(task: str, environment: str, robot: str, arms: str | None = None) -> Path:
     """Return the default path of a score file, in the current folder.
 
     Args:
         task: Name or path of a task.
         environment: Name or path of an environment.
         robot: Name or path of a robot.
+        arms: Name of an arm, or "both"; None for that of the robot file.
 
     >>> str(default_path("shaving", "environments/kitchen.yaml", "pr2"))
     'shaving-kitchen-pr2.tcs'
     """
-    return Path("-".join(Path(name).stem for name in (task, environment, robot)) + ".tcs")
+    names = [Path(name).stem for name in (task, environment, robot)]
+    return Path("-".join(names + ([arms] if arms else [])) + ".tcs")

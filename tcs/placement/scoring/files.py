@@ -75,7 +75,13 @@ def score_observed_to_file(
 
 
 def score_all_to_files(
-    environment: str | None, robot: str, folder: Path, *, progress: Progress, **options: Any
+    environment: str | None,
+    robot: str,
+    folder: Path,
+    *,
+    arms: str | None = None,
+    progress: Progress,
+    **options: Any,
 ) -> list[dict[str, Any]]:
     """Score every task in each of its environments, one file each, and return the summaries.
 
@@ -83,6 +89,7 @@ def score_all_to_files(
         environment: Restrict to this environment; None for all.
         robot: Name or path of a robot.
         folder: Folder of the files; created if missing.
+        arms: Name of an arm, or "both"; None for that of the robot file.
         progress: Reports the progress of each task.
         **options: Further options of `tcs.score`.
 
@@ -94,10 +101,12 @@ def score_all_to_files(
     make_folder(folder, advice="Name one with --out.")
     results = []
     for task, name in rows:
-        path = folder / default_path(task, name, robot)
+        path = folder / default_path(task, name, robot, arms)
         with progress(task) as on_progress:
             results.append(
-                score_to_file(task, name, robot, path, on_progress=on_progress, **options)
+                score_to_file(
+                    task, name, robot, path, arms=arms, on_progress=on_progress, **options
+                )
             )
     return results
 

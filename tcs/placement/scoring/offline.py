@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Self, Unpack
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
-from tcs.model.robots import RobotFile
+from tcs.model.grid import Grid
+from tcs.model.robots import RobotFile, arm_references
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
 from tcs.placement.constraints import (
@@ -21,16 +22,28 @@ from tcs.placement.constraints import (
     constraints_entry,
     excluded_configurations,
 )
+from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
 from tcs.placement.scoring.sweep import sweep
 from tcs.placement.store import ScoreFile, StateTables
+from tcs.placement.tables import ScoreTable
 
 NO_CONSTRAINTS = Constraints()
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """The scores of a job, and what its score file records about them."""
+
+    tables: tuple[ScoreTable, ...]
+    """Scores of each observed state."""
+    entries: Mapping[str, Any]
+    """Entries of the metadata."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +110,23 @@ class ScoringSetup:
             on_progress: Called with the number of scored configurations and their total.
             on_compile: Called before the kernel compiles, if it has to.
         """
+        scored = self.scored(on_progress=on_progress, on_compile=on_compile)
+        return self.file_of(
+            scored.tables, self.job.grid, begun, {**scored.entries, **(metadata or {})}
+        )
+
+    def scored(
+        self,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+        on_compile: Callable[[], None] | None = None,
+    ) -> Scored:
+        """Return the scores of the job, before sets are built.
+
+        Args:
+            on_progress: Called with the number of scored configurations and their total.
+            on_compile: Called before the kernel compiles, if it has to.
+        """
         job = self.job
         lowered = job.lowered(self.scene)
         shapes = robot_shapes(lowered.arrays)
@@ -117,10 +147,41 @@ class ScoringSetup:
         if contact is not None:
             advice = contact.advice(job.spec.robot)
             _log.warning("%s, %s: %s", job.task.name, job.spec.environment.name, advice)
+        return Scored(
+            swept.tables,
+            {
+                **constraints_entry(job.constraints, excluded),
+                **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
+                "scene_digest": lowered.digest(),
+                "ik": swept.ik,
+                "self_contact": None if contact is None else contact.to_json(),
+                "timings": {
+                    "compile_seconds": swept.compile_seconds,
+                    "scoring_seconds": swept.scoring_seconds,
+                },
+            },
+        )
+
+    def file_of(
+        self,
+        scores: Sequence[ScoreTable],
+        grid: Grid,
+        begun: float,
+        entries: Mapping[str, Any],
+    ) -> ScoreFile:
+        """Return the score file of scores, with the sets built from them.
+
+        Args:
+            scores: Scores of each observed state.
+            grid: Their grid: that of the job, or the same once for each arm.
+            begun: Start of the work, by `time.perf_counter` [s].
+            entries: Entries of the metadata, of `Scored.entries` and others.
+        """
+        job = self.job
         sets_begun = time.perf_counter()
         tables = tuple(
-            StateTables.of(scores, build_sets(scores, job.grid, jobs=self.jobs, **self.sets))
-            for scores in swept.tables
+            StateTables.of(table, build_sets(table, grid, jobs=self.jobs, **self.sets))
+            for table in scores
         )
         done = time.perf_counter()
         return ScoreFile(
@@ -128,17 +189,11 @@ class ScoringSetup:
                 "program_version": version("tcs"),
                 "created": datetime.now(UTC).isoformat(timespec="seconds"),
                 **self.references,
-                **(metadata or {}),
                 **({"only": list(job.constraints.only)} if job.constraints.only else {}),
-                **constraints_entry(job.constraints, excluded),
-                **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
-                "scene_digest": lowered.digest(),
+                **entries,
                 "measure": self.measure,
-                "ik": swept.ik,
-                "self_contact": None if contact is None else contact.to_json(),
                 "timings": {
-                    "compile_seconds": swept.compile_seconds,
-                    "scoring_seconds": swept.scoring_seconds,
+                    **entries["timings"],
                     "sets_seconds": done - sets_begun,
                     "total_seconds": done - begun,
                 },
@@ -146,7 +201,7 @@ class ScoringSetup:
             task=_task_as_dict(job.task),
             robot=job.spec.robot.model_dump(mode="json"),
             environment=job.spec.environment.model_dump(mode="json"),
-            grid=job.grid.to_dict(),
+            grid=grid.to_dict(),
             observed=[axis.to_dict() for axis in job.observed],
             body_frames=body_frame_positions(self.scene, job.scored_grid),
             tables=tables,
@@ -158,6 +213,7 @@ def score(
     environment: str | Path | EnvironmentFile = "wheelchair",
     robot: str | Path | RobotFile = "pr2",
     *,
+    arms: str | None = None,
     measure: str = DEFAULT_MEASURE,
     jobs: int = 2,
     on_progress: Callable[[int, int], None] | None = None,
@@ -173,6 +229,9 @@ def score(
         task: Name of a task, path of a task file, or a task.
         environment: Name of an environment, path of its file, or an environment.
         robot: Name of a robot, path of its file, or a robot.
+        arms: Name of one of the robot's arms, e.g. "left", or "both", to score all of them into one
+            file: every configuration then uses one arm, and the members of a set any of them. By
+            default the arm that the robot file describes.
         measure: Dexterity measure to maximise at each goal: "isotropy", "inverse-condition", or
             one of them with a penalty near joint limits, "-limited" or "-limited-thesis".
             Equations: docs/method.md.
@@ -192,19 +251,28 @@ def score(
         Scores and sets, ready for `tcs.save` and `tcs.select`.
 
     Raises:
-        UnknownNameError: If a task, environment, robot, frame or measure of that name does not
-            exist.
+        UnknownNameError: If a task, environment, robot, arm, frame or measure of that name does
+            not exist.
         DataFileError: If a file cannot be used.
+        RobotError: If `arms` is given and the robot file names no arms, or no file of an arm can be
+            used.
         GridError: If the grid is empty or enormous, or a condition is invalid.
         SelectionError: If the present value of an axis to keep is missing or not scored, or every
             base pose is forbidden.
         TcsError: If an option of the sets is out of range.
     """
     begun = time.perf_counter()
-    setup = ScoringSetup.load(
-        task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
-        constraints=constraints, now=now,
-    )  # fmt: skip
+    robots = {"": robot} if arms is None else arm_references(robot, arms)
+    setups = {
+        arm: ScoringSetup.load(
+            task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
+            constraints=constraints, now=now,
+        )
+        for arm, of_arm in robots.items()
+    }  # fmt: skip
+    if len(setups) > 1:
+        return score_arms(setups, begun=begun, on_progress=on_progress, on_compile=on_compile)
+    (setup,) = setups.values()
     return setup.score(begun=begun, on_progress=on_progress, on_compile=on_compile)
 
 

@@ -85,8 +85,7 @@ def build_sets(
     if jobs < 1:
         raise TcsError(f"Sets: {jobs} jobs; must be at least 1.")
     candidates = candidates_of(scores.reached, scores.weights, rule)
-    state_size = grid.size // math.prod(grid.environment_shape)
-    state = candidates.astype(np.int64) // state_size
+    state = grid.state_of(candidates)
     cell, cell_xy = base_cells(grid, candidates)
     arrays = _grouped(
         scores,
@@ -108,7 +107,8 @@ def build_sets(
         max_members=max_members,
         min_distance=float(min_distance),
         same_environment=same_environment,
-        state_size=state_size,
+        state_size=grid.state_size,
+        arm_size=grid.arm_size,
         weights=scores.weights,
         candidates=candidates,
         reached=scores.reached[candidates],

@@ -6,7 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -28,8 +28,8 @@ from tcs.placement.scoring.strata import (
     scan_counts,
     stratum_of,
 )
-from tcs.placement.scoring.sweep import ik_of
-from tcs.placement.store import ScoreFile, StateTables
+from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC, ik_of
+from tcs.placement.store import ScoreFile, StateTables, files_of_arms
 from tcs.placement.tables import Reason
 
 POSITION_BAR = 1e-6
@@ -180,7 +180,8 @@ def verify(
         raise TcsError(f"verify: jobs is {jobs}; it must be at least 1.")
     if limit is not None and (limit < 1 or not strata):
         raise TcsError(f"verify: limit is {limit}; it must be at least 1, and needs strata=True.")
-    job, scene, lowered = rebuild_scene(file)
+    measure = file.metadata["measure"]
+    checker = _FileChecker.of(file, jobs)
     rng = np.random.default_rng(seed)
     reason = np.concatenate([table.scores.reason for table in file.tables])
     reached = random_pairs(rng, reason == Reason.REACHED, pairs)
@@ -194,11 +195,6 @@ def verify(
         if on_progress is not None:
             on_progress(next(count), total)
 
-    measure = file.metadata["measure"]
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
-    checker = _FileChecker(
-        file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure), jobs
-    )
     findings = checker.stored(reached, step)
     begun = time.perf_counter()
     hits = {r: checker.hits(part, step) for r, part in unreached.items()}
@@ -213,7 +209,7 @@ def verify(
     )
     return Verification(
         measure=measure,
-        ik=ik_of(problem),
+        ik=checker.ik,
         checked=len(findings),
         false_reached=sum(not finding.is_true for finding in findings),
         max_position_error=max((finding.position_error for finding in findings), default=None),
@@ -243,26 +239,60 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
     """
-    job, scene, lowered = rebuild_scene(file)
-    measure = file.metadata["measure"]
-    problem = build_problem(lowered.arrays, lowered.grid, measure)
-    checker = _FileChecker(
-        file.tables, job.grid.size, problem, _DrakeChecker(job, scene, measure), jobs=1
-    )
-    return checker.stored([(table * job.grid.size + h, g) for h, g in pairs], lambda: None)
+    checker = _FileChecker.of(file, jobs=1)
+    return checker.stored([(table * checker.size + h, g) for h, g in pairs], lambda: None)
 
 
 @dataclass(frozen=True)
 class _FileChecker:
-    """The three types of checks on the scores of a file."""
+    """The three types of checks on the scores of a file.
+
+    Configurations are numbered through all tables, those of the first one first.
+    """
 
     tables: tuple[StateTables, ...]
     size: int
     """Number of configurations per table."""
-    problem: Problem
-    drake: _DrakeChecker
+    problems: tuple[Problem, ...]
+    """The problem of each arm."""
+    drakes: tuple[_DrakeChecker, ...]
+    """The checker of each arm."""
     jobs: int
     """Number of threads of the dense scans."""
+
+    @classmethod
+    def of(cls, file: ScoreFile, jobs: int) -> Self:
+        """Return the checker of a file.
+
+        Raises:
+            StoreMismatchError: If the models differ from those the file was made from.
+        """
+        measure = file.metadata["measure"]
+        built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
+        return cls(
+            file.tables,
+            len(built) * built[0][0].grid.size,
+            tuple(build_problem(lowered.arrays, lowered.grid, measure) for *_, lowered in built),
+            tuple(_DrakeChecker(job, scene, measure) for job, scene, _ in built),
+            jobs,
+        )
+
+    @property
+    def ik(self) -> str:
+        """Inverse kinematics of the arms: NUMERIC if that of one is."""
+        return NUMERIC if NUMERIC in map(ik_of, self.problems) else ANALYTIC
+
+    def scored(self, h: int) -> tuple[int, int]:
+        """Return the number of the arm of a configuration, and its index in the scored grid."""
+        table, row = divmod(h, self.size)
+        arm_size = self.size // len(self.problems)
+        arm, of_arm = divmod(row, arm_size)
+        return arm, table * arm_size + of_arm
+
+    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
+        """Return Drake's finding for configuration h, goal g and joint angles q."""
+        arm, scored = self.scored(h)
+        return self.drakes[arm].check(scored, g, q, value)
 
     def dexterity(self, h: int, g: int) -> float:
         """Return the stored dexterity."""
@@ -275,7 +305,7 @@ class _FileChecker:
         for h, g in pairs:
             table, row = divmod(h, self.size)
             q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
-            findings.append(self.drake.check(h, g, q, self.dexterity(h, g)))
+            findings.append(self.check(h, g, q, self.dexterity(h, g)))
             step()
         return findings
 
@@ -286,7 +316,7 @@ class _FileChecker:
         """
         hits: list[bool | None] = []
         for (h, g), value, q in self._scans(pairs):
-            hits.append(self.drake.check(h, g, q, value).is_true if value >= 0.0 else None)
+            hits.append(self.check(h, g, q, value).is_true if value >= 0.0 else None)
             step()
         return hits
 
@@ -298,14 +328,26 @@ class _FileChecker:
             step()
         return short
 
+    def _runs(self, pairs: Pairs) -> list[Pairs]:
+        """Return the pairs divided where the arm changes."""
+        by_arm = itertools.groupby(pairs, lambda pair: self.scored(pair[0])[0])
+        return [list(run) for _, run in by_arm]
+
     def _scans(self, pairs: Pairs) -> Iterator[tuple[tuple[int, int], float, NDArray[np.float64]]]:
         """Yield each pair with the dexterity and the joints of its dense scan, in order."""
 
         def scan(part: Pairs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            arm, _ = self.scored(part[0][0])
+            scored = np.array([(self.scored(h)[1], g) for h, g in part])
             joints = np.empty((len(part), 7))
-            return dense_scans(self.problem, np.array(part), DENSE_SAMPLES, joints), joints
+            return dense_scans(self.problems[arm], scored, DENSE_SAMPLES, joints), joints
 
-        parts = [pairs[start : start + SLICE] for start in range(0, len(pairs), SLICE)]
+        # Pairs of one arm at a time, in their order.
+        parts = [
+            run[start : start + SLICE]
+            for run in self._runs(pairs)
+            for start in range(0, len(run), SLICE)
+        ]
         pool = Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")
         for part, (values, joints) in zip(parts, pool(map(delayed(scan), parts)), strict=True):
             for pair, value, q in zip(part, values, joints, strict=True):

@@ -124,9 +124,8 @@ def _bases(
     grid: Grid, candidates: NDArray[np.int32]
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the distinct base poses (U, 3) [m, m, rad], and the pose of each candidate (C,)."""
-    size = int(np.prod(grid.shape[-4:]))
     # Neither the environment's state nor the torso level, the fastest axis, moves the base.
-    pose = candidates.astype(np.int64) % size // grid.shape[-1]
+    pose = candidates.astype(np.int64) % grid.state_size // grid.shape[-1]
     _, first, which = np.unique(pose, return_index=True, return_inverse=True)
     at = grid.values(candidates[first])
     return np.stack([at[name] for name in ("base_x", "base_y", "base_yaw")], axis=1), which

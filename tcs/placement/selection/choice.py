@@ -68,8 +68,14 @@ class SelectionTables:
         """Where the robot's shapes are, prepared for obstacles.
 
         Raises:
-            SelectionError: If the robot's shapes are not known.
+            SelectionError: If the robot's shapes are not known, or the tables are of several arms.
         """
+        if self.grid.arms:
+            raise SelectionError(
+                f"Obstacles cannot be tested in a score file of {' and '.join(self.grid.arms)} arm."
+                " Forbid the region instead, or score the task again with the obstacle: tcs score "
+                "TASK --arms both --blocked ..."
+            )
         if self.shapes is None or self.read_scores is None:
             raise SelectionError(
                 "The score file does not hold the robot's shapes, so nothing is known about "

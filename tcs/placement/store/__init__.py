@@ -5,6 +5,7 @@ They are read through an allow-list.
 
 from __future__ import annotations
 
+from tcs.placement.store.arms import OF_ARM, file_of_arm, files_of_arms
 from tcs.placement.store.encoding import FORMAT, FORMAT_VERSION
 from tcs.placement.store.files import load_scores, save_scores
 from tcs.placement.store.motion_file import (
@@ -15,6 +16,7 @@ from tcs.placement.store.motion_file import (
     save_motions,
 )
 from tcs.placement.store.score_file import (
+    ARMS,
     REQUIRED_METADATA,
     ScoreFile,
     StateTables,
@@ -23,13 +25,17 @@ from tcs.placement.store.score_file import (
 )
 
 __all__ = [
+    "ARMS",
     "FORMAT",
     "FORMAT_VERSION",
+    "OF_ARM",
     "REQUIRED_METADATA",
     "MotionFile",
     "ScoreFile",
     "StateTables",
     "check_scene",
+    "file_of_arm",
+    "files_of_arms",
     "load_motions",
     "load_scores",
     "motion_path",

@@ -66,22 +66,22 @@ def decode(content: object, path: Path | None = None) -> ScoreFile:
     content = check_header(content, FORMAT, FORMAT_VERSION)
     check_claims(content, exempt=_PER_PAIR)
     descriptions = {name: _dict(content.get(name), name) for name in DESCRIPTIONS}
-    size = Grid.from_dict(descriptions["grid"]).size
+    grid = Grid.from_dict(descriptions["grid"])
     return ScoreFile(
         **descriptions,
         observed=_list(content, "observed"),
         tables=tuple(
-            _decode_table(_dict(table, "table"), size, path) for table in _list(content, "tables")
+            _decode_table(_dict(table, "table"), grid, path) for table in _list(content, "tables")
         ),
     )
 
 
-def _decode_table(encoded: dict[str, Any], size: int, path: Path | None) -> StateTables:
+def _decode_table(encoded: dict[str, Any], grid: Grid, path: Path | None) -> StateTables:
     """Return the tables of one state, whose scores are decoded on first access."""
-    sets = decode_sets(_dict(encoded.get("sets"), "sets"), size)
+    sets = decode_sets(_dict(encoded.get("sets"), "sets"), grid)
     scores = _dict(encoded.get("scores"), "scores")
     success = decode_success(encoded.get("success"))
-    return StateTables(sets, partial(_read_scores, scores, sets, size, path), success)
+    return StateTables(sets, partial(_read_scores, scores, sets, grid.size, path), success)
 
 
 def _read_scores(

@@ -22,9 +22,10 @@ def score_frame(file: ScoreFile, *, everything: bool = False) -> pd.DataFrame:
         everything: Whether to include configurations that reach no goal.
 
     Returns:
-        Columns: the observed axes and the axes of the grid (angles as `..._deg`), `reachability`
-        (P_R), `manipulability` (P_M), and for each goal g `reason_g` and `dexterity_g`. The flat
-        indices start again for each observed state.
+        Columns: the observed axes and the axes of the grid (angles as `..._deg`), `arm` if
+        configurations use one of several, `reachability` (P_R), `manipulability` (P_M), and for
+        each goal g `reason_g` and `dexterity_g`. The flat indices start again for each observed
+        state.
     """
     states = zip(file.observed_states, file.tables, strict=True)
     frames = [_frame(file, state, table, everything) for state, table in states]
@@ -45,6 +46,9 @@ def _frame(
         )
         for axis in grid.axes
     }
+    if grid.arms:
+        numbers = rows // grid.arm_size
+        columns["arm"] = pd.Categorical.from_codes(numbers, pd.Index(grid.arms))
     columns["reachability"] = scores.reachability()[rows]
     columns["manipulability"] = scores.manipulability()[rows]
     names = [reason.name.lower() for reason in Reason]

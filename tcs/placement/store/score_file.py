@@ -35,6 +35,10 @@ REQUIRED_METADATA: dict[str, type] = {
 DESCRIPTIONS = ("metadata", "task", "robot", "environment", "grid", "body_frames")
 """Parts of a file that are plain containers."""
 
+ARMS = "arms"
+"""Entry of the metadata of a file of several arms: robot, description, scene digest and others of
+each arm, by its name in the order of the grid."""
+
 MAX_TABLES = 1000
 """Greatest number of observed states in a file; the tables of one take some megabytes."""
 
@@ -144,12 +148,31 @@ class ScoreFile:
         only = self.metadata.get("only", [])
         if not isinstance(only, list) or not all(isinstance(text, str) for text in only):
             raise StoreError("metadata 'only' must be a list of conditions.")
+        self._check_arms()
         self._check_tables()
         records = self.metadata.get("robustness")
         if records is not None and (
             not isinstance(records, list) or len(records) != len(self.tables)
         ):
             raise StoreError("metadata 'robustness' must be a list with an entry for each table.")
+
+    def _check_arms(self) -> None:
+        """Check that the metadata describes each arm of the grid."""
+        entries = self.metadata.get(ARMS, {})
+        keys = {"robot": str, "description": dict, "scene_digest": str}
+        if (
+            not isinstance(entries, dict)
+            or tuple(entries) != self.arms
+            or not all(
+                isinstance(entry, dict)
+                and all(isinstance(entry.get(key), expected) for key, expected in keys.items())
+                for entry in entries.values()
+            )
+        ):
+            raise StoreError(
+                f"metadata '{ARMS}' must describe the arms of the grid, each with "
+                f"{', '.join(keys)}."
+            )
 
     def _check_tables(self) -> None:
         """Check that there are tables for each observed state, with sets of this grid."""
@@ -166,7 +189,7 @@ class ScoreFile:
             sets = table.sets
             if len(sets.candidates) and sets.candidates[-1] >= grid.size:
                 raise StoreError(f"sets of more configurations than the grid has, {grid.size}.")
-            if sets.state_size * math.prod(grid.environment_shape) != grid.size:
+            if (sets.state_size, sets.arm_size) != (grid.state_size, grid.arm_size):
                 raise StoreError("sets have another number of environment states than the grid.")
             _check_success(table.success, sets)
             places = grid.values(sets.candidates)
@@ -176,6 +199,11 @@ class ScoreFile:
                     raise StoreError(
                         f"sets have base cells that are not those of the grid ({name})."
                     )
+
+    @cached_property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the arms that configurations use, one each; () in a file of one arm."""
+        return Grid.from_dict(self.grid).arms
 
     @cached_property
     def observed_axes(self) -> tuple[Axis, ...]:
@@ -198,12 +226,13 @@ class ScoreFile:
 
     @cached_property
     def robot_shapes(self) -> RobotShapes | None:
-        """The robot's collision shapes, None in files without them.
+        """The robot's collision shapes, None in files without them; of several arms, for the first.
 
         Raises:
             StoreError: If they are malformed, or have other torso levels than the grid.
         """
-        stored = self.metadata.get("robot_shapes")
+        entries = self.metadata[ARMS][self.arms[0]] if self.arms else self.metadata
+        stored = entries.get("robot_shapes")
         if stored is None:
             return None
         shapes = RobotShapes.from_dict(stored)

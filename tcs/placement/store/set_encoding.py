@@ -20,6 +20,7 @@ from tcs.files.compression import (
 )
 from tcs.files.joblib_file import check_types
 from tcs.files.quantities import GOALS
+from tcs.model.grid import Grid
 from tcs.placement.tables import BaseLattice, SetTable
 from tcs.placement.tables.base_lattice import MOVES
 from tcs.placement.tables.groups import BOUNDS, Groups
@@ -73,18 +74,19 @@ def encode_sets(sets: SetTable) -> dict[str, Any]:
     }
 
 
-def decode_sets(encoded: dict[str, Any], configurations: int) -> SetTable:
+def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
     """Return the encoded sets.
 
     Args:
         encoded: What `encode_sets` returned.
-        configurations: Number of configurations of the grid.
+        grid: Grid of the configurations.
 
     Raises:
         StoreFormatError: If something is missing or out of range.
         TcsError: If the sets contradict themselves.
     """
     check_types(encoded, _PLAIN)
+    configurations = grid.size
     weights = decompress(encoded, "weights", "f8", (AtMost(int(GOALS.high)),))
     candidates = ascending_from(
         decompress(encoded, "candidate_step", "u", (AtMost(configurations),)),
@@ -105,6 +107,7 @@ def decode_sets(encoded: dict[str, Any], configurations: int) -> SetTable:
     pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
     return SetTable(
         **{name: encoded[name] for name in _PLAIN},
+        arm_size=grid.arm_size,
         weights=weights,
         candidates=candidates.astype(np.int32),
         reached=reached,

@@ -52,7 +52,10 @@ class SetTable(ArrayTable):
     same_environment: bool
     """Whether all members of a set share the state of the environment, e.g. the bed's height."""
     state_size: int
-    """Number of configurations per state of the environment: h // state_size is the state."""
+    """Number of configurations per arm and state of the environment."""
+    arm_size: int
+    """Number of configurations per arm: h // arm_size is the arm of h, and h % arm_size //
+    state_size the state of the environment."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
     candidates: NDArray[np.int32]
@@ -126,7 +129,10 @@ class SetTable(ArrayTable):
             f"set table: max_members must be 1 to {MOST_MEMBERS}.",
         )
         require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
-        require(self.state_size > 0, "set table: state_size must be positive.")
+        require(
+            self.state_size > 0 and self.arm_size > 0 and self.arm_size % self.state_size == 0,
+            "set table: state_size must be positive, and arm_size a multiple of it.",
+        )
         require(isinstance(self.lattice, BaseLattice), "set table: lattice must be a BaseLattice.")
         self._check_candidates()
         self._check_pairs()
@@ -231,7 +237,7 @@ class SetTable(ArrayTable):
     @cached_property
     def state(self) -> NDArray[np.int64]:
         """Number of the environment's state of each candidate, shape (C,)."""
-        return self.candidates.astype(np.int64) // self.state_size
+        return self.candidates.astype(np.int64) % self.arm_size // self.state_size
 
     @cached_property
     def by_cell(self) -> NDArray[np.int64]:

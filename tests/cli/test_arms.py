@@ -1,0 +1,72 @@
+import pandas as pd
+import pytest
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("both")
+
+
+@pytest.fixture
+def both(tcs_command, corner, folder):
+    """A file of both arms, scored once by the command line, and what the command printed."""
+    path = folder / "both.tcs"
+    if not path.exists():
+        ran = tcs_command(
+            *("score", "shaving", "--environment", corner, "--robot", "pr2", "--arms", "both"),
+            *("--out", path, "--json"),
+        )
+        assert ran.code == 0
+        assert ran.json["configurations"] == 72
+        assert {member["arm"] for member in ran.json["best"]["members"]} <= {"left", "right"}
+    return path
+
+
+def test_members_have_an_arm(tcs_command, both):
+    here = ("--here", 1.4, -1.2, 180)
+    ran = tcs_command("select", both, *here, "--json")
+    assert all(member["arm"] in ("left", "right") for member in ran.json["members"])
+    shown = tcs_command("select", both, *here, "--top", 2)
+    assert ran.json["members"][0]["arm"] in shown.out
+
+
+def test_table_names_the_arm(tcs_command, both, tmp_path):
+    path = tmp_path / "scores.csv"
+    assert tcs_command("export", both, "--out", path, "--all").code == 0
+    assert pd.read_csv(path)["arm"].value_counts().to_dict() == {"left": 36, "right": 36}
+
+
+def test_a_goal_is_explained_for_an_arm(tcs_command, both):
+    words = ("explain", both, "--goal", 0, "--here", 1.05, -0.7, 180, "--torso", 0.3)
+    for arm in ("left", "right"):
+        ran = tcs_command(*words, "--arm", arm, "--json")
+        assert ran.json["explained"]["members"][0]["arm"] == arm
+    assert tcs_command("explain", both, "--goal", 0, "--arm", "left").code == 2
+
+
+def test_answers_are_confirmed_by_drake(tcs_command, both):
+    ran = tcs_command("verify", both, "--pairs", 20, "--dense", 0, "--json")
+    assert (ran.code, ran.json["checked"], ran.json["false_reached"]) == (0, 20, 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("map", "--out", "map.png"), "needs one arm, but the score file is of left and right"),
+        (("plan",), "needs one arm"),
+        (("select", "--here", 1.4, -1.2, 180, "--blocked", "1 1 0.2 0.2"), "left and right arm"),
+    ],
+)
+def test_what_needs_one_arm_says_so(tcs_command, both, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    ran = tcs_command(words[0], both, *words[1:])
+    assert ran.code == 1
+    assert message in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+def test_an_arm_that_the_robot_does_not_have_is_refused(tcs_command, corner):
+    ran = tcs_command("score", "shaving", "--environment", corner, "--arms", "middle")
+    assert (ran.code, "unknown arm 'middle'" in ran.err.lower()) == (1, True)
+    ran = tcs_command("score", "shaving", "--arms", "both", "--observed", "person_x=0.1")
+    assert ran.code == 2
