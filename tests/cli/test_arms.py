@@ -52,8 +52,9 @@ def test_answers_are_confirmed_by_drake(tcs_command, both):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("map", "--out", "map.png"), "needs one arm, but the score file is of left and right"),
+        (("report", "--out", "r.html"), "needs one arm, but the score file is of left and right"),
         (("plan",), "needs one arm"),
+        (("view", "--export", "v.html"), "needs one arm"),
         (("select", "--here", 1.4, -1.2, 180, "--blocked", "1 1 0.2 0.2"), "left and right arm"),
     ],
 )
@@ -63,6 +64,22 @@ def test_what_needs_one_arm_says_so(tcs_command, both, tmp_path, monkeypatch, wo
     assert ran.code == 1
     assert message in ran.err
     assert len(ran.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["map", pytest.param("picture", marks=pytest.mark.slow)])
+def test_pictures_show_members_with_their_arm(tcs_command, both, tmp_path, command):
+    path = tmp_path / f"{command}.svg"
+    assert tcs_command(command, both, "--out", path).code == 0
+    assert path.stat().st_size > 10_000
+
+
+def test_success_is_estimated_for_sets_of_both_arms(tcs_command, both, tmp_path):
+    copy = tmp_path / "copy.tcs"
+    copy.write_bytes(both.read_bytes())
+    assert tcs_command("evaluate", copy, "--samples", 20).code == 0
+    assert tcs_command("robustify", copy, "--sets", 3, "--samples", 20).code == 0
+    ran = tcs_command("select", copy, "--here", 1.4, -1.2, 180, "--delta", 1, "--json")
+    assert 0.0 <= ran.json["success"] <= 1.0
 
 
 def test_an_arm_that_the_robot_does_not_have_is_refused(tcs_command, corner):

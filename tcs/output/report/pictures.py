@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from tcs.errors import SelectionError
 from tcs.kernel.arrays import BOX
-from tcs.model.grid import InitialConfiguration
+from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.scene import Scene, goal_poses
 from tcs.output.draw import (
     BaseFootprint,
@@ -28,9 +28,9 @@ from tcs.output.report.scene_solids import (
     robot_solids,
 )
 from tcs.output.report.shown_set import ShownSet
-from tcs.output.words import assign_goals, assigned_goals, goals_text
+from tcs.output.words import arm_text, assign_goals, assigned_goals, goals_text
 from tcs.placement.scoring import Job, rebuild_scene
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import ScoreFile, file_of_arm
 
 _AROUND_A_GOAL = primitive_corners(BOX, (0.3, 0.3, 0.3))
 """Corners of the region shown around the tool [m]: the gripper and the nearby part of the body."""
@@ -43,18 +43,23 @@ class ScoredScene(NamedTuple):
     scene: Scene
 
 
-def scored_scene(file: ScoreFile, shown: ShownSet, *, meshes: bool = False) -> ScoredScene:
+def scored_scene(
+    file: ScoreFile, shown: ShownSet, *, arm: str | None = None, meshes: bool = False
+) -> ScoredScene:
     """Return the job and the scene of a score file.
 
     Args:
         file: A score file.
         shown: The set whose observed state the scene is in.
+        arm: The arm of the robot, in a file of several.
         meshes: Whether the robot's meshes are loaded, for the viewer.
 
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
+        SelectionError: If the file is of several arms, and none is given.
     """
-    job, scene, _ = rebuild_scene(file, meshes=meshes)
+    of_arm = file if arm is None else file_of_arm(file, arm)
+    job, scene, _ = rebuild_scene(of_arm, meshes=meshes)
     for name, value in file.observed_states[shown.table].items():
         scene.set_joint(name, value)
     return ScoredScene(job, scene)
@@ -71,16 +76,17 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
     Raises:
         StoreMismatchError: If the models are not those the file was made from.
     """
-    job, scene = scored or scored_scene(file, shown)
+    # The base is the same with either arm.
+    job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
     base = base_outline(scene)
     if shown.members:
         _set_environment(scene, shown.members[0])
     return draw_map(
-        PlaceMap.of(file.tables[shown.table].scores, job.grid),
+        PlaceMap.of(file.tables[shown.table].scores, Grid.from_dict(file.grid)),
         environment_solids(scene),
         [BaseFootprint(member, base) for member in shown.members],
         here=BaseFootprint(shown.here, base) if shown.here is not None else None,
-        title=title_of(job),
+        title=title_of(job, file),
         subtitle=shown.subtitle,
         measure=file.metadata["measure"],
     )
@@ -102,9 +108,15 @@ def scene_figure(file: ScoreFile, shown: ShownSet) -> Figure:
             "nothing to draw: no initial configuration reaches a goal. `tcs map` shows where the "
             "base can be placed."
         )
-    scored = scored_scene(file, shown)
-    panels = [_member_panel(file, scored, shown, i) for i in range(len(shown.members))]
-    return draw_scene(panels, title=f"{title_of(scored.job)}\n{shown.subtitle}")
+    scored = {
+        arm: scored_scene(file, shown, arm=arm)
+        for arm in dict.fromkeys(member.arm for member in shown.members)
+    }
+    panels = [
+        _member_panel(file, scored[member.arm], shown, i) for i, member in enumerate(shown.members)
+    ]
+    title = title_of(next(iter(scored.values())).job, file)
+    return draw_scene(panels, title=f"{title}\n{shown.subtitle}")
 
 
 def member_figure(
@@ -126,9 +138,12 @@ def member_figure(
     return draw_scene(panels, title="")
 
 
-def title_of(job: Job) -> str:
-    """Return the titles of task, environment and robot."""
-    return f"{job.task.title} · {job.spec.environment.title} · {job.spec.robot.title}"
+def title_of(job: Job, file: ScoreFile) -> str:
+    """Return the titles of task, environment and robot, with the arms of a file of several."""
+    robot = job.spec.robot.title
+    if file.arms:
+        robot = f"{file.robot['name']}, {' or '.join(file.arms)} arm"
+    return f"{job.task.title} · {job.spec.environment.title} · {robot}"
 
 
 def _set_environment(scene: Scene, member: InitialConfiguration) -> None:
@@ -168,7 +183,8 @@ def _member_panel(
         # Furniture may extend beyond the picture; robot, person and goals may not.
         whole = [solid.corners for solid in solids if solid.category is not Category.FURNITURE]
         subject, angles_deg = np.concatenate(whole), [70.0, -70.0]
-        caption = f"stop {number + 1}, serves {goals_text(served) if served else 'no goal'}"
+        arm = f", {arm_text(member.arm)}" if member.arm else ""
+        caption = f"stop {number + 1}{arm}, serves {goals_text(served) if served else 'no goal'}"
         if current is not None:
             caption += f"; arm at goal {current}"
     azimuths = tuple(along + math.radians(angle) for angle in angles_deg)

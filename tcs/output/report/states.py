@@ -60,20 +60,19 @@ def states_figure(
             f"the environment has {states} states, but at most {MOST_PANELS} can be drawn on one "
             "page. Draw the map without --states."
         )
-    job, scene = scored or scored_scene(file, shown)
+    job, scene = scored or scored_scene(file, shown, arm=next(iter(file.arms), None))
     base = base_outline(scene)
     scores = file.tables[shown.table].scores
     stands = [BaseFootprint(member, base) for member in shown.members]
-    size = grid.size // states
 
     def panel(state: int) -> StatePanel:
-        at = grid.configuration(state * size)
+        at = grid.configuration(state * grid.state_size)
         for name, value in at.environment:
             scene.set_joint(name, value)
         chosen = [
             (number, stand)
             for number, (h, stand) in enumerate(zip(shown.indices, stands, strict=True), start=1)
-            if h // size == state
+            if grid.state_of(h) == state
         ]
         return StatePanel(PlaceMap.of_state(scores, grid, state), environment_solids(scene), chosen)
 
@@ -91,7 +90,7 @@ def states_figure(
         [", ".join(setting) for setting in above][::-1],
         [_setting(columns, i) for i in range(columns.count)],
         members=stands,
-        title=title_of(job),
+        title=title_of(job, file),
         subtitle=shown.subtitle,
         score=score,
         measure=file.metadata["measure"],

@@ -64,7 +64,7 @@ def make_score_view(
     return ScoreView(
         viewed=viewed,
         objects=SceneObjects(scene, job.task, viewed, meshes=meshes),
-        title=title_of(job),
+        title=title_of(job, file),
         subtitle=shown.subtitle,
         source=job.spec.robot.source,
         meshes=meshes,

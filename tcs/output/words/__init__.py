@@ -10,6 +10,7 @@ from tcs.output.words.assignment import assign_goals, assigned_goals
 from tcs.output.words.bodies import body_name, frame_name, pair_text
 from tcs.output.words.configurations import (
     ARM,
+    arm_text,
     axis_name,
     axis_title,
     axis_unit,
@@ -38,6 +39,7 @@ __all__ = [
     "REASON_COLOURS",
     "REASON_NAMES",
     "REASON_TEXTS",
+    "arm_text",
     "assign_goals",
     "assigned_goals",
     "axis_name",

@@ -223,7 +223,7 @@ def evaluate(
         },
         members=()
         if is_drawn
-        else tuple(trials.job.grid.configuration(int(h)).to_json() for h in sets[0]),
+        else tuple(trials.grid.configuration(int(h)).to_json() for h in sets[0]),
     )
 
 

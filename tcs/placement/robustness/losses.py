@@ -84,8 +84,6 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
     # A gripper blocked by the robot may be free from another base pose.
     blocked = Reason.GRIPPER_BLOCKED_BY_ENVIRONMENT
     unavoidable = np.all([found.reason == blocked for found in outcomes], axis=0)
-    robot = trials.lowered.robot_bodies
-    others = (*trials.lowered.environment_bodies, *robot)
     found = []
     for goal in np.flatnonzero(lost.any(axis=0)).tolist():
         rows = lost[:, goal]
@@ -93,6 +91,9 @@ def losses(trials: Trials, evaluation: Evaluation) -> Losses:
         reasons = Counter(outcomes[member].reason[rows, goal].tolist())
         contacts = Counter(outcomes[member].contact[rows, goal].tolist())
         del contacts[-1]
+        lowered = trials.arm_of(int(evaluation.sets[0][member])).lowered
+        robot = lowered.robot_bodies
+        others = (*lowered.environment_bodies, *robot)
         pair, times = contacts.most_common(1)[0] if contacts else (-1, 0)
         errors = {
             name: float(values[rows].mean() / values.std())

@@ -21,10 +21,10 @@ BATCH = 500
 
 
 class BasePoses(NamedTuple):
-    """Configurations by base pose, torso level and state of the environment, shapes (m,)."""
+    """Configurations by base pose, torso level, arm and environment state, shapes (m,)."""
 
     state: IntArray
-    """Number of the environment's state in the grid."""
+    """Number of the environment's state in the grid; those of a second arm follow."""
     x: FloatArray
     """x of the base in W [m]."""
     y: FloatArray

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
 from tcs.kernel.problem import build_problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts
+from tcs.model.grid import Grid
 from tcs.model.scene import ErrorDistribution, LoweredScene, Scene, environment_at
 from tcs.placement.robustness.body_collisions import check_body_collisions, counted_pairs
 from tcs.placement.robustness.error_model import ErrorModel, Offsets
@@ -23,7 +25,7 @@ from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, Perturbe
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.scoring.sweep import warm_up
-from tcs.placement.store import ScoreFile, StateTables
+from tcs.placement.store import ScoreFile, StateTables, files_of_arms
 from tcs.placement.tables import Reason
 
 CHUNK = 1000
@@ -33,6 +35,21 @@ Errors = str | Path | Mapping[str, ErrorDistribution] | None
 """Path of an error file, errors by joint, or None for the errors of the environment."""
 Progress = Callable[[int, int], None] | None
 """Function called with the amounts of work done and in all."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmTrials:
+    """The robot with one of its arms, prepared for trials."""
+
+    job: Job
+    """The scored task, robot, environment and grid of the arm."""
+    scene: Scene
+    """The live scene."""
+    lowered: LoweredScene
+    """The scene as arrays."""
+    body_pairs: BoolArray
+    """The pairs of body and environment shapes whose collisions count, shape (n_body,
+    n_environment)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +68,8 @@ class Trials:
     """Error model of the environment."""
     body_collisions: str
     """Collisions of the robot's body that count, one of `BODY_COLLISIONS`."""
-    body_pairs: BoolArray
-    """The pairs of body and environment shapes that this means, shape (n_body, n_environment)."""
-    job: Job
-    """The scored task, robot, environment and grid."""
-    scene: Scene
-    """The live scene."""
-    lowered: LoweredScene
-    """The scene as arrays."""
+    arms: tuple[ArmTrials, ...]
+    """The robot with each arm that configurations use, in the order of the grid."""
     compile_seconds: float
     """Time for compiling the kernel or loading its machine code [s]."""
 
@@ -88,18 +99,23 @@ class Trials:
             SelectionError: If there is no such table.
         """
         check_body_collisions(body_collisions)
-        job, scene, lowered = rebuild_scene(file)
+        built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
         chosen = file.nominal_index if table is None else table
         if not 0 <= chosen < len(file.tables):
             raise SelectionError(
                 f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
             )
-        model = ErrorModel.of(scene, errors)
+        model = ErrorModel.of(built[0][1], errors)
         measure = str(file.metadata["measure"])
-        problem = build_problem(lowered.arrays, lowered.grid, measure)
-        seconds = warm_up(problem, on_compile)
-        pairs = counted_pairs(scene, lowered, body_collisions)
-        return cls(file, chosen, model, body_collisions, pairs, job, scene, lowered, seconds)
+        seconds = sum(
+            warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
+            for *_, lowered in built
+        )
+        arms = tuple(
+            ArmTrials(job, scene, lowered, counted_pairs(scene, lowered, body_collisions))
+            for job, scene, lowered in built
+        )
+        return cls(file, chosen, model, body_collisions, arms, seconds)
 
     def at_table(self, table: int) -> Trials:
         """Return the trials of another table of the same file."""
@@ -109,6 +125,25 @@ class Trials:
     def scored(self) -> StateTables:
         """Scores and sets of the table."""
         return self.file.tables[self.table]
+
+    @property
+    def job(self) -> Job:
+        """The scored task, environment and grid, with the robot of the first arm."""
+        return self.arms[0].job
+
+    @property
+    def scene(self) -> Scene:
+        """The live scene of the first arm."""
+        return self.arms[0].scene
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid of the configurations."""
+        return Grid.from_dict(self.file.grid)
+
+    def arm_of(self, member: int) -> ArmTrials:
+        """Return the robot with the arm that a configuration, given by flat index, uses."""
+        return self.arms[member // self.grid.arm_size]
 
     @property
     def observed(self) -> Mapping[str, float]:
@@ -246,7 +281,7 @@ class Trials:
         return int(np.count_nonzero(beyond))
 
     def _poses(self, members: ArrayLike) -> BasePoses:
-        grid = self.job.grid
+        grid = self.grid
         flat = np.asarray(members, dtype=np.int64)
         at = grid.values(flat)
         return BasePoses(
@@ -260,9 +295,15 @@ class Trials:
     def _positions(
         self, state: int, offsets: Offsets
     ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-        """Return joint positions in each sample, and whether a joint was held at its limit."""
-        axes = self.job.grid.environment_axes
-        along = np.unravel_index(state, self.job.grid.environment_shape) if axes else ()
+        """Return joint positions in each sample, and whether a joint was held at its limit.
+
+        Args:
+            state: Number of arm and environment state, as in `BasePoses`.
+            offsets: Errors of the joints, shapes (samples,).
+        """
+        axes = self.grid.environment_axes
+        of_arm = state % (self.grid.arm_size // self.grid.state_size)
+        along = np.unravel_index(of_arm, self.grid.environment_shape) if axes else ()
         nominal = {
             **self.observed,
             **{axis.name: float(axis.values[i]) for axis, i in zip(axes, along, strict=True)},
@@ -285,14 +326,15 @@ class Trials:
         offsets: Offsets,
         columns: IntArray,
     ) -> PerturbedScenes:
-        """Return one state of the environment in some of the samples, as arrays."""
+        """Return one state of the environment, with its arm, in some of the samples, as arrays."""
         positions, _ = self._positions(state, {name: v[columns] for name, v in offsets.items()})
         states = (
             {name: float(values[i]) for name, values in positions.items()}
             for i in range(columns.size)
         )
-        arrays = environment_at(self.lowered, self.scene, self.job.task, states)
-        arrays = arrays._replace(body_vs_environment=self.body_pairs)
+        arm = self.arm_of(state * self.grid.state_size)
+        arrays = environment_at(arm.lowered, arm.scene, arm.job.task, states)
+        arrays = arrays._replace(body_vs_environment=arm.body_pairs)
         torso_levels = len(arrays.arm_base_p)
         origin = np.zeros(1)
         grid = GridArrays(columns.size, origin, origin, origin, torso_levels)

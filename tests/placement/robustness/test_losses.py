@@ -94,11 +94,12 @@ def by_hand():
         ),
     ]  # fmt: skip
     best = np.any([found.reason == Reason.REACHED for found in outcomes], axis=0)
+    lowered = SimpleNamespace(
+        robot_bodies=("base", "hand"), environment_bodies=("bed", "person", "chair")
+    )
     trials = SimpleNamespace(
         outcome=lambda h, offsets: outcomes[h],
-        lowered=SimpleNamespace(
-            robot_bodies=("base", "hand"), environment_bodies=("bed", "person", "chair")
-        ),
+        arm_of=lambda h: SimpleNamespace(lowered=lowered),
         job=SimpleNamespace(task=SimpleNamespace(goals=[SimpleNamespace(body_frame="head")] * 3)),
     )
     evaluation = SimpleNamespace(

@@ -192,7 +192,7 @@ def test_the_reference_confirms_solutions_in_perturbed_environments(trials, rng)
                 name: believed.get(name, 0.0) + (offsets[name][sample] if name in offsets else 0.0)
                 for name in {**offsets, **believed}
             }
-            arrays = environment_at(trials.lowered, trials.scene, trials.job.task, [state])
+            arrays = environment_at(trials.arms[0].lowered, trials.scene, trials.job.task, [state])
             only = slice(level, level + 1)
             arrays = arrays._replace(
                 arm_base_R=arrays.arm_base_R[only],
@@ -239,7 +239,8 @@ def test_a_joint_beyond_its_limit_by_rounding_is_not_moved(bed_trials):
     limits = (believed + 1e-12, believed + 1.0)
     joints = SimpleNamespace(limits=lambda name: limits)
     scene = SimpleNamespace(built=SimpleNamespace(environment_joints=joints))
-    found = dataclasses.replace(bed_trials, scene=scene)
+    (arm,) = bed_trials.arms
+    found = dataclasses.replace(bed_trials, arms=(dataclasses.replace(arm, scene=scene),))
     positions, stopped = found._positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
     assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]
     assert stopped.tolist() == [False, False, True, True]
@@ -262,7 +263,8 @@ def test_a_file_of_other_models_is_refused(bed_file):
 
 
 def test_body_collisions_decide_by_base_and_person(chair_file, chair_trials):
-    arrays, lowered = chair_trials.lowered.arrays, chair_trials.lowered
+    lowered = chair_trials.arms[0].lowered
+    arrays = lowered.arrays
     checked = {
         choice: counted_pairs(chair_trials.scene, lowered, choice) for choice in BODY_COLLISIONS
     }

@@ -7,6 +7,7 @@ from tcs.errors import RobotError, SelectionError, StoreError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.robots import arm_references
 from tcs.placement.reasons import explain
+from tcs.placement.robustness import Trials
 from tcs.placement.scoring import rebuild_scene, score, verify
 from tcs.placement.scoring.verify import check_pairs
 from tcs.placement.selection import select
@@ -115,6 +116,24 @@ def test_members_of_a_choice_name_their_arm(both):
         rebuild_scene(both)
     frame = score_frame(both)
     assert set(frame["arm"]) == {"left", "right"}
+
+
+def test_trials_take_the_arm_of_each_member(both, singles):
+    grid = Grid.from_dict(both.grid)
+    scores = both.nominal.scores
+    of_each = [np.flatnonzero(scores.reached[rows].any(axis=1))[:2] for rows in _halves(grid)]
+    trials, rng = Trials.of(both), np.random.default_rng(0)
+    members = np.concatenate([of_each[0], of_each[1] + grid.arm_size])
+    exact = trials.reached(members, {"person_x": np.zeros(2)})
+    np.testing.assert_array_equal(exact[:, 0], scores.reached[members])
+    offsets = {name: rng.normal(0.0, 0.05, 20) for name in ("person_x", "person_y")}
+    found = np.split(trials.reached(members, offsets), 2)
+    for single, part, h in zip(singles.values(), found, of_each, strict=True):
+        np.testing.assert_array_equal(part, Trials.of(single).reached(h, offsets))
+
+
+def _halves(grid):
+    return slice(0, grid.arm_size), slice(grid.arm_size, grid.size)
 
 
 def test_explanation_takes_the_arm_into_account(both):
