@@ -8,7 +8,6 @@ that `tcs.kernel.machine_code` checks before they are loaded.
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import platform
 from collections.abc import Callable
@@ -19,10 +18,12 @@ from typing import Any, NoReturn, TypeVar, cast
 import llvmlite.binding as llvm
 import numba
 import numpy as np
+from numba.core import types
 from numba.core.registry import CPUDispatcher
 
 from tcs.errors import OutputError
 from tcs.files.paths import cache_folder
+from tcs.kernel.inner_code import InnerCache, InnerCompiler, inner_key
 from tcs.kernel.machine_code import CodeCache, private_folder, warn_once
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -83,39 +84,39 @@ def jit(function: _Function) -> _Function:
     Division by zero gives inf or nan as in numpy. No `fastmath`: results must not depend on how
     a compiler reorders sums. Contraction to fused multiply-add is off for the same reason.
     """
-    compiled = _compiled(function)
+    compiled = _compiled(function, CodeCache)
     if isinstance(compiled, CPUDispatcher):
         compiled.__class__ = _Entry
+        cast(_Entry, compiled).inner = inner(function)
     return cast(_Function, compiled)
 
 
 def inner(function: _Function) -> _Function:
     """Compile `function` as `jit` does, for calls from compiled functions only.
 
-    Without the wrappers for calls from Python, the kernel compiles in about 6/7 of the time.
+    It is optimised together with the `jit` function that calls it in the end, see `InnerCompiler`.
     """
-    compiled = _compiled(function, no_cpython_wrapper=True)
+    compiled = _compiled(
+        function, InnerCache, pipeline_class=InnerCompiler, no_cpython_wrapper=True
+    )
     if isinstance(compiled, CPUDispatcher):
         compiled.__class__ = _Inner
     return cast(_Function, compiled)
 
 
 class _Entry(CPUDispatcher):
-    """Dispatcher that compiles without garbage collection."""
+    """Dispatcher that Python calls; compiled functions call what it is for them, `inner`."""
 
-    def compile(self, sig: Any) -> Any:
-        """Compile for a signature, with everything that the function calls."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile(sig)
-        finally:
-            if collects:
-                gc.enable()
+    inner: Any
+
+    @property
+    def _numba_type_(self) -> types.Dispatcher:
+        """Type of the function as compiled functions see it."""
+        return types.Dispatcher(self.inner)
 
 
 class _Inner(CPUDispatcher):
-    """Dispatcher that rejects calls from Python, in which numba would follow a null pointer."""
+    """Dispatcher of what `InnerCompiler` compiles, which rejects calls from Python."""
 
     def __call__(self, *args: object) -> NoReturn:
         raise TypeError(
@@ -123,8 +124,17 @@ class _Inner(CPUDispatcher):
             "decorate it with `jit` in place of `inner` to call it from Python."
         )
 
+    def add_overload(self, compiled: Any) -> None:
+        """Register the code for one signature with those who call it."""
+        if compiled.entry_point is None:
+            compiled = compiled._replace(entry_point=inner_key())
+            self.targetctx.insert_user_function(
+                compiled.entry_point, compiled.fndesc, [compiled.library]
+            )
+        self.overloads[tuple(compiled.signature.args)] = compiled
 
-def _compiled(function: _Function, **options: Any) -> object:
+
+def _compiled(function: _Function, code_cache: type[CodeCache], **options: Any) -> object:
     """Return `function` decorated with `numba.njit`, cached in `jit_folder()`."""
     decorate: Callable[[_Function], object] = numba.njit(
         nogil=True, error_model="numpy", **_WRAPPERS, **options
@@ -134,5 +144,5 @@ def _compiled(function: _Function, **options: Any) -> object:
     # With NUMBA_DISABLE_JIT, functions stay as they are.
     if folder is not None and isinstance(compiled, CPUDispatcher):
         # As numba's own `enable_caching` does.
-        compiled._cache = CodeCache(function, folder)  # type: ignore[attr-defined]
+        compiled._cache = code_cache(function, folder)  # type: ignore[attr-defined]
     return compiled

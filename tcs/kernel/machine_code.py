@@ -167,14 +167,18 @@ class _Locator(UserProvidedCacheLocator):
         pass
 
 
-class _Implementation(CompileResultCacheImpl):
+class CodeImplementation(CompileResultCacheImpl):
+    """Tells numba's cache where sources are, and what to keep of a compiled function."""
+
     _locator_classes: list[type[object]] = [_Locator]  # noqa: RUF012  # numba's own type
 
 
 class CodeCache(FunctionCache):
     """Numba's cache of one function, kept in checked files."""
 
-    _impl_class = _Implementation
+    _impl_class: type[CodeImplementation] = CodeImplementation
+    _suffix = ""
+    """End of the names of the files, before the hash of the key."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         """Keep the machine code of a function in a folder of `private_folder`."""
@@ -182,5 +186,7 @@ class CodeCache(FunctionCache):
         name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
         self._cache_path = str(folder)
         self._cache_file = CodeFiles(
-            folder, re.sub(r"[^\w.-]", "", name), self._impl.locator.get_source_stamp()
+            folder,
+            re.sub(r"[^\w.-]", "", name) + self._suffix,
+            self._impl.locator.get_source_stamp(),
         )

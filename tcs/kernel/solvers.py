@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from numba.core import types
+import numba
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from tcs.kernel.analytic import pairs as analytic
@@ -67,8 +67,7 @@ def score_pair(
 class _OfSolver(AbstractTemplate):
     """Types a call by the type of its last argument, the solver.
 
-    As `numba.extending.overload` does, without a function in between: everything that a function
-    calls is optimised anew together with it, which takes a second for `score_pair`.
+    As `numba.extending.overload` does, without a function in between.
     """
 
     implementations: ClassVar[tuple[Any, Any]]
@@ -79,7 +78,7 @@ class _OfSolver(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
         """Return the signature of the implementation that fits the types of the arguments."""
         implementation = self.implementations[tuple_class(args[-1]) is not Search]
-        dispatcher = types.Dispatcher(implementation)
+        dispatcher: Any = numba.typeof(implementation)
         signature: Any = dispatcher.get_call_type(self.context, args, kws)
         self.entries[signature.args] = dispatcher.get_overload(signature)
         return signature

@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
 
 from tcs.kernel import machine_code
-from tcs.kernel.cache import jit, jit_folder
+from tcs.kernel.cache import inner, jit, jit_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -48,6 +49,85 @@ def hits(function, expected):
     compiled = jit(function)
     assert compiled(2.0) == expected
     return sum(compiled.stats.cache_hits.values())
+
+
+def summed(x):
+    """Return a sum; tests decorate it before they compile its callers."""
+    if x > 1e6:
+        raise ValueError("too large")
+    return x + shifted(x)
+
+
+def twice_summed(x):
+    """Return a value that two compiled functions below take part in."""
+    return 2.0 * summed(x)
+
+
+def thrice_summed(x):
+    """Return a value of another caller."""
+    return 3.0 * summed(x)
+
+
+@pytest.fixture
+def decorated(monkeypatch):
+    """Function that decorates those that compiled functions call, as a new process would."""
+
+    def decorate(decorator=inner):
+        for name in ("shifted", "summed"):
+            monkeypatch.setitem(globals(), name, decorator(UNDECORATED[name]))
+        return summed
+
+    return decorate
+
+
+UNDECORATED = {"shifted": shifted, "summed": summed}
+
+
+@pytest.mark.parametrize("decorator", [inner, jit], ids=["inner", "jit"])
+def test_code_for_compiled_callers_is_loaded_for_a_new_caller(
+    folder, warnings, decorated, decorator
+):
+    decorated(decorator)
+    assert hits(twice_summed, -6.0) == 0
+    callee = decorated(decorator)
+    assert hits(thrice_summed, -9.0) == 0
+    inside = callee if decorator is inner else callee.inner
+    assert sum(inside.stats.cache_hits.values()) == 1
+    # Loaded as a whole: of functions that only loaded ones call, nothing is looked for.
+    assert hits(thrice_summed, -9.0) == 1
+    assert warnings() == []
+
+
+def test_damaged_code_for_compiled_callers_is_compiled_again(folder, warnings, decorated):
+    decorated()
+    hits(twice_summed, -6.0)
+    (path,) = folder.glob("*summed*-inner.*")
+    path.write_bytes(path.read_bytes()[:-1])
+    callee = decorated()
+    assert hits(thrice_summed, -9.0) == 0
+    assert sum(callee.stats.cache_hits.values()) == 0
+    assert warnings() == [f"Machine code is compiled again: '{path}': its checksum is false."]
+
+
+def test_code_for_compiled_callers_is_optimised_once_with_all_of_it(folder, decorated, monkeypatch):
+    # Otherwise it is optimised once for every level of callers above it.
+    optimised, optimise = [], CPUCodeLibrary._optimize_final_module
+    monkeypatch.setattr(
+        JITCodeLibrary,
+        "_optimize_final_module",
+        lambda library: (optimised.append(library.name), optimise(library)),
+    )
+    decorated()
+    assert hits(twice_summed, -6.0) == 0
+    assert optimised == ["twice_summed"]
+
+
+def test_an_error_in_a_function_for_compiled_callers_reaches_python(folder, decorated):
+    decorated()
+    # Compiled, then loaded.
+    for _ in range(2):
+        with pytest.raises(ValueError, match="too large"):
+            jit(twice_summed)(1e7)
 
 
 def only_file(folder):
