@@ -327,23 +327,27 @@ def distance(a: Placed, b: Placed) -> float:
     A core is a box, some of whose half sizes may be 0. Cores overlap if no separating axis exists;
     otherwise the least distance is attained on an edge of one of them.
     """
-    if not _apart(a, b):
+    if separation(a, b) <= 1e-15:
         return -(a.radius + b.radius)
     least = min(_edges_to_box(a, b), _edges_to_box(b, a))
     return least - a.radius - b.radius
 
 
-def _apart(a: Placed, b: Placed) -> bool:
-    """Return whether one of the 15 candidate axes separates the cores."""
+def separation(a: Placed, b: Placed) -> float:
+    """Return the widest gap that one of the 15 candidate axes shows between the cores [m].
+
+    It is at most their distance, and not above 0 if they overlap.
+    """
     axes = [a.R[:, i] for i in range(3)] + [b.R[:, i] for i in range(3)]
     axes += [np.cross(a.R[:, i], b.R[:, j]) for i in range(3) for j in range(3)]
+    widest = -math.inf
     for axis in axes:
-        if np.linalg.norm(axis) < 1e-6:
+        length = float(np.linalg.norm(axis))
+        if length < 1e-6:
             continue
         spread = np.abs(axis @ a.R) @ a.half + np.abs(axis @ b.R) @ b.half
-        if abs(axis @ (b.p - a.p)) > spread + 1e-15:
-            return True
-    return False
+        widest = max(widest, (abs(float(axis @ (b.p - a.p))) - float(spread)) / length)
+    return widest
 
 
 def _edges_to_box(a: Placed, b: Placed) -> float:

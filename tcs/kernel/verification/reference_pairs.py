@@ -39,6 +39,7 @@ from tcs.kernel.verification.reference import (
     link_poses,
     measured,
     rot_z,
+    separation,
     shapes_of,
     solutions,
 )
@@ -66,7 +67,7 @@ class Verdict:
 
 
 FAR = 0.01
-"""Distance of bounding spheres beyond the required one [m] at which shapes are not compared."""
+"""Least distance of two shapes beyond the required one [m] at which it is not computed."""
 
 
 @dataclass
@@ -90,6 +91,9 @@ class PlacedScene:
         required = max(margin, a.pad + b.pad)
         # Bounding spheres well apart make the exact distance unnecessary.
         if float(np.linalg.norm(a.p - b.p)) - a.sphere - b.sphere > required + FAR:
+            return False
+        # So does a gap along one axis, which takes far less time.
+        if separation(a, b) - a.radius - b.radius > required + FAR:
             return False
         excess = distance(a, b) - required
         self.clearance = min(self.clearance, abs(excess))
