@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tcs.cli import options
+from tcs.cli.motion import verify_plan
 from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
@@ -158,7 +159,12 @@ def score(
 
 @expand_options
 def verify(
-    file: options.File,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A file made by `tcs score`, or a plan.json by `tcs plan --out`."
+        ),
+    ],
     sizes: options.CheckOptions,
     strata: Annotated[
         bool,
@@ -178,9 +184,12 @@ def verify(
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Re-check answers with Drake and estimate the recall of the search."""
+    """Re-check answers with Drake and estimate the recall of the search, or re-check a plan."""
     if limit is not None and not strata:
         raise typer.BadParameter("requires --strata.", param_hint="--limit")
+    if file.suffix == ".json":
+        verify_plan(file, as_json=as_json)
+        return
 
     import tcs
 

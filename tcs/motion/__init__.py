@@ -11,8 +11,11 @@ from tcs.motion.approach import Access, Accesses, accesses
 from tcs.motion.curves import Curve
 from tcs.motion.examine import examine
 from tcs.motion.files import save_plan
-from tcs.motion.plans import GoalResult, MotionPlan, Segment, StopPlan, plan
+from tcs.motion.motion_plan import GoalResult, MotionPlan, Segment, StopPlan
+from tcs.motion.plan_check import PlanCheck, check_plan
+from tcs.motion.plans import plan
 from tcs.motion.stops import Stop
+from tcs.motion.stored_plan import load_plan
 from tcs.motion.timing import Timed
 
 __all__ = [
@@ -21,12 +24,15 @@ __all__ = [
     "Curve",
     "GoalResult",
     "MotionPlan",
+    "PlanCheck",
     "Segment",
     "Stop",
     "StopPlan",
     "Timed",
     "accesses",
+    "check_plan",
     "examine",
+    "load_plan",
     "plan",
     "save_plan",
 ]

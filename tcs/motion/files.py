@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tcs.errors import OutputError
 from tcs.files.writing import whole_file
-from tcs.motion.plans import MotionPlan
+from tcs.motion.motion_plan import MotionPlan
 
 FORMATS = (".json", ".csv")
 

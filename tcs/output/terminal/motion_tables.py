@@ -68,6 +68,16 @@ def report_motions(result: Mapping[str, Any]) -> None:
     )
 
 
+def report_plan_check(result: Mapping[str, Any]) -> None:
+    """Print what a re-check of a plan found."""
+    results_console().print(
+        f"{result['verdict']}: {result['edges']:,} edges re-checked, {result['false']} false, "
+        f"{result['jumps']} jumps; {result['goals']} goals, tool within "
+        f"{result['max_position_error']:.1e} m; at most {result['velocity']:.1%} of the velocity "
+        f"limits and {result['acceleration']:.1%} of the acceleration limits"
+    )
+
+
 def _place(name: str | int) -> str:
     return name if isinstance(name, str) else f"goal {name}"
 

@@ -19,6 +19,7 @@ from tcs.placement.constraints.scored import (
     constraint_texts,
     constraints_entry,
     excluded_configurations,
+    recorded_constraints,
     scored_constraints,
 )
 
@@ -39,5 +40,6 @@ __all__ = [
     "kept_conditions",
     "merged",
     "read_constraints",
+    "recorded_constraints",
     "scored_constraints",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -81,13 +81,22 @@ def scored_constraints(file: ScoreFile) -> Constraints:
     Raises:
         StoreError: If the file does not hold them in the form of `constraints_entry`.
     """
-    entry = file.metadata.get(KEY, {})
+    return recorded_constraints(file.metadata)
+
+
+def recorded_constraints(metadata: Mapping[str, Any]) -> Constraints:
+    """Return the constraints in the metadata of a score file.
+
+    Raises:
+        StoreError: If they are not in the form of `constraints_entry`.
+    """
+    entry = metadata.get(KEY, {})
     where = f"metadata '{KEY}'"
     if not isinstance(entry, dict):
         raise StoreError(f"{where} must be a mapping.")
     try:
         return Constraints(
-            only=tuple(file.metadata.get("only", ())),
+            only=tuple(metadata.get("only", ())),
             forbid=tuple(Region.of(polygon, where) for polygon in entry.get("forbid", [])),
             blocked=tuple(Obstacle(**box) for box in entry.get("blocked", [])),
         )

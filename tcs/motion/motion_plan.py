@@ -1,0 +1,152 @@
+"""Plans as values: segments, the tour of each stop, and what became of each goal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tcs.model.grid import InitialConfiguration
+from tcs.motion.curves import Curve
+from tcs.motion.stops import BodyPair
+from tcs.motion.timing import Timed
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One motion of a tour."""
+
+    type: str
+    """"move", past everything; "approach" or "retreat", straight."""
+    start: int | None
+    """Goal near which it begins; None for rest. A straight motion begins and ends near one goal."""
+    end: int | None
+    """Goal near which it ends; None for rest."""
+    curves: tuple[Curve, ...]
+    """The path; the arm stops between curves."""
+    timing: Timed
+
+    @property
+    def edges(self) -> int:
+        """Number of pieces of its curves."""
+        return sum(curve.pieces for curve in self.curves)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the segment as plain containers, angles in radians."""
+        return {
+            "type": self.type,
+            "from": "rest" if self.start is None else self.start,
+            "to": "rest" if self.end is None else self.end,
+            "duration": self.timing.duration,
+            "edges": self.edges,
+            "times": self.timing.times.round(6).tolist(),
+            # Adding 0.0 turns -0.0 into 0.0.
+            "positions": (self.timing.positions.round(9) + 0.0).tolist(),
+            "velocities": (self.timing.velocities.round(9) + 0.0).tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class GoalResult:
+    """What became of one goal."""
+
+    goal: int
+    stop: int | None
+    """Number of the stop that was to do it; None if no stop reaches it."""
+    done: bool
+    reason: str
+    """"" if done; "unreached", "rest_blocked", "approach_limits", "approach_blocked" or
+    "no_path"."""
+    pair: BodyPair | None = None
+    """The bodies whose contact stood in the way most often."""
+    segment: str = ""
+    """The segment without a motion, e.g. "rest to goal 3"."""
+    seconds: float = field(default=0.0, compare=False)
+    """How long it was tried [s]."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as plain containers."""
+        plain: dict[str, Any] = {"goal": self.goal, "stop": self.stop, "done": self.done}
+        if not self.done:
+            plain |= {
+                "reason": self.reason,
+                "pair": None if self.pair is None else list(self.pair),
+                "segment": self.segment,
+                "seconds": self.seconds,
+            }
+        return plain
+
+
+@dataclass(frozen=True, eq=False)
+class StopPlan:
+    """The motions at one stop."""
+
+    at: InitialConfiguration
+    index: int
+    """Flat configuration index."""
+    segments: tuple[Segment, ...]
+    """In order, from rest to rest; empty if no goal can be done."""
+    returns: bool
+    """Whether a motion back to rest was found."""
+
+    @property
+    def goals(self) -> tuple[int, ...]:
+        """Goals that are done, in order."""
+        return tuple(s.end for s in self.segments if s.type == "approach" and s.end is not None)
+
+    @property
+    def duration(self) -> float:
+        """Duration of all segments [s]."""
+        return sum(segment.timing.duration for segment in self.segments)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the stop as plain containers."""
+        return {
+            **self.at.to_json(),
+            "configuration": self.index,
+            "goals": list(self.goals),
+            "returns": self.returns,
+            "duration": self.duration,
+            "segments": [segment.to_json() for segment in self.segments],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPlan:
+    """The motions that do a task from the stops of a set."""
+
+    made_from: Mapping[str, Any]
+    """The scene, as plain containers: `task`, `environment`, `robot`, `scene_digest`, `observed`
+    and, if it was scored under any, `constraints`."""
+    joints: tuple[str, ...]
+    """Names of the joints, in the order of all joint arrays."""
+    stops: tuple[StopPlan, ...]
+    results: tuple[GoalResult, ...]
+    """What became of each goal of the task, in order."""
+    edges: int
+    """Number of pieces of curves that Drake re-checked."""
+    false: int
+    """Number of these that Drake refutes."""
+    seed: int
+    seconds: float
+    """Duration of planning, timing and re-check [s]."""
+
+    @property
+    def goals_done(self) -> int:
+        """Number of goals done."""
+        return sum(result.done for result in self.results)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the plan as plain containers, as `tcs plan --json` prints it."""
+        return {
+            "made_from": dict(self.made_from),
+            "joints": list(self.joints),
+            "stops": [stop.to_json() for stop in self.stops],
+            "goals": len(self.results),
+            "goals_reached": sum(result.stop is not None for result in self.results),
+            "goals_done": self.goals_done,
+            "results": [result.to_json() for result in self.results],
+            "verified": {"edges": self.edges, "false": self.false},
+            "seed": self.seed,
+            "seconds": self.seconds,
+        }

@@ -1,0 +1,148 @@
+"""The tour of one stop: through the goals it serves, from rest and back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.motion.approach import Access, Accesses, accesses, joint_time
+from tcs.motion.curves import Curve
+from tcs.motion.motion_plan import GoalResult, Segment, StopPlan
+from tcs.motion.paths import find_path, rounded
+from tcs.motion.stops import BodyPair, Stop
+from tcs.motion.timing import Timed, timed
+from tcs.motion.tour import REST, best_tour
+
+
+def plan_stop(
+    stop: Stop, index: int, number: int, goals: Sequence[int]
+) -> tuple[StopPlan, list[GoalResult]]:
+    """Plan the tour of one stop through goals.
+
+    Args:
+        stop: The stop.
+        index: Flat index of its configuration.
+        number: Number of the stop in the plan.
+        goals: Numbers of the goals.
+
+    Returns:
+        The motions, and what became of each goal.
+    """
+    tour = _Tour(stop, number)
+    blocked = stop.rest_contact()
+    for goal in goals:
+        if blocked is not None:
+            tour.fail(goal, "rest_blocked", blocked, "rest", time.perf_counter())
+            continue
+        tour.open(goal)
+    for goal, access in tour.order():
+        tour.visit(goal, access)
+    returns = tour.go_home()
+    planned = StopPlan(stop.at, index, tuple(tour.segments), returns)
+    return planned, list(tour.results.values())
+
+
+class _Tour:
+    """The tour of one stop while it is planned."""
+
+    def __init__(self, stop: Stop, number: int) -> None:
+        self.stop, self.number = stop, number
+        self.found: dict[int, Accesses] = {}
+        self.results: dict[int, GoalResult] = {}
+        self.segments: list[Segment] = []
+        self.q = stop.rest
+        """Joint angles where the arm is [rad]."""
+        self.goal: int | None = None
+        """Goal visited last, None at rest."""
+
+    def open(self, goal: int) -> None:
+        """Find the postures at a goal that can be approached."""
+        begun = time.perf_counter()
+        found = accesses(self.stop, goal)
+        if found.found:
+            self.found[goal] = found
+            return
+        self.fail(goal, found.reason, found.pair, f"approach of goal {goal}", begun)
+
+    def order(self) -> list[tuple[int, Access]]:
+        """Return the goals in the order of the shortest tour in joint time, each with a posture."""
+        goals = sorted(self.found)
+        lists = [self.found[goal].found for goal in goals]
+
+        def leg(a: int, b: int) -> FloatArray:
+            rest = self.stop.rest[None]
+            starts = rest if a == REST else np.array([access.end for access in lists[a]])
+            ends = rest if b == REST else np.array([access.begin for access in lists[b]])
+            return np.array([joint_time(self.stop, start, ends) for start in starts])
+
+        tour = best_tour([len(found) for found in lists], leg)
+        return [(goals[number], lists[number][posture]) for number, posture in tour]
+
+    def visit(self, goal: int, access: Access) -> None:
+        """Append the motions to a goal, in and out, or note that there are none."""
+        begun = time.perf_counter()
+        self.stop.forget_contacts()
+        chosen, path = access, self._path(access.begin[None])
+        if path is None:
+            # By another posture at the same goal.
+            others = self.found[goal].found
+            path = self._path(np.array([other.begin for other in others]))
+            chosen = access if path is None else others[path[1]]
+        if path is None:
+            here = "rest" if self.goal is None else f"goal {self.goal}"
+            pair = self.stop.most_frequent_contact()
+            self.fail(goal, "no_path", pair, f"{here} to goal {goal}", begun)
+            return
+        self._move(path[0], goal)
+        # Joints without limits may have arrived full turns away.
+        offset = self.q - chosen.begin
+        for kind, curve in (("approach", chosen.approach), ("retreat", chosen.retreat)):
+            curve = curve.shifted(offset)
+            self._append(kind, goal, goal, (curve,))
+        self.q, self.goal = self.segments[-1].curves[-1].q[-1], goal
+        self.results[goal] = GoalResult(goal, self.number, True, "")
+
+    def go_home(self) -> bool:
+        """Append the motion back to rest; return whether there is one."""
+        if self.goal is None:
+            return True
+        path = self._path(self.stop.rest[None])
+        if path is None:
+            return False
+        self._move(path[0], None)
+        return True
+
+    def _path(self, ends: FloatArray) -> tuple[FloatArray, int] | None:
+        return find_path(self.stop, self.q[None], ends)
+
+    def _move(self, path: FloatArray, goal: int | None) -> None:
+        curves = tuple(rounded(self.stop, path))
+        if curves:
+            self._append("move", self.goal, goal, curves)
+        self.q = path[-1]
+
+    def _append(
+        self, kind: str, start: int | None, end: int | None, curves: tuple[Curve, ...]
+    ) -> None:
+        parts = [timed(curve, self.stop.velocity, self.stop.acceleration) for curve in curves]
+        self.segments.append(Segment(kind, start, end, curves, _joined(parts)))
+
+    def fail(
+        self, goal: int, reason: str, pair: BodyPair | None, segment: str, begun: float
+    ) -> None:
+        """Note that a goal cannot be done."""
+        seconds = time.perf_counter() - begun
+        self.results[goal] = GoalResult(goal, self.number, False, reason, pair, segment, seconds)
+
+
+def _joined(parts: Sequence[Timed]) -> Timed:
+    """Return timed curves one after the other."""
+    times, positions, velocities = [parts[0].times], [parts[0].positions], [parts[0].velocities]
+    for part in parts[1:]:
+        times.append(times[-1][-1] + part.times[1:])
+        positions.append(part.positions[1:])
+        velocities.append(part.velocities[1:])
+    return Timed(np.concatenate(times), np.concatenate(positions), np.concatenate(velocities))
