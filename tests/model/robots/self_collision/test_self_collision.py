@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
+from tcs.model.robots import load_robot
 from tcs.model.robots.draft import draft_robot
+from tcs.model.robots.robot_file import DisabledGroup, RobotFile
 from tcs.model.robots.self_collision import (
     SelfCollision,
+    blocked_at_boxes,
     blocked_by_shapes,
     propose_disabled_pairs,
+    renewed_groups,
     sample_positions,
 )
 from tcs.model.robots.self_collision.clearance import (
@@ -186,3 +190,54 @@ def test_postures_that_shapes_alone_block_are_counted(pr2):
     # Without exemptions the shapes of neighbours block every posture.
     bare = blocked_by_shapes(pr2.model_copy(update={"disabled_groups": ()}), postures=10)
     assert bare.free == 0
+
+
+def test_groups_made_by_hand_are_kept(pr2, monkeypatch):
+    by_hand = DisabledGroup(
+        reason="nested: their meshes overlap",
+        limits="hard",
+        pairs=(("base_link", "l_forearm_link"),),
+    )
+    neighbours = "neighbours: one joint connects them, and its limits keep them apart"
+    old = DisabledGroup(reason=neighbours, pairs=(("base_link", "laser_tilt_mount_link"),))
+    found = (
+        DisabledGroup(
+            reason=neighbours,
+            # The pair of the group made by hand, the other way round, and one more.
+            pairs=(("l_forearm_link", "base_link"), ("l_forearm_link", "l_wrist_flex_link")),
+        ),
+        DisabledGroup(
+            reason="primitives overlap in each of 2000 postures: parts of one joint assembly",
+            pairs=(("base_link", "l_forearm_link"),),
+        ),
+    )
+    monkeypatch.setattr(
+        "tcs.model.robots.self_collision.disabled_pairs.propose_disabled_pairs", lambda _: found
+    )
+    kept, fresh = renewed_groups(pr2.model_copy(update={"disabled_groups": (old, by_hand)}))
+    assert kept == by_hand
+    # What the search found before is replaced, and a group that would be empty is left out.
+    assert fresh == found[0].model_copy(
+        update={"pairs": (("l_forearm_link", "l_wrist_flex_link"),)}
+    )
+
+
+class _Swollen(RobotFile):
+    """A robot whose shapes protrude by 3 cm more."""
+
+    def load_primitives(self):
+        return tuple(shape.shrunk(-0.03) for shape in super().load_primitives())
+
+
+def test_postures_that_shapes_alone_block_at_boxes_are_counted():
+    """The shapes of the iiwa are its surface, so only shapes that protrude block any."""
+    robot = load_robot("iiwa7")
+    tight = blocked_at_boxes(robot, postures=50)
+    assert (tight.blocked, tight.pairs) == (0, ())
+    # Measured on the triangles: 2,357 of 2,744.
+    assert 30 < tight.free < 50
+    swollen = blocked_at_boxes(_Swollen(**robot.model_dump()), postures=50)
+    assert swollen.free == tight.free
+    assert swollen.blocked > 0
+    assert all(other == "box" and body in robot.model().links for (body, other), _ in swollen.pairs)
+    assert f"of {swollen.free} random postures" in swollen.text()
