@@ -10,7 +10,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.connect import Trees, new_trees
-from tcs.kernel.motion.edges import NO_PAIR, posture_contact
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact, without_idle_pairs
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
@@ -76,7 +76,7 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        motion = motion_scene(self.problem, configuration)
+        motion = without_idle_pairs(motion_scene(self.problem, configuration))
         work = new_motion_workspace(motion)
         return Stop(self, configuration, motion, work, trees)
 

@@ -1,7 +1,9 @@
 """A path between two sets of postures: RRT-Connect (Kuffner, LaValle 2000) with certified edges.
 
 Two trees grow, from the starts and from the goals. The smaller one takes a step towards a random
-posture; the other one is then extended to the new posture until it arrives or is blocked.
+posture; the other one is then extended to the new posture until it arrives or is blocked. The
+nearest node is the one from which the arm moves least: each joint counts by how far from its axis
+the arm reaches.
 """
 
 from __future__ import annotations
@@ -17,8 +19,13 @@ from tcs.kernel.motion.random import RandomState, random_state, uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
 
-STEP = 1.0
+STEP = 2.0
 """Longest edge of a tree [rad, norm of the joints]."""
+LOCAL = 0.3
+"""Fraction of the random postures that are drawn around a node of the tree that grows: next to a
+narrow passage few others can be reached from it."""
+SPREAD = 3.0
+"""Scale of these: the standard deviation of each joint is half of it [rad]."""
 MOST_NODES = 20_000
 """Capacity of each tree."""
 MOST_POINTS = 1024
@@ -41,6 +48,8 @@ class Trees(NamedTuple):
     """Number of nodes, shape (2,)."""
     target: FloatArray
     """Posture to grow towards, and next posture [rad], shape (2, 7)."""
+    turned: FloatArray
+    """End of a shortcut, full turns taken off [rad], shape (7,)."""
     path: FloatArray
     """Postures of the path, from a start to a goal [rad], shape (MOST_POINTS, 7)."""
     spare: FloatArray
@@ -58,6 +67,7 @@ def new_trees(seed: int) -> Trees:
         parent=np.empty((2, MOST_NODES), np.int64),
         nodes=np.zeros(2, np.int64),
         target=np.empty((2, 7)),
+        turned=np.empty(7),
         path=np.empty((MOST_POINTS, 7)),
         spare=np.empty((MOST_POINTS, 7)),
         ends=np.zeros(2, np.int64),
@@ -73,6 +83,13 @@ def difference(scene: MotionScene, start: float, end: float, k: int) -> float:
     if period > 0.0:
         angle -= period * np.floor(angle / period + 0.5)
     return angle
+
+
+@inner
+def unwound(scene: MotionScene, start: float, end: float, k: int) -> float:
+    """Return the position of joint k nearest to `start` that equals `end` up to full turns."""
+    period = scene.period[k]
+    return end - period * np.floor((end - start) / period + 0.5) if period > 0.0 else end
 
 
 @inner
@@ -119,11 +136,7 @@ def connect(
     for _ in range(iterations):
         grown = trees.nodes[0] - len(starts), trees.nodes[1] - len(goals)
         side = 0 if grown[0] <= grown[1] else 1
-        for k in range(7):
-            low, high = scene.lower[k], scene.upper[k]
-            if scene.period[k] > 0.0:
-                low, high = -np.pi, np.pi
-            target[k] = low + (high - low) * uniform(trees.random)
+        _draw_target(scene, trees, side)
         if max(trees.nodes[0], trees.nodes[1]) >= MOST_NODES:
             return 0
         new = _grow(scene, work, trees, side, _nearest(scene, trees, side, target), target)
@@ -142,6 +155,26 @@ def connect(
         if met != NONE:
             return _path(scene, trees, met, new)
     return 0
+
+
+@inner
+def _draw_target(scene: MotionScene, trees: Trees, side: int) -> None:
+    """Fill the posture to grow towards: a random one, or one around a random node of the tree."""
+    target, q = trees.target[0], trees.q[side]
+    local = uniform(trees.random) < LOCAL
+    n = int(uniform(trees.random) * trees.nodes[side])
+    for k in range(7):
+        low, high = scene.lower[k], scene.upper[k]
+        if scene.period[k] > 0.0:
+            low, high = -np.pi, np.pi
+        first = uniform(trees.random)
+        target[k] = low + (high - low) * first
+        if local:
+            # The sum of three is close to normal, with a standard deviation of 0.5.
+            about = first + uniform(trees.random) + uniform(trees.random) - 1.5
+            target[k] = q[n, k] + SPREAD * about
+            if scene.period[k] == 0.0:
+                target[k] = min(max(target[k], low), high)
 
 
 @inner
@@ -172,7 +205,7 @@ def _connect_directly(
             return False
         start, goal = trees.q[0, trees.ends[0]], trees.q[1, trees.ends[1]]
         for k in range(7):
-            end[k] = start[k] + difference(scene, start[k], goal[k], k)
+            end[k] = unwound(scene, start[k], goal[k], k)
         if edge_is_free(scene, work, start, end):
             return True
         least = nearest
@@ -181,15 +214,15 @@ def _connect_directly(
 
 @inner
 def _nearest(scene: MotionScene, trees: Trees, side: int, target: FloatArray) -> int:
-    """Return the node of a tree that is nearest to a posture."""
-    q, best, least = trees.q[side], 0, np.inf
+    """Return the node of a tree from which the arm moves least to a posture."""
+    q, weight, best, least = trees.q[side], scene.weight, 0, np.inf
     for n in range(trees.nodes[side]):
         square = 0.0
         for k in range(7):
             angle = target[k] - q[n, k]
             if scene.period[k] > 0.0:
                 angle = difference(scene, q[n, k], target[k], k)
-            square += angle * angle
+            square += weight[k] * angle * angle
         if square < least:
             best, least = n, square
     return best
@@ -248,6 +281,5 @@ def _path(scene: MotionScene, trees: Trees, first: int, second: int) -> int:
         return 0
     for n in range(1, count):
         for k in range(7):
-            before = trees.path[n - 1, k]
-            trees.path[n, k] = before + difference(scene, before, trees.path[n, k], k)
+            trees.path[n, k] = unwound(scene, trees.path[n - 1, k], trees.path[n, k], k)
     return count

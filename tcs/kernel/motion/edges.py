@@ -5,131 +5,31 @@ points. A piece of it is certified when, at its middle posture, every pair of sh
 apart than its gap plus a bound on how far the shapes move on the piece. Other pieces are halved and
 the pairs in question checked again, until all are certified or a pair is in contact. So nothing
 lies between samples, however thin.
-
-The bound: with the joints changed one after the other, from the last to the first, a point at
-distance d from the axis of joint k moves by at most `delta_k d` when that joint turns; and its
-distance from the axis has grown by no more than the motion before (Schwarzer, Saha, Latombe 2005
-bound the motion of all postures at once, which is looser).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import CAPSULE, FloatArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
-from tcs.kernel.kinematics import link_poses
-from tcs.kernel.motion.scene import DEPTH, MotionScene, MotionWorkspace
+from tcs.kernel.motion.pairs import ROUNDING, is_near, list_near, take_posture
+from tcs.kernel.motion.scene import (
+    DEPTH,
+    MotionScene,
+    MotionWorkspace,
+    new_motion_workspace,
+    with_pairs,
+)
 from tcs.kernel.views import unowned
 
 RESOLUTION = 1e-5
 """Motion [m] below which a piece that is not certified counts as blocked: a path keeps at most this
 much more clearance than required."""
-COARSE = 0.15
-"""Motion [m] above which bounding spheres alone decide whether a pair may meet on a piece: the
-exact distance is seldom greater, and the piece is halved anyway."""
-ROUNDING = 1e-9
-"""Excess of the bounds [relative, and m], far above rounding errors of positions."""
+PIECE = 0.2
+"""Motion [m] of the pieces into which a curve is divided first: on longer ones most pairs may
+meet."""
 NO_PAIR = -1
-
-
-@inner
-def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
-    """Place shape i of the arm at the current posture and fill its row of `motion`."""
-    if work.placed[i] == work.posture[0]:
-        return
-    work.placed[i] = work.posture[0]
-    frame, shapes = scene.link_frame[i], work.shapes
-    move(work.link_R[frame], work.link_p[frame], scene.links, i, shapes, i)
-    # The two cap centres of a capsule; one centre for others.
-    half, radius = 0.0, shapes[i, BOUND]
-    if shapes[i, TYPE] == CAPSULE:
-        half, radius = shapes[i, SIZE + 1], shapes[i, SIZE]
-    x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
-    ax, ay, az = (
-        half * shapes[i, ROTATION + 2],
-        half * shapes[i, ROTATION + 5],
-        half * shapes[i, ROTATION + 8],
-    )
-    total = 0.0
-    work.motion[i, frame] = 0.0
-    for k in range(frame, 0, -1):
-        angle = work.delta[k - 1]
-        if angle > 0.0:
-            R, p = work.link_R[k], work.link_p[k]
-            dx, dy, dz = x - p[0], y - p[1], z - p[2]
-            square = _from_axis(R, dx + ax, dy + ay, dz + az)
-            if half > 0.0:
-                square = max(square, _from_axis(R, dx - ax, dy - ay, dz - az))
-            total += angle * (np.sqrt(square) + radius + total) * (1.0 + ROUNDING)
-        work.motion[i, k - 1] = total
-
-
-@inner
-def _from_axis(R: FloatArray, x: float, y: float, z: float) -> float:
-    """Return the squared distance of a point from the z axis of an orientation R [m^2]."""
-    cx, cy, cz = y * R[2, 2] - z * R[1, 2], z * R[0, 2] - x * R[2, 2], x * R[1, 2] - y * R[0, 2]
-    return cx * cx + cy * cy + cz * cz
-
-
-@inner
-def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
-    """Make `work.q` the current posture: shapes are placed anew when next used."""
-    work.posture[0] += 1
-    link_poses(scene.chain_R, scene.chain_p, work.q, work.link_R, work.link_p)
-
-
-@inner
-def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> bool:
-    """Return whether pair k may touch: at the current posture, or `grown`, on the current piece."""
-    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
-    place_shape(scene, work, i)
-    if base > 0:
-        place_shape(scene, work, j)
-    gap, moved = scene.gap[k], 0.0
-    if grown:
-        moved = work.motion[i, base] + ROUNDING
-    shapes = work.shapes
-    return spheres_overlap(shapes, i, shapes, j, gap + moved) and (
-        moved > COARSE or closer(shapes, i, shapes, j, gap + moved)
-    )
-
-
-@inner
-def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int) -> int:
-    """List the pairs that may touch on the current piece from `work.pairs[0]` on.
-
-    Args:
-        scene: The scene.
-        work: Scratch, with the current posture.
-        extra: Added to the gap of each pair [m].
-        most: Number of pairs after which to stop.
-
-    Returns:
-        Number of pairs listed.
-    """
-    pair, gap, first = scene.pair, scene.gap, scene.first_pair
-    shapes, motion, near = work.shapes, work.motion, work.pairs
-    count = 0
-    for i in range(len(scene.links)):
-        place_shape(scene, work, i)
-    for i in range(len(scene.links)):
-        x, y, z = shapes[i, CENTRE], shapes[i, CENTRE + 1], shapes[i, CENTRE + 2]
-        for k in range(first[i], first[i + 1]):
-            j = pair[k, 1]
-            moved = motion[i, pair[k, 2]]
-            within = gap[k] + moved + extra
-            dx, dy, dz = shapes[j, CENTRE] - x, shapes[j, CENTRE + 1] - y, shapes[j, CENTRE + 2] - z
-            apart = shapes[i, BOUND] + shapes[j, BOUND] + within
-            if dx * dx + dy * dy + dz * dz >= apart * apart:
-                continue
-            if moved > COARSE or closer(shapes, i, shapes, j, within):
-                near[count] = k
-                count += 1
-                if count == most:
-                    return count
-    return count
 
 
 @inner
@@ -192,12 +92,45 @@ def edge_is_free(
 @inner
 def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
     """Return how far the curve `work.control` is certified, from its begin; 1 for all of it."""
-    span, stretch = work.span, work.stretch
     _take_middle(work, 0.0, 1.0)
-    take_posture(scene, work)
-    span[0, 0], span[0, 1] = 0.0, 1.0
-    stretch[0, 0], stretch[0, 1] = 0, list_near(scene, work, ROUNDING, len(scene.pair))
-    top = 1 if stretch[0, 1] > 0 else 0
+    moved = 0.0
+    for k in range(7):
+        moved += work.delta[k] * scene.reach[k]
+    pieces = int(np.ceil(moved / PIECE)) if moved > PIECE else 1
+    for n in range(pieces):
+        begin, end = n / pieces, (n + 1) / pieces
+        _take_middle(work, begin, end)
+        take_posture(scene, work)
+        count = list_near(scene, work, ROUNDING, len(scene.pair))
+        for m in range(count):
+            if is_near(scene, work, work.pairs[m], False):
+                work.contact[0] = work.pairs[m]
+                work.hits[work.contact[0]] += 1
+                return begin
+        until = _halves_are_free_until(scene, work, count, begin, end)
+        if until < end:
+            return until
+    return 1.0
+
+
+@inner
+def _halves_are_free_until(
+    scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float
+) -> float:
+    """Return how far both halves of a piece of `work.control` are certified; `end` for all of it.
+
+    Args:
+        scene: The scene.
+        work: Holds the curve; the first pairs in `pairs` are checked.
+        count: Number of pairs.
+        begin: Begin of the piece, in [0, 1].
+        end: End of the piece.
+    """
+    if count == 0:
+        return end
+    whole, top = end, 2
+    span, stretch = work.span, work.stretch
+    _push_halves(work, 0, begin, end, 0, count)
     while top:
         top -= 1
         begin, end = span[top, 0], span[top, 1]
@@ -207,14 +140,59 @@ def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
             work.hits[work.contact[0]] += 1
             return begin
         if left > 0:
-            # The first half goes on top, so that what is certified grows from the begin.
-            middle = 0.5 * (begin + end)
-            span[top, 0], span[top, 1] = middle, end
-            span[top + 1, 0], span[top + 1, 1] = begin, middle
-            for n in range(2):
-                stretch[top + n, 0], stretch[top + n, 1] = last, last + left
+            _push_halves(work, top, begin, end, last, last + left)
             top += 2
-    return 1.0
+    return whole
+
+
+@inner
+def _push_halves(
+    work: MotionWorkspace, top: int, begin: float, end: float, first: int, last: int
+) -> None:
+    """Put both halves of a piece on the stack, with the pairs to check on them.
+
+    The first half goes on top, so that what is certified grows from the begin.
+    """
+    span, stretch, middle = work.span, work.stretch, 0.5 * (begin + end)
+    span[top, 0], span[top, 1] = middle, end
+    span[top + 1, 0], span[top + 1, 1] = begin, middle
+    for n in range(2):
+        stretch[top + n, 0], stretch[top + n, 1] = first, last
+
+
+@jit
+def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: BoolArray) -> None:
+    """Fill which pairs can touch as far as one joint decides, shape (n_pairs,).
+
+    Of links next to each other only the angle of the joint between them counts: a pair that is
+    certified over the whole range of the joint never touches.
+
+    Args:
+        owned_scene: The scene.
+        owned_work: Scratch.
+        needed: Filled.
+    """
+    scene, work = unowned(owned_scene), unowned(owned_work)
+    for n in range(len(scene.pair)):
+        joint = scene.pair[n, 2]
+        needed[n] = True
+        if scene.link_frame[scene.pair[n, 0]] != joint + 1:
+            continue
+        low, high = scene.lower[joint], scene.upper[joint]
+        if scene.period[joint] > 0.0:
+            low, high = -np.pi, np.pi
+        for m in range(4):
+            for k in range(7):
+                work.control[m, k] = low + (high - low) * m / 3.0 if k == joint else 0.0
+        work.pairs[0] = n
+        needed[n] = _halves_are_free_until(scene, work, 1, 0.0, 1.0) < 1.0
+
+
+def without_idle_pairs(scene: MotionScene) -> MotionScene:
+    """Return a scene without the pairs of neighbouring links that never touch."""
+    needed = np.ones(len(scene.pair), np.bool_)
+    list_needed(scene, new_motion_workspace(scene), needed)
+    return with_pairs(scene, needed)
 
 
 @inner

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,10 @@ class MotionScene(NamedTuple):
     """Upper joint limits [rad], shape (7,); +inf where continuous."""
     period: FloatArray
     """A full turn for each continuous joint, 0 for the others [rad], shape (7,)."""
+    reach: FloatArray
+    """Bound on how far any point of the arm may be from the axis of each joint [m], shape (7,)."""
+    weight: FloatArray
+    """Square of `reach` relative to its largest, shape (7,)."""
     links: FloatArray
     """The arm's shapes, packed, in link frames, shape (n_arm, 17)."""
     link_frame: IntArray
@@ -42,6 +46,13 @@ class MotionScene(NamedTuple):
     is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
     first_pair: IntArray
     """First pair of each shape of the arm, and the number of pairs, shape (n_arm + 1,)."""
+    first_moving: IntArray
+    """First pair of each shape of the arm with another shape of the arm: pairs with fixed shapes
+    come before those; shape (n_arm,)."""
+    centre: FloatArray
+    """Centre of the fixed shape of each pair in A [m], shape (3, n_pairs); 0 where both move."""
+    bound: FloatArray
+    """Sum of the radii of the bounding spheres of each pair [m], shape (n_pairs,)."""
     gap: FloatArray
     """Distance that each pair must keep [m], shape (n_pairs,)."""
     body: IntArray
@@ -130,20 +141,50 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
     gap = np.concatenate([gap_fixed[:, near][arm, other], gap_arm[first, second]])
     order = np.argsort(pair[:, 0], kind="stable")
     lower, upper = problem.arm.lower, problem.arm.upper
+    reach = _reach(problem.chain_p, links, link_frame)
+    fixed = np.ascontiguousarray(fixed[near])
     return MotionScene(
         chain_R=problem.chain_R,
         chain_p=problem.chain_p,
         lower=lower,
         upper=upper,
         period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
+        reach=reach,
+        weight=(reach / reach.max()) ** 2,
         links=links,
         link_frame=link_frame,
-        fixed=np.ascontiguousarray(fixed[near]),
-        pair=np.ascontiguousarray(pair[order].astype(np.int64)),
-        first_pair=np.searchsorted(pair[order, 0], np.arange(count + 1)).astype(np.int64),
-        gap=np.ascontiguousarray(gap[order]),
+        fixed=fixed,
         body=np.concatenate([problem.link_body + problem.environment_bodies, body[near]]),
+        **_pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
     )
+
+
+def with_pairs(scene: MotionScene, kept: BoolArray) -> MotionScene:
+    """Return a scene with some of its pairs only, those `kept`, shape (n_pairs,)."""
+    fields = _pair_fields(scene.links, scene.fixed, scene.pair[kept], scene.gap[kept])
+    return scene._replace(**fields)
+
+
+def _pair_fields(
+    links: FloatArray, fixed: FloatArray, pair: IntArray, gap: FloatArray
+) -> dict[str, Any]:
+    """Return the fields of a scene that describe its pairs, which are sorted by their first shape.
+
+    The pairs of a shape of the arm begin with those with fixed shapes.
+    """
+    first_pair = np.searchsorted(pair[:, 0], np.arange(len(links) + 1)).astype(np.int64)
+    moving = pair[:, 2] > 0
+    fixed_pairs = np.bincount(pair[~moving, 0], minlength=len(links))
+    shapes = np.concatenate([links, fixed])
+    centre = np.where(moving[:, None], 0.0, shapes[pair[:, 1], CENTRE : CENTRE + 3])
+    return {
+        "pair": np.ascontiguousarray(pair),
+        "first_pair": first_pair,
+        "first_moving": first_pair[:-1] + fixed_pairs,
+        "gap": np.ascontiguousarray(gap),
+        "centre": np.ascontiguousarray(centre.T),
+        "bound": shapes[pair[:, 0], BOUND] + shapes[pair[:, 1], BOUND],
+    }
 
 
 def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
@@ -182,8 +223,23 @@ def _within_reach(
     chain_p: FloatArray, links: FloatArray, link_frame: IntArray, fixed: FloatArray, gap: FloatArray
 ) -> BoolArray:
     """Return whether each shape of the arm may come near each fixed shape, (n_arm, n_fixed)."""
-    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain_p[:7], axis=1))])
-    reach = spans[link_frame] + np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
+    out = _reach_from(0, chain_p, links, link_frame)
     away = np.linalg.norm(fixed[:, CENTRE : CENTRE + 3], axis=1) - fixed[:, BOUND]
-    meets = away[None] <= (reach + links[:, BOUND])[:, None] + gap
+    meets = away[None] <= out[:, None] + gap
     return np.asarray((gap > 0.0) & meets)
+
+
+def _reach(chain_p: FloatArray, links: FloatArray, link_frame: IntArray) -> FloatArray:
+    """Return a bound on the distance of any point of the arm from each axis [m], shape (7,)."""
+    out = [_reach_from(k + 1, chain_p, links, link_frame).max(initial=0.0) for k in range(7)]
+    return np.array(out)
+
+
+def _reach_from(
+    frame: int, chain_p: FloatArray, links: FloatArray, link_frame: IntArray
+) -> FloatArray:
+    """Return a bound on the distance of each shape from the origin of a link, 0 if it is before."""
+    spans = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain_p[:7], axis=1))])
+    centre = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1)
+    out = spans[link_frame] - spans[frame] + centre + links[:, BOUND]
+    return np.where(link_frame >= frame, out, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.connect import MOST_POINTS, Trees
+from tcs.kernel.motion.connect import MOST_POINTS, Trees, distance, unwound
 from tcs.kernel.motion.edges import edge_is_free
 from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
@@ -24,7 +24,7 @@ def shorten(
     count: int,
     attempts: int,
 ) -> int:
-    """Shorten `path` in place; its ends stay, and all edges remain certified.
+    """Shorten `path` in place; its ends stay up to full turns, and all edges remain certified.
 
     Args:
         owned_scene: The scene.
@@ -55,14 +55,38 @@ def _length(a: FloatArray, b: FloatArray) -> float:
 
 
 @inner
+def _edge_is_free(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, start: FloatArray, end: FloatArray
+) -> bool:
+    """Return whether the edge to a posture, the short way round, is free; fills `trees.turned`."""
+    for k in range(7):
+        trees.turned[k] = unwound(scene, start[k], end[k], k)
+    return edge_is_free(scene, work, start, trees.turned)
+
+
+@inner
+def _turn(path: FloatArray, first: int, count: int, before: FloatArray, after: FloatArray) -> None:
+    """Add the full turns from one position of the joints to another to the rest of the path."""
+    for k in range(7):
+        turns = after[k] - before[k]
+        if turns != 0.0:
+            for n in range(first, count):
+                path[n, k] += turns
+
+
+@inner
 def _drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
     """Drop postures between which an edge is free, the longest runs first; return how many stay."""
     path, begin = trees.path, 0
     while begin < count - 2:
         end = count - 1
-        while end > begin + 1 and not edge_is_free(scene, work, path[begin], path[end]):
+        while end > begin + 1 and not _edge_is_free(scene, work, trees, path[begin], path[end]):
             end -= 1
         dropped = end - begin - 1
+        if dropped > 0:
+            _turn(path, end + 1, count, path[end], trees.turned)
+            for k in range(7):
+                path[end, k] = trees.turned[k]
         for n in range(end, count):
             for k in range(7):
                 path[n - dropped, k] = path[n, k]
@@ -81,16 +105,17 @@ def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) ->
     first, second = uniform(trees.random) * total, uniform(trees.random) * total
     early, late = min(first, second), max(first, second)
     m, n = _take_point(path, count, early, ends[0]), _take_point(path, count, late, ends[1])
-    if m == n or _length(ends[0], ends[1]) > (1.0 - LEAST_GAIN) * (late - early):
+    if m == n or distance(scene, ends[0], ends[1]) > (1.0 - LEAST_GAIN) * (late - early):
         return count
-    if not edge_is_free(scene, work, ends[0], ends[1]):
+    if not _edge_is_free(scene, work, trees, ends[0], ends[1]):
         return count
+    _turn(path, n + 1, count, ends[1], trees.turned)
     kept = count - (n + 1)
     for i in range(kept):
         for k in range(7):
             spare[i, k] = path[n + 1 + i, k]
     for k in range(7):
-        path[m + 1, k], path[m + 2, k] = ends[0, k], ends[1, k]
+        path[m + 1, k], path[m + 2, k] = ends[0, k], trees.turned[k]
     for i in range(kept):
         for k in range(7):
             path[m + 3 + i, k] = spare[i, k]

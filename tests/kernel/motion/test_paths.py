@@ -56,7 +56,7 @@ def length(path):
 def test_a_path_leads_around_a_wall_and_is_free(chain, seed):
     path, ready, work, _ = plan(walled(chain), seed)
     assert len(path) > 2
-    np.testing.assert_array_equal(path[[0, -1]], SWING)
+    np.testing.assert_allclose(path[[0, -1]], SWING, atol=1e-12)
     low, high = ready.lower - 1e-12, ready.upper + 1e-12
     assert np.all((path >= low) & (path <= high))
     for a, b in itertools.pairwise(path):
@@ -85,6 +85,17 @@ def test_without_a_gap_there_is_no_path(chain):
     path, _, work, _ = plan(walled(chain, 0.0, 3.0, begin=0.3), iterations=200)
     assert path is None
     assert work.hits.sum() > 0
+
+
+def test_shortcuts_take_full_turns_off(chain):
+    ready, work, _ = prepared(bare(chain))
+    trees = new_trees(0)
+    # Twice around the forearm's axis for nothing.
+    twist = np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
+    path = np.linspace(SWING[0], SWING[1], 7) + np.arange(7)[:, None] * twist * (2 * np.pi / 6)
+    trees.path[:7] = path
+    assert shorten(ready, work, trees, 7, 0) == 2
+    np.testing.assert_allclose(trees.path[:2], SWING, atol=1e-12)
 
 
 def test_shortcuts_do_not_lengthen_a_path(chain):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.kernel.motion.edges import without_idle_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference_pairs import placed_scene
@@ -18,7 +19,7 @@ SWING = np.array([[0.9, 0.0, 0.0, -0.5, 0.0, -0.3, 0.0], [-0.7, 0.0, 0.0, -0.5, 
 
 def prepared(scene, h=HERE):
     """Return a motion scene, its workspace and the scene as the reference reads it."""
-    ready = motion_scene(build_problem(scene, toy_grid()), h)
+    ready = without_idle_pairs(motion_scene(build_problem(scene, toy_grid()), h))
     return ready, new_motion_workspace(ready), placed_scene(scene, toy_grid(), h, 0)[0]
 
 
