@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tcs.cli import options
-from tcs.cli.values import observed_settings, state_if_given
+from tcs.cli.values import current_state, observed_settings, state_if_given
 from tcs.output import terminal
+
+if TYPE_CHECKING:
+    from tcs.placement.store import ScoreFile
 
 
 def plan(
@@ -23,8 +27,25 @@ def plan(
             show_default="the set with the best scores",
         ),
     ] = None,
+    exactly: Annotated[
+        bool,
+        typer.Option(
+            "--exactly", help="With --here: plan from that very base pose, on or off the grid."
+        ),
+    ] = False,
     torso: options.Torso = 0.0,
-    max_members: options.Members = None,
+    at: options.At = None,
+    max_members: Annotated[
+        int | None,
+        typer.Option(
+            "--members",
+            "--max-members",
+            min=1,
+            max=3,
+            help="Greatest number of base poses in the set: 1, 2 or 3.",
+            show_default="that of the file",
+        ),
+    ] = None,
     observed: options.Observed = None,
     configuration: Annotated[
         list[int] | None,
@@ -33,8 +54,19 @@ def plan(
             "the order of the visits."
         ),
     ] = None,
+    order: Annotated[
+        str,
+        typer.Option(
+            metavar="best|given",
+            help="Order of the goals at a stop: that of the shortest tour, or their own.",
+        ),
+    ] = "best",
     out: Annotated[
-        Path | None, typer.Option(help="File to write the plan to: .json or .csv.")
+        Path | None,
+        typer.Option(
+            help="File to write the plan to: .json, .csv, .yaml (ROS JointTrajectory) or .npz "
+            "(arrays for Drake)."
+        ),
     ] = None,
     seed: options.Seed = 0,
     as_json: options.Json = False,
@@ -42,15 +74,19 @@ def plan(
     """Plan the motions that do the task from each stop: to the goals, straight in and out, back."""
     if configuration and (here is not None or max_members is not None):
         raise typer.BadParameter(
-            "give --configuration, or --here and --max-members.", param_hint="--configuration"
+            "give --configuration, or --here and --members.", param_hint="--configuration"
         )
+    if exactly and (here is None or max_members is not None):
+        raise typer.BadParameter("requires --here, without --members.", param_hint="--exactly")
+    if at and not exactly:
+        raise typer.BadParameter("requires --exactly.", param_hint="--at")
     state = state_if_given(here, torso)
 
     import tcs
     from tcs.files.writing import check_writable
-    from tcs.model.grid import Grid
     from tcs.motion import save_plan
     from tcs.motion.files import check_plan_path
+    from tcs.motion.plans import exact_state
     from tcs.output.report.shown_set import ShownSet
     from tcs.output.terminal.motion_tables import report_plan
     from tcs.placement.selection import nearest_table
@@ -60,22 +96,19 @@ def plan(
         check_writable(out, [file])
     loaded = tcs.load(file)
     settings = observed_settings(observed or (), loaded.observed_axes)
-    if configuration:
-        table, indices = nearest_table(loaded, None, settings).index, tuple(configuration)
+    members: Any
+    if exactly and here is not None:
+        members = exact_state(loaded, current_state(here, torso, at or ()), settings)
+    elif configuration:
+        members = _flat_indices(loaded, nearest_table(loaded, None, settings).index, configuration)
     else:
         shown = ShownSet.of(loaded, state, max_members, settings)
-        table, indices = shown.table, shown.indices
-    size = Grid.from_dict(loaded.grid).size
-    for h in indices:
-        if not 0 <= h < size:
-            raise typer.BadParameter(
-                f"{h} is not a configuration; there are {size:,}, from 0.",
-                param_hint="--configuration",
-            )
+        members = _flat_indices(loaded, shown.table, shown.indices)
     with terminal.progress_bar("stops") as on_progress:
         found = tcs.plan(
             loaded,
-            [table * size + h for h in indices],
+            members,
+            order=order,
             seed=seed,
             on_progress=on_progress,
             on_compile=terminal.note_compiling,
@@ -84,6 +117,24 @@ def plan(
         save_plan(out, found)
         terminal.note(f"wrote {out}")
     terminal.print_result(found.to_json(), report_plan, as_json=as_json)
+
+
+def _flat_indices(loaded: ScoreFile, table: int, indices: Sequence[int]) -> list[int]:
+    """Return flat indices in all tables of configurations of one of them.
+
+    Raises:
+        typer.BadParameter: If there is no such configuration.
+    """
+    from tcs.model.grid import Grid
+
+    size = Grid.from_dict(loaded.grid).size
+    for h in indices:
+        if not 0 <= h < size:
+            raise typer.BadParameter(
+                f"{h} is not a configuration; there are {size:,}, from 0.",
+                param_hint="--configuration",
+            )
+    return [table * size + h for h in indices]
 
 
 def motions(

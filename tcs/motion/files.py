@@ -1,4 +1,7 @@
-"""Plans as files: JSON as `tcs plan --json` prints it, or CSV with one row for each sample."""
+"""Plans as files: JSON, CSV with a row for each sample, ROS messages, arrays for Drake.
+
+JSON is as `tcs plan --json` prints it. The others hold the trajectory of each stop as a whole.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,16 @@ import csv
 import io
 import json
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from tcs.errors import OutputError
 from tcs.files.writing import whole_file
+from tcs.kernel.arrays import FloatArray
 from tcs.motion.motion_plan import MotionPlan
 
-FORMATS = (".json", ".csv")
+FORMATS = (".json", ".csv", ".yaml", ".npz")
 
 
 def check_plan_path(path: Path) -> None:
@@ -21,19 +28,28 @@ def check_plan_path(path: Path) -> None:
         OutputError: If its suffix is not one of `FORMATS`.
     """
     if path.suffix not in FORMATS:
-        raise OutputError(f"Cannot write '{path}': a plan is written as {' or '.join(FORMATS)}.")
+        raise OutputError(
+            f"Cannot write '{path}': a plan is written as "
+            f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}."
+        )
 
 
 def save_plan(path: Path, plan: MotionPlan) -> None:
-    """Write a plan as JSON or CSV, by the suffix of the path.
+    """Write a plan in the format of its suffix: one of FORMATS.
 
     Raises:
         OutputError: If the format is unknown or the file cannot be written.
     """
     check_plan_path(path)
-    text = json.dumps(plan.to_json(), indent=1) if path.suffix == ".json" else plan_csv(plan)
+    written = {
+        ".json": lambda: json.dumps(plan.to_json(), indent=1).encode(),
+        ".csv": lambda: plan_csv(plan).encode(),
+        ".yaml": lambda: plan_messages(plan).encode(),
+        ".npz": lambda: plan_arrays(plan),
+    }
+    content = written[path.suffix]()
     with whole_file(path, "Plan") as stream:
-        stream.write(text.encode())
+        stream.write(content)
 
 
 def plan_csv(plan: MotionPlan) -> str:
@@ -59,3 +75,55 @@ def plan_csv(plan: MotionPlan) -> str:
                 rows.writerow([*head, f"{begin + at:.6f}", *numbers])
             begin += timing.duration
     return out.getvalue()
+
+
+def plan_messages(plan: MotionPlan) -> str:
+    """Return the trajectory of each stop in the layout of ROS 2 `trajectory_msgs/JointTrajectory`.
+
+    One YAML document for each stop with motions. Accelerations [rad/s^2] are the derivatives of the
+    sampled velocities.
+    """
+    documents = []
+    for stop in plan.stops:
+        if not stop.segments:
+            continue
+        found = stop.samples()
+        accelerations = np.gradient(found.velocities, found.times, axis=0)
+        rows = zip(found.times, found.positions, found.velocities, accelerations, strict=True)
+        message = {
+            "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+            "joint_names": list(plan.joints),
+            "points": [_point(*row) for row in rows],
+        }
+        # JSON is YAML, and much faster to write.
+        documents.append(json.dumps(message))
+    return "".join(f"---\n{document}\n" for document in documents)
+
+
+def _point(time: float, q: FloatArray, v: FloatArray, a: FloatArray) -> dict[str, Any]:
+    nanoseconds = round(float(time) * 1e9)
+    return {
+        "positions": (q.round(9) + 0.0).tolist(),
+        "velocities": (v.round(9) + 0.0).tolist(),
+        "accelerations": (a.round(9) + 0.0).tolist(),
+        "effort": [],
+        "time_from_start": {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9},
+    }
+
+
+def plan_arrays(plan: MotionPlan) -> bytes:
+    """Return the trajectory of each stop as arrays in numpy's format.
+
+    `joints`; for stop number N with motions `breaks_N` [s], shape (n,), `samples_N` [rad] and
+    `samples_dot_N` [rad/s], shapes (7, n), as `PiecewisePolynomial.CubicHermite` of Drake takes.
+    """
+    arrays: dict[str, Any] = {"joints": np.array(plan.joints)}
+    for number, stop in enumerate(plan.stops):
+        if stop.segments:
+            found = stop.samples()
+            arrays[f"breaks_{number}"] = found.times
+            arrays[f"samples_{number}"] = found.positions.T
+            arrays[f"samples_dot_{number}"] = found.velocities.T
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()

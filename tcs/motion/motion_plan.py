@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from tcs.errors import TcsError
 from tcs.model.grid import InitialConfiguration
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair
@@ -82,8 +85,8 @@ class StopPlan:
     """The motions at one stop."""
 
     at: InitialConfiguration
-    index: int
-    """Flat configuration index."""
+    index: int | None
+    """Flat configuration index; None off the grid."""
     segments: tuple[Segment, ...]
     """In order, from rest to rest; empty if no goal can be done."""
     returns: bool
@@ -98,6 +101,16 @@ class StopPlan:
     def duration(self) -> float:
         """Duration of all segments [s]."""
         return sum(segment.timing.duration for segment in self.segments)
+
+    def samples(self) -> Timed:
+        """Return all segments one after the other; a sample where two meet is there once.
+
+        Raises:
+            TcsError: If there are no segments.
+        """
+        if not self.segments:
+            raise TcsError("Nothing can be done from this stop, so it has no trajectory.")
+        return joined([segment.timing for segment in self.segments])
 
     def to_json(self) -> dict[str, Any]:
         """Return the stop as plain containers."""
@@ -150,3 +163,13 @@ class MotionPlan:
             "seed": self.seed,
             "seconds": self.seconds,
         }
+
+
+def joined(parts: Sequence[Timed]) -> Timed:
+    """Return timed curves one after the other; a sample where two meet is there once."""
+    times, positions, velocities = [parts[0].times], [parts[0].positions], [parts[0].velocities]
+    for part in parts[1:]:
+        times.append(times[-1][-1] + part.times[1:])
+        positions.append(part.positions[1:])
+        velocities.append(part.velocities[1:])
+    return Timed(np.concatenate(times), np.concatenate(positions), np.concatenate(velocities))

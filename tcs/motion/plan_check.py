@@ -12,6 +12,7 @@ import numpy as np
 from tcs.errors import StoreFormatError
 from tcs.model.scene import goal_poses
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
+from tcs.motion.plans import value_of
 from tcs.motion.recheck import false_pieces
 from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
@@ -100,10 +101,8 @@ def check_plan(
 
 def stop_of(plan: MotionPlan, planned: StopPlan, job: Job, scene: Any) -> Stop:
     """Return the stop of a plan, the live scene set to it."""
-    at = planned.at
-    values = {"base_x": at.base_x, "base_y": at.base_y, "base_yaw": at.base_yaw, "torso": at.torso}
-    values |= dict(at.environment)
-    return Stop.at_values(job, scene, [values[a.name] for a in job.scored_grid.axes], plan.seed)
+    values = [value_of(planned.at, axis.name) for axis in job.scored_grid.axes]
+    return Stop.at_values(job, scene, values, plan.seed)
 
 
 def _check_names(plan: MotionPlan, job: Job) -> None:

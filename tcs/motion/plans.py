@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
-from tcs.errors import TcsError
+import numpy as np
+
+from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.cache import is_compiled
+from tcs.model.grid import InitialConfiguration
 from tcs.motion.motion_plan import GoalResult, MotionPlan
 from tcs.motion.recheck import false_pieces
-from tcs.motion.stop_tour import plan_stop
+from tcs.motion.stop_tour import ORDERS, plan_stop
 from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import made_from, rebuild_scene
@@ -22,8 +26,9 @@ ENTRY = "motion.connect.connect"
 
 def plan(
     file: ScoreFile,
-    members: Choice | Sequence[int],
+    members: Choice | Sequence[int] | InitialConfiguration,
     *,
+    order: str = "best",
     seed: int = 0,
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
@@ -37,7 +42,9 @@ def plan(
     Args:
         file: A score file.
         members: A selected set, or flat configuration indices of the stops in the order of the
-            visits; in a file with observed states, those of all its tables one after the other.
+            visits; in a file with observed states, those of all its tables one after the other. Or
+            one initial configuration, on or off the grid, from which every goal is tried.
+        order: Order of the goals at a stop: "best" for the shortest tour, "given" for their own.
         seed: Seed of the planner; the plan is the same for the same seed.
         on_progress: Called with the number of finished stops and their total.
         on_compile: Called before the planner compiles, if it has to.
@@ -48,28 +55,23 @@ def plan(
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
         RobotError: If a velocity limit of the arm is unknown.
-        TcsError: If there is no such configuration.
+        UnknownNameError: If there is no such order.
+        TcsError: If there is no such configuration, or it lacks an axis.
     """
     begun = time.perf_counter()
+    if order not in ORDERS:
+        raise UnknownNameError("order", order, ORDERS)
     job, scene, _ = rebuild_scene(file)
-    if isinstance(members, Choice):
-        table = 0 if members.match is None else members.match.index
-        members = [table * job.grid.size + members.indices[i] for i in members.order]
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
-    for h in members:
-        if not 0 <= h < job.scored_grid.size:
-            raise TcsError(
-                f"plan: no configuration {h}; the file has {job.scored_grid.size:,}, from 0."
-            )
-    serving = _serving(file, job, members)
+    places, serving = _places(file, job, members)
     results: dict[int, GoalResult] = {
         goal: GoalResult(goal, None, False, "unreached")
         for goal in range(len(job.task.goals))
         if not serving[goal]
     }
     stops, edges, false = [], 0, 0
-    for number, h in enumerate(members):
+    for number, (h, values) in enumerate(places):
         goals = [
             goal
             for goal, able in enumerate(serving)
@@ -78,8 +80,8 @@ def plan(
             # The most dexterous stop serves a goal; later stops take over what it could not do.
             and (able[0] == number or goal in results)
         ]
-        stop = Stop.of(job, scene, h, seed)
-        planned, found = plan_stop(stop, h, number, goals)
+        stop = Stop.at_values(job, scene, values, seed)
+        planned, found = plan_stop(stop, h, number, goals, order)
         results |= {result.goal: result for result in found}
         stops.append(planned)
         for segment in planned.segments:
@@ -87,7 +89,7 @@ def plan(
                 edges += curve.pieces
                 false += false_pieces(scene, stop.motion, curve)
         if on_progress is not None:
-            on_progress(number + 1, len(members))
+            on_progress(number + 1, len(places))
     return MotionPlan(
         made_from=made_from(file),
         joints=tuple(job.spec.robot.arm_joints),
@@ -98,6 +100,65 @@ def plan(
         seed=seed,
         seconds=time.perf_counter() - begun,
     )
+
+
+Place = tuple[int | None, list[float]]
+"""Flat index of a configuration, None off the grid, and the value of each axis [m or rad]."""
+
+
+def _places(
+    file: ScoreFile, job: Job, members: Choice | Sequence[int] | InitialConfiguration
+) -> tuple[list[Place], list[list[int]]]:
+    """Return the stops, and for each goal the numbers of those to try it from, the best first."""
+    axes = job.scored_grid.axes
+    if isinstance(members, InitialConfiguration):
+        values = [value_of(members, axis.name) for axis in axes]
+        return [(None, values)], [[0]] * len(job.task.goals)
+    if isinstance(members, Choice):
+        table = 0 if members.match is None else members.match.index
+        members = [table * job.grid.size + members.indices[i] for i in members.order]
+    for h in members:
+        if not 0 <= h < job.scored_grid.size:
+            raise TcsError(
+                f"plan: no configuration {h}; the file has {job.scored_grid.size:,}, from 0."
+            )
+    of_axes = job.scored_grid.values(np.array(members, dtype=np.int64))
+    places: list[Place] = [
+        (h, [float(of_axes[axis.name][row]) for axis in axes]) for row, h in enumerate(members)
+    ]
+    return places, _serving(file, job, members)
+
+
+def exact_state(
+    file: ScoreFile, at: InitialConfiguration, observed: Mapping[str, float]
+) -> InitialConfiguration:
+    """Return a state with the observed axes of a file added: as observed, or of its nominal table.
+
+    Args:
+        file: The score file.
+        at: Robot and environment.
+        observed: Values of observed axes [m or rad].
+    """
+    known = {**file.observed_states[file.nominal_index], **observed}
+    units = {axis.name: "rad" if axis.unit == "deg" else "m" for axis in file.observed_axes}
+    return replace(
+        at,
+        environment=(*known.items(), *at.environment),
+        environment_units=(*(units[name] for name in known), *at.environment_units),
+    )
+
+
+def value_of(at: InitialConfiguration, axis: str) -> float:
+    """Return the value of an axis of the grid [m or rad].
+
+    Raises:
+        TcsError: If the configuration lacks it.
+    """
+    values = {name: getattr(at, name) for name in ("base_x", "base_y", "base_yaw", "torso")}
+    values |= dict(at.environment)
+    if axis not in values:
+        raise TcsError(f"plan: the state lacks the axis '{axis}'. Give it: --at {axis}=VALUE.")
+    return float(values[axis])
 
 
 def _serving(file: ScoreFile, job: Job, members: Sequence[int]) -> list[list[int]]:

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.motion.approach import Access, Accesses, accesses, joint_time
 from tcs.motion.curves import Curve
-from tcs.motion.motion_plan import GoalResult, Segment, StopPlan
+from tcs.motion.motion_plan import GoalResult, Segment, StopPlan, joined
 from tcs.motion.paths import find_path, rounded
 from tcs.motion.stops import BodyPair, Stop
-from tcs.motion.timing import Timed, timed
-from tcs.motion.tour import REST, best_tour
+from tcs.motion.timing import timed
+from tcs.motion.tour import REST, best_tour, given_tour
+
+ORDERS = {"best": best_tour, "given": given_tour}
+"""Orders of the goals: that of the shortest tour, or their own."""
 
 
 def plan_stop(
-    stop: Stop, index: int, number: int, goals: Sequence[int]
+    stop: Stop, index: int | None, number: int, goals: Sequence[int], order: str = "best"
 ) -> tuple[StopPlan, list[GoalResult]]:
     """Plan the tour of one stop through goals.
 
     Args:
         stop: The stop.
-        index: Flat index of its configuration.
+        index: Flat index of its configuration; None off the grid.
         number: Number of the stop in the plan.
         goals: Numbers of the goals.
+        order: Order of the goals, one of ORDERS.
 
     Returns:
         The motions, and what became of each goal.
@@ -38,7 +42,7 @@ def plan_stop(
             tour.fail(goal, "rest_blocked", blocked, "rest", time.perf_counter())
             continue
         tour.open(goal)
-    for goal, access in tour.order():
+    for goal, access in tour.order(ORDERS[order]):
         tour.visit(goal, access)
     returns = tour.go_home()
     planned = StopPlan(stop.at, index, tuple(tour.segments), returns)
@@ -67,8 +71,12 @@ class _Tour:
             return
         self.fail(goal, found.reason, found.pair, f"approach of goal {goal}", begun)
 
-    def order(self) -> list[tuple[int, Access]]:
-        """Return the goals in the order of the shortest tour in joint time, each with a posture."""
+    def order(self, through: Callable[..., Sequence[tuple[int, int]]]) -> list[tuple[int, Access]]:
+        """Return the goals in the order of a tour in joint time, each with a posture.
+
+        Args:
+            through: Returns the tour from numbers of postures and their distances in joint time.
+        """
         goals = sorted(self.found)
         lists = [self.found[goal].found for goal in goals]
 
@@ -78,7 +86,7 @@ class _Tour:
             ends = rest if b == REST else np.array([access.begin for access in lists[b]])
             return np.array([joint_time(self.stop, start, ends) for start in starts])
 
-        tour = best_tour([len(found) for found in lists], leg)
+        tour = through([len(found) for found in lists], leg)
         return [(goals[number], lists[number][posture]) for number, posture in tour]
 
     def visit(self, goal: int, access: Access) -> None:
@@ -128,7 +136,7 @@ class _Tour:
         self, kind: str, start: int | None, end: int | None, curves: tuple[Curve, ...]
     ) -> None:
         parts = [timed(curve, self.stop.velocity, self.stop.acceleration) for curve in curves]
-        self.segments.append(Segment(kind, start, end, curves, _joined(parts)))
+        self.segments.append(Segment(kind, start, end, curves, joined(parts)))
 
     def fail(
         self, goal: int, reason: str, pair: BodyPair | None, segment: str, begun: float
@@ -136,13 +144,3 @@ class _Tour:
         """Note that a goal cannot be done."""
         seconds = time.perf_counter() - begun
         self.results[goal] = GoalResult(goal, self.number, False, reason, pair, segment, seconds)
-
-
-def _joined(parts: Sequence[Timed]) -> Timed:
-    """Return timed curves one after the other."""
-    times, positions, velocities = [parts[0].times], [parts[0].positions], [parts[0].velocities]
-    for part in parts[1:]:
-        times.append(times[-1][-1] + part.times[1:])
-        positions.append(part.positions[1:])
-        velocities.append(part.velocities[1:])
-    return Timed(np.concatenate(times), np.concatenate(positions), np.concatenate(velocities))

@@ -84,7 +84,7 @@ def _stop(plain: Mapping[str, Any]) -> StopPlan:
     )
     return StopPlan(
         at=at,
-        index=int(plain["configuration"]),
+        index=None if plain["configuration"] is None else int(plain["configuration"]),
         segments=tuple(_segment(segment) for segment in plain["segments"]),
         returns=bool(plain["returns"]),
     )

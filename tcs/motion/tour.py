@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from itertools import combinations
 
@@ -12,6 +13,8 @@ from tcs.kernel.arrays import FloatArray
 
 EXACT = 10
 """Greatest number of goals for which the tour is the shortest one."""
+LEAST_GAIN = 1e-9
+"""Least reduction of the cost for which a part of the tour is reversed."""
 
 Leg = Callable[[int, int], FloatArray]
 """Costs from each posture of one goal to each of another, shape (n, m); -1 stands for rest, which
@@ -23,7 +26,8 @@ def best_tour(sizes: Sequence[int], leg: Leg) -> tuple[tuple[int, int], ...]:
     """Return goals in the order of the tour, each with the number of its posture.
 
     Up to EXACT goals it is the shortest tour (Held, Karp 1962, over all postures of each goal). For
-    more, each next goal is the nearest one.
+    more, each next goal is the nearest one, and then parts of the tour are reversed as long as that
+    shortens it (2-opt, Croes 1958).
 
     Args:
         sizes: Number of postures of each goal, each at least 1.
@@ -37,7 +41,19 @@ def best_tour(sizes: Sequence[int], leg: Leg) -> tuple[tuple[int, int], ...]:
     """
     if not sizes:
         return ()
-    return _exact(sizes, leg) if len(sizes) <= EXACT else _nearest(sizes, leg)
+    if len(sizes) <= EXACT:
+        return _exact(sizes, leg)
+    return _reversed_where_shorter(sizes, leg, [goal for goal, _ in _nearest(sizes, leg)])
+
+
+def given_tour(sizes: Sequence[int], leg: Leg) -> tuple[tuple[int, int], ...]:
+    """Return the goals in their own order, each with the posture of the shortest such tour.
+
+    Args:
+        sizes: Number of postures of each goal, each at least 1.
+        leg: Costs between postures of two goals.
+    """
+    return _in_order(range(len(sizes)), leg)[1] if sizes else ()
 
 
 Choices = tuple[FloatArray, NDArray[np.intp], NDArray[np.intp]]
@@ -96,3 +112,39 @@ def _nearest(sizes: Sequence[int], leg: Leg) -> tuple[tuple[int, int], ...]:
         left.remove(goal)
         tour.append((goal, posture))
     return tuple(tour)
+
+
+def _in_order(order: Sequence[int], leg: Leg) -> tuple[float, tuple[tuple[int, int], ...]]:
+    """Return cost and postures of the shortest tour through goals in a given order."""
+    cost, choices = leg(REST, order[0])[0], []
+    for before, goal in itertools.pairwise(order):
+        totals = cost[:, None] + leg(before, goal)
+        choices.append(totals.argmin(axis=0))
+        cost = totals.min(axis=0)
+    cost = cost + leg(order[-1], REST)[:, 0]
+    postures = [int(cost.argmin())]
+    for choice in reversed(choices):
+        postures.append(int(choice[postures[-1]]))
+    return float(cost.min()), tuple(zip(order, reversed(postures), strict=True))
+
+
+def _reversed_where_shorter(
+    sizes: Sequence[int], leg: Leg, order: list[int]
+) -> tuple[tuple[int, int], ...]:
+    """Return the tour after reversals of its parts, until none shortens it."""
+    ends = (REST, *range(len(sizes)))
+    legs = {(a, b): leg(a, b) for a in ends for b in ends if a != b}
+
+    def known(a: int, b: int) -> FloatArray:
+        return legs[a, b]
+
+    best, tour = _in_order(order, known)
+    shorter = True
+    while shorter:
+        shorter = False
+        for first, last in combinations(range(len(order) + 1), 2):
+            changed = [*order[:first], *reversed(order[first:last]), *order[last:]]
+            cost, found = _in_order(changed, known)
+            if cost < best - LEAST_GAIN:
+                best, tour, order, shorter = cost, found, changed, True
+    return tour
