@@ -35,8 +35,9 @@ def blocked_bodies(obstacle: Obstacle, postures: Postures) -> BoolArray:
     clearance = np.maximum(shapes.margin, body.pad) + ROUNDING
     blocked = np.zeros(len(first), dtype=np.bool_)
     distance = frames.distances(near, p_B.astype(np.float32))
-    # A shape whose centre is well in the obstacle needs no closer test, nor do others of that pose.
-    inside = np.any(distance == 0.0, axis=1)
+    # A shape whose inscribed sphere meets the obstacle needs no closer test, nor do others of that
+    # pose. Single precision is finer than the clearance.
+    inside = np.any(distance <= body.inner, axis=1)
     blocked[near[inside]] = True
     pose, shape = np.nonzero((distance <= body.bound + clearance + ROUNDING) & ~inside[:, None])
     p_O = frames.to_obstacle(near[pose], p_B[:, pose, shape].T)
@@ -66,7 +67,7 @@ def blocked_solutions(obstacle: Obstacle, postures: Postures, admitted: BoolArra
     clearance = np.maximum(shapes.margin, arm.pad) + ROUNDING
     distance = frames.distances(candidate[near], postures.centres[:, near])
     blocked = np.zeros(len(candidate), dtype=np.bool_)
-    inside = np.any(distance == 0.0, axis=1)
+    inside = np.any(distance <= arm.inner, axis=1)
     blocked[near[inside]] = True
     close = (distance <= arm.bound + clearance + ROUNDING) & ~inside[:, None]
     row, shape = np.nonzero(close)

@@ -15,17 +15,13 @@ from numpy.typing import NDArray
 from tcs.placement.selection.admission import Admitted
 from tcs.placement.selection.alternatives import Distinct
 from tcs.placement.selection.index import GroupIndex
+from tcs.placement.selection.lowered import SLACK, LoweredScores
 from tcs.placement.selection.penalties import Penalties
 from tcs.placement.selection.travel import Legs
 from tcs.placement.selection.utility import UtilityWeights
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-SLACK = 1e-12
-"""Relative margin for rounding in bounds that are not computed by the operations of the utility: a
-dozen roundings of 1.1e-16 each, with three digits to spare. A bound without it could end up one
-bit below the utility it bounds, and lose a tie."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +71,29 @@ class Bounds:
 
     def of_member(self, group: IntArray, member: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain a candidate, shape (n,)."""
-        of_group = self._group_gain[group] - self._levels[member]
+        return self._net_of(self._group_gain[group], group, member)
+
+    def of_member_with(
+        self, group: IntArray, member: IntArray, others: tuple[IntArray, ...]
+    ) -> FloatArray:
+        """Return tighter bounds, given the cells of the other members, where scores are lowered.
+
+        Args:
+            group: The groups, shape (n,).
+            member: A candidate of each, shape (n,).
+            others: Cells of its partners, shapes (n,).
+        """
+        if self.lowered is None:
+            return self.of_member(group, member)
+        return self._net_of(self.lowered.with_partners(member, others), group, member)
+
+    def _net_of(self, gain: FloatArray, group: IntArray, member: IntArray) -> FloatArray:
+        """Return bounds on sets that contain a candidate, given a bound on their gain."""
+        net = gain - self._levels[member]
         if self.penalties is not None:
-            of_group -= self.penalties.of_candidates[member]
-        gain = np.minimum(self._net_gain[member], of_group)
-        return gain - (self.travel * self._driving[group] - self._slack[group])
+            net -= self.penalties.of_candidates[member]
+        net = np.minimum(self._net_gain[member], net)
+        return net - (self.travel * self._driving[group] - self._slack[group])
 
     def of_two(self, group: IntArray, a: IntArray, b: IntArray) -> FloatArray:
         """Return bounds on the sets of a group that contain two candidates, shape (n,).
@@ -106,9 +120,20 @@ class Bounds:
         return np.asarray(bound)
 
     @cached_property
+    def lowered(self) -> LoweredScores | None:
+        """What the candidates reach under the constraints; None if that is what is stored."""
+        if self.admitted is None or not self.admitted.has_lower_scores:
+            return None
+        return LoweredScores.of(self.index.all, self.admitted, self.weights)
+
+    @cached_property
     def _group_gain(self) -> FloatArray:
         """Bound on alpha P_R + beta P_M of each group, shape (K,)."""
-        return self._gain(*self.index.group_scores)
+        stored = self._gain(*self.index.group_scores)
+        if self.lowered is None:
+            return stored
+        # Some sets of the group may be kept for scores that its members no longer have.
+        return np.minimum(stored, self.lowered.of_cells(self.index.cells))
 
     @cached_property
     def _member_gain(self) -> FloatArray:

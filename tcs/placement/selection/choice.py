@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -43,6 +43,8 @@ class SelectionTables:
     """Returns the stored solutions."""
     read_frames: Callable[[], dict[str, FloatArray]] | None = None
     """Returns the positions of the body frames in W for each environment state [m], (states, 3)."""
+    derived: dict[str, Any] = field(default_factory=dict, repr=False)
+    """What was derived from the sets, by name; of a file, kept for its next selection."""
 
     @classmethod
     def of(cls, file: ScoreFile, table: int | None = None) -> SelectionTables:
@@ -51,11 +53,12 @@ class SelectionTables:
         chosen = file.tables[number]
         return cls(
             chosen.sets,
-            Grid.from_dict(file.grid),
+            file.configurations,
             chosen.success,
             partial(getattr, file, "robot_shapes"),
             partial(getattr, chosen, "scores"),
             partial(_frames, file, number),
+            chosen.derived,
         )
 
     @cached_property
@@ -83,10 +86,24 @@ class SelectionTables:
             )
         return Postures(self.shapes, self.sets, self.grid, self.read_scores())
 
-    @cached_property
+    @property
     def index(self) -> SetIndex:
         """The sets, prepared for the search."""
-        return SetIndex(self.sets)
+        return index_of(self.sets, self.derived)
+
+
+def index_of(sets: SetTable, derived: dict[str, Any]) -> SetIndex:
+    """Return the index of sets, made on the first call.
+
+    Args:
+        sets: The sets.
+        derived: Where the index is kept.
+    """
+    if "index" not in derived:
+        derived["index"] = SetIndex(sets)
+    found = derived["index"]
+    assert isinstance(found, SetIndex)
+    return found
 
 
 def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:

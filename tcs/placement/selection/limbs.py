@@ -11,8 +11,9 @@ from tcs.errors import SelectionError
 from tcs.placement.constraints import Constraints
 from tcs.placement.selection.admission import Admitted
 from tcs.placement.selection.observed import Match
-from tcs.placement.store import ScoreFile
-from tcs.placement.tables import SetTable
+from tcs.placement.store import ScoreFile, StateTables
+
+IntArray = NDArray[np.intp]
 
 
 def tables_of_goals(file: ScoreFile, match: Match) -> tuple[int, ...]:
@@ -68,12 +69,19 @@ def admitted_at_limbs(
     sets = file.tables[match.index].sets
     everything = np.ones(len(sets.candidates), dtype=np.bool_)
     found = admitted or Admitted(everything, sets.reached, sets.dexterity, (), (), None)
-    reached, dexterity = found.reached.copy(), found.dexterity.copy()
-    for table in set(tables) - {match.index}:
-        goals = np.flatnonzero(np.array(tables) == table)
-        theirs, values = _at_candidates(file.tables[table].sets, sets.candidates, goals)
-        reached[:, goals] &= theirs
-        dexterity[:, goals] = np.minimum(dexterity[:, goals], values)
+    # One contiguous row for each goal.
+    reached, dexterity = found.reached.T.copy("C"), found.dexterity.T.copy("C")
+    for goal, table in enumerate(tables):
+        if table != match.index:
+            other = file.tables[table].sets
+            mine, theirs = _common(file.tables[match.index], file.tables[table])
+            still = np.zeros(reached.shape[1], dtype=np.bool_)
+            still[mine] = other.reached[theirs, goal]
+            reached[goal] &= still
+            lesser = np.minimum(dexterity[goal, mine], other.dexterity[theirs, goal])
+            dexterity[goal, mine] = lesser
+    dexterity[~reached] = 0.0
+    reached, dexterity = reached.T, dexterity.T
     remaining = found.candidates & reached.any(axis=1)
     if not np.any(remaining):
         raise SelectionError(
@@ -85,17 +93,18 @@ def admitted_at_limbs(
     )
 
 
-def _at_candidates(
-    sets: SetTable, candidates: NDArray[np.int32], goals: NDArray[np.intp]
-) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-    """Return what candidates of another table reach in this one, and their dexterity, (C, n).
+def _common(sets: StateTables, other: StateTables) -> tuple[IntArray, IntArray]:
+    """Return the numbers of the candidates that two tables share, in the one and in the other.
 
-    Configurations that are no candidates here count as reaching nothing.
+    They are kept for the next selection.
     """
-    if not len(sets.candidates):
-        none = np.zeros((len(candidates), len(goals)))
-        return none.astype(np.bool_), none.astype(np.float32)
-    row = np.minimum(np.searchsorted(sets.candidates, candidates), len(sets.candidates) - 1)
-    is_there = (sets.candidates[row] == candidates)[:, None]
-    reached = sets.reached[row[:, None], goals] & is_there
-    return reached, np.where(reached, sets.dexterity[row[:, None], goals], np.float32(0.0))
+    known = sets.derived.setdefault("shared candidates", {})
+    candidates = other.sets.candidates
+    if id(candidates) not in known:
+        mine, theirs = np.intersect1d(
+            sets.sets.candidates, candidates, assume_unique=True, return_indices=True
+        )[1:]
+        # The array is kept as well, so that no other one can have its number.
+        known[id(candidates)] = candidates, mine, theirs
+    _, mine, theirs = known[id(candidates)]
+    return mine, theirs

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError, UnknownNameError
-from tcs.model.grid import Axis, Grid, InitialConfiguration
+from tcs.model.grid import Axis, InitialConfiguration
 from tcs.placement.store import ScoreFile, state_to_json
 
 MAX_FRAME_ERROR = 0.10
@@ -204,7 +204,7 @@ def _scored_positions(file: ScoreFile, name: str) -> NDArray[np.float64]:
 
 def _possible_states(file: ScoreFile, here: InitialConfiguration | None) -> NDArray[np.bool_]:
     """Return which states of the environment may be the present one, shape (states,)."""
-    axes = Grid.from_dict(file.grid).environment_axes
+    axes = file.configurations.environment_axes
     known = dict(here.environment) if here is not None else {}
     possible = np.ones(tuple(axis.count for axis in axes), dtype=np.bool_)
     for i, axis in enumerate(axes):

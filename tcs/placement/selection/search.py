@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FIRST_CANDIDATES = 200
-"""Candidates examined in the first round, which is enough for most searches; later rounds double,
+"""Candidates examined in the first round, which is enough for most searches; later rounds triple,
 so that a search that opens many groups does not spend its time on bookkeeping."""
 
 MOST_CANDIDATES = 100_000
@@ -66,7 +66,7 @@ def best_set(bounds: Bounds, to_beat: float) -> Found | None:
         now, remaining = _split(bounds, remaining, budget)
         search.open(now)
         remaining = _promising(bounds, remaining, search.best)
-        budget = min(2 * budget, MOST_CANDIDATES)
+        budget = min(3 * budget, MOST_CANDIDATES)
     return search.best
 
 
@@ -86,8 +86,8 @@ class _Search:
     def open(self, groups: IntArray) -> None:
         """Examine the sets of some groups."""
         feasible = [
-            _feasible_members(self.bounds, groups, cells[groups], self.least)
-            for cells in self.bounds.index.cells
+            _feasible_members(self.bounds, groups, number, self.least)
+            for number in range(self.bounds.index.members)
         ]
         which = np.repeat(np.arange(groups.size), feasible[0].size)
         self._join(groups, which, (feasible[0].numbers,), feasible[1:])
@@ -193,25 +193,25 @@ def _best_of(
     # The exact travel cost rejects most sets before their scores, which take longer.
     feasible = np.flatnonzero(bounds.of_set(group, members, cost) >= least)
     members, cost = tuple(member[feasible] for member in members), cost[feasible]
-    every = bounds.index.all
-    scores = _scores(every.dexterity, every.reached, every.sets.weights, members)
+    every, lowered = bounds.index.all, bounds.lowered
+    of_sets = every if lowered is None else lowered
+    scores = _scores(of_sets.dexterity, of_sets.reached, every.sets.weights, members)
+    utilities = utility(*scores, cost, bounds.weights)
+    if bounds.penalties is not None:
+        utilities = utilities - bounds.penalties.of_sets(members)
+    enough = np.flatnonzero(utilities >= least)
+    members, utilities = tuple(member[enough] for member in members), utilities[enough]
+    scores = scores[0][enough], scores[1][enough]
+    if lowered is not None:
+        # Stored sets are compared, so the rule applies to their stored scores.
+        scores = _scores(every.dexterity, every.reached, every.sets.weights, members)
     is_kept = _is_kept(bounds.index, members, *scores)
     if bounds.distinct is not None:
         is_kept &= bounds.distinct.of_sets(members)
     kept = np.flatnonzero(is_kept)
     if not kept.size:
         return None
-    members = tuple(member[kept] for member in members)
-    reachability, manipulability = scores[0][kept], scores[1][kept]
-    admitted = bounds.admitted
-    if admitted is not None and admitted.has_lower_scores:
-        # Stored sets are compared, so the rule applies to their stored scores.
-        reachability, manipulability = _scores(
-            admitted.dexterity.T, admitted.reached.T, every.sets.weights, members
-        )
-    utilities = utility(reachability, manipulability, cost[kept], bounds.weights)
-    if bounds.penalties is not None:
-        utilities = utilities - bounds.penalties.of_sets(members)
+    members, utilities = tuple(member[kept] for member in members), utilities[kept]
     best = utilities.max()
     ties = np.flatnonzero(utilities == best)
     first = ties[np.lexsort(tuple(member[ties] for member in reversed(members)))[0]]
@@ -289,13 +289,27 @@ class _Feasible(NamedTuple):
     """Number of candidates of each group."""
 
 
-def _feasible_members(bounds: Bounds, groups: IntArray, cells: IntArray, least: float) -> _Feasible:
-    """Return candidates of one cell of each group that may be in a set with this utility."""
+def _feasible_members(bounds: Bounds, groups: IntArray, number: int, least: float) -> _Feasible:
+    """Return candidates of one cell of each group that may be in a set with this utility.
+
+    Args:
+        bounds: Bounds on the utility.
+        groups: The groups.
+        number: Number of the cell in each group.
+        least: The utility.
+    """
     every = bounds.index.all
+    cells = bounds.index.cells[number][groups]
     size = every.size[cells]
     which = np.repeat(np.arange(groups.size), size)
     within = np.arange(which.size) - np.repeat(np.cumsum(size) - size, size)
     member = every.sets.by_cell[every.start[cells][which] + within]
     feasible = bounds.of_member(groups[which], member) >= least
-    count = np.bincount(which[feasible], minlength=groups.size)
-    return _Feasible(member[feasible], np.cumsum(count) - count, count)
+    which, member = which[feasible], member[feasible]
+    if bounds.lowered is not None:
+        of_group = groups[which]
+        others = tuple(c[of_group] for i, c in enumerate(bounds.index.cells) if i != number)
+        feasible = bounds.of_member_with(of_group, member, others) >= least
+        which, member = which[feasible], member[feasible]
+    count = np.bincount(which, minlength=groups.size)
+    return _Feasible(member, np.cumsum(count) - count, count)

@@ -43,6 +43,11 @@ class Primitives:
     """Centres [m], shape (n, 3)."""
 
     @property
+    def inner(self) -> FloatArray:
+        """Radius of the inscribed sphere about each centre [m], shape (n,)."""
+        return np.where(self.type == BOX, self.size.min(axis=1, initial=np.inf), self.size[:, 0])
+
+    @property
     def bound(self) -> FloatArray:
         """Radius of the bounding sphere about each centre [m], shape (n,)."""
         capsule = self.size[:, 0] + self.size[:, 1]

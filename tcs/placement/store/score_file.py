@@ -78,6 +78,11 @@ class StateTables:
         """
         return self.read_scores()
 
+    @cached_property
+    def derived(self) -> dict[str, Any]:
+        """What other packages derived from the tables, by name, kept while the tables live."""
+        return {}
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: a copy decodes the scores itself if it needs them."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -201,9 +206,14 @@ class ScoreFile:
                     )
 
     @cached_property
+    def configurations(self) -> Grid:
+        """The grid of the initial configurations, `grid` as an object."""
+        return Grid.from_dict(self.grid)
+
+    @property
     def arms(self) -> tuple[str, ...]:
         """Names of the arms that configurations use, one each; () in a file of one arm."""
-        return Grid.from_dict(self.grid).arms
+        return self.configurations.arms
 
     @cached_property
     def observed_axes(self) -> tuple[Axis, ...]:
