@@ -71,6 +71,15 @@ Only = Annotated[
         "'base_x = -1..0.5 m'.",
     ),
 ]
+Person = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="FILE|KEY=VALUE",
+        help="Whose body the person has: sex=female or male, and any of stature, mass and other "
+        "measures of docs/people.md (m, kg), or NAME_percentile=P; or a YAML file of these.",
+        show_default="that of the environment file",
+    ),
+]
 MetreWeight = Annotated[float, typer.Option(help="Cost of a metre of driving.")]
 TurnWeight = Annotated[float, typer.Option(help="Cost of a radian of base rotation.")]
 TorsoWeight = Annotated[float, typer.Option(help="Cost of a metre of torso motion.")]

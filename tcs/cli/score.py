@@ -90,6 +90,7 @@ def score(
         ),
     ] = None,
     at: options.At = None,
+    person: options.Person = None,
     as_json: options.Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to select from."""
@@ -109,7 +110,7 @@ def score(
             param_hint="--at",
         )
 
-    from tcs.cli.values import settings
+    from tcs.cli.values import person_values, settings
     from tcs.placement.scoring import default_path, files
 
     scoring_options: dict[str, Any] = {
@@ -119,6 +120,7 @@ def score(
         "max_members": max_members,
         "constraints": constraints,
         "now": settings(at or (), "--at"),
+        "person": person_values(person or ()),
         "jobs": jobs,
         "on_compile": terminal.note_compiling,
     }
@@ -130,6 +132,9 @@ def score(
         return
     environment = environment or "wheelchair"
     path = out or default_path(task, environment, robot, arms)
+    if out is None and person:
+        # By default, do not overwrite the file of the papers' man.
+        path = path.with_stem(f"{path.stem}-person")
     if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(

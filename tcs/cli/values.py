@@ -1,13 +1,14 @@
-"""Values of options: the current state, settings of axes, observed joints and frames."""
+"""Values of options: the current state, settings of axes, observed joints and frames, people."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import typer
 
-from tcs.errors import SelectionError
+from tcs.errors import DataFileError, SelectionError, one_line
 from tcs.model.grid import Axis, InitialConfiguration
 
 
@@ -124,6 +125,40 @@ def frame_values(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
                 f"--frames is '{text}'; must be FRAME=X,Y,Z, e.g. head=0.29,0.05,0.68."
             ) from None
     return frames
+
+
+def person_values(given: Sequence[str]) -> dict[str, Any] | None:
+    """Return the keys and values of a person given as files and as "KEY=VALUE", None if not given.
+
+    A value on the command line replaces that of a file.
+
+    Raises:
+        DataFileError: If a file cannot be read, or a value is not of that form.
+
+    >>> person_values(["sex=female", "stature_percentile=5"])
+    {'sex': 'female', 'stature_percentile': 5.0}
+    """
+    if not given:
+        return None
+
+    from tcs.model.people import person_keys
+
+    found: dict[str, Any] = {}
+    written: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            found.update(person_keys(text))
+            continue
+        if name in written:
+            raise DataFileError(f"--person sets '{name}' twice. Give it once.")
+        try:
+            written[name] = value if name in ("sex", "model") else float(value)
+        except ValueError:
+            raise DataFileError(
+                f"--person is '{one_line(text)}'; must be KEY=NUMBER, e.g. stature=1.62."
+            ) from None
+    return {**found, **written}
 
 
 def axis_values(given: Sequence[str], option: str) -> tuple[tuple[str, float], ...]:

@@ -14,12 +14,14 @@ from tcs.model.scene.environment import (
     Obstacle,
     environment_names,
     load_environment,
+    with_person,
 )
 from tcs.model.scene.environment_shapes import environment_shapes
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
+from tcs.model.scene.person_goals import goals_on_person
 from tcs.model.scene.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
 from tcs.model.scene.spec import SceneSpec
@@ -44,6 +46,8 @@ __all__ = [
     "environment_shapes",
     "estimate_joints",
     "goal_poses",
+    "goals_on_person",
     "load_environment",
     "lower",
+    "with_person",
 ]

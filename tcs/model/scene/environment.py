@@ -22,6 +22,7 @@ from tcs.files.documents import (
 )
 from tcs.files.paths import DataFiles, data_folder, expanded
 from tcs.model.grid import Axis, Grid
+from tcs.model.people import Person, PersonEntry, PersonLike, load_person
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
 
@@ -77,9 +78,9 @@ class EnvironmentFile(Document):
     """Description of the origin and the axes of W."""
     source: str
     models: Annotated[tuple[ModelEntry, ...], Entries] = ()
-    person: Name | None = None
-    """Name of the model that is the person; without it the model named "person", if there is one.
-    All other models are furniture, also those with body frames."""
+    person: PersonEntry | None = None
+    """Name of the model that is the person, or whose body they have; without a name it is the model
+    named "person", if there is one. All other models are furniture, also those with body frames."""
     obstacles: Annotated[tuple[Obstacle, ...], Entries] = ()
     floor: bool = True
     """Whether there is a floor at z = 0; the arm must not touch it, the rest of the robot may."""
@@ -115,9 +116,10 @@ class EnvironmentFile(Document):
     @model_validator(mode="after")
     def _person_is_a_model(self) -> Self:
         known = [model.name for model in self.models]
-        if self.person is not None and self.person not in known:
+        if self.person is not None and self.person_model not in known:
             raise ValueError(
-                f"person: no model is named '{self.person}'; there are {', '.join(known) or 'none'}"
+                f"person: no model is named '{self.person_model}'; there are "
+                f"{', '.join(known) or 'none'}"
             )
         return self
 
@@ -165,9 +167,19 @@ class EnvironmentFile(Document):
         """Models, then obstacles."""
         return (*self.models, *self.obstacles)
 
+    @property
+    def person_model(self) -> str:
+        """Name of the model that is the person, if there is one."""
+        return (self.person.model if self.person else None) or "person"
+
+    @property
+    def has_body(self) -> bool:
+        """Whether the person is resized to a body other than that of the model's file."""
+        return self.person is not None and self.person.has_body
+
     def is_person(self, model: str) -> bool:
         """Return whether the model of that name is the person, rather than furniture."""
-        return model == (self.person or "person") and any(m.name == model for m in self.models)
+        return model == self.person_model and any(m.name == model for m in self.models)
 
     def __hash__(self) -> int:
         """Return a hash of the content; pydantic's own hash fails on mappings."""
@@ -212,6 +224,28 @@ def load_environment(name_or_path: str | Path) -> EnvironmentFile:
     return _read(ENVIRONMENTS.path(name_or_path).absolute())
 
 
+def with_person(environment: EnvironmentFile, person: PersonLike) -> EnvironmentFile:
+    """Return an environment with another person.
+
+    Args:
+        environment: An environment with a person.
+        person: As for `tcs.model.people.load_person`.
+
+    Raises:
+        EnvironmentFileError: If there is no person in the environment.
+        TcsError: As `tcs.model.people.load_person`.
+    """
+    found = load_person(person)
+    model = found.model or environment.person_model
+    if not any(entry.name == model for entry in environment.models):
+        raise EnvironmentFileError(
+            f"environment '{environment.name}' has no model '{model}', so there is no person to "
+            "resize. Name the model with the key 'model' of the person."
+        )
+    named = Person(model=model, sex=found.sex, **found.known)
+    return environment.model_copy(update={"person": named})
+
+
 def _folder() -> Path:
     return data_folder() / "models" / "beds_wheelchairs"
 
@@ -229,6 +263,8 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     )
     # Only to raise for an invalid grid here, where the message can name the file.
     Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
+    if environment.person is not None and environment.has_body:
+        environment.person.body(f"{where}, field 'person'")
     _check_observed(environment, where=f"{where}, field 'observed'")
     return _with_files_resolved(environment, path)
 

@@ -24,6 +24,7 @@ from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.model_files import check_model_file
+from tcs.model.scene.resized_person import padding_of, resized_model, scales_of
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Size of the floor [m]: wider than any environment, so that there is a floor at every base pose,
@@ -67,7 +68,8 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
             _check_free(plant, entry.name, here)
             links[entry.name] = _add_box(plant, entry.name, entry.box, X_PM)
             continue
-        instance = _add_model(plant, entry, parent, X_PM, here)
+        instance = _add_model(plant, entry, here, resize=_resizing(environment, entry))
+        _fix(plant, instance, parent, X_PM, here)
         for index in plant.GetBodyIndices(instance):
             body = plant.get_body(index)
             links[f"{entry.name}::{body.name()}"] = body
@@ -101,11 +103,12 @@ def environment_parts(
 ) -> tuple[Part, ...]:
     """Return every collision shape of the environment, in the order of the environment file."""
     parts = []
+    scales = scales_of(environment)
     for link, body in added.links.items():
         model = link.split("::", maxsplit=1)[0]
         for geometry in plant.GetCollisionGeometriesForBody(body):
             name = link if model in added.named_by_link else inspector.GetName(geometry)
-            pad = float(environment.padding.get(link, 0.0))
+            pad = padding_of(environment, link, scales)
             parts.append(Part(geometry, body.index(), Group.ENVIRONMENT, 0, name, pad))
     if added.floor:
         world = plant.world_body()
@@ -137,20 +140,30 @@ def _add_box(
     return body
 
 
+def _resizing(environment: EnvironmentFile, entry: ModelEntry | Obstacle) -> EnvironmentFile | None:
+    """Return the environment if the entry is its person and resized, else None."""
+    return environment if environment.has_body and environment.is_person(entry.name) else None
+
+
 def _add_model(
     plant: MultibodyPlant,
     entry: ModelEntry | Obstacle,
-    parent: Frame,
-    X_PM: RigidTransform,
     where: str,
+    *,
+    resize: EnvironmentFile | None = None,
 ) -> ModelInstanceIndex:
-    """Parse the entry's file and fix its model frame M to the parent."""
-    check_model_file(Path(str(entry.file)), f"{where}: '{entry.file}'")
+    """Parse the entry's file; the model is resized to the person of the environment `resize`."""
+    file = Path(str(entry.file))
+    check_model_file(file, f"{where}: '{entry.file}'")
+    text = None if resize is None else resized_model(resize, file, where)
     parser = Parser(plant)
     # Several entries may use one file, e.g. two shelves.
     parser.SetAutoRenaming(True)
     try:
-        instances = parser.AddModels(str(entry.file))
+        if text is None:
+            instances = parser.AddModels(str(file))
+        else:
+            instances = parser.AddModelsFromString(text, "sdf")
     except Exception as error:
         # Drake raises errors of several classes, e.g. ValueError for a number it cannot convert.
         reason = " ".join(str(error).split())
@@ -164,7 +177,6 @@ def _add_model(
     if plant.GetModelInstanceName(instance) != entry.name:
         _check_free(plant, entry.name, where)
     plant.RenameModelInstance(instance, entry.name)
-    _fix(plant, instance, parent, X_PM, where)
     return instance
 
 

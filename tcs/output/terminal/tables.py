@@ -17,9 +17,11 @@ from tcs.output.words import (
     axis_name,
     axis_title,
     axis_value,
+    body_name,
     deviation_text,
     frame_name,
     percentage,
+    person_text,
     reason_of,
     scores_text,
     settings_text,
@@ -54,6 +56,12 @@ def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
 def report_scores(result: Mapping[str, Any]) -> None:
     """Print the summary of a scored task."""
     out = results_console()
+    if "person" in result:
+        out.print(f"scored for {person_text(result['person'])}")
+        for goal in result["person"]["touching_goals"]:
+            out.print(
+                f"goal {goal['goal']}: the gripper touches {body_name(goal['part'])} of this person"
+            )
     out.print(
         f"{result['configurations']:,} configurations x {result['goals']} goals scored in "
         f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} reach at least one goal, "

@@ -25,6 +25,7 @@ from tcs.output.words.configurations import (
 from tcs.output.words.goals import goal_list, goals_by_reason, goals_text
 from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
 from tcs.output.words.numbers import p_value, percent, percentage, signed
+from tcs.output.words.people import person_text
 from tcs.output.words.reasons import (
     REASON_COLOURS,
     REASON_NAMES,
@@ -60,6 +61,7 @@ __all__ = [
     "pair_text",
     "percent",
     "percentage",
+    "person_text",
     "quantity",
     "reason_of",
     "scores_text",

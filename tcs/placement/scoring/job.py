@@ -11,6 +11,7 @@ from typing import Any
 from tcs.errors import TaskError
 from tcs.files.paths import data_reference
 from tcs.model.grid import Axis, Grid, restricted
+from tcs.model.people import PersonLike
 from tcs.model.robots import RobotFile, load_robot
 from tcs.model.scene import (
     EnvironmentFile,
@@ -18,8 +19,10 @@ from tcs.model.scene import (
     Scene,
     SceneSpec,
     environment_names,
+    goals_on_person,
     load_environment,
     lower,
+    with_person,
 )
 from tcs.model.tasks import Task, load_task
 from tcs.placement.constraints import Constraints, kept_conditions
@@ -73,6 +76,7 @@ def load_job(
     only: Sequence[str] = (),
     constraints: Constraints = _NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
+    person: PersonLike | None = None,
 ) -> Job:
     """Load a task, an environment and a robot, check them against each other and return their job.
 
@@ -85,9 +89,12 @@ def load_job(
         constraints: Further conditions, axes that keep their present value, forbidden regions and
             obstacles. Preferences have no effect.
         now: Present values of axes [m or rad], for the axes to keep.
+        person: Whose body the person has, as for `tcs.model.people.load_person`; by default that of
+            the environment file. Goals on the person are moved to that body.
 
     Raises:
-        UnknownNameError: If a task, environment, robot or axis of that name does not exist.
+        UnknownNameError: If a task, environment, robot, axis or body measure of that name does not
+            exist.
         DataFileError: If a file cannot be used, or the task is not for that environment.
         GridError: If the grid is empty or enormous, or a condition is invalid.
         SelectionError: If the present value of an axis to keep is missing or not scored.
@@ -95,6 +102,8 @@ def load_job(
     task = task if isinstance(task, Task) else load_task(task)
     if not isinstance(environment, EnvironmentFile):
         environment = load_environment(environment)
+    if person is not None:
+        environment = with_person(environment, person)
     robot = robot if isinstance(robot, RobotFile) else load_robot(robot)
     # An environment of the user's own may take any task whose body frames it has.
     is_shipped = environment.name in environment_names()
@@ -114,6 +123,7 @@ def load_job(
     conditions = (*only, *constraints.only, *kept)
     grid = restricted(grid, conditions)
     applied = dataclasses.replace(constraints, only=conditions, keep=())
+    task = goals_on_person(task, environment)
     spec = SceneSpec(robot, with_obstacles(environment, constraints.blocked))
     return Job(task, spec, grid, environment.observed_axes, applied)
 

@@ -12,6 +12,7 @@ from typing import Unpack
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import build_problem
 from tcs.model.grid import Axis
+from tcs.model.people import PersonLike
 from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
@@ -45,6 +46,7 @@ class LiveScorer:
         only: Sequence[str] = (),
         constraints: Constraints = NO_CONSTRAINTS,
         now: Mapping[str, float] | None = None,
+        person: PersonLike | None = None,
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -60,6 +62,7 @@ class LiveScorer:
             only: Conditions on axes of the grid.
             constraints: As for `tcs.score`.
             now: Present values of axes [m or rad], for the axes that the constraints keep.
+            person: Whose body the person has, as for `tcs.score`.
             **sets: Options of the kept sets.
 
         Raises:
@@ -67,7 +70,7 @@ class LiveScorer:
         """
         self._setup = ScoringSetup.load(
             task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now,
+            constraints=constraints, now=now, person=person,
         )  # fmt: skip
         lowered = self._job_at({}).lowered(self._setup.scene)
         warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
@@ -129,6 +132,7 @@ def score_observed(
     jobs: int = 2,
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
+    person: PersonLike | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
@@ -144,6 +148,7 @@ def score_observed(
         jobs: Number of threads.
         constraints: As for `tcs.score`.
         now: Present values of axes [m or rad], for the axes that the constraints keep.
+        person: Whose body the person has, as for `tcs.score`.
         **sets: Options of the kept sets.
 
     Returns:
@@ -154,6 +159,6 @@ def score_observed(
     """
     scorer = LiveScorer(
         task, environment, robot, measure=measure, jobs=jobs, constraints=constraints, now=now,
-        **sets,
+        person=person, **sets,
     )  # fmt: skip
     return scorer.score(observation)

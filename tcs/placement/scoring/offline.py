@@ -13,6 +13,7 @@ from typing import Any, Self, Unpack
 
 from tcs.kernel.dexterity import DEFAULT_MEASURE, dexterity
 from tcs.model.grid import Grid
+from tcs.model.people import PersonLike
 from tcs.model.robots import RobotFile, arm_references
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
 from tcs.model.tasks import Task
@@ -24,6 +25,7 @@ from tcs.placement.constraints import (
 )
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.job import Job, data_references, load_job
+from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
 from tcs.placement.scoring.self_contact import prevailing_self_contact
 from tcs.placement.scoring.sets import SetOptions, build_sets, checked_options
@@ -75,6 +77,7 @@ class ScoringSetup:
         only: Sequence[str] = (),
         constraints: Constraints = NO_CONSTRAINTS,
         now: Mapping[str, float] | None = None,
+        person: PersonLike | None = None,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -87,7 +90,9 @@ class ScoringSetup:
         """
         dexterity(measure)
         options = checked_options(**sets)
-        job = load_job(task, environment, robot, only=only, constraints=constraints, now=now)
+        job = load_job(
+            task, environment, robot, only=only, constraints=constraints, now=now, person=person
+        )
         references = data_references(job, task, environment, robot)
         return cls(job, job.scene(), references, options, measure, jobs)
 
@@ -143,6 +148,7 @@ class ScoringSetup:
             on_compile=on_compile,
             excluded=excluded,
         )
+        person = person_entry(job.spec.environment, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
         if contact is not None:
             advice = contact.advice(job.spec.robot)
@@ -151,6 +157,7 @@ class ScoringSetup:
             swept.tables,
             {
                 **constraints_entry(job.constraints, excluded),
+                **person,
                 **({} if shapes is None else {"robot_shapes": shapes.to_dict()}),
                 "scene_digest": lowered.digest(),
                 "ik": swept.ik,
@@ -221,6 +228,7 @@ def score(
     only: Sequence[str] = (),
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
+    person: PersonLike | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -244,6 +252,9 @@ def score(
             scored, and blocked boxes become obstacles of the environment. Preferences have no
             effect.
         now: Present values of axes [m or rad], for the axes that the constraints keep.
+        person: Whose body the person has, e.g. `{"sex": "female", "stature_percentile": 5}`, or the
+            path of a file; by default that of the environment, which without a body of its own has
+            that of the papers' average man. Goals on the person are moved to that body.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -266,7 +277,7 @@ def score(
     setups = {
         arm: ScoringSetup.load(
             task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now,
+            constraints=constraints, now=now, person=person,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip

@@ -11,6 +11,8 @@ from tcs.model.grid import Axis
 from tcs.model.scene import LoweredScene, Scene
 from tcs.placement.constraints import recorded_constraints
 from tcs.placement.scoring.job import Job, load_job
+from tcs.placement.scoring.person import KEY as PERSON
+from tcs.placement.scoring.person import recorded_person
 from tcs.placement.store import ScoreFile, check_scene
 
 _MADE_FROM = ("task", "environment", "robot", "scene_digest")
@@ -18,7 +20,7 @@ _MADE_FROM = ("task", "environment", "robot", "scene_digest")
 
 def made_from(file: ScoreFile) -> dict[str, Any]:
     """Return what identifies the scene of a score file, as plain containers."""
-    optional = [key for key in ("only", "constraints") if key in file.metadata]
+    optional = [key for key in ("only", "constraints", PERSON) if key in file.metadata]
     return {
         **{key: file.metadata[key] for key in (*_MADE_FROM, *optional)},
         "observed": file.observed,
@@ -84,6 +86,7 @@ def _rebuilt(
     job = load_job(
         *(record[key] for key in ("task", "environment", "robot")),
         constraints=recorded_constraints(record),
+        person=recorded_person(record),
     )
     # A file that was scored live has an observed state of its own.
     job = dataclasses.replace(job, observed=observed)

@@ -44,6 +44,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "best_single": _set_summary(file, file.nominal.sets.best_single),
         "reasons": dict(reasons),
         **({"constraints": texts} if (texts := constraint_texts(file)) else {}),
+        **({"person": file.metadata["person"]} if "person" in file.metadata else {}),
         "self_contact": file.metadata.get("self_contact"),
         "tables": [
             {

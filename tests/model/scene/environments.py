@@ -10,7 +10,7 @@ from pydrake.geometry import Box
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from tcs.model.scene.environment import load_environment
+from tcs.model.scene.environment import EnvironmentFile, load_environment
 from tcs.model.scene.environment_plant import add_environment, environment_parts
 
 DATA = Path(__file__).parents[2] / "data"
@@ -31,7 +31,8 @@ class EnvironmentAlone:
     """An environment in a plant without a robot."""
 
     def __init__(self, environment):
-        self.file = load_environment(environment)
+        is_file = isinstance(environment, EnvironmentFile)
+        self.file = environment if is_file else load_environment(environment)
         builder = DiagramBuilder()
         self.plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)
         self.added = add_environment(self.plant, self.file)

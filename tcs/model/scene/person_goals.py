@@ -1,0 +1,60 @@
+"""Goals on the body of a resized person: as far from the skin as on the papers' average man."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray
+from tcs.model.people import Scale
+from tcs.model.scene.environment import EnvironmentFile
+from tcs.model.scene.person_shapes import LinkShape
+from tcs.model.scene.resized_person import padding_of, person_shapes, scales_of
+from tcs.model.tasks import Goal, Task
+
+
+def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
+    """Return a task with its goals moved to the body of the person of an environment.
+
+    A goal on a link of the person belongs to the nearest point of the link's shapes. On the resized
+    link it is beside the same point of the same shape, in the same direction, as far from the
+    padded surface; its orientation in the body frame and its straight motions stay.
+
+    Args:
+        task: A task for the papers' man.
+        environment: An environment; without a resized person the task itself is returned.
+
+    Raises:
+        TcsError: If the person or their model is not valid.
+    """
+    scales = scales_of(environment)
+    if not scales:
+        return task
+    shapes = person_shapes(environment)
+    goals = []
+    for goal in task.goals:
+        link = environment.body_frames.get(goal.body_frame, "")
+        if link not in scales:
+            goals.append(goal)
+            continue
+        padding = padding_of(environment, link, scales) - padding_of(environment, link, {})
+        goals.append(_moved(goal, shapes[link], scales[link], padding))
+    return dataclasses.replace(task, goals=tuple(goals))
+
+
+def _moved(goal: Goal, shapes: list[LinkShape], scale: Scale, padding: float) -> Goal:
+    """Return a goal on a resized link.
+
+    Args:
+        goal: The goal on the link of the papers' man.
+        shapes: The shapes of that link.
+        scale: How the link is stretched.
+        padding: By how much the padding of the link grows [m].
+    """
+    near = [(shape, *shape.nearest(goal.position)) for shape in shapes]
+    shape, distance, surface, normal = min(near, key=lambda found: found[1])
+    stretched = shape.stretch(scale)
+    at: FloatArray = shape.follow(surface, normal, stretched)
+    position = at + (distance + padding) * (stretched.R_LS @ normal)
+    return dataclasses.replace(goal, position=np.asarray(position))

@@ -1,0 +1,38 @@
+"""Words for the person for whom something was scored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+NOUNS = {"female": "a woman", "male": "a man"}
+
+
+def person_text(entry: Mapping[str, Any]) -> str:
+    """Return for whom a file was scored, in a few words.
+
+    Args:
+        entry: The entry `person` of a score file's metadata.
+
+    >>> person_text({"sex": "female", "stature": 1.525, "stature_percentile": 5.0, "mass": 58.2,
+    ...              "mass_percentile": 18.8})
+    'a woman of 1.525 m (5th percentile) and 58.2 kg (19th percentile)'
+    """
+    stature, mass = (_ordinal(entry[f"{key}_percentile"]) for key in ("stature", "mass"))
+    return (
+        f"{NOUNS[entry['sex']]} of {entry['stature']:.3f} m ({stature} percentile) and "
+        f"{entry['mass']:.1f} kg ({mass} percentile)"
+    )
+
+
+def _ordinal(percentile: float) -> str:
+    """Return a percentile as an ordinal number.
+
+    >>> [_ordinal(p) for p in (1, 2.4, 12, 43, 99.97)]
+    ['1st', '2nd', '12th', '43rd', '99.97th']
+    """
+    if not 0.5 <= percentile <= 99.5:
+        return f"{percentile:g}th"
+    number = round(percentile)
+    ending = "th" if number in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"

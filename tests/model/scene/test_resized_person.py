@@ -1,0 +1,194 @@
+"""A resized person: sizes as asked, links connected, on the seat or mattress, goals on the skin."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tcs.errors import EnvironmentFileError
+from tcs.model.people import PAPERS_MAN, Person, papers_man
+from tcs.model.scene import goals_on_person, load_environment, with_person
+from tcs.model.scene.person_shapes import LinkShape
+from tcs.model.scene.resized_person import _PARENTS, part_of, person_shapes, scales_of
+from tcs.model.tasks import load_task, task_names
+from tests.model.scene.environments import EnvironmentAlone
+
+PEOPLE = {
+    "woman-5": Person(sex="female", stature_percentile=5, mass_percentile=5),
+    "man-95": Person(sex="male", stature_percentile=95, mass_percentile=95),
+    "stout-woman": Person(sex="female", stature_percentile=20, mass_percentile=97),
+}
+SAME = Person(sex="male", **PAPERS_MAN)
+ENVIRONMENTS = ("wheelchair", "bed")
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Function that returns an environment in Drake without a robot, for a person or None."""
+    built = {}
+
+    def get(name, who=None):
+        if (name, who) not in built:
+            file = load_environment(name)
+            person = {**PEOPLE, "same": SAME}.get(who)
+            built[name, who] = EnvironmentAlone(with_person(file, person) if person else file)
+        return built[name, who]
+
+    return get
+
+
+def extent(scene, *links):
+    """Return least and greatest corner of the shapes of some links in W."""
+    corners = [_corners(scene)[f"person::{link}"] for link in links]
+    return np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
+
+
+@cache
+def _corners(scene):
+    """Return the bounding box in W of every link of the person."""
+    scales = scales_of(scene.file)
+    found = {}
+    for link, shapes in person_shapes(scene.file).items():
+        X = scene.pose(link)
+        R, p = X.rotation().matrix(), X.translation()
+        boxes = [shape.stretch(scales.get(link, (1, 1, 1))).extent(R, p) for shape in shapes]
+        found[link] = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    return found
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_body_of_the_same_size_keeps_every_frame(alone, name):
+    before, after = alone(name), alone(name, "same")
+    for link in before.file.body_frames.values():
+        np.testing.assert_allclose(
+            before.pose(link).GetAsMatrix34(), after.pose(link).GetAsMatrix34(), atol=1e-9
+        )
+
+
+@pytest.mark.parametrize("who", PEOPLE)
+def test_sizes_measured_on_the_shapes_are_those_asked(alone, who):
+    scene = alone("wheelchair", who)
+    asked = PEOPLE[who].body().measures
+    low, high = extent(scene, "head_center", "quad_left_link", "quad_right_link")
+    # The trunk is stretched along a spine that is bent, and in depth, so a few per cent.
+    assert high[2] - low[2] == pytest.approx(asked["sittingheight"], rel=0.03)
+    low, high = extent(scene, "quad_left_link", "quad_right_link")
+    # Capsules are round: their radius is the mean of what height and breadth ask for.
+    assert high[1] - low[1] == pytest.approx(asked["hipbreadthsitting"], rel=0.07)
+    assert high[2] - low[2] == pytest.approx(asked["thighclearance"], rel=0.13)
+    for side in ("left", "right"):
+        shoulder, elbow, wrist = (
+            scene.pose(f"person::{link}_{side}_link").translation()
+            for link in ("arm", "forearm", "hand")
+        )
+        before = alone("wheelchair").pose(f"person::arm_{side}_link").translation()
+        bent = alone("wheelchair").pose(f"person::forearm_{side}_link").translation()
+        ratio = np.linalg.norm(elbow - shoulder) / np.linalg.norm(bent - before)
+        # The elbow is a few centimetres beside the axis of the upper arm.
+        expected = asked["shoulderelbowlength"] / papers_man().measures["shoulderelbowlength"]
+        assert ratio == pytest.approx(expected, rel=0.02)
+        forearm = asked["forearmhandlength"] - asked["handlength"]
+        assert np.linalg.norm(wrist - elbow) == pytest.approx(0.251 * forearm / 0.3, rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "who"), [("wheelchair", "stout-woman"), ("bed", "man-95")])
+def test_links_stay_connected_and_symmetric(alone, name, who):
+    before, after = alone(name), alone(name, who)
+    for link, parent in _PARENTS.items():
+        gap = [_gap(scene, link, parent) for scene in (before, after)]
+        # Overlapping shapes are 0 apart; a link is at most 2.5 times as large.
+        assert gap[1] <= 2.5 * gap[0] + 0.01
+    for link in (link for link in _PARENTS if "left" in link):
+        left, right = (
+            after.pose(f"person::{other}").translation()
+            for other in (link, link.replace("left", "right"))
+        )
+        # The original's right arm is bent by a degree or two less than the left one.
+        np.testing.assert_allclose(left * (1, -1, 1), right, atol=0.012)
+        assert part_of(link) == part_of(link.replace("left", "right"))
+
+
+def _gap(scene, link, parent):
+    """Return the distance between the bounding boxes of two links, 0 where they overlap [m]."""
+    (low, high), (below, above) = extent(scene, link), extent(scene, parent)
+    return float(np.linalg.norm(np.maximum(0.0, np.maximum(low - above, below - high))))
+
+
+@pytest.mark.parametrize("who", ["man-95"])
+def test_the_person_is_on_the_seat_or_on_the_mattress(alone, who):
+    trunk = ("upper_body_link", "mid_body_link", "lower_body_link")
+    thighs = ("quad_left_link", "quad_right_link")
+    before, after = alone("wheelchair"), alone("wheelchair", who)
+    assert extent(after, *thighs)[0][2] == pytest.approx(extent(before, *thighs)[0][2], abs=1e-6)
+    assert extent(after, *trunk)[0][0] == pytest.approx(extent(before, *trunk)[0][0], abs=1e-6)
+    before, after = alone("bed"), alone("bed", who)
+    assert extent(after, *trunk)[0][2] == pytest.approx(extent(before, *trunk)[0][2], abs=1e-6)
+    hips = [scene.pose("person::lower_body_link").translation()[0] for scene in (before, after)]
+    assert hips[0] == pytest.approx(hips[1], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", task_names())
+def test_goals_keep_their_distance_from_the_padded_skin(name):
+    task = load_task(name)
+    file = load_environment(task.environments[0])
+    shapes_of = person_shapes(file)
+    for person in (SAME, PEOPLE["stout-woman"]):
+        environment = with_person(file, person)
+        moved = goals_on_person(task, environment)
+        scales = scales_of(environment)
+        for before, after in zip(task.goals, moved.goals, strict=True):
+            link = file.body_frames[before.body_frame]
+            scale = scales[link]
+            grown = (max(scale) - 1.0) * file.padding[link]
+            shapes = shapes_of[link]
+            d = [shape.nearest(before.position)[0] for shape in shapes]
+            nearest = shapes[int(np.argmin(d))].stretch(scale)
+            assert nearest.nearest(after.position)[0] == pytest.approx(min(d) + grown, abs=1e-12)
+            np.testing.assert_allclose(before.quaternion, after.quaternion, atol=1e-15)
+            if person is SAME:
+                np.testing.assert_allclose(before.position, after.position, atol=1e-9)
+    assert goals_on_person(task, file) is task
+
+
+@pytest.mark.parametrize("is_box", [True, False], ids=["box", "capsule"])
+def test_surface_points_follow_the_shape(is_box):
+    generator = np.random.default_rng(0)
+    size = np.array([0.1, 0.2, 0.3]) if is_box else np.array([0.1, 0.2])
+    shape = LinkShape(is_box, size, np.eye(3), np.array([0.1, 0.0, -0.1]))
+    stretched = shape.stretch((1.2, 0.8, 1.5))
+    for point in generator.uniform(-0.6, 0.6, (50, 3)):
+        distance, surface, normal = shape.nearest(point)
+        back = shape.p_LoSo_L + surface + distance * normal
+        np.testing.assert_allclose(back, point, atol=1e-12)
+        assert shape.nearest(shape.p_LoSo_L + surface)[0] == pytest.approx(0.0, abs=1e-12)
+        followed = shape.follow(surface, normal, stretched)
+        outside = abs(distance) * normal
+        # The same normal leads straight out of the stretched shape.
+        assert stretched.nearest(followed + outside)[0] == pytest.approx(abs(distance), abs=1e-12)
+    lower, upper = stretched.extent(np.eye(3), np.zeros(3))
+    np.testing.assert_allclose((upper - lower)[2], 1.5 * 2 * 0.3, rtol=1e-12)
+
+
+def test_the_person_of_an_environment_file_is_resized(tmp_path):
+    path = tmp_path / "hers.yaml"
+    text = "name: hers\nbased_on: wheelchair\nperson: {sex: female, stature_percentile: 5}\n"
+    path.write_text(text)
+    assert load_environment(path).person == Person(sex="female", stature_percentile=5)
+    path.write_text(text.replace("female", "female, statur: 1.5"))
+    with pytest.raises(Exception, match=r"hers\.yaml', field 'person': unknown body measure"):
+        load_environment(path)
+    path.write_text("name: hers\nbased_on: wheelchair\nperson: wheelchair\n")
+    assert load_environment(path).is_person("wheelchair")
+
+
+def test_another_model_cannot_be_resized():
+    with pytest.raises(EnvironmentFileError, match="no link 'head_center'"):
+        EnvironmentAlone(with_person(load_environment("wheelchair"), {
+            "model": "wheelchair", "sex": "male",
+        }))  # fmt: skip
+    with pytest.raises(EnvironmentFileError, match="no model 'guest'"):
+        with_person(load_environment("wheelchair"), {"model": "guest", "sex": "male"})
+    assert not list(Path.cwd().glob("*.sdf"))
