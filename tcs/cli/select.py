@@ -182,6 +182,13 @@ def explain(
     ] = None,
     costs: _ChangeCosts,
     observed: options.Observed = None,
+    frames: Annotated[
+        list[str] | None,
+        options.frames(
+            "Observed position of a body frame in the environment frame (m), in place of "
+            "--observed."
+        ),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Explain why a goal is not reached, and find the cheapest change that reaches it."""
@@ -191,7 +198,7 @@ def explain(
         raise typer.BadParameter("--torso, --at and --arm require --here.", param_hint="--here")
 
     import tcs
-    from tcs.cli.values import current_state, observed_settings
+    from tcs.cli.values import current_state, frame_values, observed_settings
     from tcs.model.grid import Grid
     from tcs.output.terminal.explanations import report_explanation
     from tcs.placement.reasons import fix_weights
@@ -212,6 +219,7 @@ def explain(
             route=costs.travel,
         ),
         observed=observed_settings(observed or (), loaded.observed_axes),
+        frames=frame_values(frames or ()),
     )
     result = {**explanation.to_json(), "measure": loaded.metadata["measure"]}
     terminal.print_result(result, report_explanation, as_json=as_json)

@@ -40,6 +40,12 @@ def report_explanation(result: Mapping[str, Any]) -> None:
             f"; {deviation_text(name, value)}" for name, value in result["observed_error"].items()
         )
         out.print(f"Scored for {settings_text(result['observed'])}{error}.")
+    for one in result.get("frames", ()):
+        if one["frame"] == result["body_frame"]:
+            out.print(
+                f"Goals on {frame_name(one['frame'])} also as scored for "
+                f"{settings_text(one['observed'])}, {one['position_error']:.3f} m from it."
+            )
     if result["explained"] is not None:
         _print_explained(out, result)
     _print_fix(out, result)

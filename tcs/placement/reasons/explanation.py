@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from tcs.errors import SelectionError
-from tcs.model.grid import Grid, InitialConfiguration
+from tcs.model.grid import InitialConfiguration
 from tcs.placement.reasons.distribution import Distribution
 from tcs.placement.reasons.explained import ExplainedConfiguration
 from tcs.placement.reasons.fix import Fix, fix_weights, nearest_fix
-from tcs.placement.selection import Match, TravelWeights, nearest_table
+from tcs.placement.selection import Match, TravelWeights, nearest_table, scores_at_limbs
 from tcs.placement.store import ScoreFile, state_to_json
 from tcs.placement.tables import SetTable
 
@@ -62,6 +62,7 @@ class Explanation:
             "body_frame": self.body_frame,
             "observed": state_to_json(axes, self.match.state),
             "observed_error": state_to_json(axes, self.match.observed_error),
+            **({"frames": frames} if (frames := self.match.to_json().get("frames")) else {}),
             "explained": None if self.explained is None else self.explained.to_json(),
             "best_set": {
                 "configurations": list(self.best_set),
@@ -101,7 +102,9 @@ def explain(
             greatest P_R + P_M by itself.
         weights: Cost of each type of change; by default `fix_weights` of the grid.
         observed: Observed values of the file's observed axes [m or rad].
-        frames: Instead of `observed`, positions of body frames in W [m], by name.
+        frames: Instead of `observed`, positions of body frames in W [m], by name. With several,
+            each goal also has to be reached in the table nearest to its own frame, as in
+            `tcs.select`; best set and base positions are those of the table nearest to all.
 
     Returns:
         The reason, the distribution of reasons over the grid, and the nearest configuration that
@@ -122,7 +125,7 @@ def explain(
             f"There is no goal {goal}: task '{file.metadata['task']}' has {goals}, "
             f"numbered 0 to {goals - 1}."
         )
-    grid, scores = Grid.from_dict(file.grid), table.scores
+    grid, scores = file.configurations, scores_at_limbs(file, match)
     weights = fix_weights(grid) if weights is None else weights
     requested = _best_member(table.sets) if configuration is None else configuration
     explained = None

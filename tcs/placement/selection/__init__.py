@@ -10,6 +10,7 @@ from tcs.placement.selection.alternatives import Top
 from tcs.placement.selection.best import select
 from tcs.placement.selection.choice import Choice, SelectionTables
 from tcs.placement.selection.executable import Executability
+from tcs.placement.selection.limbs import scores_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.travel import TravelWeights, shortest_tour
 from tcs.placement.selection.uncertain_base import same_set
@@ -26,6 +27,7 @@ __all__ = [
     "UtilityWeights",
     "nearest_table",
     "same_set",
+    "scores_at_limbs",
     "select",
     "shortest_tour",
     "utility",

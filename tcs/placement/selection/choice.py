@@ -79,12 +79,17 @@ class SelectionTables:
                 " Forbid the region instead, or score the task again with the obstacle: tcs score "
                 "TASK --arms both --blocked ..."
             )
+        kept = self.derived.get("postures")
+        if isinstance(kept, Postures) and kept.shapes is self.shapes:
+            return kept
         if self.shapes is None or self.read_scores is None:
             raise SelectionError(
                 "The score file does not hold the robot's shapes, so nothing is known about "
                 "contact with an obstacle. Score the task again, or forbid the region instead."
             )
-        return Postures(self.shapes, self.sets, self.grid, self.read_scores())
+        found = Postures(self.shapes, self.sets, self.grid, self.read_scores())
+        self.derived["postures"] = found
+        return found
 
     @property
     def index(self) -> SetIndex:

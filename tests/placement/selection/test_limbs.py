@@ -9,11 +9,25 @@ import pytest
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.constraints import Constraints, Obstacle
-from tcs.placement.selection import TravelWeights, UtilityWeights, select
+from tcs.placement.constraints import (
+    Constraints,
+    Obstacle,
+    blocked_bodies,
+    blocked_solutions,
+)
+from tcs.placement.reasons import explain
+from tcs.placement.selection import (
+    SelectionTables,
+    TravelWeights,
+    UtilityWeights,
+    scores_at_limbs,
+    select,
+)
+from tcs.placement.selection.admission import admitted_candidates
 from tcs.placement.selection.limbs import admitted_at_limbs, tables_of_goals
 from tcs.placement.selection.observed import nearest_table
 from tcs.placement.tables import ScoreTable
+from tests.placement.selection.test_admission import made_up_robot
 from tests.placement.selection.test_choice import brute_force
 from tests.placement.store.example import score_file
 from tests.placement.tables.small import all_sets, set_scores, small_grid
@@ -112,15 +126,70 @@ def test_one_frame_or_frames_that_agree_use_one_table(file, frames):
     np.testing.assert_equal(dataclasses.astuple(choice)[3:7], dataclasses.astuple(same)[3:7])
 
 
-def test_constraints_hold_too_and_obstacles_are_refused(file):
+def test_obstacles_block_the_solutions_of_every_table(file):
+    robot = dataclasses.replace(made_up_robot(), torso_shift=np.zeros((2, 3)))
+    metadata = {**file.metadata, "robot_shapes": robot.to_dict()}
+    file = dataclasses.replace(file, metadata=metadata)
+    match = nearest_table(file, HERE, frames=SPREAD)
+    box = Obstacle.parse("0.1 0.4 0.2 0.1 20 0.5 0.8")
+    constraints = Constraints(blocked=(box,))
+    tables = [SelectionTables.of(file, i) for i in (2, 3, 1)]
+    admitted = admitted_candidates(constraints, HERE, tables[0])
+    found = admitted_at_limbs(file, match, constraints, admitted)
+    # In plain loops: free in the table nearest to all, and in that of the goal's own frame.
+    free = []
+    for one in tables:
+        everyone = np.ones(len(one.sets.candidates), dtype=np.bool_)
+        hit = blocked_solutions(box, one.postures, everyone)
+        pairs = zip(*one.postures.pairs, hit, strict=True)
+        free.append({(int(one.sets.candidates[c]), int(g)) for c, g, is_hit in pairs if not is_hit})
+    candidates = tables[0].sets.candidates
+    standing = ~blocked_bodies(box, tables[0].postures)
+    own = {0: free[1], 3: free[1], 1: free[2], 4: free[2], 2: free[0]}
+    for c, h in enumerate(candidates.tolist()):
+        expected = [(h, g) in free[0] and (h, g) in own[g] for g in range(5)]
+        if standing[c] and admitted.candidates[c]:
+            assert found.reached[c].tolist() == expected
+            assert found.candidates[c] == any(expected)
+    choice = select(file, HERE, frames=SPREAD, constraints=constraints)
+    without = select(file, HERE, frames=SPREAD)
+    assert choice.utility < without.utility
+
+
+def test_scores_where_each_limb_is(file):
+    match = nearest_table(file, HERE, frames=SPREAD)
+    whole, head, arm = (file.tables[i].scores for i in (2, 3, 1))
+    found = scores_at_limbs(file, match)
+    own = (head, arm, whole, head, arm)
+    for h, g in np.ndindex(found.reason.shape):
+        first = whole if whole.reason[h, g] else own[g]
+        assert found.reason[h, g] == first.reason[h, g]
+        assert found.dexterity[h, g] == min(whole.dexterity[h, g], own[g].dexterity[h, g])
+        pair, names = found.pair[h, g], first.pair[h, g]
+        assert (pair < 0) == (names < 0)
+        assert pair < 0 or found.pair_names[pair] == first.pair_names[names]
+        if found.reached[h, g]:
+            np.testing.assert_array_equal(found.joints_of(h, g), whole.joints_of(h, g))
+    together = nearest_table(file, HERE, frames={"heel": (-0.8, 0, 0.5)})
+    assert scores_at_limbs(file, together) is file.tables[together.index].scores
+
+
+def test_an_explanation_follows_the_limb_of_the_goal(file):
+    match = nearest_table(file, HERE, frames=SPREAD)
+    whole, found = file.tables[2].scores, scores_at_limbs(file, match)
+    h = int(np.flatnonzero(whole.reached[:, 0] & ~found.reached[:, 0])[0])
+    explanation = explain(file, 0, h, frames={**SPREAD})
+    assert not explanation.explained.is_reached
+    assert explanation.explained.reason == found.reason[h, 0]
+    assert found.reached[explanation.fix.index, 0]
+    assert [one["frame"] for one in explanation.to_json()["frames"]] == ["head", "arm"]
+
+
+def test_constraints_hold_too(file):
     only = Constraints(only=("base_x <= 0 m",))
     choice = select(file, HERE, frames=SPREAD, constraints=only)
     assert all(member.base_x <= 1e-9 for member in choice.members)
     assert choice.constraints[0].constraint == "only base_x <= 0 m"
-    box = Constraints(blocked=(Obstacle(x=9.0, y=9.0, width=0.1, depth=0.1),))
-    match = nearest_table(file, HERE, frames=SPREAD)
-    with pytest.raises(SelectionError, match=r"obstacles cannot be tested .* tcs score TASK"):
-        admitted_at_limbs(file, match, box, None)
 
 
 def test_limbs_from_which_nothing_is_reached_are_refused(file):
