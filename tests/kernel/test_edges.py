@@ -16,7 +16,6 @@ from tcs.kernel.verification.constructed import (
     ELBOW,
     SHOULDER,
     WRIST,
-    between_contacts,
     between_limits,
     near_singular_goals,
     singular_angles,
@@ -89,19 +88,8 @@ def test_the_measure_is_that_of_the_posture_or_better(scene, joint, away, goal):
 
 @pytest.mark.parametrize("width", some_of([0.01, 0.003, 0.001], 0.003))
 def test_goals_in_windows_between_limits_are_reached(scene, width):
-    check_windows(between_limits, scene, width)
-
-
-# Few tries succeed: the link must bend round the sphere fast enough to leave it a clear distance.
-@pytest.mark.parametrize("scene", ["tiago"], indirect=True)
-@pytest.mark.parametrize("width", some_of([0.01, 0.003], 0.01))
-def test_goals_in_windows_that_one_pair_leaves_are_reached(scene, width):
-    check_windows(between_contacts, scene, width)
-
-
-def check_windows(make, scene, width):
     rng = np.random.default_rng(round(1e4 * width))
-    tries = (make(rng, *scene, width) for _ in range(120))
+    tries = (between_limits(rng, *scene, width) for _ in range(120))
     found = list(islice((made for made in tries if made is not None), 2))
     assert found
     assert [missed(made) for made in found] == [[]] * len(found)
