@@ -55,7 +55,6 @@ def test_answers_are_confirmed_by_drake(tcs_command, both):
         (("report", "--out", "r.html"), "needs one arm, but the score file is of left and right"),
         (("plan",), "needs one arm"),
         (("view", "--export", "v.html"), "needs one arm"),
-        (("select", "--here", 1.4, -1.2, 180, "--blocked", "1 1 0.2 0.2"), "left and right arm"),
     ],
 )
 def test_what_needs_one_arm_says_so(tcs_command, both, tmp_path, monkeypatch, words, message):

@@ -13,6 +13,7 @@ from tcs.model.grid import Grid, InitialConfiguration
 from tcs.placement.constraints import (
     Constraints,
     Footprint,
+    Obstacle,
     axis_constraints,
     blocked_bodies,
     blocked_solutions,
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from tcs.placement.selection.choice import SelectionTables
 
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +108,10 @@ def admitted_candidates(
                 f"{footprint.radius:g} m about its base. Score the task again for its footprint."
             )
     for obstacle in constraints.blocked:
-        remaining &= ~blocked_bodies(obstacle, tables.postures)
-        hit = blocked_solutions(obstacle, tables.postures, remaining)
-        candidate, goal = (index[hit] for index in tables.postures.pairs)
+        remaining &= ~np.concatenate(
+            [blocked_bodies(obstacle, of_arm.postures) for of_arm in tables.arms]
+        )
+        candidate, goal = blocked_pairs(obstacle, tables, remaining)
         reached, dexterity = reached.copy(), dexterity.copy()
         reached[candidate, goal], dexterity[candidate, goal] = False, 0.0
         remaining &= reached.any(axis=1)
@@ -118,6 +121,27 @@ def admitted_candidates(
         remaining, reached, dexterity, tuple(left), tuple(warnings), footprint,
         has_lower_scores=bool(constraints.blocked),
     )  # fmt: skip
+
+
+def blocked_pairs(
+    obstacle: Obstacle, tables: SelectionTables, admitted: BoolArray
+) -> tuple[IntArray, IntArray]:
+    """Return candidates and goals whose stored arm solution an obstacle blocks, shapes (n,).
+
+    Args:
+        obstacle: The obstacle.
+        tables: The candidates, of one arm or of several.
+        admitted: Candidates to examine, shape (C,).
+    """
+    candidates, goals, start = [], [], 0
+    for of_arm in tables.arms:
+        postures, stop = of_arm.postures, start + len(of_arm.sets.candidates)
+        hit = blocked_solutions(obstacle, postures, admitted[start:stop])
+        candidate, goal = postures.pairs
+        candidates.append(candidate[hit] + start)
+        goals.append(goal[hit])
+        start = stop
+    return np.concatenate(candidates), np.concatenate(goals)
 
 
 def _bases(

@@ -16,7 +16,7 @@ from tcs.placement.constraints import Footprint, Postures
 from tcs.placement.selection.admission import Left
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import ScoreFile, files_of_arms
 from tcs.placement.store.robot_shapes import RobotShapes
 from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
 
@@ -43,6 +43,8 @@ class SelectionTables:
     """Returns the stored solutions."""
     read_frames: Callable[[], dict[str, FloatArray]] | None = None
     """Returns the positions of the body frames in W for each environment state [m], (states, 3)."""
+    read_arms: Callable[[], tuple[SelectionTables, ...]] | None = None
+    """Returns the tables of each arm, in a file of several; None for one arm."""
     derived: dict[str, Any] = field(default_factory=dict, repr=False)
     """What was derived from the sets, by name; of a file, kept for its next selection."""
 
@@ -58,6 +60,7 @@ class SelectionTables:
             partial(getattr, file, "robot_shapes"),
             partial(getattr, chosen, "scores"),
             partial(_frames, file, number),
+            partial(_of_arms, file, number) if file.arms else None,
             chosen.derived,
         )
 
@@ -66,19 +69,23 @@ class SelectionTables:
         """The robot's shapes, None if they are not known."""
         return None if self.read_shapes is None else self.read_shapes()
 
+    @property
+    def arms(self) -> tuple[SelectionTables, ...]:
+        """The tables of each arm, whose candidates come one arm after the other; or these."""
+        if self.read_arms is None:
+            return (self,)
+        if "arms" not in self.derived:
+            self.derived["arms"] = self.read_arms()
+        found: tuple[SelectionTables, ...] = self.derived["arms"]
+        return found
+
     @cached_property
     def postures(self) -> Postures:
         """Where the robot's shapes are, prepared for obstacles.
 
         Raises:
-            SelectionError: If the robot's shapes are not known, or the tables are of several arms.
+            SelectionError: If the robot's shapes are not known.
         """
-        if self.grid.arms:
-            raise SelectionError(
-                f"Obstacles cannot be tested in a score file of {' and '.join(self.grid.arms)} arm."
-                " Forbid the region instead, or score the task again with the obstacle: tcs score "
-                "TASK --arms both --blocked ..."
-            )
         kept = self.derived.get("postures")
         if isinstance(kept, Postures) and kept.shapes is self.shapes:
             return kept
@@ -109,6 +116,11 @@ def index_of(sets: SetTable, derived: dict[str, Any]) -> SetIndex:
     found = derived["index"]
     assert isinstance(found, SetIndex)
     return found
+
+
+def _of_arms(file: ScoreFile, table: int) -> tuple[SelectionTables, ...]:
+    """Return one of the tables of a file, for each arm."""
+    return tuple(SelectionTables.of(part, table) for part in files_of_arms(file))
 
 
 def _frames(file: ScoreFile, table: int) -> dict[str, FloatArray]:

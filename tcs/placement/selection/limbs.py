@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
-from tcs.placement.constraints import Constraints, blocked_solutions
-from tcs.placement.selection.admission import Admitted
+from tcs.placement.constraints import Constraints
+from tcs.placement.selection.admission import Admitted, blocked_pairs
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.selection.observed import Match
 from tcs.placement.store import ScoreFile, StateTables
@@ -123,9 +123,7 @@ def _unblocked(
     tested[theirs] = admitted[mine]
     reached = reached.copy()
     for obstacle in constraints.blocked:
-        hit = blocked_solutions(obstacle, tables.postures, tested)
-        candidate, goal = (index[hit] for index in tables.postures.pairs)
-        reached[candidate, goal] = False
+        reached[blocked_pairs(obstacle, tables, tested)] = False
     return reached
 
 

@@ -6,11 +6,13 @@ import pytest
 from tcs.errors import RobotError, SelectionError, StoreError, UnknownNameError
 from tcs.model.grid import Grid, InitialConfiguration
 from tcs.model.robots import arm_references
+from tcs.placement.constraints import Constraints, Obstacle
 from tcs.placement.reasons import explain
 from tcs.placement.robustness import Trials
 from tcs.placement.scoring import rebuild_scene, score, verify
 from tcs.placement.scoring.verify import check_pairs
-from tcs.placement.selection import select
+from tcs.placement.selection import SelectionTables, select
+from tcs.placement.selection.admission import admitted_candidates
 from tcs.placement.store import (
     ARMS,
     file_of_arm,
@@ -130,6 +132,20 @@ def test_trials_take_the_arm_of_each_member(both, singles):
     found = np.split(trials.reached(members, offsets), 2)
     for single, part, h in zip(singles.values(), found, of_each, strict=True):
         np.testing.assert_array_equal(part, Trials.of(single).reached(h, offsets))
+
+
+def test_obstacles_block_the_solutions_of_each_arm(both, singles):
+    constraints = Constraints(blocked=(Obstacle.parse("0.75 -0.45 0.2 0.2 0 0.9 1.2"),))
+    here = InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.1, torso=0.0)
+    found = admitted_candidates(constraints, here, SelectionTables.of(both))
+    parts = [
+        admitted_candidates(constraints, here, SelectionTables.of(single))
+        for single in singles.values()
+    ]
+    for name in ("candidates", "reached", "dexterity"):
+        together = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(getattr(found, name), together)
+    assert not np.array_equal(found.reached, both.nominal.sets.reached)
 
 
 def _halves(grid):
