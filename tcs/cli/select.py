@@ -146,6 +146,8 @@ def select(
             "covariance": covariance.tolist(),
             "same_set": same_set(partial(choose, motions=motions), here, covariance),
         }
+    if "person" in loaded.metadata:
+        result["person"] = loaded.metadata["person"]
     if scored := constraint_texts(loaded):
         result["scored_constraints"] = scored
     terminal.print_result(result, tables.report_choice, as_json=as_json)

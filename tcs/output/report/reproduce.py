@@ -36,6 +36,8 @@ def score_command(report: ScoreReport) -> str:
     words += ["--max-members", str(sets.max_members)]
     if sets.same_environment:
         words.append("--same-environment")
+    for key, value in file.metadata.get("person", {}).get("given", {}).items():
+        words += ["--person", f"{key}={value}"]
     for constraint in constraint_texts(file):
         option, _, value = constraint.partition(" ")
         words += [f"--{option}", value]

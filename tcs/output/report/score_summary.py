@@ -11,6 +11,7 @@ from tcs.output.words import (
     goals_text,
     percent,
     percentage,
+    person_text,
     settings_text,
 )
 from tcs.placement.constraints import constraint_texts
@@ -56,7 +57,7 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
         tables = len(report.file.tables)
         of_states = f" (one of {tables} states in the file)" if tables > 1 else ""
         items.append(f"The scores are those of the observed state {values}{of_states}.")
-    items += _constraints(report) + _success(report)
+    items += _person(report) + _constraints(report) + _success(report)
     return [Bullets([*items, _soundness(report), LIMITS]), stops_table(report)]
 
 
@@ -71,6 +72,12 @@ def unreached_everywhere(report: ScoreReport) -> list[str]:
         f"the most checks: {reason}."
         for reason, goals in found.items()
     ]
+
+
+def _person(report: ScoreReport) -> list[str]:
+    """Return for whom the file was scored, if not for the papers' man."""
+    entry = report.file.metadata.get("person")
+    return [] if entry is None else [f"Scored for {person_text(entry)}."]
 
 
 def _constraints(report: ScoreReport) -> list[str]:

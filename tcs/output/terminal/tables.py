@@ -145,6 +145,8 @@ def report_choice(result: Mapping[str, Any]) -> None:
         out.print(_executable_text(result["executable"]))
     if "alternatives" in result:
         out.print(_alternatives_table(result))
+    if "person" in result:
+        out.print(f"scored for {person_text(result['person'])}")
     if "scored_constraints" in result:
         out.print(f"scored under constraints: {'; '.join(result['scored_constraints'])}")
     for constraint in result.get("constraints", ()):

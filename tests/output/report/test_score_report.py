@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from tcs.cli.app import app
 from tcs.model.grid import InitialConfiguration
+from tcs.model.people import load_person
 from tcs.output.report import CheckSizes, as_html, as_markdown, make_score_page, make_score_report
 from tcs.output.report.check_tables import success_table, verification_table
 from tcs.output.report.goal_tables import goals_table, joints_table, stops_table
@@ -316,3 +317,14 @@ def test_a_measure_that_is_not_that_of_the_posture_is_found(score_path, tmp_path
     found = make_score_report(path, sizes=CheckSizes(pairs=0, dense=0))
     assert all(one.is_true for one in found.findings.values())
     assert not found.is_sound
+
+
+def test_the_person_is_named_with_the_command(report):
+    person = load_person({"sex": "female", "stature": 1.6}).to_json()
+    file = dataclasses.replace(report.file, metadata={**report.file.metadata, "person": person})
+    hers = dataclasses.replace(report, file=file)
+    words = shlex.split(score_command(hers))
+    given = [words[i + 1] for i, word in enumerate(words) if word == "--person"]
+    assert given == ["sex=female", "stature=1.6"]
+    shown = as_markdown(make_score_page(hers, command="c"))
+    assert "Scored for a woman of 1.600 m" in shown

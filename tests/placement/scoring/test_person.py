@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 import tcs
+from tcs.errors import StoreError
 from tcs.model.people import PAPERS_MAN
+from tcs.placement.scoring.person import recorded_person
+from tcs.placement.scoring.rebuild import made_from
 from tests.environments import BESIDE, write_environment
 
 SMALL = {"sex": "female", "stature_percentile": 5, "mass_percentile": 5}
@@ -66,3 +71,13 @@ def test_scores_of_a_person_hold_in_drake(places, caplog, place, task, person, t
     # The scene is built again for the person whom the file names.
     found = tcs.verify(file, pairs=40, dense=5)
     assert (found.false_reached, found.missed) == (0, 0)
+
+
+def test_a_record_names_the_person(small_file):
+    metadata = {**small_file.metadata, "person": {"given": SMALL}}
+    file = dataclasses.replace(small_file, metadata=metadata)
+    assert recorded_person(made_from(file)) == SMALL
+    assert recorded_person(made_from(small_file)) is None
+    for entry in (None, SMALL, {"given": ["sex"]}):
+        with pytest.raises(StoreError, match="'person' must hold"):
+            recorded_person({"person": entry})
