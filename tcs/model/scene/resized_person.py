@@ -39,7 +39,7 @@ _LIMBS = (
     ("foot", "calf"),
 )
 _ROOT = "head_center"
-_PARENTS: Mapping[str, str] = {
+PARENTS: Mapping[str, str] = {
     "neck_link": _ROOT,
     "upper_body_link": "neck_link",
     "mid_body_link": "upper_body_link",
@@ -81,7 +81,7 @@ def scales_of(environment: EnvironmentFile) -> dict[str, Scale]:
         return {}
     scales = link_scales(person.body(f"environment '{environment.name}', person"))
     model = environment.person_model
-    return {f"{model}::{link}": scales[part_of(link)] for link in (_ROOT, *_PARENTS)}
+    return {f"{model}::{link}": scales[part_of(link)] for link in (_ROOT, *PARENTS)}
 
 
 def padding_of(environment: EnvironmentFile, link: str, scales: Mapping[str, Scale]) -> float:
@@ -121,7 +121,7 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
     """
     root = read_xml(path, where, EnvironmentFileError)
     links = {link.get("name", ""): link for link in root.iter("link")}
-    for name in (_ROOT, *_PARENTS):
+    for name in (_ROOT, *PARENTS):
         if name not in links:
             raise EnvironmentFileError(
                 f"{where}: '{path}' has no link '{name}', so that the person cannot be resized. "
@@ -132,13 +132,13 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
         scales[alias] = next(s for name, s in scales.items() if part_of(name) == part)
     joints = _joints(environment)
     before, shapes = _link_poses(root, joints), _shapes(root, where)
-    for name in (_ROOT, *_PARENTS):
+    for name in (_ROOT, *PARENTS):
         for element in (*links[name].findall("collision"), *links[name].findall("visual")):
             write_shape(element, read_shape(element, where).stretch(scales[name]))
     _move_joints(links, before, scales)
     after, resized = _link_poses(root, joints), _shapes(root, where)
     shift = _shift(before, shapes, after, resized)
-    for name in (_ROOT, *_PARENTS):
+    for name in (_ROOT, *PARENTS):
         pose = _pose(_carrier(links, name))
         if (over := pose.get("relative_to", "")) not in scales:
             write_position(pose, read_pose(pose)[1] + before[over][0].T @ shift)
@@ -157,7 +157,7 @@ def _move_joints(
     """Stretch the positions of the joints on each link, in place."""
     # What each origin moves by, so that a person of the same size keeps every digit.
     moved = {_ROOT: np.zeros(3)}
-    for name, parent in _PARENTS.items():
+    for name, parent in PARENTS.items():
         R, p = before[parent]
         offset = R.T @ (before[name][1] - p)
         moved[name] = moved[parent] + R @ ((np.array(scales[parent]) - 1.0) * offset)
@@ -203,7 +203,7 @@ def _shapes(root: ElementTree.Element, where: str) -> dict[str, list[LinkShape]]
     return {
         name: [read_shape(element, where) for element in link.findall("collision")]
         for link in root.iter("link")
-        if (name := link.get("name", "")) == _ROOT or name in _PARENTS
+        if (name := link.get("name", "")) == _ROOT or name in PARENTS
     }
 
 

@@ -12,7 +12,7 @@ from tcs.errors import EnvironmentFileError
 from tcs.model.people import PAPERS_MAN, Person, papers_man
 from tcs.model.scene import goals_on_person, load_environment, with_person
 from tcs.model.scene.person_shapes import LinkShape
-from tcs.model.scene.resized_person import _PARENTS, part_of, person_shapes, scales_of
+from tcs.model.scene.resized_person import PARENTS, part_of, person_shapes, scales_of
 from tcs.model.tasks import load_task, task_names
 from tests.model.scene.environments import EnvironmentAlone
 
@@ -97,11 +97,11 @@ def test_sizes_measured_on_the_shapes_are_those_asked(alone, who):
 @pytest.mark.parametrize(("name", "who"), [("wheelchair", "stout-woman"), ("bed", "man-95")])
 def test_links_stay_connected_and_symmetric(alone, name, who):
     before, after = alone(name), alone(name, who)
-    for link, parent in _PARENTS.items():
+    for link, parent in PARENTS.items():
         gap = [_gap(scene, link, parent) for scene in (before, after)]
         # Overlapping shapes are 0 apart; a link is at most 2.5 times as large.
         assert gap[1] <= 2.5 * gap[0] + 0.01
-    for link in (link for link in _PARENTS if "left" in link):
+    for link in (link for link in PARENTS if "left" in link):
         left, right = (
             after.pose(f"person::{other}").translation()
             for other in (link, link.replace("left", "right"))
