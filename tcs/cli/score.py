@@ -48,6 +48,14 @@ def score(
             "near joint limits, -limited-thesis with the penalty printed in the ITCM thesis."
         ),
     ] = "isotropy",
+    approach: Annotated[
+        bool,
+        typer.Option(
+            "--approach/--no-approach",
+            help="Count a goal as reached only if a posture there can be approached: backwards "
+            "along the goal's straight line, within the limits, touching nothing.",
+        ),
+    ] = False,
     jobs: options.Jobs = 2,
     out: Annotated[
         Path | None,
@@ -115,6 +123,7 @@ def score(
 
     scoring_options: dict[str, Any] = {
         "measure": measure,
+        "approach": approach,
         "rule": rules,
         "same_environment": same_environment,
         "max_members": max_members,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 REACHED, TOO_FAR, JOINT_LIMITS, BODY_BLOCKED = 0, 1, 2, 3
 GRIPPER_BLOCKED_BY_ENVIRONMENT, GRIPPER_BLOCKED_BY_ROBOT, ARM_BLOCKED = 4, 5, 6
+APPROACH_LIMITS, APPROACH_BLOCKED = 8, 9
 """Reasons, equal to the values of `tcs.placement.tables.Reason`."""
 
 

@@ -17,13 +17,10 @@ from tcs.kernel.motion.straight import (
     new_straight_workspace,
     straight_motion,
 )
-from tcs.model.tasks import ToolLine
+from tcs.model.tasks import TOOL_SPEED, ToolLine
 from tcs.motion.curves import Curve
 from tcs.motion.stops import BodyPair, Stop
 
-TOOL_SPEED = 0.1
-"""Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
-width in a second, slow enough for a person to turn away."""
 SPACING = 0.005
 """Greatest distance of the tool between two points of a straight motion [m]."""
 SAMPLES = (96, 1000)

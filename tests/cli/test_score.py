@@ -347,3 +347,30 @@ def test_script_is_the_command(tmp_path):
     )
     assert done.returncode == 1
     assert "Did you mean 'shaving'?" in done.stderr
+
+
+def test_scoring_with_approach(tcs_command, corner, corner_file, tmp_path):
+    path = tmp_path / "out.tcs"
+    words = ("score", "shaving", "--environment", corner, "--out", path, "--json")
+    result = tcs_command(*words, "--approach").json
+    found, postures = result["approach"], tcs.load(corner_file)
+    assert (found["tool_speed"], found["approachable"]) == (0.1, result["reached_pairs"])
+    assert (found["limits"], found["blocked"]) == tuple(
+        result["reasons"][f"approach_{name}"] for name in ("limits", "blocked")
+    )
+    before = postures.nominal.scores
+    assert found["approachable"] + found["limits"] + found["blocked"] == before.reached.sum()
+    assert 0.3 < found["fraction"] < 1.0
+    file = tcs.load(path)
+    after = file.nominal.scores
+    assert not np.any(after.reached & ~before.reached)
+    assert file.metadata["approach"] == {"tool_speed": 0.1}
+    assert file.task["goals"][0]["approach"] == {"direction": [1.0, 0.0, 0.0], "distance": 0.1}
+    h, g = np.argwhere(after.reason >= 8)[0]
+    told = tcs_command("explain", path, "--goal", g, "--configuration", h, "--json").json
+    assert told["explained"]["reason"].startswith("approach_")
+    checks = [check["reason"] for check in told["checks"]]
+    assert checks[-2:] == ["approach_limits", "approach_blocked"]
+    assert "approach" in tcs_command("explain", path, "--goal", g, "--configuration", h).out
+    assert tcs_command(*words, "--no-approach").json["approach"] is None
+    np.testing.assert_array_equal(tcs.load(path).nominal.scores.reason, before.reason)

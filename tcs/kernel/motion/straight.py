@@ -111,22 +111,22 @@ def straight_motion(
         for k in range(7):
             if abs(tangents[n, k]) > fastest[k]:
                 return LIMITS
-    _keep_within_limits(scene, points, tangents)
+    keep_within_limits(scene, points, tangents)
     for k in range(7):
         line.locked[k] = 0
     for n in range(last):
-        _take_piece(work, points, tangents, n)
-        if _error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
+        take_piece(work, points, tangents, n)
+        if error_between(scene, work, line, offset, (n + 0.5) / last) > OFF_LINE:
             return LIMITS
     for n in range(last):
-        _take_piece(work, points, tangents, n)
+        take_piece(work, points, tangents, n)
         if curve_is_free_until(scene, work) < 1.0:
             return BLOCKED
     return DONE
 
 
 @inner
-def _take_piece(work: MotionWorkspace, points: FloatArray, tangents: FloatArray, n: int) -> None:
+def take_piece(work: MotionWorkspace, points: FloatArray, tangents: FloatArray, n: int) -> None:
     """Make piece n of a spline the current curve."""
     third = 1.0 / (3.0 * (len(points) - 1))
     for k in range(7):
@@ -136,7 +136,7 @@ def _take_piece(work: MotionWorkspace, points: FloatArray, tangents: FloatArray,
 
 
 @inner
-def _error_between(
+def error_between(
     scene: MotionScene,
     work: MotionWorkspace,
     line: StraightWorkspace,
@@ -149,11 +149,11 @@ def _error_between(
         line.q[k] = 0.125 * (c[0, k] + c[3, k]) + 0.375 * (c[1, k] + c[2, k])
     for r in range(3):
         line.target[r] = line.p_AT[r] + fraction * offset[r]
-    return _evaluate(scene, line, line.q)
+    return evaluate_on_line(scene, line, line.q)
 
 
 @inner
-def _evaluate(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
+def evaluate_on_line(scene: MotionScene, line: StraightWorkspace, q: FloatArray) -> float:
     """Fill pose error and Jacobian at joint angles q, with the columns of locked joints at 0."""
     newton = line.newton
     link_poses(scene.chain_R, scene.chain_p, q, newton.link_R, newton.link_p)
@@ -187,7 +187,7 @@ def _follow(
             line.q[k] = after[k] if line.locked[k] == 1 else before[k]
         arrived = False
         for _ in range(ITERATIONS):
-            if _evaluate(scene, line, line.q) < ON_LINE:
+            if evaluate_on_line(scene, line, line.q) < ON_LINE:
                 arrived = True
                 break
             factorise(line.newton, 0.0)
@@ -224,7 +224,7 @@ def _tangent(
 ) -> bool:
     """Fill the derivative of the joints by the fraction of the line; False at a singularity."""
     newton = line.newton
-    _evaluate(scene, line, q)
+    evaluate_on_line(scene, line, q)
     factorise(newton, 0.0)
     for r in range(3):
         newton.error[r], newton.error[3 + r] = 0.0, offset[r]
@@ -234,12 +234,19 @@ def _tangent(
 
 
 @inner
-def _keep_within_limits(scene: MotionScene, points: FloatArray, tangents: FloatArray) -> None:
-    """Shorten tangents such that the control points of every piece are within the joint limits."""
-    steps = 3.0 * (len(points) - 1)
-    for n in range(len(points)):
+def keep_within_limits(scene: MotionScene, points: FloatArray, tangents: FloatArray) -> None:
+    """Shorten tangents such that the control points of every piece are within the joint limits.
+
+    Points have one on either side, the first and the last on one side: a motion may begin or end at
+    a limit.
+    """
+    last = len(points) - 1
+    steps = 3.0 * last
+    for n in range(last + 1):
         for k in range(7):
             if scene.period[k] == 0.0:
-                below, above = points[n, k] - scene.lower[k], scene.upper[k] - points[n, k]
-                most = steps * max(min(below, above), 0.0)
-                tangents[n, k] = min(max(tangents[n, k], -most), most)
+                below = steps * max(points[n, k] - scene.lower[k], 0.0)
+                above = steps * max(scene.upper[k] - points[n, k], 0.0)
+                most = above if n == 0 else (below if n == last else min(below, above))
+                least = below if n == 0 else (above if n == last else min(below, above))
+                tangents[n, k] = min(max(tangents[n, k], -least), most)

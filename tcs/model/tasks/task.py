@@ -74,6 +74,9 @@ class ToolLine:
         return ToolLine((-x, -y, -z), self.distance)
 
 
+TOOL_SPEED = 0.1
+"""Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
+width in a second, slow enough for a person to turn away."""
 DEFAULT_APPROACH = ToolLine((1.0, 0.0, 0.0), 0.1)
 """Straight out of the fingers: a gripper is narrowest seen from there. 10 cm is the depth of a hand
 beyond its fingers, which then clears what the tool touches before the arm swings to the side."""

@@ -15,6 +15,8 @@ REASON_TEXTS = {
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "the gripper at the goal would touch the robot's own body",
     Reason.ARM_BLOCKED: "every arm posture would touch something",
     Reason.EXCLUDED: "excluded by a constraint when scoring",
+    Reason.APPROACH_LIMITS: "no posture at the goal can be approached within the joint limits",
+    Reason.APPROACH_BLOCKED: "the arm would touch something on its way straight to the goal",
 }
 """Each reason as part of a sentence."""
 REASON_NAMES = {
@@ -26,6 +28,8 @@ REASON_NAMES = {
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "gripper blocked by robot",
     Reason.ARM_BLOCKED: "arm blocked",
     Reason.EXCLUDED: "excluded by a constraint",
+    Reason.APPROACH_LIMITS: "approach beyond joint limits",
+    Reason.APPROACH_BLOCKED: "approach blocked",
 }
 """Each reason as the title of a column or in a legend."""
 REASON_COLOURS = {
@@ -37,8 +41,10 @@ REASON_COLOURS = {
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "#cc79a7",
     Reason.ARM_BLOCKED: "#d55e00",
     Reason.EXCLUDED: "#d9d9d9",
+    Reason.APPROACH_LIMITS: "#0072b2",
+    Reason.APPROACH_BLOCKED: "#8c510a",
 }
-"""The palette of Okabe and Ito, distinct under colour vision deficiency, and two greys."""
+"""The palette of Okabe and Ito, distinct under colour vision deficiency, two greys and a brown."""
 COLOUR_NAMES = {
     Reason.REACHED: "green",
     Reason.TOO_FAR: "light blue",
@@ -48,6 +54,8 @@ COLOUR_NAMES = {
     Reason.GRIPPER_BLOCKED_BY_ROBOT: "pink",
     Reason.ARM_BLOCKED: "dark orange",
     Reason.EXCLUDED: "light grey",
+    Reason.APPROACH_LIMITS: "dark blue",
+    Reason.APPROACH_BLOCKED: "brown",
 }
 """Names of the colours, for text without colour."""
 

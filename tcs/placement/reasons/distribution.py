@@ -18,18 +18,25 @@ CHECKS = (
     Reason.GRIPPER_BLOCKED_BY_ROBOT,
     Reason.JOINT_LIMITS,
     Reason.ARM_BLOCKED,
+    Reason.APPROACH_LIMITS,
+    Reason.APPROACH_BLOCKED,
 )
 """Reasons why a goal is not reached, in the order in which they are checked. The first is there
-only in files that were scored under constraints."""
+only in files that were scored under constraints, the last two in files scored with approach."""
+APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
 
 
 def checks_of(reasons: Mapping[Reason, int]) -> tuple[Reason, ...]:
-    """Return the `CHECKS` that were made: constraints only if they excluded a configuration.
+    """Return the `CHECKS` that were made.
+
+    Constraints and approaches count only if they stopped a configuration.
 
     Args:
         reasons: Number of configurations with each reason.
     """
-    return CHECKS if reasons[Reason.EXCLUDED] else CHECKS[1:]
+    first = 0 if reasons[Reason.EXCLUDED] else 1
+    last = len(CHECKS) if any(reasons[one] for one in APPROACH) else -len(APPROACH)
+    return CHECKS[first:last]
 
 
 @dataclass(frozen=True, slots=True)

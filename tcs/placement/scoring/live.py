@@ -17,6 +17,7 @@ from tcs.model.robots import RobotFile
 from tcs.model.scene import EnvironmentFile, Observation, estimate_joints
 from tcs.model.tasks import Task
 from tcs.placement.constraints import Constraints
+from tcs.placement.scoring.approaches import approach_lines
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.offline import NO_CONSTRAINTS, ScoringSetup
 from tcs.placement.scoring.sets import SetOptions
@@ -47,6 +48,7 @@ class LiveScorer:
         constraints: Constraints = NO_CONSTRAINTS,
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
+        approach: bool = False,
         **sets: Unpack[SetOptions],
     ) -> None:
         """Load the models, build the scene and compile the kernel.
@@ -63,6 +65,7 @@ class LiveScorer:
             constraints: As for `tcs.score`.
             now: Present values of axes [m or rad], for the axes that the constraints keep.
             person: Whose body the person has, as for `tcs.score`.
+            approach: As for `tcs.score`.
             **sets: Options of the kept sets.
 
         Raises:
@@ -70,10 +73,11 @@ class LiveScorer:
         """
         self._setup = ScoringSetup.load(
             task, environment, robot, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now, person=person,
+            constraints=constraints, now=now, person=person, approach=approach,
         )  # fmt: skip
         lowered = self._job_at({}).lowered(self._setup.scene)
-        warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
+        problem = build_problem(lowered.arrays, lowered.grid, measure)
+        warm_up(problem, on_compile, approach_lines(self.job) if approach else None)
 
     @property
     def job(self) -> Job:
@@ -133,6 +137,7 @@ def score_observed(
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
+    approach: bool = False,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task in the scene as it is observed, on the whole grid of the environment.
@@ -149,6 +154,7 @@ def score_observed(
         constraints: As for `tcs.score`.
         now: Present values of axes [m or rad], for the axes that the constraints keep.
         person: Whose body the person has, as for `tcs.score`.
+        approach: As for `tcs.score`.
         **sets: Options of the kept sets.
 
     Returns:
@@ -159,6 +165,6 @@ def score_observed(
     """
     scorer = LiveScorer(
         task, environment, robot, measure=measure, jobs=jobs, constraints=constraints, now=now,
-        person=person, **sets,
+        person=person, approach=approach, **sets,
     )  # fmt: skip
     return scorer.score(observation)

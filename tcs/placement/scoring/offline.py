@@ -16,13 +16,14 @@ from tcs.model.grid import Grid
 from tcs.model.people import PersonLike
 from tcs.model.robots import RobotFile, arm_references
 from tcs.model.scene import EnvironmentFile, Scene, body_frame_positions
-from tcs.model.tasks import Task
+from tcs.model.tasks import Task, ToolLine
 from tcs.placement.constraints import (
     Constraints,
     Footprint,
     constraints_entry,
     excluded_configurations,
 )
+from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry
@@ -63,6 +64,8 @@ class ScoringSetup:
     """Name of the dexterity measure."""
     jobs: int
     """Number of threads; the result does not depend on it."""
+    approach: bool = False
+    """Whether a goal counts as reached only by postures that can be approached."""
 
     @classmethod
     def load(
@@ -78,6 +81,7 @@ class ScoringSetup:
         constraints: Constraints = NO_CONSTRAINTS,
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
+        approach: bool = False,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -94,7 +98,7 @@ class ScoringSetup:
             task, environment, robot, only=only, constraints=constraints, now=now, person=person
         )
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs)
+        return cls(job, job.scene(), references, options, measure, jobs, approach)
 
     def score(
         self,
@@ -147,6 +151,7 @@ class ScoringSetup:
             on_progress=on_progress,
             on_compile=on_compile,
             excluded=excluded,
+            approaches=approach_lines(job) if self.approach else None,
         )
         person = person_entry(job.spec.environment, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
@@ -165,6 +170,7 @@ class ScoringSetup:
                 "timings": {
                     "compile_seconds": swept.compile_seconds,
                     "scoring_seconds": swept.scoring_seconds,
+                    "approach_seconds": swept.approach_seconds,
                 },
             },
         )
@@ -199,6 +205,7 @@ class ScoringSetup:
                 **({"only": list(job.constraints.only)} if job.constraints.only else {}),
                 **entries,
                 "measure": self.measure,
+                **(approach_entry() if self.approach else {}),
                 "timings": {
                     **entries["timings"],
                     "sets_seconds": done - sets_begun,
@@ -229,6 +236,7 @@ def score(
     constraints: Constraints = NO_CONSTRAINTS,
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
+    approach: bool = False,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -255,6 +263,8 @@ def score(
         person: Whose body the person has, e.g. `{"sex": "female", "stature_percentile": 5}`, or the
             path of a file; by default that of the environment, which without a body of its own has
             that of the papers' average man. Goals on the person are moved to that body.
+        approach: Whether a goal counts as reached only by postures that the arm can leave backwards
+            along the goal's approach. The best of these gives joints and dexterity.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -271,13 +281,14 @@ def score(
         SelectionError: If the present value of an axis to keep is missing or not scored, or every
             base pose is forbidden.
         TcsError: If an option of the sets is out of range.
+        ArmClassError: If `approach` is requested of an arm without a closed form.
     """
     begun = time.perf_counter()
     robots = {"": robot} if arms is None else arm_references(robot, arms)
     setups = {
         arm: ScoringSetup.load(
             task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now, person=person,
+            constraints=constraints, now=now, person=person, approach=approach,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip
@@ -302,7 +313,14 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 "position": goal.position.tolist(),
                 "quaternion_wxyz": goal.quaternion.tolist(),
                 "weight": goal.weight,
+                "approach": _line_as_dict(goal.approach),
+                "retreat": _line_as_dict(goal.retreat),
             }
             for goal in task.goals
         ],
     }
+
+
+def _line_as_dict(line: ToolLine) -> dict[str, Any]:
+    """Return a straight tool motion as in a task file."""
+    return {"direction": list(line.direction), "distance": line.distance}

@@ -27,6 +27,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "measure": file.metadata["measure"],
         # Files without the entry were solved in closed form.
         "ik": file.metadata.get("ik", ANALYTIC),
+        "approach": _approach_summary(file, reasons),
         "configurations": pairs // goals,
         "goals": goals,
         "pairs": pairs,
@@ -54,6 +55,22 @@ def summary(file: ScoreFile) -> dict[str, Any]:
             }
             for state, table in zip(file.observed_states, file.tables, strict=True)
         ],
+    }
+
+
+def _approach_summary(file: ScoreFile, reasons: Counter[str]) -> dict[str, Any] | None:
+    """Return what scoring with approach found; None for a file scored without."""
+    entry = file.metadata.get("approach")
+    if entry is None:
+        return None
+    stopped = [reasons["approach_limits"], reasons["approach_blocked"]]
+    return {
+        **entry,
+        "approachable": reasons["reached"],
+        "limits": stopped[0],
+        "blocked": stopped[1],
+        "fraction": reasons["reached"] / max(reasons["reached"] + sum(stopped), 1),
+        "seconds": file.metadata["timings"]["approach_seconds"],
     }
 
 

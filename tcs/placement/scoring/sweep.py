@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -19,7 +20,16 @@ from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.model.scene import LoweredScene
+from tcs.placement.scoring.approaches import (
+    ENTRY,
+    check_closed_form,
+    score_with_approach,
+    warm_up_approaches,
+)
 from tcs.placement.tables import Reason, ScoreTable
+
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
 
 SLICE = 1024
 """Configurations per slice: some milliseconds of work, so that threads finish together and progress
@@ -46,6 +56,8 @@ class Sweep:
     """Time of the scoring alone [s]."""
     ik: str
     """Inverse kinematics of the arm: ANALYTIC or NUMERIC."""
+    approach_seconds: float = 0.0
+    """Part of the scoring time that the approaches took [s]."""
 
 
 def sweep(
@@ -58,6 +70,7 @@ def sweep(
     on_progress: Callable[[int, int], None] | None = None,
     on_compile: Callable[[], None] | None = None,
     excluded: NDArray[np.bool_] | None = None,
+    approaches: ApproachLines | None = None,
 ) -> Sweep:
     """Score every configuration of the grid against every goal.
 
@@ -71,6 +84,8 @@ def sweep(
         on_progress: Called with the number of scored configurations and their total.
         on_compile: Called first, if there is no cached machine code.
         excluded: Configurations that are not scored, shape (configurations,); None for none.
+        approaches: The approaches of the goals, to score approachable postures only; None to score
+            all postures.
 
     Returns:
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
@@ -78,11 +93,12 @@ def sweep(
     Raises:
         UnknownNameError: If there is no measure of that name.
         TcsError: If `jobs` is less than 1.
+        ArmClassError: If there are approaches, and the arm has no closed form.
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     problem = build_problem(lowered.arrays, lowered.grid, measure)
-    compile_seconds = warm_up(problem, on_compile)
+    compile_seconds = warm_up(problem, on_compile, approaches)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()
     grippers = gripper_contacts(problem)
@@ -103,9 +119,14 @@ def sweep(
         done += len(part.reason)
         if on_progress is not None:
             on_progress(done, size)
-    scoring_seconds = time.perf_counter() - begun
-    names = _name_contacts(contact, lowered, problem)
     winning = np.concatenate(joints) if joints else np.empty((0, 7), np.float32)
+    approach_begun = time.perf_counter()
+    if approaches is not None:
+        winning = score_with_approach(
+            problem, approaches, reason, contact, dexterity, winning, jobs=jobs
+        )
+    done_at = time.perf_counter()
+    names = _name_contacts(contact, lowered, problem)
     winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
     parts = tuple(
         ScoreTable(
@@ -119,7 +140,13 @@ def sweep(
         for i in range(tables)
         for rows in [slice(i * size // tables, (i + 1) * size // tables)]
     )
-    return Sweep(parts, compile_seconds, scoring_seconds, ik_of(problem))
+    return Sweep(
+        parts,
+        compile_seconds,
+        scoring_seconds=done_at - begun,
+        ik=ik_of(problem),
+        approach_seconds=done_at - approach_begun,
+    )
 
 
 def ik_of(problem: Problem) -> str:
@@ -127,13 +154,26 @@ def ik_of(problem: Problem) -> str:
     return NUMERIC if is_outside(problem.arm) else ANALYTIC
 
 
-def warm_up(problem: Problem, on_compile: Callable[[], None] | None = None) -> float:
-    """Compile the kernel or load its machine code; return the time this took [s]."""
-    if on_compile is not None and not is_compiled(_ENTRIES[ik_of(problem)]):
+def warm_up(
+    problem: Problem,
+    on_compile: Callable[[], None] | None = None,
+    approaches: ApproachLines | None = None,
+) -> float:
+    """Compile the kernel or load its machine code; return the time this took [s].
+
+    Raises:
+        ArmClassError: If there are approaches, and the arm has no closed form.
+    """
+    entries = [_ENTRIES[ik_of(problem)]]
+    if approaches is not None:
+        check_closed_form(problem)
+        entries.append(ENTRY)
+    if on_compile is not None and not all(map(is_compiled, entries)):
         on_compile()
     begun = time.perf_counter()
     _slice(problem, gripper_contacts(problem), 0, 0)
-    return time.perf_counter() - begun
+    seconds = time.perf_counter() - begun
+    return seconds + (0.0 if approaches is None else warm_up_approaches(problem, approaches))
 
 
 def _size(problem: Problem) -> int:

@@ -31,6 +31,10 @@ class Reason(IntEnum):
     ARM_BLOCKED = 6
     EXCLUDED = 7
     """A constraint excludes the configuration, which was not scored."""
+    APPROACH_LIMITS = 8
+    """Scored with approach: joint limits or velocity limits end the approach of every posture."""
+    APPROACH_BLOCKED = 9
+    """Scored with approach: no posture can be approached without contact."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -36,6 +36,8 @@ def test_reasons_are_counted_by_name():
         "gripper_blocked_by_robot": 0,
         "arm_blocked": 1,
         "excluded": 0,
+        "approach_limits": 0,
+        "approach_blocked": 0,
     }
 
 
@@ -77,7 +79,7 @@ WRONG = {
     "dexterity below zero": ("dexterity", lambda a: a - 1.0, "dexterity"),
     "dexterity not a number": ("dexterity", lambda a: a * np.float32(np.nan), "dexterity"),
     "dexterity where not reached": ("dexterity", lambda a: a + np.float32(0.1), "not reached"),
-    "reason unknown": ("reason", lambda a: a + np.uint8(2), r"outside 0\.\.7"),
+    "reason unknown": ("reason", lambda a: a + np.uint8(4), r"outside 0\.\.9"),
     "pair unknown": ("pair", lambda a: a + np.int32(1), r"outside -1\.\.0"),
     "joints missing": ("arm_joints", lambda a: a[:2], "2 rows of arm joints for 3"),
     "six joints": ("arm_joints", lambda a: a[:, :6].copy(), "shape"),
@@ -106,4 +108,6 @@ def test_reason_numbers_are_those_of_stored_files():
         ("GRIPPER_BLOCKED_BY_ROBOT", 5),
         ("ARM_BLOCKED", 6),
         ("EXCLUDED", 7),
+        ("APPROACH_LIMITS", 8),
+        ("APPROACH_BLOCKED", 9),
     ]

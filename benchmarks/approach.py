@@ -1,0 +1,149 @@
+"""Scoring with approach: time, share of approachable pairs, recall, and what Drake refutes.
+
+Usage: python benchmarks/approach.py [--pairs 300] [--rounds 5] [--rows TASK/ENVIRONMENT ...]
+
+Processor times of scoring with and without approach are taken in turns on one thread. Reached pairs
+drawn at random are compared with a dense scan: postures at 96 values of the free joint, at 1,000 if
+none is approachable, at both ends of the line, followed by the straight motions of the planner.
+Drake re-checks approaches of the drawn pairs at postures at most a millimetre of motion apart.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+from table import cell, header, parser, row, save
+
+import tcs
+from tcs.kernel.approach.sweep import approach_spline
+from tcs.kernel.problem import build_problem
+from tcs.model.tasks import TOOL_SPEED
+from tcs.motion import Stop
+from tcs.motion.approach import SAMPLES, first_accesses
+from tcs.motion.curves import Curve
+from tcs.motion.recheck import false_pieces
+from tcs.placement.scoring import Job, load_job, sweep, task_environment_pairs
+from tcs.placement.scoring.approaches import approach_lines
+from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.tables import Reason
+
+TIMED = ("shaving", "wheelchair")
+COMPARED = (TIMED, ("bathing", "bed"))
+APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
+
+
+def main() -> int:
+    """Measure everything."""
+    command_line = parser(__doc__)
+    command_line.add_argument("--pairs", type=int, default=300)
+    command_line.add_argument("--rounds", type=int, default=5)
+    command_line.add_argument("--rows", nargs="*", metavar="TASK/ENVIRONMENT")
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
+    header()
+    row("seed", str(options.seed))
+    time_of(*TIMED, options.rounds)
+    chosen = options.rows
+    rows = task_environment_pairs() if chosen is None else [one.split("/") for one in chosen]
+    for task, environment in rows:
+        file = tcs.score(task, environment, approach=True)
+        share(file)
+        if (task, environment) in COMPARED:
+            compare(file, options.pairs, options.seed)
+    save(options)
+    return 0
+
+
+def time_of(task: str, environment: str, rounds: int) -> None:
+    """Measure the processor time of scoring with and without approach, in turns."""
+    job = load_job(task, environment, "pr2")
+    lowered, lines = job.lowered(job.scene()), approach_lines(job)
+    seconds: dict[bool, list[float]] = {False: [], True: []}
+    for number in range(rounds + 1):
+        for approach, taken in seconds.items():
+            begun = time.process_time()
+            sweep(lowered, job.task.weights, jobs=1, approaches=lines if approach else None)
+            # The first round loads the machine code.
+            if number:
+                taken.append(time.process_time() - begun)
+    without, with_approach = (float(np.median(taken)) for taken in seconds.values())
+    line = f"{task}-{environment}-pr2"
+    cell("time", line, "without approach [s]", f"{without:.2f}")
+    cell("time", line, "with approach [s]", f"{with_approach:.2f}")
+    cell("time", line, "ratio", f"{with_approach / without:.1f}")
+    row(f"{line}, processor time", f"{without:.2f} s, with {with_approach:.2f} s")
+
+
+def share(file: tcs.ScoreFile) -> None:
+    """Count the approachable pairs of a file."""
+    reason = np.concatenate([table.scores.reason for table in file.tables])
+    counts = [int(np.sum(reason == one)) for one in (Reason.REACHED, *APPROACH)]
+    line = name_of(file)
+    cell("rows", line, "reached by a posture", f"{sum(counts):,}")
+    cell("rows", line, "approachable", f"{counts[0] / sum(counts):.1%}")
+    cell("rows", line, "ended by limits", f"{counts[1] / sum(counts):.1%}")
+    cell("rows", line, "blocked", f"{counts[2] / sum(counts):.1%}")
+    row(line, f"{sum(counts):,} reached, {counts[0]:,} approachable")
+
+
+def compare(file: tcs.ScoreFile, pairs: int, seed: int) -> None:
+    """Compare random pairs with the dense scan, and re-check their approaches with Drake."""
+    job, scene, lowered = rebuild_scene(file)
+    problem, lines = build_problem(lowered.arrays, lowered.grid), approach_lines(job)
+    table = file.nominal_index
+    scores = file.tables[table].scores
+    drawn = np.argwhere(scores.reached | np.isin(scores.reason, APPROACH))
+    rng = np.random.default_rng(seed)
+    dense = both = checked = false = lost = 0
+    for h, g in drawn[rng.permutation(len(drawn))[:pairs]].tolist():
+        number = table * job.grid.size + h
+        stop = Stop.of(job, scene, number, seed)
+        is_found = any(True for n in SAMPLES for _ in first_accesses(stop, g, n))
+        dense += is_found
+        both += is_found and bool(scores.reached[h, g])
+        if not scores.reached[h, g]:
+            continue
+        spline = approach_spline(problem, lines, number, g, scores.joints_of(h, g))
+        if spline is None:
+            lost += 1
+            continue
+        checked += 1
+        false += not is_true(job, stop, g, *spline)
+    line = name_of(file)
+    cell("recall", line, "pairs", f"{pairs:,}")
+    cell("recall", line, "approachable by the dense scan", f"{dense:,}")
+    cell("recall", line, "of these found", f"{both:,}")
+    cell("recall", line, "false (Drake), of the approaches re-checked", f"{false:,} of {checked:,}")
+    row(line, f"{both} of {dense} found, {false} of {checked} false, {lost} not found again")
+
+
+def is_true(job: Job, stop: Stop, goal: int, points: np.ndarray, tangents: np.ndarray) -> bool:
+    """Return whether Drake confirms an approach: straight, within limits, free of contact."""
+    line = job.task.goals[goal].approach
+    knots = np.linspace(0.0, 1.0, len(points))
+    curve = Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
+    if false_pieces(stop.scene, stop.motion, curve):
+        return False
+    stop.scene.set_arm(points[-1])
+    X_WG = stop.scene.tool_pose()
+    for piece in range(curve.pieces):
+        fractions = np.linspace(0.0, 1.0, 9)
+        for fraction, q in zip(fractions, curve.points(piece, fractions), strict=True):
+            stop.scene.set_arm(q)
+            X_GT = X_WG.inverse() @ stop.scene.tool_pose()
+            ahead = 1.0 - (piece + fraction) / curve.pieces
+            off = np.linalg.norm(X_GT.translation() + ahead * line.offset)
+            if off > 2e-3 or X_GT.rotation().ToAngleAxis().angle() > 2e-3:
+                return False
+    return True
+
+
+def name_of(file: tcs.ScoreFile) -> str:
+    """Return task, environment and robot of a file."""
+    return "-".join(part["name"] for part in (file.task, file.environment, file.robot))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,289 @@
+"""The best approachable posture of one reached pair."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.analytic.ik import sample_joints
+from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
+from tcs.kernel.analytic.scratch import Search, new_search, sort_candidates
+from tcs.kernel.approach.curve import CurveWorkspace, follow_path, new_curve, place_line
+from tcs.kernel.approach.grid import (
+    NOWHERE,
+    PIECES,
+    Grid,
+    column_at,
+    find_onward,
+    new_grid,
+    open_levels,
+    place_columns,
+    place_levels,
+    take_path,
+)
+from tcs.kernel.approach.scene import new_scene, pair_contact_code
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.cache import inner
+from tcs.kernel.contacts import NO_CONTACT, Workspace, new_workspace
+from tcs.kernel.kinematics import copy_joints
+from tcs.kernel.motion.edges import posture_is_free
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
+from tcs.kernel.motion.straight import BLOCKED, DONE
+from tcs.kernel.problem import Problem
+from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
+
+PATH_SPEED = 0.8
+"""Fraction of the velocity limit up to which the free joint moves from level to level: cubics
+through the levels are faster in between."""
+STRIDE = 8
+"""Number of columns from one of the postures tried first to the next."""
+NEAR = 8
+"""Number of columns on either side of the posture that scoring found, whose line is tried first."""
+MOST_CURVES = 100
+"""Greatest number of motions that are followed for a pair."""
+ENOUGH = 1_000_000
+"""In place of the number of motions: no other can be free."""
+GRIPPER = 7
+"""Link of the gripper, whose motion is the same from every posture."""
+PHASE = 1e6
+"""Above any measure: sort key of postures that are tried later."""
+CLOSED = -2
+"""Outcome of a posture that is in contact, or has no path of the free joint."""
+
+
+class Approach(NamedTuple):
+    """Memory of one worker."""
+
+    work: Workspace
+    search: Search
+    grid: Grid
+    scene: MotionScene
+    motion: MotionWorkspace
+    curve: CurveWorkspace
+    offset: FloatArray
+    """Motion of the tool from the goal to the begin of the approach, in A [m], shape (3,)."""
+    columns: IntArray
+    """Number of columns of the grid, and of those that the free joint moves from level to level;
+    column and branch of the posture that scoring found; number of motions followed; shape (5,)."""
+    contact: IntArray
+    """First contact that blocked a motion, as a code, shape (1,)."""
+
+
+def new_approach(problem: Problem) -> Approach:
+    """Return the memory of one worker."""
+    scene = new_scene(problem)
+    return Approach(
+        new_workspace(problem),
+        new_search(),
+        new_grid(),
+        scene,
+        new_motion_workspace(scene),
+        new_curve(),
+        np.empty(3),
+        np.zeros(5, np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+@inner
+def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> int:
+    """Find the best posture of a reached pair that can be left backwards along the approach.
+
+    Args:
+        problem: The scene.
+        approach: `work`, `scene` and `offset` are in place. `search.best` is filled with the joint
+            angles [rad] if another posture than q is the best, `contact` if all are blocked.
+        fastest: Greatest motion of each joint for the whole line at constant rate [rad], shape
+            (7,).
+        q: Joint angles that scoring found [rad], shape (7,).
+
+    Returns:
+        REACHED, APPROACH_LIMITS or APPROACH_BLOCKED; -1 if q itself is approachable.
+    """
+    _prepare(problem, approach, fastest, q)
+    columns = approach.columns
+    branch = columns[3]
+    for n in range(-1, len(problem.arm.branches)):
+        # The branch of the posture that scoring found comes first.
+        b = branch if n < 0 else n
+        if n >= 0 and b == branch:
+            continue
+        if n < 0:
+            first, last = max(columns[2] - NEAR, 0), min(columns[2] + NEAR, columns[0] - 1)
+            if _open(problem, approach, b, first, last) and (
+                _follow(problem, approach, fastest, b, columns[2], True) == DONE
+            ):
+                return -1
+            if columns[4] == ENOUGH:
+                return APPROACH_BLOCKED
+        _open(problem, approach, b, 0, columns[0] - 1)
+    count = _list_candidates(problem, approach)
+    search = approach.search
+    for rank in range(count):
+        n = search.order[rank]
+        b, i = search.found_branch[n], search.found_pair[n, 0]
+        if _follow(problem, approach, fastest, b, i, False) == DONE:
+            copy_joints(approach.curve.points[0], search.best)
+            if rank > 0:
+                _climb(problem, approach, fastest, b, i)
+            return REACHED
+        if columns[4] > MOST_CURVES:
+            break
+    return APPROACH_LIMITS if approach.contact[0] == NO_CONTACT else APPROACH_BLOCKED
+
+
+@inner
+def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> int:
+    """Follow the line from a posture at the goal; return DONE if it succeeds.
+
+    Args:
+        problem: The scene.
+        approach: As for `approach_pair`; the spline is filled.
+        fastest: As for `approach_pair`.
+        q: Joint angles of a posture free of contact [rad], shape (7,).
+    """
+    _prepare(problem, approach, fastest, q)
+    b, columns = approach.columns[3], approach.columns
+    if not _open(problem, approach, b, 0, columns[0] - 1):
+        return CLOSED
+    return _follow(problem, approach, fastest, b, columns[2], True)
+
+
+@inner
+def _open(problem: Problem, approach: Approach, b: int, first: int, last: int) -> bool:
+    """Fill the nodes of a branch from columns at the goal; return whether the line is complete."""
+    grid, columns = approach.grid, approach.columns
+    if open_levels(problem.arm, approach.search, grid, b, columns[0], columns[1], first, last):
+        find_onward(grid, b, columns[0], columns[1])
+        return True
+    for i in range(columns[0]):
+        grid.onward[b, 0, i] = NOWHERE
+    return False
+
+
+@inner
+def _prepare(problem: Problem, approach: Approach, fastest: FloatArray, q: FloatArray) -> None:
+    """Place line and grid, and find column and branch of the posture that scoring found."""
+    arm, grid, search, columns = problem.arm, approach.grid, approach.search, approach.columns
+    place_levels(arm, approach.work, approach.offset, grid)
+    place_line(approach.work, approach.curve)
+    angle = q[arm.free]
+    columns[0] = place_columns(arm, grid, angle)
+    columns[1] = int(PATH_SPEED * fastest[arm.free] / (PIECES * grid.origin[1]))
+    columns[2] = int((angle - grid.origin[0]) / grid.origin[1] + 0.5)
+    columns[3], columns[4] = 0, 0
+    approach.contact[0] = NO_CONTACT
+    least = np.inf
+    for b in range(len(arm.branches)):
+        sample_joints(arm, grid.goal[0], arm.branches[b], angle, search.q)
+        error = 0.0
+        for k in range(7):
+            error += 1.0 - np.cos(search.q[k] - q[k])
+        if error < least:
+            least, columns[3] = error, b
+
+
+@inner
+def _follow(
+    problem: Problem,
+    approach: Approach,
+    fastest: FloatArray,
+    b: int,
+    column: int,
+    is_free: bool,
+) -> int:
+    """Follow the line from a node at the goal, around contacts that are met.
+
+    A node in contact is closed, and so is one from which the line cannot be followed.
+
+    Args:
+        problem: The scene.
+        approach: The grid is filled; so is the spline.
+        fastest: As for `approach_pair`.
+        b: The branch.
+        column: The column of the node.
+        is_free: Whether the node is known to be free of contact.
+
+    Returns:
+        DONE, LIMITS, BLOCKED or CLOSED.
+    """
+    grid, columns, scene = approach.grid, approach.columns, approach.scene
+    if grid.onward[b, 0, column] == NOWHERE:
+        return CLOSED
+    arm, q = problem.arm, approach.search.q
+    angle = grid.origin[0] + column * grid.origin[1]
+    sample_joints(arm, grid.goal[0], arm.branches[b], angle, q)
+    outcome = CLOSED
+    if is_free or posture_is_free(scene, approach.motion, q):
+        while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
+            columns[4] += 1
+            take_path(grid, b, column)
+            outcome = follow_path(
+                arm, scene, approach.motion, grid, approach.curve, b, approach.offset, fastest
+            )
+            if outcome != BLOCKED:
+                break
+            level, k = approach.curve.blocked[0], approach.curve.blocked[1]
+            gripper = scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER
+            if gripper or approach.contact[0] == NO_CONTACT:
+                approach.contact[0] = pair_contact_code(problem, scene, k)
+            if gripper:
+                columns[4] = ENOUGH
+                break
+            grid.is_open[b, level, column_at(grid, b, column, level)] = False
+            find_onward(grid, b, columns[0], columns[1])
+    if outcome != DONE:
+        grid.is_open[b, 0, column] = False
+        grid.onward[b, 0, column] = NOWHERE
+    return outcome
+
+
+@inner
+def _list_candidates(problem: Problem, approach: Approach) -> int:
+    """List the nodes at the goal from which the line can be completed; return their number.
+
+    The best one comes first, then every STRIDE-th, then all others, each in descending order of
+    their measure.
+    """
+    grid, search, columns = approach.grid, approach.search, approach.columns
+    count, best = 0, 0
+    for b in range(len(problem.arm.branches)):
+        for i in range(columns[0]):
+            if grid.onward[b, 0, i] == NOWHERE or count == len(search.key):
+                continue
+            if not samples_hold_measure(problem):
+                for r in range(4):
+                    for c in range(3):
+                        search.goal[r, c] = grid.goal[0, r, c]
+                angle = grid.origin[0] + i * grid.origin[1]
+                grid.measure[b, i] = measure_of(problem, search, b, angle)
+            search.found_branch[count], search.found_pair[count, 0] = b, i
+            search.key[count] = -grid.measure[b, i]
+            if search.key[count] < search.key[best]:
+                best = count
+            count += 1
+    for n in range(count):
+        if n == best:
+            search.key[n] -= PHASE
+        elif search.found_pair[n, 0] % STRIDE:
+            search.key[n] += PHASE
+    sort_candidates(search, count)
+    return count
+
+
+@inner
+def _climb(problem: Problem, approach: Approach, fastest: FloatArray, b: int, i: int) -> None:
+    """Climb from a node whose line is free to a better one less than STRIDE columns away."""
+    grid, columns, step = approach.grid, approach.columns, STRIDE // 2
+    measure, best = grid.measure[b], approach.search.best
+    while step >= 1 and columns[4] <= MOST_CURVES:
+        for side in range(2):
+            j = i + step if side else i - step
+            if not 0 <= j < columns[0] or measure[j] <= measure[i]:
+                continue
+            if _follow(problem, approach, fastest, b, j, False) == DONE:
+                copy_joints(approach.curve.points[0], best)
+                i = j
+                break
+        step //= 2

@@ -1,0 +1,161 @@
+"""Approaches of the reached pairs of a scored grid."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.approach.pairs import Approach, approach_pair, follow_posture, new_approach
+from tcs.kernel.approach.scene import place_scene
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.cache import inner, jit
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.dexterity.measures import measure_at, rounded_inward
+from tcs.kernel.motion.straight import DONE
+from tcs.kernel.problem import Problem
+from tcs.kernel.scores import APPROACH_BLOCKED, REACHED
+from tcs.kernel.views import unowned
+
+
+class ApproachLines(NamedTuple):
+    """The straight tool motions that end at the goals."""
+
+    offset: FloatArray
+    """Motion of the tool from begin to end, in the tool frame at the goal [m], shape (goals, 3)."""
+    fastest: FloatArray
+    """Greatest motion of each joint for the whole line at constant rate, which is what the velocity
+    limits allow at the tool's speed [rad], shape (goals, 7)."""
+
+
+class ReachedPairs(NamedTuple):
+    """Scores of reached pairs, in ascending order of the configurations."""
+
+    pair: IntArray
+    """Configuration and goal, shape (n, 2)."""
+    reason: NDArray[np.uint8]
+    """REACHED; filled with the reason where no posture is approachable, shape (n,)."""
+    contact: NDArray[np.int32]
+    """Filled with the contact that blocks the approach, or NO_CONTACT, shape (n,)."""
+    dexterity: NDArray[np.float32]
+    """Measure of the best solution; filled with that of the best approachable one, shape (n,)."""
+    joints: NDArray[np.float32]
+    """Its joint angles [rad], shape (n, 7)."""
+
+
+def score_approaches(problem: Problem, lines: ApproachLines, pairs: ReachedPairs) -> None:
+    """Replace the scores of reached pairs by those with approach.
+
+    Args:
+        problem: The scene, its goals and its grid; an arm with a closed form.
+        lines: The approaches of the goals.
+        pairs: The scores; replaced.
+    """
+    # Other orders in memory are other types, for which the code would be compiled anew.
+    pairs = pairs._replace(pair=np.ascontiguousarray(pairs.pair, dtype=np.int64))
+    # Allocated here to outlive the call: the compiled code takes unowned views of these arrays.
+    _score_approaches(problem, new_approach(problem), lines, pairs)
+
+
+def approach_spline(
+    problem: Problem, lines: ApproachLines, configuration: int, goal: int, q: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the approach of a posture as a spline in joint space, None if none is found.
+
+    Args:
+        problem: The scene, its goals and its grid; an arm with a closed form.
+        lines: The approaches of the goals.
+        configuration: Flat index of the initial configuration.
+        goal: Number of the goal.
+        q: Joint angles at the goal, free of contact [rad], shape (7,).
+
+    Returns:
+        Joint angles at equal distances of the tool [rad], shape (n, 7), from the begin of the
+        approach to the goal, and their derivatives by the fraction of the line [rad]: a cubic
+        Hermite spline.
+    """
+    approach = new_approach(problem)
+    posture = np.array(q, dtype=np.float64)
+    if _follow_posture(problem, approach, lines, configuration, goal, posture) != DONE:
+        return None
+    count = approach.curve.pieces[0] + 1
+    points, tangents = approach.curve.points[:count], approach.curve.tangents[:count]
+    return points[::-1].copy(), -tangents[::-1]
+
+
+@jit
+def _follow_posture(
+    owned_problem: Problem,
+    owned_approach: Approach,
+    owned_lines: ApproachLines,
+    configuration: int,
+    goal: int,
+    q: FloatArray,
+) -> int:
+    problem, approach = unowned(owned_problem), unowned(owned_approach)
+    lines = unowned(owned_lines)
+    torso = configuration % problem.torso_levels
+    state = place_base(problem, approach.work, configuration // problem.torso_levels)
+    _place_surroundings(problem, approach, torso)
+    _place_goal(problem, approach, lines, state, torso, goal)
+    return follow_posture(problem, approach, lines.fastest[goal], q)
+
+
+@inner
+def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
+    """Place everything around the arm, the base being in place."""
+    environment_in_arm_base(problem, approach.work, torso)
+    place_scene(problem, approach.work, torso, approach.scene, approach.motion)
+    # The reported contact must not depend on the configurations before.
+    approach.motion.contact[0] = -1
+
+
+@inner
+def _place_goal(
+    problem: Problem, approach: Approach, lines: ApproachLines, state: int, torso: int, g: int
+) -> None:
+    """Fill the pose of a goal in A, and the offset from there to the begin of its approach."""
+    work = approach.work
+    goal_in_arm_base(problem, work, state, torso, g)
+    for r in range(3):
+        approach.offset[r] = 0.0
+        for c in range(3):
+            approach.offset[r] -= work.R_AG[r, c] * lines.offset[g, c]
+
+
+@jit
+def _score_approaches(
+    owned_problem: Problem,
+    owned_approach: Approach,
+    owned_lines: ApproachLines,
+    owned_pairs: ReachedPairs,
+) -> None:
+    problem, approach = unowned(owned_problem), unowned(owned_approach)
+    lines, pairs = unowned(owned_lines), unowned(owned_pairs)
+    work, q = approach.work, np.empty(7)
+    place, state, configuration = -1, 0, -1
+    for n in range(len(pairs.pair)):
+        h, g = pairs.pair[n, 0], pairs.pair[n, 1]
+        torso = h % problem.torso_levels
+        if h // problem.torso_levels != place:
+            place = h // problem.torso_levels
+            state = place_base(problem, work, place)
+        if h != configuration:
+            configuration = h
+            _place_surroundings(problem, approach, torso)
+        _place_goal(problem, approach, lines, state, torso, g)
+        for k in range(7):
+            q[k] = pairs.joints[n, k]
+        outcome = approach_pair(problem, approach, lines.fastest[g], q)
+        if outcome == -1:
+            continue
+        pairs.reason[n] = outcome
+        pairs.contact[n] = approach.contact[0] if outcome == APPROACH_BLOCKED else NO_CONTACT
+        pairs.dexterity[n] = 0.0
+        if outcome == REACHED:
+            rounded_inward(approach.search.best, problem.arm.lower, problem.arm.upper, q)
+            for k in range(7):
+                pairs.joints[n, k] = q[k]
+            pairs.dexterity[n] = measure_at(problem, q)

@@ -1,0 +1,126 @@
+"""Approach as part of a goal: scores of the postures that the arm can leave backwards."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.errors import ArmClassError
+from tcs.kernel.analytic.solver import is_outside
+from tcs.kernel.problem import Problem
+from tcs.model.tasks import TOOL_SPEED
+from tcs.placement.scoring.job import Job
+
+if TYPE_CHECKING:
+    from tcs.kernel.approach.sweep import ApproachLines
+
+SLICE = 256
+"""Reached pairs per slice: tens of milliseconds of work."""
+ENTRY = "approach.pairs.approach_pair"
+"""Function into which the kernel of approaches is compiled, with its module."""
+
+
+def approach_lines(job: Job) -> ApproachLines:
+    """Return the approaches of a job's goals as arrays.
+
+    Raises:
+        RobotError: If a velocity limit is unknown.
+    """
+    # Imported here, as below: scoring without approach does not import this part of the kernel.
+    from tcs.kernel.approach.sweep import ApproachLines
+
+    velocity, _ = job.spec.robot.arm_rates()
+    goals = job.task.goals
+    seconds = np.array([goal.approach.distance / TOOL_SPEED for goal in goals])
+    return ApproachLines(
+        offset=np.array([goal.approach.offset for goal in goals]),
+        fastest=seconds[:, None] * np.array(velocity),
+    )
+
+
+def approach_entry() -> dict[str, Any]:
+    """Return the entry of a file's metadata that records scoring with approach."""
+    return {"approach": {"tool_speed": TOOL_SPEED}}
+
+
+def check_closed_form(problem: Problem) -> None:
+    """Check that the arm has a closed form.
+
+    Raises:
+        ArmClassError: If it has none.
+    """
+    if is_outside(problem.arm):
+        raise ArmClassError(
+            "approaches are scored for arms with a closed form, and this arm has none: score it "
+            "without approach (--no-approach). `tcs plan` finds its approaches."
+        )
+
+
+def warm_up_approaches(problem: Problem, lines: ApproachLines) -> float:
+    """Compile the kernel of approaches or load its machine code; return the time this took [s]."""
+    begun = time.perf_counter()
+    empty = np.empty((0, problem.goal_p.shape[1]))
+    score_with_approach(
+        problem,
+        lines,
+        empty.astype(np.uint8),
+        empty.astype(np.int32),
+        empty.astype(np.float32),
+        np.empty((0, 7), np.float32),
+        jobs=1,
+    )
+    return time.perf_counter() - begun
+
+
+def score_with_approach(
+    problem: Problem,
+    lines: ApproachLines,
+    reason: NDArray[np.uint8],
+    contact: NDArray[np.int32],
+    dexterity: NDArray[np.float32],
+    joints: NDArray[np.float32],
+    *,
+    jobs: int,
+) -> NDArray[np.float32]:
+    """Replace the scores of reached pairs by those of their best approachable postures.
+
+    Args:
+        problem: The scene, its goals and its grid.
+        lines: The approaches of the goals.
+        reason: Reasons, replaced where no posture is approachable, shape (H, G).
+        contact: Contact codes, replaced where the approach is blocked, shape (H, G).
+        dexterity: Replaced where another posture is the best, shape (H, G).
+        joints: Arm joints of the R reached pairs [rad], shape (R, 7).
+        jobs: Number of threads; the scores do not depend on it.
+
+    Returns:
+        Arm joints of the pairs that remain reached [rad].
+    """
+    from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
+
+    pairs = np.argwhere(reason == 0)
+    rows, columns = pairs.T
+
+    def part(start: int) -> ReachedPairs:
+        chosen = slice(start, start + SLICE)
+        at = rows[chosen], columns[chosen]
+        scores = ReachedPairs(
+            pairs[chosen], reason[at], contact[at], dexterity[at],
+            joints[chosen].copy(),
+        )  # fmt: skip
+        score_approaches(problem, lines, scores)
+        return scores
+
+    found = Parallel(n_jobs=jobs, prefer="threads")(
+        delayed(part)(start) for start in range(0, max(len(pairs), 1), SLICE)
+    )
+    scores = ReachedPairs(*map(np.concatenate, zip(*found, strict=True)))
+    reason[rows, columns] = scores.reason
+    contact[rows, columns] = scores.contact
+    dexterity[rows, columns] = scores.dexterity
+    kept: NDArray[np.float32] = scores.joints[scores.reason == 0]
+    return kept

@@ -1,0 +1,151 @@
+"""Approaches of reached pairs: against the plain-loop reference, obstacles and limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from tcs.errors import ArmClassError
+from tcs.kernel.analytic.solver import outside_solver
+from tcs.kernel.approach.sweep import ApproachLines, ReachedPairs, approach_spline, score_approaches
+from tcs.kernel.arrays import SPHERE
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
+from tcs.kernel.verification.reference import link_poses
+from tcs.kernel.verification.reference_motion import least_excess
+from tcs.kernel.verification.reference_pairs import placed_scene
+from tcs.placement.scoring.approaches import check_closed_form
+from tests.kernel.arms import drake_arm
+from tests.kernel.shapes import placed
+from tests.kernel.toy import goal_in_base, scores_of, toy_grid, toy_scene, with_obstacle
+
+GRID = toy_grid()
+BACK = np.array([-0.1, 0.0, 0.0])
+"""From the goal to the begin of the approach, in the tool frame [m]."""
+FEW = slice(0, 40)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return toy_scene(drake_arm("pr2 left").chain, 3, obstacles=12)
+
+
+@pytest.fixture(scope="module")
+def scores(scene):
+    return scores_of(scene, GRID)
+
+
+def lines(scene, *, offset=-BACK, fastest=2.0):
+    goals = scene.goal_p.shape[1]
+    return ApproachLines(np.tile(offset, (goals, 1)), np.full((goals, 7), fastest))
+
+
+def approached(scene, scores, **changes):
+    """Return the first reached pairs, scored with approach."""
+    pairs = np.argwhere(scores.reason == REACHED)[FEW]
+    at = tuple(pairs.T)
+    found = ReachedPairs(
+        pairs, scores.reason[at], scores.contact[at], scores.dexterity[at], scores.joints[at]
+    )
+    score_approaches(build_problem(scene, GRID), lines(scene, **changes), found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def found(scene, scores):
+    return approached(scene, scores)
+
+
+def test_every_outcome_occurs_and_the_best_posture_stays_where_it_is_approachable(scores, found):
+    assert set(found.reason.tolist()) == {REACHED, APPROACH_LIMITS, APPROACH_BLOCKED}
+    at = tuple(found.pair.T)
+    reached = found.reason == REACHED
+    same = np.all(found.joints == scores.joints[at], axis=1)
+    assert 0 < np.sum(same & reached) < reached.sum()
+    np.testing.assert_array_equal(
+        found.dexterity[same & reached], scores.dexterity[at][same & reached]
+    )
+    # The search of scoring refines its best posture to about this much.
+    assert np.all(found.dexterity[reached] <= scores.dexterity[at][reached] + 1e-3)
+    assert not found.dexterity[~reached].any()
+    np.testing.assert_array_equal(found.contact != NO_CONTACT, found.reason == APPROACH_BLOCKED)
+
+
+def test_approaches_are_straight_within_limits_and_free_by_the_reference(scene, found):
+    problem, chain = build_problem(scene, GRID), scene.chain
+    for n in np.flatnonzero(found.reason == REACHED)[:6]:
+        h, g = map(int, found.pair[n])
+        spline = approach_spline(problem, lines(scene), h, g, found.joints[n])
+        assert spline is not None
+        points, tangents = spline
+        np.testing.assert_allclose(points[-1], found.joints[n], atol=1e-5)
+        curve = CubicHermiteSpline(np.linspace(0.0, 1.0, len(points)), points, tangents)
+        R_AG, p_AG = goal_in_base(scene, GRID, h, g)
+        plain = placed_scene(scene, GRID, h, g)[0]
+        for fraction in np.linspace(0.0, 1.0, 40):
+            q = curve(fraction)
+            R, p = link_poses(chain, q)[-1]
+            on_line = p_AG + (1.0 - fraction) * (R_AG @ BACK)
+            assert np.abs(p - on_line).max() < 1e-3
+            assert np.abs(R - R_AG).max() < 1e-3
+            assert np.all((q >= chain.lower - 1e-9) & (q <= chain.upper + 1e-9))
+            assert least_excess(plain, q) > -1e-9
+        assert np.abs(curve.derivative()(np.linspace(0.0, 1.0, 40))).max() < 2.2
+
+
+def test_an_obstacle_on_the_line_alone_blocks_the_approach_and_is_named(scene, scores, found):
+    body = int(scene.environment.body.max()) + 1
+    flipped = 0
+    for n in np.flatnonzero(found.reason == REACHED):
+        h, g = map(int, found.pair[n])
+        s = h // (len(scores.reason) // GRID.environment_states)
+        R_WG, p_WG = scene.goal_R[s, g], scene.goal_p[s, g]
+        # The palm is there when the approach begins, and 10 cm away at the goal.
+        palm = -0.5 * scene.chain.R[7].T @ scene.chain.p[7]
+        centre = p_WG + R_WG @ (BACK * 0.95 + palm)
+        more = with_obstacle(scene, placed(SPHERE, [0.01, 0, 0], p=centre, body=body))
+        again = scores_of(more, GRID)
+        if again.reason[h, g] != REACHED:
+            continue
+        here = ReachedPairs(found.pair[n : n + 1], *(a[h, g : g + 1].copy() for a in again))
+        problem = build_problem(more, GRID)
+        score_approaches(problem, lines(more), here)
+        assert here.reason[0] == APPROACH_BLOCKED
+        bodies = problem.environment_bodies + problem.robot_bodies
+        assert divmod(int(here.contact[0]), bodies) == (5, body)
+        flipped += 1
+        if flipped == 2:
+            return
+    pytest.fail("no goal is free with the obstacle")
+
+
+def test_obstacles_far_away_change_nothing(scene, scores, found):
+    far = with_obstacle(scene, placed(SPHERE, [0.2, 0, 0], p=[9.0, 9.0, 0.5]))
+    for before, after in zip(found, approached(far, scores), strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_limits_end_approaches(scene, scores, found):
+    reached = found.reason == REACHED
+    slow = approached(scene, scores, fastest=0.01)
+    assert np.all(slow.reason[reached] == APPROACH_LIMITS)
+    # Beyond the reach of the arm.
+    long = approached(scene, scores, offset=-10.0 * BACK, fastest=20.0)
+    assert np.sum(long.reason == APPROACH_LIMITS) > np.sum(found.reason == APPROACH_LIMITS)
+    n = int(np.flatnonzero(reached)[0])
+    chain, elbow = scene.chain, float(found.joints[n, 3])
+    lower, upper = chain.lower.copy(), chain.upper.copy()
+    lower[3], upper[3] = elbow - 1e-3, elbow + 1e-3
+    stiff = scene._replace(chain=chain._replace(lower=lower, upper=upper))
+    here = ReachedPairs(*(array[n : n + 1].copy() for array in found))
+    score_approaches(build_problem(stiff, GRID), lines(stiff), here)
+    assert here.reason[0] == APPROACH_LIMITS
+    assert here.contact[0] == NO_CONTACT
+
+
+def test_an_arm_without_a_closed_form_is_refused(scene):
+    problem = build_problem(scene, GRID)
+    with pytest.raises(ArmClassError, match="--no-approach"):
+        check_closed_form(problem._replace(arm=outside_solver(scene.chain)))
