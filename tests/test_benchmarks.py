@@ -59,7 +59,7 @@ def peers(*arguments: str) -> subprocess.CompletedProcess[str]:
     "script",
     [
         *("faults.py", "live.py", "numeric_arms.py", "robots.py", "rows.py", "run.py"),
-        *("constraints.py", "motion.py", "selection.py", "teleop.py"),
+        *("constraints.py", "motion.py", "planning.py", "selection.py", "teleop.py"),
     ],
 )
 def test_each_script_describes_its_usage(module, monkeypatch, capsys, script):

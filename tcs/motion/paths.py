@@ -11,7 +11,7 @@ from tcs.kernel.motion.shortcut import shorten
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
-ITERATIONS = 1500
+ITERATIONS = 1600
 """Greatest number of random postures that the planner grows towards: less than a tenth of a second
 among a hundred shapes."""
 SHORTCUTS = 60

@@ -25,7 +25,9 @@ LOCAL = 0.3
 """Fraction of the random postures that are drawn around a node of the tree that grows: next to a
 narrow passage few others can be reached from it."""
 SPREAD = 3.0
-"""Scale of these: the standard deviation of each joint is half of it [rad]."""
+"""Greatest scale of these: the standard deviation of each joint is half of it [rad]. The scale is
+this times the square of a random number, so that some targets are near enough for a trapped tree.
+"""
 MOST_NODES = 20_000
 """Capacity of each tree."""
 MOST_POINTS = 1024
@@ -162,6 +164,8 @@ def _draw_target(scene: MotionScene, trees: Trees, side: int) -> None:
     """Fill the posture to grow towards: a random one, or one around a random node of the tree."""
     target, q = trees.target[0], trees.q[side]
     local = uniform(trees.random) < LOCAL
+    root = uniform(trees.random)
+    scale = SPREAD * root * root
     n = int(uniform(trees.random) * trees.nodes[side])
     for k in range(7):
         low, high = scene.lower[k], scene.upper[k]
@@ -172,7 +176,7 @@ def _draw_target(scene: MotionScene, trees: Trees, side: int) -> None:
         if local:
             # The sum of three is close to normal, with a standard deviation of 0.5.
             about = first + uniform(trees.random) + uniform(trees.random) - 1.5
-            target[k] = q[n, k] + SPREAD * about
+            target[k] = q[n, k] + scale * about
             if scene.period[k] == 0.0:
                 target[k] = min(max(target[k], low), high)
 

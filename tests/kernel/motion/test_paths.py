@@ -9,12 +9,12 @@ import pytest
 
 from tcs.kernel.arrays import BOX
 from tcs.kernel.motion.connect import connect, new_trees
-from tcs.kernel.motion.edges import certified
+from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.shortcut import shorten
 from tcs.kernel.verification.clutter import arm_base
 from tcs.kernel.verification.reference_motion import straight_curve
 from tests.kernel.arms import drake_arm
-from tests.kernel.motion.toys import HERE, SWING, bare, prepared
+from tests.kernel.motion.toys import HERE, SWING, bare, prepared, within_limits
 from tests.kernel.shapes import placed
 from tests.kernel.toy import toy_grid, with_obstacle
 
@@ -117,6 +117,20 @@ def test_a_path_starts_and_ends_at_the_nearest_of_several_postures(chain):
     assert connect(ready, work, trees, starts, goals, 10) == 2
     assert trees.ends.tolist() == [1, 1]
     np.testing.assert_allclose(trees.path[1], SWING[1], atol=1e-12)
+
+
+def test_an_arm_without_a_closed_form_plans_too(rng):
+    baxter = drake_arm("baxter").chain
+    ready, work, _ = prepared(bare(baxter))
+    drawn = (within_limits(rng, baxter) for _ in range(200))
+    free = (q for q in drawn if posture_contact(ready, work, q) == NO_PAIR)
+    ends = np.array([next(free), next(free)])
+    trees = new_trees(0)
+    count = connect(ready, work, trees, ends[:1], ends[1:], 3000)
+    assert count >= 2
+    np.testing.assert_allclose(trees.path[[0, count - 1]], ends, atol=1e-12)
+    for a, b in itertools.pairwise(trees.path[:count]):
+        assert certified(ready, work, straight_curve(a, b)) == 1.0
 
 
 def test_without_postures_there_is_no_path(chain):

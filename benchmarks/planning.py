@@ -1,0 +1,296 @@
+"""Paths between joint angles of the Panda: time, success and length, beside OMPL's.
+
+Usage: python benchmarks/planning.py [--limit 100] [--compared 4] [--seeds 50] [--seed 0]
+
+The problems are MotionBenchMaker's (`planning_problems`), with the fingers as wide open as the
+robot's. A cylinder becomes the prism of twelve sides around it, of six boxes. A problem is refused
+where start or goal is beyond a joint limit, in contact with itself or an obstacle, or nearer than
+the margins of scoring; the pairs that do so are counted. Both planners use the same shapes: OMPL's
+RRT-Connect calls the posture check of the kernel, at postures at most 0.02 rad apart, and its own
+simplification follows. Times are those of the processor, one core, without preparing the scene.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from planning_problems import Obstacle, Problem, planning_problems
+from scipy.spatial.transform import Rotation
+from table import cell, header, parser, row, save
+
+from tcs.kernel.arrays import BOX, SceneArrays, Shapes
+from tcs.kernel.motion.connect import connect, new_trees
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact, without_idle_pairs
+from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, motion_scene, new_motion_workspace
+from tcs.kernel.motion.shortcut import shorten
+from tcs.kernel.problem import build_problem
+from tcs.model.scene import LoweredScene
+from tcs.motion.paths import SHORTCUTS
+from tcs.placement.scoring import load_job
+
+FloatArray = NDArray[np.float64]
+ROBOT = "panda"
+SIDES = 12
+"""Sides of the prism around a cylinder, an even number."""
+AGAIN = 10.0
+"""Time after which a problem counts as unsolvable [s]."""
+MOST_ITERATIONS = 10_000
+"""Number of random postures to grow towards: scenes without a task may be narrower than those of
+`tcs plan`."""
+OMPL_SECONDS = 30.0
+"""Time that OMPL is given [s]."""
+OMPL_STEP = 0.02
+"""Greatest distance of the postures that OMPL checks [rad]."""
+
+
+def main() -> None:
+    """Plan every problem, and some of them with OMPL."""
+    command_line = parser(__doc__)
+    command_line.add_argument("--limit", type=int, default=100, help="problems of each scene")
+    command_line.add_argument(
+        "--compared", type=int, default=4, help="problems of each scene for OMPL and all seeds"
+    )
+    command_line.add_argument("--seeds", type=int, default=50, help="seeds of the best length")
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
+    header("ompl")
+    row("seed", str(options.seed))
+    bench = Bench()
+    refusals, tallies = Counter[str](), defaultdict[str, list[Found]](list)
+    total = Counter[str]()
+    for problem in planning_problems():
+        if total[problem.scene] == options.limit:
+            continue
+        total[problem.scene] += 1
+        query = bench.query(problem)
+        reason = query.refusal(bench)
+        if reason:
+            refusals[reason] += 1
+            continue
+        compared = len(tallies[problem.scene]) < options.compared
+        tallies[problem.scene].append(
+            query.found(options.seed, options.seeds if compared else 0, compared)
+        )
+    tallies["all"] = [found for scene in list(tallies) for found in tallies[scene]]
+    total["all"] = total.total()
+    for scene, found in tallies.items():
+        report(scene, total[scene], found)
+    for reason, count in refusals.most_common():
+        cell("refused", reason, "problems", str(count))
+        row(f"refused: {reason}", str(count))
+    save(options)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Results of one problem."""
+
+    milliseconds: float
+    length: float
+    """Length of the path [rad], nan if none was found."""
+    solved_again: bool
+    """Whether other random numbers found a path where the first did not."""
+    best: float
+    """Least length of all seeds [rad], nan if they were not tried."""
+    ompl_milliseconds: float
+    ompl_length: float
+    """Results of OMPL, nan where it was not tried or found nothing."""
+
+
+class Bench:
+    """The Panda without an environment."""
+
+    def __init__(self) -> None:
+        """Lower the robot in a scene of one configuration."""
+        job = load_job("feeding", "wheelchair", ROBOT)
+        self.robot = job.spec.robot
+        self.lowered: LoweredScene = job.lowered(job.scene())
+
+    def query(self, problem: Problem) -> Query:
+        """Return a problem, prepared for planning."""
+        arrays = self._arrays(problem.obstacles)
+        grid = self.lowered.grid._replace(
+            environment_states=1, base_x=np.zeros(1), base_y=np.zeros(1), base_yaw=np.zeros(1)
+        )
+        return Query(problem, without_idle_pairs(motion_scene(build_problem(arrays, grid), 0)))
+
+    def _arrays(self, obstacles: tuple[Obstacle, ...]) -> SceneArrays:
+        arrays = self.lowered.arrays
+        R_BA, p_BA = arrays.arm_base_R[0], arrays.arm_base_p[0]
+        boxes = [box for number, one in enumerate(obstacles) for box in _boxes(one, number)]
+        number = len(boxes)
+        R = np.array([R_BA @ R_SO for _, R_SO, _, _ in boxes])
+        p = np.array([R_BA @ p_SO + p_BA for _, _, p_SO, _ in boxes])
+        environment = Shapes(
+            type=np.full(number, BOX, np.int8),
+            size=np.array([size for size, _, _, _ in boxes]),
+            pad=np.zeros(number),
+            body=np.array([body for _, _, _, body in boxes], np.int16),
+            frame=np.zeros(number, np.int8),
+            R=R[None],
+            p=p[None],
+        )
+        return arrays._replace(
+            environment=environment,
+            arm_vs_environment=np.ones((len(arrays.arm.type), number), np.bool_),
+            body_vs_environment=np.zeros((len(arrays.body.type), number), np.bool_),
+            goal_R=arrays.goal_R[:1],
+            goal_p=arrays.goal_p[:1],
+        )
+
+
+def _boxes(
+    obstacle: Obstacle, number: int
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, int]]:
+    """Yield the boxes of an obstacle."""
+    if obstacle.kind == "box":
+        yield np.array(obstacle.size) / 2.0, obstacle.R_SO, obstacle.p_SoOo_S, number
+        return
+    length, radius = obstacle.size
+    half = np.array([radius, radius * np.tan(np.pi / SIDES), length / 2.0])
+    for side in range(SIDES // 2):
+        turned = Rotation.from_euler("z", 2.0 * np.pi * side / SIDES).as_matrix()
+        yield half, obstacle.R_SO @ turned, obstacle.p_SoOo_S, number
+
+
+class Query:
+    """One problem, prepared."""
+
+    def __init__(self, problem: Problem, scene: MotionScene) -> None:
+        """Take memory for a planner."""
+        self.problem, self.scene = problem, scene
+        self.work: MotionWorkspace = new_motion_workspace(scene)
+
+    def refusal(self, bench: Bench) -> str:
+        """Return what excludes start or goal, "" if nothing does."""
+        scene = self.scene
+        for end in (self.problem.start, self.problem.goal):
+            if np.any(end < scene.lower) or np.any(end > scene.upper):
+                beyond = np.flatnonzero((end < scene.lower) | (end > scene.upper))
+                return f"range of {bench.robot.arm_joints[beyond[0]]}"
+            pair = posture_contact(scene, self.work, end)
+            if pair != NO_PAIR:
+                return " / ".join(self._body(bench, int(i)) for i in scene.pair[pair, :2])
+        return ""
+
+    def _body(self, bench: Bench, shape: int) -> str:
+        """Return the name of the body of a shape."""
+        number, obstacles = int(self.scene.body[shape]), self._environment_bodies
+        return "obstacle" if number < obstacles else bench.lowered.robot_bodies[number - obstacles]
+
+    @property
+    def _environment_bodies(self) -> int:
+        return len(self.problem.obstacles)
+
+    def found(self, seed: int, seeds: int, with_ompl: bool) -> Found:
+        """Return the results of one seed, the best of several, and OMPL's."""
+        begun = time.process_time()
+        length = self.planned(seed)
+        milliseconds = 1e3 * (time.process_time() - begun)
+        again, begun = not np.isfinite(length), time.process_time()
+        solved, other = False, seed
+        while again and not solved and time.process_time() - begun < AGAIN:
+            other += 1
+            solved = bool(np.isfinite(self.planned(other)))
+        best = min((self.planned(one) for one in range(seed, seed + seeds)), default=np.nan)
+        ompl = self.ompl_planned(seed) if with_ompl else (np.nan, np.nan)
+        return Found(milliseconds, length, solved, best, *ompl)
+
+    def planned(self, seed: int) -> float:
+        """Return the length of a path [rad], inf if none was found."""
+        trees = new_trees(seed)
+        ends = self.problem.start[None], self.problem.goal[None]
+        count = connect(self.scene, self.work, trees, *ends, MOST_ITERATIONS)
+        if count == 0:
+            return np.inf
+        count = shorten(self.scene, self.work, trees, count, SHORTCUTS)
+        return _length(trees.path[:count])
+
+    def ompl_planned(self, seed: int) -> tuple[float, float]:
+        """Return time [ms] and length [rad] of OMPL's RRT-Connect, inf if it finds no path."""
+        import ompl.base
+        import ompl.geometric
+        import ompl.util
+
+        ompl.util.noOutputHandler()
+        ompl.util.RNG.setSeed(seed + 1)
+        space = ompl.base.RealVectorStateSpace(7)
+        bounds = ompl.base.RealVectorBounds(7)
+        for k in range(7):
+            bounds.setLow(k, float(self.scene.lower[k]))
+            bounds.setHigh(k, float(self.scene.upper[k]))
+        space.setBounds(bounds)
+        setup = ompl.geometric.SimpleSetup(space)
+        q = np.empty(7)
+
+        def is_valid(state: object) -> bool:
+            for k in range(7):
+                q[k] = state[k]  # type: ignore[index]
+            return posture_contact(self.scene, self.work, q) == NO_PAIR
+
+        setup.setStateValidityChecker(is_valid)
+        information = setup.getSpaceInformation()
+        information.setStateValidityCheckingResolution(OMPL_STEP / space.getMaximumExtent())
+        setup.setPlanner(ompl.geometric.RRTConnect(information))
+        start, goal = space.allocState(), space.allocState()
+        for k in range(7):
+            start[k], goal[k] = float(self.problem.start[k]), float(self.problem.goal[k])
+        setup.setStartAndGoalStates(start, goal)
+        begun = time.process_time()
+        solved = setup.solve(OMPL_SECONDS)
+        if not solved or not setup.haveExactSolutionPath():
+            return np.inf, np.inf
+        setup.simplifySolution(OMPL_SECONDS)
+        milliseconds = 1e3 * (time.process_time() - begun)
+        path = setup.getSolutionPath()
+        states = [path.getState(n) for n in range(path.getStateCount())]
+        return milliseconds, _length(np.array([[state[k] for k in range(7)] for state in states]))
+
+
+def _length(path: FloatArray) -> float:
+    """Return the length of a path [rad, norm of the joints]."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def report(scene: str, problems: int, found: list[Found]) -> None:
+    """Print and record the results of one scene."""
+    solved = [one for one in found if np.isfinite(one.length)]
+    solvable = len(solved) + sum(one.solved_again for one in found)
+    times = np.quantile([one.milliseconds for one in found], [0.5, 0.95, 1.0])
+    cells = {
+        "not refused": f"{len(found)} of {problems}",
+        "solved, of those solvable": f"{len(solved)} of {solvable}",
+        "median [ms]": f"{times[0]:.1f}",
+        "p95 [ms]": f"{times[1]:.0f}",
+        "slowest [ms]": f"{times[2]:.0f}",
+        "median length [rad]": f"{np.median([one.length for one in solved]):.2f}",
+    }
+    compared = [one for one in solved if np.isfinite(one.best) and np.isfinite(one.ompl_length)]
+    for column, text in cells.items():
+        cell("problems", scene, column, text)
+    row(scene, ", ".join(f"{column} {text}" for column, text in cells.items()))
+    if not compared:
+        return
+    ratios = [one.length / one.best for one in compared]
+    longer = [one.length / one.ompl_length for one in compared]
+    slower = np.median([one.ompl_milliseconds for one in compared])
+    own = np.median([one.milliseconds for one in compared])
+    peers = {
+        "problems": str(len(compared)),
+        "length / best of the seeds": f"{np.median(ratios):.2f}",
+        "length / OMPL's": f"{np.median(longer):.2f}",
+        "median [ms]": f"{own:.0f}",
+        "OMPL, median [ms]": f"{slower:.0f}",
+    }
+    for column, text in peers.items():
+        cell("compared", scene, column, text)
+    row(f"{scene}, compared", ", ".join(f"{column} {text}" for column, text in peers.items()))
+
+
+if __name__ == "__main__":
+    main()
