@@ -30,7 +30,6 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/bathing-bed-pr2.tcs"),
         *("--places", "60", "--drake", "10"),
     ),
-    "planning": (),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),
