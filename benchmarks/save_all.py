@@ -30,6 +30,7 @@ PARTS: dict[str, tuple[str, ...]] = {
         *(f"{SCORES}/shaving-wheelchair-pr2.tcs", f"{SCORES}/bathing-bed-pr2.tcs"),
         *("--places", "60", "--drake", "10"),
     ),
+    "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),
