@@ -31,6 +31,16 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--places", "60", "--drake", "10"),
     ),
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
+    "motions": tuple(
+        f"{SCORES}/{name}-pr2.tcs"
+        for name in (
+            *("shaving-wheelchair", "feeding-wheelchair", "brushing-wheelchair"),
+            *("shaving-bed", "shaving-bed-no-wall", "bathing-bed", "scratching_chest-bed"),
+            *("scratching_forearm_left-bed", "scratching_forearm_right-bed"),
+            *("scratching_upper_arm_left-bed", "scratching_upper_arm_right-bed"),
+            *("scratching_thigh_left-bed", "scratching_thigh_right-bed"),
+        )
+    ),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),

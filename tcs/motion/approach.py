@@ -113,7 +113,7 @@ class _Search:
         begin = self.p_AG - self.R_AG @ goal.approach.offset if forwards else self.p_AG
         line = goal.approach if forwards else goal.approach.reverse()
         for q in postures_at(stop.problem, self.R_AG, begin, samples):
-            pair = posture_contact(stop.motion, stop.work, q)
+            pair = posture_contact(stop.lines, stop.line_work, q)
             if pair != NO_PAIR:
                 if not forwards:
                     self.at_goal[pair] = self.at_goal.get(pair, 0) + 1
@@ -138,8 +138,8 @@ class _Search:
         pieces = max(2, int(np.ceil(line.distance / SPACING)))
         points, tangents = np.empty((pieces + 1, 7)), np.empty((pieces + 1, 7))
         outcome = straight_motion(
-            self.stop.motion,
-            self.stop.work,
+            self.stop.lines,
+            self.stop.line_work,
             self.line,
             q,
             np.ascontiguousarray(self.R_AG @ line.offset),
@@ -155,12 +155,12 @@ class _Search:
     def nothing(self) -> Accesses:
         """Return why nothing was found."""
         if self.outcomes[BLOCKED]:
-            return Accesses((), "approach_blocked", self.stop.most_frequent_contact())
+            return Accesses((), "approach_blocked", self.stop.most_frequent_on_lines())
         if self.outcomes[LIMITS]:
             return Accesses((), "approach_limits", None)
         counts: dict[BodyPair, int] = {}
         for pair, count in self.at_goal.items():
-            names = self.stop.bodies(pair)
+            names = self.stop.bodies(self.stop.lines, pair)
             counts[names] = counts.get(names, 0) + count
         most = max(counts, key=lambda names: counts[names], default=None)
         return Accesses((), "unreached", most)

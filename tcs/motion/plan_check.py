@@ -13,7 +13,7 @@ from tcs.errors import StoreFormatError
 from tcs.model.scene import goal_poses
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
 from tcs.motion.plans import value_of
-from tcs.motion.recheck import false_pieces
+from tcs.motion.recheck import StopCheck
 from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import rebuild_made_from
@@ -82,10 +82,11 @@ def check_plan(
     error = velocity = acceleration = 0.0
     for planned in plan.stops:
         stop = stop_of(plan, planned, job, scene)
+        check = StopCheck(stop)
         jumps += _jumps(planned, stop)
         for segment in planned.segments:
             edges += segment.edges
-            false += sum(false_pieces(scene, stop.motion, curve) for curve in segment.curves)
+            false += check.false_pieces(segment)
             if segment.type == "approach":
                 goals += 1
                 error = max(error, _position_error(segment, stop))

@@ -12,7 +12,7 @@ from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.cache import is_compiled
 from tcs.model.grid import InitialConfiguration
 from tcs.motion.motion_plan import GoalResult, MotionPlan
-from tcs.motion.recheck import false_pieces
+from tcs.motion.recheck import StopCheck
 from tcs.motion.stop_tour import ORDERS, plan_stop
 from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
@@ -84,10 +84,9 @@ def plan(
         planned, found = plan_stop(stop, h, number, goals, order)
         results |= {result.goal: result for result in found}
         stops.append(planned)
-        for segment in planned.segments:
-            for curve in segment.curves:
-                edges += curve.pieces
-                false += false_pieces(scene, stop.motion, curve)
+        check = StopCheck(stop)
+        edges += sum(segment.edges for segment in planned.segments)
+        false += sum(check.false_pieces(segment) for segment in planned.segments)
         if on_progress is not None:
             on_progress(number + 1, len(places))
     return MotionPlan(

@@ -10,6 +10,9 @@ from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.scene import MotionScene
 from tcs.model.scene import Scene
 from tcs.motion.curves import Curve
+from tcs.motion.keep_out import scene_with_keep_out
+from tcs.motion.motion_plan import Segment
+from tcs.motion.stops import Stop
 
 LARGEST_STEP = 0.001
 """Greatest motion of any point of the arm between two checked postures [m]."""
@@ -18,6 +21,23 @@ CLEARANCE_ROUNDING = 2e-6
 1e-6 m."""
 COARSE = 24
 """Parts of a piece of which the motion of the arm is measured."""
+
+
+class StopCheck:
+    """The re-check of the motions of one stop, whose live scenes it sets up."""
+
+    def __init__(self, stop: Stop) -> None:
+        """Take the stop to which the live scene is set."""
+        self.stop = stop
+        self.walled = stop.scene
+        """The scene for paths, with the boxes that they keep out of."""
+        if stop.job.task.keep_out:
+            self.walled = scene_with_keep_out(stop.job, stop.scene)
+
+    def false_pieces(self, segment: Segment) -> int:
+        """Return how many pieces of a segment Drake refutes."""
+        scene = self.walled if segment.type == "move" else self.stop.scene
+        return sum(false_pieces(scene, self.stop.motion, curve) for curve in segment.curves)
 
 
 def false_pieces(scene: Scene, motion: MotionScene, curve: Curve) -> int:

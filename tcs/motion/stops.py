@@ -20,6 +20,7 @@ from tcs.kernel.motion.scene import (
 from tcs.kernel.problem import Problem, build_problem
 from tcs.model.grid import Axis, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, lower
+from tcs.motion.keep_out import with_keep_out
 from tcs.placement.scoring.job import Job
 
 BodyPair = tuple[str, str]
@@ -37,6 +38,9 @@ class StopGrid:
     lowered: LoweredScene
     """Scene and configurations as arrays."""
     problem: Problem
+    walled: LoweredScene
+    """The same with the boxes that paths keep out of; the same object if there are none."""
+    walled_problem: Problem
     rest: FloatArray
     """Rest posture of the arm [rad], shape (7,)."""
     velocity: FloatArray
@@ -58,12 +62,19 @@ class StopGrid:
             RobotError: If a velocity limit is unknown.
         """
         velocity, acceleration = job.spec.robot.arm_rates()
+        problem = build_problem(lowered.arrays, lowered.grid)
+        walled, walled_problem = lowered, problem
+        if job.task.keep_out:
+            walled = with_keep_out(lowered, job.task)
+            walled_problem = build_problem(walled.arrays, walled.grid)
         return cls(
             job=job,
             scene=scene,
             configurations=grid,
             lowered=lowered,
-            problem=build_problem(lowered.arrays, lowered.grid),
+            problem=problem,
+            walled=walled,
+            walled_problem=walled_problem,
             rest=np.array(job.spec.robot.arm_rest()),
             velocity=np.array(velocity),
             acceleration=np.array(acceleration),
@@ -76,9 +87,13 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        motion = without_idle_pairs(motion_scene(self.problem, configuration))
-        work = new_motion_workspace(motion)
-        return Stop(self, configuration, motion, work, trees)
+        lines = without_idle_pairs(motion_scene(self.problem, configuration))
+        line_work = new_motion_workspace(lines)
+        motion, work = lines, line_work
+        if self.walled_problem is not self.problem:
+            motion = without_idle_pairs(motion_scene(self.walled_problem, configuration))
+            work = new_motion_workspace(motion)
+        return Stop(self, configuration, motion, work, lines, line_work, trees)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +104,11 @@ class Stop:
     number: int
     """Flat index of the configuration in `grid`."""
     motion: MotionScene
+    """The scene of paths, with the boxes that they keep out of."""
     work: MotionWorkspace
+    lines: MotionScene
+    """The scene of straight motions to and from goals."""
+    line_work: MotionWorkspace
     trees: Trees
 
     @classmethod
@@ -203,29 +222,34 @@ class Stop:
     def contact_at(self, q: FloatArray) -> BodyPair | None:
         """Return two bodies in contact at joint angles q, None if nothing touches."""
         pair = posture_contact(self.motion, self.work, q)
-        return None if pair == NO_PAIR else self.bodies(pair)
+        return None if pair == NO_PAIR else self.bodies(self.motion, pair)
 
-    def bodies(self, pair: int) -> BodyPair:
-        """Return the names of the bodies of a pair of shapes."""
-        first, second = (self._body(int(self.motion.body[i])) for i in self.motion.pair[pair, :2])
+    def bodies(self, motion: MotionScene, pair: int) -> BodyPair:
+        """Return the names of the bodies of a pair of shapes of one of the two scenes."""
+        walled = motion is self.motion
+        lowered = self.grid.walled if walled else self.grid.lowered
+        # Robot bodies are numbered after those of the environment.
+        names = (*lowered.environment_bodies, *lowered.robot_bodies)
+        first, second = (names[int(motion.body[i])] for i in motion.pair[pair, :2])
         return first, second
 
-    def _body(self, number: int) -> str:
-        environment = self.problem.environment_bodies
-        if number < environment:
-            return self.grid.lowered.environment_bodies[number]
-        return self.grid.lowered.robot_bodies[number - environment]
-
     def forget_contacts(self) -> None:
-        """Start counting anew which pairs block edges."""
-        self.work.hits[:] = 0
+        """Start counting anew which pairs block edges and straight motions."""
+        self.work.hits[:] = self.line_work.hits[:] = 0
 
     def most_frequent_contact(self) -> BodyPair | None:
         """Return the pair of bodies that blocked most edges since `forget_contacts`."""
+        return self._most_frequent(self.motion, self.work)
+
+    def most_frequent_on_lines(self) -> BodyPair | None:
+        """Return the pair of bodies that blocked most straight motions since `forget_contacts`."""
+        return self._most_frequent(self.lines, self.line_work)
+
+    def _most_frequent(self, motion: MotionScene, work: MotionWorkspace) -> BodyPair | None:
         counts: dict[BodyPair, int] = {}
-        for pair in np.flatnonzero(self.work.hits):
-            names = self.bodies(int(pair))
-            counts[names] = counts.get(names, 0) + int(self.work.hits[pair])
+        for pair in np.flatnonzero(work.hits):
+            names = self.bodies(motion, int(pair))
+            counts[names] = counts.get(names, 0) + int(work.hits[pair])
         return max(counts, key=lambda names: counts[names], default=None)
 
     def rest_contact(self) -> BodyPair | None:

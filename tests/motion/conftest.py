@@ -9,8 +9,17 @@ from typer.testing import CliRunner
 import tcs
 from tcs.cli.app import app
 from tcs.files.paths import data_folder
+from tcs.motion import recheck
 
 CONFIGURATION = ("base_x = 1.1 m", "base_y = 0.7 m", "base_yaw = 180 deg", "torso = 0.3 m")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _coarse_recheck():
+    """Postures of Drake's re-check are a centimetre apart, as one takes it ten milliseconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recheck, "LARGEST_STEP", 0.01)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles
-from tcs.model.tasks.task import DEFAULT_APPROACH, Goal, Task, ToolLine
+from tcs.model.tasks.task import DEFAULT_APPROACH, Goal, KeepOut, Task, ToolLine
 
 TASKS = DataFiles("task", "tasks/*/*.yaml")
 
@@ -39,6 +39,14 @@ class GoalEntry(_Entry):
     retreat: LineEntry | None = None
 
 
+class KeepOutEntry(_Entry):
+    """A box in a body frame: centre and full sizes [m]."""
+
+    body_frame: str
+    position: list[float]
+    box: list[float]
+
+
 class AxisEntry(_Entry):
     """Changes of a task to one axis of an environment's grid."""
 
@@ -58,6 +66,7 @@ class TaskFile(_Entry):
     tool: str = ""
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
+    keep_out: list[KeepOutEntry] = Field(default_factory=list)
     allowed_contacts: list[list[str]] = Field(default_factory=list)
     grids: dict[str, dict[str, AxisEntry]] = Field(default_factory=dict)
 
@@ -107,6 +116,7 @@ def _read(path: Path) -> Task:
             source=written.source,
             tool=written.tool,
             allowed_contacts=tuple((pair[0], pair[1]) for pair in written.allowed_contacts),
+            keep_out=tuple(_keep_out(i, entry) for i, entry in enumerate(written.keep_out)),
             grids={
                 environment: {
                     axis: entry.model_dump(exclude_none=True) for axis, entry in axes.items()
@@ -134,6 +144,18 @@ def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
         approach=approach,
         retreat=retreat,
     )
+
+
+def _keep_out(number: int, entry: KeepOutEntry) -> KeepOut:
+    """Return a box that paths keep out of."""
+    for name in ("position", "box"):
+        if len(getattr(entry, name)) != 3:
+            raise TaskError(f"field 'keep_out[{number}].{name}' must be [x, y, z].")
+    (x, y, z), (length, width, height) = entry.position, entry.box
+    try:
+        return KeepOut(entry.body_frame, (x, y, z), (length, width, height))
+    except TaskError as error:
+        raise TaskError(f"field 'keep_out[{number}]': {error}") from None
 
 
 def _line(entry: LineEntry | None, field: str) -> ToolLine | None:

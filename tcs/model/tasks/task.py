@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TaskError, UnknownNameError
-from tcs.files.quantities import GOALS, WEIGHT
+from tcs.files.quantities import GOALS, SIZE, WEIGHT
 
 UNIT_TOLERANCE = 1e-5
 """Tolerance of a quaternion's length: six printed digits round by less than this."""
@@ -77,6 +77,34 @@ class ToolLine:
 TOOL_SPEED = 0.1
 """Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
 width in a second, slow enough for a person to turn away."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeepOut:
+    """A box fixed to a body frame H that the arm enters on straight motions to a goal alone."""
+
+    body_frame: str
+    """Name of frame H, that of a goal, e.g. "head"."""
+    position: tuple[float, float, float]
+    """p_HoKo_H: centre of the box in H [m]."""
+    box: tuple[float, float, float]
+    """Full sizes along the axes of H [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            TaskError: If a value is not finite, or a size is out of its physical range.
+        """
+        if not self.body_frame:
+            raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
+        position = _finite("position", self.position, ("x", "y", "z"))
+        if math.hypot(*position) > MAX_DISTANCE:
+            raise TaskError(f"field 'position' is beyond {MAX_DISTANCE:g} m. Write metres.")
+        for size in _finite("box", self.box, ("x", "y", "z")):
+            SIZE.check(float(size), "field 'box'", TaskError)
+
+
 DEFAULT_APPROACH = ToolLine((1.0, 0.0, 0.0), 0.1)
 """Straight out of the fingers: a gripper is narrowest seen from there. 10 cm is the depth of a hand
 beyond its fingers, which then clears what the tool touches before the arm swings to the side."""
@@ -166,6 +194,8 @@ class Task:
     """Description of the tool frame that the goals refer to."""
     allowed_contacts: tuple[tuple[str, str], ...] = ()
     """Pairs (robot body, environment body) that may touch."""
+    keep_out: tuple[KeepOut, ...] = ()
+    """Virtual walls: boxes that paths of the arm keep out of; scoring does not know them."""
     grids: Mapping[str, Mapping[str, Mapping[str, object]]] = field(
         default_factory=dict, hash=False
     )
@@ -187,6 +217,12 @@ class Task:
         for name in self.environments:
             if self.environments.count(name) > 1:
                 raise TaskError(f"field 'environments': '{name}' is repeated. Remove one of them.")
+        frames = {goal.body_frame for goal in self.goals}
+        for one in self.keep_out:
+            if one.body_frame not in frames:
+                raise UnknownNameError(
+                    "frame", one.body_frame, frames, where="field 'keep_out', frames of the goals"
+                )
         for name in self.grids:
             if name not in self.environments:
                 raise UnknownNameError(

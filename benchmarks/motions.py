@@ -1,0 +1,92 @@
+"""Reached goals that have no motion, and the best sets that can be executed, for each row.
+
+Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--jobs 2] [--seed 0]
+
+All pairs of configuration and goal that a score file reaches in its nominal table are examined:
+from rest to the approach, straight in, out and back. Processor times are those of the whole
+process.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from table import cell, header, parser, row, save
+
+import tcs
+from tcs.model.grid import Grid
+from tcs.motion.examine import examination
+from tcs.placement.selection import Executability
+
+WEIGHTS = tcs.UtilityWeights(travel=0.0, places=0.0, environment=0.0)
+"""Sets are compared by P_R + P_M alone."""
+
+
+def main() -> int:
+    """Examine every file."""
+    command_line = parser(__doc__)
+    command_line.add_argument("files", nargs="+", type=Path)
+    command_line.add_argument("--most", type=int, help="configurations, those of the best sets")
+    command_line.add_argument("--jobs", type=int, default=2)
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
+    header()
+    pairs = done = 0
+    for path in options.files:
+        file = tcs.load(path)
+        motions = tcs.examine(
+            file, within=None, most=options.most, seed=options.seed, jobs=options.jobs
+        )
+        found = examination(file, motions, file.nominal_index)
+        pairs, done = pairs + found["pairs"], done + found["done"]
+        report(path.stem, found)
+        report_sets(path.stem, file, motions)
+    share = f"{1.0 - done / pairs:.1%}"
+    row("all rows", f"{share} of {pairs:,} reached pairs without a motion")
+    cell("pairs", "all rows", "reached", f"{pairs:,}")
+    cell("pairs", "all rows", "no motion", share)
+    save(options)
+    return 0
+
+
+def report(name: str, found: dict) -> None:
+    """Print and record which pairs can be done."""
+    pairs, reasons = found["pairs"], found["not_done"]
+    cells = {
+        "reached": f"{pairs:,}",
+        "no motion": f"{found['fraction_not_done']:.1%}",
+        "rest in contact": f"{reasons['rest_blocked'] / pairs:.1%}",
+        "approach at limits": f"{reasons['approach_limits'] / pairs:.1%}",
+        "approach blocked": f"{(reasons['approach_blocked'] + reasons['unreached']) / pairs:.1%}",
+        "no path": f"{reasons['no_path'] / pairs:.1%}",
+        "processor time [s]": f"{found['processor_seconds']:.0f}",
+    }
+    for column, text in cells.items():
+        cell("pairs", name, column, text)
+    row(name, ", ".join(f"{column} {text}" for column, text in cells.items()))
+
+
+def report_sets(name: str, file: tcs.ScoreFile, motions: object) -> None:
+    """Print and record the best set by postures, and the best one that can be executed."""
+    sets = file.nominal.sets
+    here = Grid.from_dict(file.grid).configuration(sets.best[0])
+    settings = file.observed_states[file.nominal_index]
+    best = tcs.select(file, here, weights=WEIGHTS, observed=settings)
+    chosen = tcs.select(file, here, weights=WEIGHTS, observed=settings, motions=motions)
+    compared = Executability.of(file, motions, chosen, best)
+    cells = {
+        "P_R": f"{best.reachability:.3f}",
+        "P_M": f"{best.manipulability:.3f}",
+        "P_R with motions": f"{compared.reachability_done:.3f}",
+        "P_R, executable set": f"{chosen.reachability:.3f}",
+        "P_M, executable set": f"{chosen.manipulability:.3f}",
+        "stops": f"{len(best.members)}, {len(chosen.members)}",
+    }
+    for column, text in cells.items():
+        cell("sets", name, column, text)
+    row(name, ", ".join(f"{column} {text}" for column, text in cells.items()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
