@@ -157,6 +157,7 @@ COMMANDS = (
     Command("arplace merge", ("map.apm",)),
     Command("arplace show", ("model.arp",)),
     Command("plan", ("scores.tcs",)),
+    Command("motions", ("scores.tcs",), ("--most", "2", "--jobs", "1")),
     Command("locate", (), ("--table-at", "1.2", "0.3", "10", "--scans", "2")),
     Command("study new", ("out",)),
     Command("study record", ("study",), _WINDOW),

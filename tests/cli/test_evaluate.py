@@ -129,9 +129,9 @@ def test_robustify_writes_estimates_that_select_weighs(tcs_command, stored, tmp_
     expected = success_summary(made)
     assert ran.json == {"file": str(out), **expected}
     here = ("--here", 1.4, -1.2, 180)
-    choice = tcs_command("select", out, *here, "--delta", 100, "--json").json
+    choice = tcs_command("select", out, *here, "--delta", 10_000, "--json").json
     assert choice["success_ci95"][0] == made.nominal.success.low.max()
-    assert "under error" in tcs_command("select", out, *here, "--delta", 100).out
+    assert "under error" in tcs_command("select", out, *here, "--delta", 10_000).out
     assert tcs.load(stored).nominal.success is None
     robust = tcs_command("evaluate", out, "--select", "robust", "--samples", 5, "--json").json
     best = expected["tables"][0]["best"][-1]["members"]

@@ -11,7 +11,7 @@ from tcs.cli.app import app
 from tcs.files.paths import data_folder
 from tcs.motion import recheck
 
-CONFIGURATION = ("base_x = 1.1 m", "base_y = 0.7 m", "base_yaw = 180 deg", "torso = 0.3 m")
+CONFIGURATION = ("base_x = 0.6 m", "base_y = -0.9 m", "base_yaw = 45 deg", "torso = 0.3 m")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -24,10 +24,10 @@ def _coarse_recheck():
 
 @pytest.fixture(scope="session")
 def two_goals(tmp_path_factory):
-    """Path of a score file with goals 0 and 2 of shaving at one configuration."""
+    """Path of a score file with goals 5 and 6 of shaving at one configuration."""
     folder = tmp_path_factory.mktemp("motion")
     task = yaml.safe_load((data_folder() / "tasks" / "adl" / "shaving.yaml").read_text())
-    task["goals"] = [task["goals"][0], task["goals"][2]]
+    task["goals"] = [task["goals"][5], task["goals"][6]]
     path = folder / "shaving.yaml"
     path.write_text(yaml.safe_dump(task))
     scored = folder / "two_goals.tcs"

@@ -41,7 +41,7 @@ def test_the_command_writes_beside_the_file_and_select_counts_only_what_can_be_d
     assert one["done"] == [0]
     assert one["not_done"] == [{"goal": 1, "reason": "approach_limits", "pair": None}]
     chosen = json.loads(
-        run("select", two_goals, "--here", 1.1, 0.7, 180, "--executable", "--json").stdout
+        run("select", two_goals, "--here", 0.6, -0.9, 45, "--executable", "--json").stdout
     )
     assert chosen["reachability"] == 0.5
     found = chosen["executable"]
@@ -49,7 +49,7 @@ def test_the_command_writes_beside_the_file_and_select_counts_only_what_can_be_d
     assert found["by_postures"]["reachability"] == 1.0
     assert found["by_postures"]["reachability_done"] == 0.5
     assert found["costs"]["reachability"] == 0.5
-    text = run("select", two_goals, "--here", 1.1, 0.7, 180, "--executable").stdout
+    text = run("select", two_goals, "--here", 0.6, -0.9, 45, "--executable").stdout
     assert "goals with motions: 0" in text
     assert "1 of 2 reached pairs can be done" in run("motions", two_goals, "--jobs", 1).stdout
 

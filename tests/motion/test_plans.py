@@ -31,7 +31,9 @@ def test_the_arm_goes_from_rest_straight_in_and_out_and_back(planned, stop):
     assert [segment.type for segment in segments] == ["move", "approach", "retreat", "move"]
     assert [(s.start, s.end) for s in segments] == [(None, 0), (0, 0), (0, 0), (0, None)]
     np.testing.assert_array_equal(segments[0].timing.positions[0], stop.rest)
-    np.testing.assert_allclose(segments[-1].timing.positions[-1], stop.rest, atol=1e-9)
+    # A joint without limits may have taken a full turn.
+    turned = segments[-1].timing.positions[-1] - stop.rest
+    np.testing.assert_allclose(np.sin(0.5 * turned), 0.0, atol=1e-9)
     for before, after in itertools.pairwise(segments):
         np.testing.assert_allclose(
             before.timing.positions[-1], after.timing.positions[0], atol=1e-12

@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver
-from tcs.kernel.approach.grid import PIECES, Grid
+from tcs.kernel.approach.grid import PIECES, LineGrid
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import Workspace
@@ -81,7 +81,7 @@ def follow_path(
     arm: ArmSolver,
     scene: MotionScene,
     motion: MotionWorkspace,
-    grid: Grid,
+    grid: LineGrid,
     curve: CurveWorkspace,
     b: int,
     offset: FloatArray,
@@ -132,7 +132,7 @@ def follow_path(
 def _fill_points(
     arm: ArmSolver,
     scene: MotionScene,
-    grid: Grid,
+    grid: LineGrid,
     curve: CurveWorkspace,
     b: int,
     offset: FloatArray,

@@ -30,7 +30,7 @@ NOWHERE = -1
 TWO = int_constant(2)
 
 
-class Grid(NamedTuple):
+class LineGrid(NamedTuple):
     """Nodes of the search of one pair, reused from pair to pair."""
 
     goal: FloatArray
@@ -52,9 +52,9 @@ class Grid(NamedTuple):
     """Free joint at each level of the current path [rad], shape (PIECES + 1,)."""
 
 
-def new_grid() -> Grid:
+def new_grid() -> LineGrid:
     """Return memory for one worker."""
-    return Grid(
+    return LineGrid(
         np.empty((PIECES + 1, 4, 3)),
         np.empty(3),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
@@ -67,7 +67,7 @@ def new_grid() -> Grid:
 
 
 @inner
-def place_levels(arm: ArmSolver, work: Workspace, offset: FloatArray, grid: Grid) -> None:
+def place_levels(arm: ArmSolver, work: Workspace, offset: FloatArray, grid: LineGrid) -> None:
     """Fill the tool's poses at each level.
 
     Args:
@@ -83,7 +83,7 @@ def place_levels(arm: ArmSolver, work: Workspace, offset: FloatArray, grid: Grid
 
 
 @inner
-def place_columns(arm: ArmSolver, grid: Grid, through: float) -> int:
+def place_columns(arm: ArmSolver, grid: LineGrid, through: float) -> int:
     """Choose the angles of the free joint, one of them `through` [rad]; return their number."""
     low, high = arm.lower[arm.free], arm.upper[arm.free]
     if not high - low < 2.0 * np.pi:
@@ -98,7 +98,7 @@ def place_columns(arm: ArmSolver, grid: Grid, through: float) -> int:
 def open_levels(
     arm: ArmSolver,
     search: Search,
-    grid: Grid,
+    grid: LineGrid,
     b: int,
     columns: int,
     most: int,
@@ -149,7 +149,7 @@ def open_levels(
 
 
 @inner
-def find_onward(grid: Grid, b: int, columns: int, most: int) -> None:
+def find_onward(grid: LineGrid, b: int, columns: int, most: int) -> None:
     """Fill `onward` of one branch from the open nodes."""
     for i in range(columns):
         grid.onward[b, PIECES, i] = i if grid.is_open[b, PIECES, i] else NOWHERE
@@ -176,7 +176,7 @@ def find_onward(grid: Grid, b: int, columns: int, most: int) -> None:
 
 
 @inner
-def take_path(grid: Grid, b: int, column: int) -> None:
+def take_path(grid: LineGrid, b: int, column: int) -> None:
     """Fill `path` with the angles of the free joint from a column at the goal on."""
     for level in range(PIECES + 1):
         grid.path[level] = grid.origin[0] + column * grid.origin[1]
@@ -184,7 +184,7 @@ def take_path(grid: Grid, b: int, column: int) -> None:
 
 
 @inner
-def column_at(grid: Grid, b: int, column: int, level: int) -> int:
+def column_at(grid: LineGrid, b: int, column: int, level: int) -> int:
     """Return the column of the path from a column at the goal, at a level."""
     for k in range(level):
         column = grid.onward[b, k, column]

@@ -13,7 +13,7 @@ from tcs.kernel.approach.curve import CurveWorkspace, follow_path, new_curve, pl
 from tcs.kernel.approach.grid import (
     NOWHERE,
     PIECES,
-    Grid,
+    LineGrid,
     column_at,
     find_onward,
     new_grid,
@@ -57,7 +57,7 @@ class Approach(NamedTuple):
 
     work: Workspace
     search: Search
-    grid: Grid
+    grid: LineGrid
     scene: MotionScene
     motion: MotionWorkspace
     curve: CurveWorkspace

@@ -59,7 +59,7 @@ Poses = Mapping[str, tuple[FloatArray, FloatArray]]
 
 
 def part_of(link: str) -> str:
-    """Return the key of a link in `tcs.model.people.LINKS`.
+    """Return the key of a link in `LINKS` of `tcs.model.people`.
 
     >>> part_of("quad_left_link"), part_of("head_center")
     ('quad', 'head')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from tcs.placement.constraints import (
     Constraints,
     Footprint,
     Obstacle,
+    Postures,
     axis_constraints,
     blocked_bodies,
     blocked_solutions,
@@ -111,7 +113,7 @@ def admitted_candidates(
         remaining &= ~np.concatenate(
             [blocked_bodies(obstacle, of_arm.postures) for of_arm in tables.arms]
         )
-        candidate, goal = blocked_pairs(obstacle, tables, remaining)
+        candidate, goal = blocked_pairs(obstacle, postures_of_arms(tables), remaining)
         reached, dexterity = reached.copy(), dexterity.copy()
         reached[candidate, goal], dexterity[candidate, goal] = False, 0.0
         remaining &= reached.any(axis=1)
@@ -124,24 +126,29 @@ def admitted_candidates(
 
 
 def blocked_pairs(
-    obstacle: Obstacle, tables: SelectionTables, admitted: BoolArray
+    obstacle: Obstacle, arms: Sequence[tuple[Postures, int]], admitted: BoolArray
 ) -> tuple[IntArray, IntArray]:
     """Return candidates and goals whose stored arm solution an obstacle blocks, shapes (n,).
 
     Args:
         obstacle: The obstacle.
-        tables: The candidates, of one arm or of several.
+        arms: Postures and number of candidates of each arm, in the order of the candidates.
         admitted: Candidates to examine, shape (C,).
     """
     candidates, goals, start = [], [], 0
-    for of_arm in tables.arms:
-        postures, stop = of_arm.postures, start + len(of_arm.sets.candidates)
+    for postures, count in arms:
+        stop = start + count
         hit = blocked_solutions(obstacle, postures, admitted[start:stop])
         candidate, goal = postures.pairs
         candidates.append(candidate[hit] + start)
         goals.append(goal[hit])
         start = stop
     return np.concatenate(candidates), np.concatenate(goals)
+
+
+def postures_of_arms(tables: SelectionTables) -> list[tuple[Postures, int]]:
+    """Return postures and number of candidates of each arm, for `blocked_pairs`."""
+    return [(of_arm.postures, len(of_arm.sets.candidates)) for of_arm in tables.arms]
 
 
 def _bases(
