@@ -132,7 +132,8 @@ def the_experiment(robot: Robot, options: argparse.Namespace) -> None:
 
 def increase(value: float, reference: float) -> str:
     """Return an increase in percent."""
-    return f"{100.0 * (value / reference - 1.0):+.0f}"
+    percent = 100.0 * (value / reference - 1.0)
+    return "none" if math.isnan(percent) else f"{percent:+.0f}"
 
 
 def task_map(robot: Robot) -> TaskMap:
