@@ -70,10 +70,10 @@ def dense_fractions(motion: MotionScene, curve: Curve, piece: int) -> FloatArray
     points = shape_corners(motion, curve.points(piece, coarse))
     moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1)
     # 5 % for the curvature of the points' paths and uneven speed along a part.
-    parts = np.maximum(np.ceil(1.05 * moved / LARGEST_STEP), 1).astype(int)
-    spans = zip(itertools.pairwise(coarse), parts, strict=True)
-    inner = [np.linspace(a, b, n, endpoint=False) for (a, b), n in spans]
-    return np.concatenate([*inner, [1.0]])
+    travelled = np.concatenate([[0.0], np.cumsum(1.05 * moved)])
+    parts = max(int(np.ceil(travelled[-1] / LARGEST_STEP)), 1)
+    inner = np.interp(np.linspace(0.0, travelled[-1], parts + 1)[1:-1], travelled, coarse)
+    return np.concatenate([[0.0], inner, [1.0]])
 
 
 def shape_corners(motion: MotionScene, q: FloatArray) -> FloatArray:

@@ -300,6 +300,9 @@ def test_score_as_text(tcs_command, tmp_path, stand_in):
     assert ran.code == 0
     for word in ("configurations", "best set", "best base pose", "base x [m]", "o.tcs"):
         assert word in ran.out
+    # Neither constraints nor approaches were requested.
+    assert "constraint" not in ran.out
+    assert "approach" not in ran.out
 
 
 def test_nothing_reached_is_an_answer(tcs_command, example, tmp_path, monkeypatch):

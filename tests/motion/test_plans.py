@@ -13,7 +13,7 @@ import pytest
 import tcs
 from tcs.errors import OutputError, TcsError
 from tcs.kernel.motion.edges import certified
-from tcs.motion import Stop, save_plan
+from tcs.motion import Stop, recheck, save_plan
 from tcs.motion.recheck import false_pieces
 from tcs.output.terminal.motion_tables import report_plan
 from tcs.placement.scoring.rebuild import rebuild_scene
@@ -67,6 +67,17 @@ def test_drake_refutes_a_curve_through_the_person(planned, stop):
     beyond = approach.shifted(3.0 * (approach.q[-1] - approach.q[0]))
     assert false_pieces(stop.scene, stop.motion, approach) == 0
     assert false_pieces(stop.scene, stop.motion, beyond) > 0
+
+
+def test_drake_checks_at_most_a_step_of_motion_apart(planned, stop):
+    for segment in planned.stops[0].segments:
+        for curve in segment.curves:
+            for piece in range(curve.pieces):
+                at = recheck.dense_fractions(stop.motion, curve, piece)
+                assert (at[0], at[-1]) == (0.0, 1.0)
+                corners = recheck.shape_corners(stop.motion, curve.points(piece, at))
+                steps = np.linalg.norm(np.diff(corners, axis=0), axis=2).max(axis=1)
+                assert steps.max() <= recheck.LARGEST_STEP
 
 
 def test_straight_motions_are_no_faster_than_the_tool_speed(planned):

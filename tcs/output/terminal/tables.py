@@ -53,6 +53,10 @@ def report_catalogue(known: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
         out.print(table)
 
 
+_ON_REQUEST = ("excluded", "approach_limits", "approach_blocked")
+"""Reasons of files scored under constraints or with approach, left out where there are none."""
+
+
 def report_scores(result: Mapping[str, Any]) -> None:
     """Print the summary of a scored task."""
     out = results_console()
@@ -73,7 +77,7 @@ def report_scores(result: Mapping[str, Any]) -> None:
     if "constraints" in result:
         out.print(f"scored under constraints: {'; '.join(result['constraints'])}")
     for name, count in result["reasons"].items():
-        if name == "excluded" and not count:
+        if name in _ON_REQUEST and not count:
             continue
         fraction = percentage(count / result["pairs"])
         reasons.add_row(REASON_TEXTS[reason_of(name)], f"{count:,}", fraction)
