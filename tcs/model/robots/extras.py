@@ -8,7 +8,8 @@ import numpy as np
 
 from tcs.model.robots.robot_file import BodyPrimitive, RobotFile
 from tcs.model.robots.urdf import Geometry, Joint, Urdf
-from tcs.model.robots.urdf.kinematic import kinematic_urdf
+from tcs.model.robots.urdf.kinematic import urdf_text
+from tcs.model.robots.urdf.model import fixed_joint
 
 
 def model_with_extras(robot: RobotFile) -> Urdf:
@@ -31,7 +32,7 @@ def model_with_extras(robot: RobotFile) -> Urdf:
 
 
 def robot_urdf(robot: RobotFile, meshes: bool = False) -> str:
-    """Return `kinematic_urdf` of a robot with its extra frames and bodies as further links.
+    """Return `urdf_text` of a robot with its extra frames and bodies as further links.
 
     Args:
         robot: The robot.
@@ -40,24 +41,13 @@ def robot_urdf(robot: RobotFile, meshes: bool = False) -> str:
     Raises:
         RobotError: If the URDF or one of its meshes cannot be used.
     """
-    return kinematic_urdf(robot.urdf_path(), meshes, _extra_joints(robot))
+    return urdf_text(model_with_extras(robot), meshes)
 
 
 def _extra_joints(robot: RobotFile) -> tuple[Joint, ...]:
     """Return the fixed joints that carry a robot's extra frames and bodies."""
     return tuple(
-        Joint(
-            name=f"{extra.name}_joint",
-            type="fixed",
-            parent=extra.parent,
-            child=extra.name,
-            xyz=extra.xyz,
-            rpy=extra.rpy,
-            axis=(1.0, 0.0, 0.0),
-            hard=(0.0, 0.0),
-            soft=(0.0, 0.0),
-            mimic=None,
-        )
+        fixed_joint(extra.parent, extra.name, extra.xyz, extra.rpy)
         for extra in (*robot.frames, *robot.bodies)
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -12,7 +13,7 @@ from pydantic import Field, model_validator
 from tcs.errors import RobotError, UnknownNameError
 from tcs.files.documents import Clearance, Document, Entries, JointPosition, Placed, Size, checked
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
-from tcs.model.robots.urdf import Urdf, read_urdf
+from tcs.model.robots.urdf import WORLD, Urdf, read_urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
@@ -30,6 +31,13 @@ class _OnLink(Placed):
 
     name: Name
     parent: Name
+
+
+class Mount(Placed):
+    """Pose of the URDF's root link in a further link on the floor, which carries it."""
+
+    link: Name
+    """Name of the further link, the root of the robot."""
 
 
 class ExtraFrame(_OnLink):
@@ -79,8 +87,11 @@ class RobotFile(Document):
     them. Empty for a robot with one arm."""
     urdf: str
     """A `package://` address or a path."""
+    mount: Mount | None = None
+    """The link that carries the root link of a URDF that starts above the floor; None if it is on
+    the floor."""
     root_body: Name
-    """B: the URDF's root link, which the planar base joint carries."""
+    """B: the root link of URDF or mount, which the planar base joint carries."""
     arm_base: Name
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
@@ -182,12 +193,13 @@ class RobotFile(Document):
         return resolve_uri(self.urdf, Path())
 
     def model(self) -> Urdf:
-        """Return the content of the URDF.
+        """Return the content of the URDF, on its mount.
 
         Raises:
             RobotError: If the URDF cannot be used.
         """
-        return read_urdf(self.urdf_path())
+        path = self.urdf_path()
+        return read_urdf(path) if self.mount is None else _mounted(path, self.mount)
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
@@ -289,6 +301,19 @@ class RobotFile(Document):
         chosen = {"posture": posture, "gripper": gripper, "limits": limits}
         given = {key: value for key, value in chosen.items() if value is not None}
         return checked(self.model_dump() | given, RobotFile, f"robot '{self.name}'", RobotError)
+
+
+@cache
+def _mounted(path: Path, mount: Mount) -> Urdf:
+    """Return a URDF on a mount.
+
+    Raises:
+        RobotError: If the URDF cannot be used, or the name of the mount is taken.
+    """
+    model = read_urdf(path)
+    if mount.link in (*model.links, WORLD):
+        raise RobotError(f"link '{mount.link}' of the mount: the name is taken. Choose another.")
+    return model.mounted_on(mount.link, mount.xyz, mount.rpy)
 
 
 def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:

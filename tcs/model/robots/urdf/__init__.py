@@ -7,6 +7,6 @@ In: the path or `package://` address of a URDF and of its meshes. Out: its tree 
 from __future__ import annotations
 
 from tcs.model.robots.urdf.model import Geometry, Joint, Mimic, Urdf, Vector
-from tcs.model.robots.urdf.reading import WORLD, read_urdf
+from tcs.model.robots.urdf.reading import ROOT, WORLD, read_urdf
 
-__all__ = ["WORLD", "Geometry", "Joint", "Mimic", "Urdf", "Vector", "read_urdf"]
+__all__ = ["ROOT", "WORLD", "Geometry", "Joint", "Mimic", "Urdf", "Vector", "read_urdf"]

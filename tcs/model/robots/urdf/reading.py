@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +20,9 @@ AXIS_LENGTHS = (1e-3, 1e3)
 
 WORLD = "world"
 """Name that Drake gives to the body that does not move: no link can have it."""
+
+ROOT = "root_link"
+"""Name under which a root link called `world` is read, as in URDFs of arms to be bolted down."""
 
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 """XML namespace of the macros from which a URDF is generated."""
@@ -60,9 +64,21 @@ def read_urdf(path: Path) -> Urdf:
             found for element in elements if (found := geometry(element)) is not None
         )
     joints = {j.name: j for j in (_joint(element, path) for element in root.findall("joint"))}
-    model = Urdf(path=path, links=links, joints=joints)
+    model = _without_world(Urdf(path=path, links=links, joints=joints))
     _check_tree(model)
     return model
+
+
+def _without_world(model: Urdf) -> Urdf:
+    """Return the model with a root link called `world` renamed to `ROOT`."""
+    if WORLD not in model.links or WORLD in model.parent_joints or ROOT in model.links:
+        return model
+    links = {ROOT if name == WORLD else name: found for name, found in model.links.items()}
+    joints = {
+        name: replace(joint, parent=ROOT) if joint.parent == WORLD else joint
+        for name, joint in model.joints.items()
+    }
+    return Urdf(path=model.path, links=links, joints=joints)
 
 
 def _check_tree(model: Urdf) -> None:

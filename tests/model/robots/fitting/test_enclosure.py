@@ -7,11 +7,12 @@ import pytest
 import trimesh
 from scipy import ndimage
 
-from tcs.model.robots import load_robot, robot_names
+from tcs.model.robots import load_robot
 from tcs.model.robots.fitting.enclosure import enclosure, surfaces_to_enclose
 from tcs.model.robots.primitives import enclosed
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf.surfaces import body_triangles
+from tests.model.robots.shipped import all_robots
 
 PR2_ARM = (
     "shoulder_pan_link shoulder_lift_link upper_arm_roll_link upper_arm_link elbow_flex_link "
@@ -24,7 +25,7 @@ PARTS = 20
 """Parts of a surface of which one after the other is looked at."""
 
 
-@pytest.fixture(scope="module", params=robot_names())
+@pytest.fixture(scope="module", params=all_robots())
 def robot(request):
     return load_robot(request.param)
 

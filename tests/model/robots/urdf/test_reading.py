@@ -5,7 +5,9 @@ import pytest
 
 from tcs.errors import RobotError, UnknownNameError
 from tcs.model.robots import read_urdf
+from tcs.model.robots.urdf import ROOT
 from tcs.model.robots.urdf.packages import resolve_uri
+from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
 
 TWO_LINKS = """<robot name="two">
@@ -140,12 +142,33 @@ def test_a_package_may_be_a_folder_above(tmp_path):
     assert resolve_uri("package://my_robot/meshes/arm.stl", urdf_folder) == mesh
 
 
-def test_a_link_named_world_is_refused(tmp_path):
+def test_a_link_named_world_is_refused_unless_it_is_the_root(tmp_path):
     """Drake's own body of that name does not move; before, building the scene failed."""
     path = two_links(tmp_path)
-    path.write_text(path.read_text().replace('"a"', '"world"'))
+    text = path.read_text()
+    path.write_text(text.replace('"b"', '"world"'))
     with pytest.raises(RobotError, match="a link is named 'world'"):
         read_urdf(path)
+    other = tmp_path / "bolted_down.urdf"
+    other.write_text(text.replace('"a"', '"world"'))
+    model = read_urdf(other)
+    assert model.root == ROOT
+    assert model.joints["hinge"].parent == ROOT
+
+
+def test_a_mount_becomes_the_root(tmp_path):
+    model = read_urdf(two_links(tmp_path)).mounted_on("stand", (0.0, 0.1, 0.7), (0.0, 0.0, 0.0))
+    assert model.root == "stand"
+    assert list(model.links) == ["stand", "a", "b"]
+    _, p = pose_in_root(model, "a", {})
+    assert p.tolist() == [0.0, 0.1, 0.7]
+
+
+def test_an_address_may_have_a_third_slash(tmp_path):
+    mesh = tmp_path / "my_robot" / "arm.stl"
+    mesh.parent.mkdir()
+    mesh.touch()
+    assert resolve_uri("package:///my_robot/arm.stl", mesh.parent) == mesh
 
 
 def test_a_fixed_joint_needs_no_axis(tmp_path):
