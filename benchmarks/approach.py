@@ -19,6 +19,7 @@ from table import cell, header, parser, row, save
 import tcs
 from tcs.kernel.approach.sweep import approach_spline
 from tcs.kernel.problem import build_problem
+from tcs.model.scene import NeighbourList
 from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop
 from tcs.motion.approach import SAMPLES, first_accesses
@@ -124,7 +125,7 @@ def is_true(job: Job, stop: Stop, goal: int, points: np.ndarray, tangents: np.nd
     line = job.task.goals[goal].approach
     knots = np.linspace(0.0, 1.0, len(points))
     curve = Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
-    if false_pieces(stop.scene, stop.motion, curve):
+    if false_pieces(NeighbourList(stop.scene), stop.motion, curve):
         return False
     stop.scene.set_arm(points[-1])
     X_WG = stop.scene.tool_pose()

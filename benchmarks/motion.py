@@ -22,6 +22,7 @@ from table import cell, header, parser, row, save
 import tcs
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.random import random_state
+from tcs.model.scene import NeighbourList
 from tcs.motion import Stop, accesses
 from tcs.motion.paths import find_path, rounded
 from tcs.motion.recheck import false_pieces
@@ -55,7 +56,7 @@ class Tally:
             self.checked += 1
             for curve in rounded(stop, found[0]):
                 self.edges += curve.pieces
-                self.false += false_pieces(stop.scene, stop.motion, curve)
+                self.false += false_pieces(NeighbourList(stop.scene), stop.motion, curve)
 
     def report(self, line: str) -> None:
         """Print and record the results."""

@@ -4,11 +4,13 @@ Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--jobs 2] [--see
 
 All pairs of configuration and goal that a score file reaches in its nominal table are examined:
 from rest to the approach, straight in, out and back. Processor times are those of the whole
-process.
+process. A row whose motion file lies beside its score file, as the benchmark leaves it, is not
+examined again, so that an interrupted run continues; delete the files to begin anew.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -18,6 +20,7 @@ import tcs
 from tcs.model.grid import Grid
 from tcs.motion.examine import examination
 from tcs.placement.selection import Executability
+from tcs.placement.store import MotionFile, motion_path, motions_of, save_motions
 
 WEIGHTS = tcs.UtilityWeights(travel=0.0, places=0.0, environment=0.0)
 """Sets are compared by P_R + P_M alone."""
@@ -35,19 +38,29 @@ def main() -> int:
     pairs = done = 0
     for path in options.files:
         file = tcs.load(path)
-        motions = tcs.examine(
-            file, within=None, most=options.most, seed=options.seed, jobs=options.jobs
-        )
+        motions = examined(path, file, options)
         found = examination(file, motions, file.nominal_index)
         pairs, done = pairs + found["pairs"], done + found["done"]
         report(path.stem, found)
         report_sets(path.stem, file, motions)
+        save(options)
     share = f"{1.0 - done / pairs:.1%}"
     row("all rows", f"{share} of {pairs:,} reached pairs without a motion")
     cell("pairs", "all rows", "reached", f"{pairs:,}")
     cell("pairs", "all rows", "no motion", share)
     save(options)
     return 0
+
+
+def examined(path: Path, file: tcs.ScoreFile, options: argparse.Namespace) -> MotionFile:
+    """Return the motions of a row: those beside its score file, or else planned and saved there."""
+    if motion_path(path).exists():
+        return motions_of(file, path)
+    motions = tcs.examine(
+        file, within=None, most=options.most, seed=options.seed, jobs=options.jobs
+    )
+    save_motions(motion_path(path), motions)
+    return motions
 
 
 def report(name: str, found: dict) -> None:
@@ -67,7 +80,7 @@ def report(name: str, found: dict) -> None:
     row(name, ", ".join(f"{column} {text}" for column, text in cells.items()))
 
 
-def report_sets(name: str, file: tcs.ScoreFile, motions: object) -> None:
+def report_sets(name: str, file: tcs.ScoreFile, motions: MotionFile) -> None:
     """Print and record the best set by postures, and the best one that can be executed."""
     sets = file.nominal.sets
     here = Grid.from_dict(file.grid).configuration(sets.best[0])

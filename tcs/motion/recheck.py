@@ -8,7 +8,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.scene import MotionScene
-from tcs.model.scene import Scene
+from tcs.model.scene import NeighbourList
 from tcs.motion.curves import Curve
 from tcs.motion.keep_out import scene_with_keep_out
 from tcs.motion.motion_plan import Segment
@@ -29,36 +29,39 @@ class StopCheck:
     def __init__(self, stop: Stop) -> None:
         """Take the stop to which the live scene is set."""
         self.stop = stop
-        self.walled = stop.scene
-        """The scene for paths, with the boxes that they keep out of."""
+        self._lines = self._paths = NeighbourList(stop.scene)
         if stop.job.task.keep_out:
-            self.walled = scene_with_keep_out(stop.job, stop.scene)
+            self._paths = NeighbourList(scene_with_keep_out(stop.job, stop.scene))
 
     def false_pieces(self, segment: Segment) -> int:
         """Return how many pieces of a segment Drake refutes."""
-        scene = self.walled if segment.type == "move" else self.stop.scene
-        return sum(false_pieces(scene, self.stop.motion, curve) for curve in segment.curves)
+        neighbours = self._paths if segment.type == "move" else self._lines
+        return sum(false_pieces(neighbours, self.stop.motion, curve) for curve in segment.curves)
 
 
-def false_pieces(scene: Scene, motion: MotionScene, curve: Curve) -> int:
+def false_pieces(neighbours: NeighbourList, motion: MotionScene, curve: Curve) -> int:
     """Return how many pieces of a curve Drake finds in contact or beyond joint limits.
 
     Args:
-        scene: The live scene, at the stop; the arm is moved.
+        neighbours: Those of the live scene, at the stop; the arm is moved.
         motion: The same scene, for the motion of its shapes.
         curve: A curve of the scored arm.
     """
-    return sum(not _is_true(scene, motion, curve, piece) for piece in range(curve.pieces))
+    return sum(
+        not _is_true(neighbours, curve.points(piece, dense_fractions(motion, curve, piece)))
+        for piece in range(curve.pieces)
+    )
 
 
-def _is_true(scene: Scene, motion: MotionScene, curve: Curve, piece: int) -> bool:
+def _is_true(neighbours: NeighbourList, postures: FloatArray) -> bool:
+    scene = neighbours.scene
     lower, upper = scene.arm_limits
-    for q in curve.points(piece, dense_fractions(motion, curve, piece)):
+    for q in postures:
         # Control points are within the limits; sums of them round.
         if np.any(q < lower - 1e-9) or np.any(q > upper + 1e-9):
             return False
         scene.set_arm(q)
-        for first, second, distance in scene.violations():
+        for first, second, distance in neighbours.violations():
             if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING:
                 return False
     return True

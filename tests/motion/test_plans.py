@@ -13,6 +13,7 @@ import pytest
 import tcs
 from tcs.errors import OutputError, TcsError
 from tcs.kernel.motion.edges import certified
+from tcs.model.scene import NeighbourList
 from tcs.motion import Stop, recheck, save_plan
 from tcs.motion.recheck import false_pieces
 from tcs.output.terminal.motion_tables import report_plan
@@ -65,8 +66,9 @@ def test_drake_refutes_a_curve_through_the_person(planned, stop):
     approach = planned.stops[0].segments[1].curves[0]
     # 30 cm beyond the goal, the tool would be in the head.
     beyond = approach.shifted(3.0 * (approach.q[-1] - approach.q[0]))
-    assert false_pieces(stop.scene, stop.motion, approach) == 0
-    assert false_pieces(stop.scene, stop.motion, beyond) > 0
+    neighbours = NeighbourList(stop.scene)
+    assert false_pieces(neighbours, stop.motion, approach) == 0
+    assert false_pieces(neighbours, stop.motion, beyond) > 0
 
 
 def test_drake_checks_at_most_a_step_of_motion_apart(planned, stop):

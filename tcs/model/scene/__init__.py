@@ -20,6 +20,7 @@ from tcs.model.scene.environment_shapes import environment_shapes
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
+from tcs.model.scene.neighbours import NeighbourList
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
 from tcs.model.scene.person_goals import goals_on_person
 from tcs.model.scene.posture import Posture
@@ -34,6 +35,7 @@ __all__ = [
     "JointEstimate",
     "LoweredScene",
     "ModelEntry",
+    "NeighbourList",
     "Observation",
     "Obstacle",
     "Posture",

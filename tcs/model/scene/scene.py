@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
-from tcs.model.scene.contacts import Group
+from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.plant import ScenePlant, build_plant
 from tcs.model.scene.spec import SceneSpec
 
@@ -60,6 +60,7 @@ class Scene:
         self._arm_velocities = np.array([joint.velocity_start() for joint in joints])
         self._pads: dict[str, float] = {}
         self._of_environment: set[str] = set()
+        self._part_of = {part.geometry: part for part in self.built.parts}
         self._self_margin = spec.robot.self_margin
         self._contact_margin = spec.environment.contact_margin
         for part in self.built.parts:
@@ -129,6 +130,10 @@ class Scene:
         """Return the positions of all joints for `restore`, shape (n,)."""
         return np.array(self.built.plant.GetPositions(self._state))
 
+    def positions_without_arm(self) -> FloatArray:
+        """Return the positions of all joints but those of the scored arm, shape (n - 7,)."""
+        return np.delete(self.positions(), self._arm_positions)
+
     def restore(self, positions: FloatArray) -> None:
         """Set all joints to positions that `positions` returned."""
         self.built.plant.SetPositions(self._state, positions)
@@ -191,18 +196,11 @@ class Scene:
             For each pair of bodies the least signed distance between their shapes, negative where
             they overlap. Bodies of the arm come first in a pair, those of the environment last.
         """
-        part_of = {part.geometry: part for part in self.built.parts}
-        order = (Group.ARM, Group.BODY, Group.ENVIRONMENT)
-        least: dict[tuple[str, str], float] = {}
-        for pair in self.query_object().ComputeSignedDistancePairwiseClosestPoints(max_distance):
-            both = sorted(
-                (part_of[pair.id_A], part_of[pair.id_B]),
-                key=lambda part: (order.index(part.group), part.carrier, part.name),
-            )
-            names = (both[0].name, both[1].name)
-            least[names] = min(pair.distance, least.get(names, np.inf))
-        found = [(a, b, float(distance)) for (a, b), distance in least.items()]
-        return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))
+        query = self.query_object()
+        return least_distances(
+            (self._part_of[pair.id_A], self._part_of[pair.id_B], pair.distance)
+            for pair in query.ComputeSignedDistancePairwiseClosestPoints(max_distance)
+        )
 
     def required_clearance(self, first: str, second: str) -> float:
         """Return the distance that two bodies must keep [m].
@@ -235,3 +233,24 @@ class Scene:
         q = self.built.plant.GetPositions(self._state).copy()
         q[index] = value
         self.built.plant.SetPositions(self._state, q)
+
+
+def least_distances(pairs: Iterable[tuple[Part, Part, float]]) -> tuple[Contact, ...]:
+    """Return the least distance of each pair of bodies, closest first.
+
+    Args:
+        pairs: Two shapes and their signed distance [m].
+
+    Returns:
+        Bodies of the arm come first in a pair, those of the environment last.
+    """
+    order = (Group.ARM, Group.BODY, Group.ENVIRONMENT)
+    least: dict[tuple[str, str], float] = {}
+    for first, second, distance in pairs:
+        both = sorted(
+            (first, second), key=lambda part: (order.index(part.group), part.carrier, part.name)
+        )
+        names = (both[0].name, both[1].name)
+        least[names] = min(distance, least.get(names, np.inf))
+    found = [(a, b, float(distance)) for (a, b), distance in least.items()]
+    return tuple(sorted(found, key=lambda contact: (contact[2], contact[:2])))

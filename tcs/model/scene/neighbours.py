@@ -1,0 +1,175 @@
+"""Contacts of an arm that moves in small steps: distant pairs of shapes are left out for a while.
+
+Drake's own search for close pairs tests every shape of the scene at every posture, moving or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.tree import BodyIndex
+
+from tcs.kernel.arrays import BOX, CAPSULE, FloatArray
+from tcs.model.scene.contacts import Group, Part, shape_of
+from tcs.model.scene.scene import Contact, Scene, least_distances
+
+SKIN = 0.04
+"""Motion of any point of the arm after which close pairs are sought again [m]. Less means fewer
+pairs at each posture, but more searches."""
+ROUNDING = 1e-6
+"""Added to required distances when pairs are left out [m]: poses round, and far less."""
+
+
+class NeighbourList:
+    """The checked pairs of shapes of a scene that may touch before the arm has moved by `SKIN`.
+
+    A pair is left out only while a bound shows that it cannot come closer than required: the
+    distance of boxes that enclose its shapes, along their axes, when close pairs were last sought,
+    less the motion of both bodies since, from Drake's poses. Drake measures all other pairs at
+    every posture. If more than the arm has moved, close pairs are sought again.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        """Read the shapes and the checked pairs of a scene, which keeps its state."""
+        self.scene = scene
+        parts = scene.built.parts
+        bodies = sorted({int(part.body) for part in parts})
+        number = {body: row for row, body in enumerate(bodies)}
+        self._bodies = [scene.built.plant.get_body(BodyIndex(body)) for body in bodies]
+        self._body = np.array([number[int(part.body)] for part in parts])
+        self._boxes = _Boxes.of(scene, parts)
+        arm = {number[int(part.body)] for part in parts if part.group is Group.ARM}
+        self._arm = np.array(sorted(arm))
+        self._radius = np.zeros(len(bodies))
+        np.maximum.at(self._radius, self._body, self._boxes.reach)
+        self._pairs, self._required = _checked_pairs(scene, parts)
+        self._near = np.zeros(0, dtype=np.intp)
+        self._bound = np.zeros(0)
+        self._sought: FloatArray | None = None
+        self._others = scene.positions_without_arm()
+
+    def violations(self) -> tuple[Contact, ...]:
+        """Return the same as `Scene.violations` at the current state of the scene."""
+        moved = self._moved()
+        if moved is None or moved.max() > SKIN:
+            moved = self._seek()
+        rows = self._near
+        first, second = self._body[self._pairs[rows]].T
+        limits = self._required[rows] + moved[first] + moved[second] + ROUNDING
+        close = rows[self._bound < limits]
+        if not len(close):
+            return ()
+        query, parts = self.scene.query_object(), self.scene.built.parts
+        found = []
+        for row in close:
+            a, b = (parts[i] for i in self._pairs[row])
+            pair = query.ComputeSignedDistancePairClosestPoints(a.geometry, b.geometry)
+            if pair.distance < self._required[row]:
+                found.append((a, b, pair.distance))
+        return least_distances(found)
+
+    def _moved(self) -> FloatArray | None:
+        """Return how far any point of each body has moved at most since pairs were sought [m].
+
+        None if more than the arm has moved, or if they were never sought.
+        """
+        others = self.scene.positions_without_arm()
+        if self._sought is None or not np.array_equal(others, self._others):
+            return None
+        moved = np.zeros(len(self._bodies))
+        change = self._poses(self._arm) - self._sought[self._arm]
+        # The spectral norm of the difference of two rotations is their Frobenius norm / sqrt(2).
+        rotated = np.linalg.norm(change[:, :, :3], axis=(1, 2)) / np.sqrt(2.0)
+        moved[self._arm] = (
+            np.linalg.norm(change[:, :, 3], axis=1) + rotated * self._radius[self._arm]
+        )
+        return moved
+
+    def _seek(self) -> FloatArray:
+        """Seek the pairs that may touch within `SKIN`; return that no body has moved since."""
+        self._others = self.scene.positions_without_arm()
+        self._sought = self._poses(np.arange(len(self._bodies)))
+        poses = self._sought[self._body]
+        self._near, self._bound = self._boxes.near(
+            poses, self._pairs, self._required + 2.0 * SKIN + ROUNDING
+        )
+        return np.zeros(len(self._bodies))
+
+    def _poses(self, bodies: NDArray[np.intp]) -> FloatArray:
+        """Return the poses of bodies in W: rotations and positions [m], shape (n, 3, 4)."""
+        plant, context = self.scene.built.plant, self.scene.plant_context
+        return np.array(
+            [plant.EvalBodyPoseInWorld(context, self._bodies[i]).GetAsMatrix34() for i in bodies]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    """Boxes that enclose the shapes, in the frames of their bodies."""
+
+    X_BG: FloatArray
+    """Rotations and centres [m], shape (n, 3, 4)."""
+    half: FloatArray
+    """Half lengths of the edges [m], shape (n, 3)."""
+
+    @classmethod
+    def of(cls, scene: Scene, parts: tuple[Part, ...]) -> _Boxes:
+        """Enclose the shapes of a scene."""
+        inspector = scene.built.scene_graph.model_inspector()
+        half, poses = [], []
+        for part in parts:
+            poses.append(inspector.GetPoseInFrame(part.geometry).GetAsMatrix34())
+            type_, size = shape_of(inspector, part)
+            if type_ == BOX:
+                half.append(size)
+            else:
+                radius, length = size[0], size[1] if type_ == CAPSULE else 0.0
+                half.append((radius, radius, radius + length))
+        return cls(np.array(poses), np.array(half))
+
+    @property
+    def reach(self) -> FloatArray:
+        """Greatest distance of a point of each box from the origin of its body [m], shape (n,)."""
+        centre = np.linalg.norm(self.X_BG[:, :, 3], axis=1)
+        return np.asarray(centre + np.linalg.norm(self.half, axis=1))
+
+    def near(
+        self, X_WB: FloatArray, pairs: NDArray[np.intp], limits: FloatArray
+    ) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the numbers of pairs that may be closer than their limits, with lower bounds [m].
+
+        Args:
+            X_WB: Pose of the body of each shape, shape (n, 3, 4).
+            pairs: Numbers of two shapes, shape (m, 2).
+            limits: Distances [m], shape (m,).
+        """
+        R = X_WB[:, :, :3] @ self.X_BG[:, :, :3]
+        p = np.einsum("nij,nj->ni", X_WB[:, :, :3], self.X_BG[:, :, 3]) + X_WB[:, :, 3]
+        radius = np.linalg.norm(self.half, axis=1)
+        a, b = pairs.T
+        apart = np.linalg.norm(p[b] - p[a], axis=1) - radius[a] - radius[b]
+        rows = np.flatnonzero(apart < limits)
+        a, b = pairs[rows].T
+        offset, R_ab = p[b] - p[a], np.einsum("nji,njk->nik", R[a], R[b])
+        extent = np.abs(R_ab)
+        along_a = np.abs(np.einsum("nji,nj->ni", R[a], offset)) - self.half[a]
+        along_a -= np.einsum("nij,nj->ni", extent, self.half[b])
+        along_b = np.abs(np.einsum("nji,nj->ni", R[b], offset)) - self.half[b]
+        along_b -= np.einsum("nij,ni->nj", extent, self.half[a])
+        bound = np.maximum(along_a.max(axis=1), along_b.max(axis=1))
+        bound = np.maximum(bound, apart[rows])
+        closer = bound < limits[rows]
+        return rows[closer], bound[closer]
+
+
+def _checked_pairs(scene: Scene, parts: tuple[Part, ...]) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return two numbers of shapes, shape (m, 2), and the required distance [m] of each pair."""
+    number = {part.geometry: row for row, part in enumerate(parts)}
+    candidates = scene.built.scene_graph.model_inspector().GetCollisionCandidates()
+    pairs = np.array([(number[a], number[b]) for a, b in candidates], dtype=np.intp).reshape(-1, 2)
+    names = sorted({part.name for part in parts})
+    required = np.array([[scene.required_clearance(a, b) for b in names] for a in names])
+    name = np.array([names.index(part.name) for part in parts])
+    return pairs, required[name[pairs[:, 0]], name[pairs[:, 1]]]

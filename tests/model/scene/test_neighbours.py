@@ -1,0 +1,69 @@
+"""Contacts of an arm that moves in small steps: the same as Drake's search among all pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.model.scene import NeighbourList
+
+REACHING = np.array([0.3, 0.2, 0.5, -1.2, 0.4, -0.8, 0.2])
+
+
+@pytest.fixture(scope="module")
+def listed(_one_scene):
+    return NeighbourList(_one_scene)
+
+
+@pytest.fixture
+def neighbours(scene, listed):
+    """Those of the PR2 beside the wheelchair."""
+    scene.place_base(0.6, -0.9, 0.8)
+    scene.set_torso(0.3)
+    return listed
+
+
+def test_contacts_on_a_path_are_those_of_all_pairs(neighbours, rng):
+    scene = neighbours.scene
+    lower, upper = (np.clip(limit, -3.0, 3.0) for limit in scene.arm_limits)
+    touched = free = 0
+    for _ in range(3):
+        end = rng.uniform(lower, upper)
+        # Short steps first, then ones beyond the skin.
+        for part in np.concatenate([np.linspace(0.0, 0.06, 4), np.linspace(0.1, 1.0, 6)]):
+            scene.set_arm(REACHING + part * (end - REACHING))
+            expected = scene.violations()
+            found = neighbours.violations()
+            assert [c[:2] for c in found] == [c[:2] for c in expected]
+            np.testing.assert_allclose([c[2] for c in found], [c[2] for c in expected], atol=1e-9)
+            touched += bool(found)
+            free += not found
+    assert min(touched, free) > 2
+
+
+def test_pairs_are_sought_again_when_the_base_moves(neighbours):
+    scene = neighbours.scene
+    scene.set_arm(REACHING)
+    before = neighbours.violations()
+    # The person sits at the origin.
+    scene.place_base(0.0, 0.0, 0.0)
+    assert neighbours.violations() == scene.violations() != before
+
+
+def test_a_tiny_motion_into_contact_is_seen(neighbours, rng):
+    """The step is far below the skin, so no pairs are sought between the two postures."""
+    scene = neighbours.scene
+    lower, upper = (np.clip(limit, -3.0, 3.0) for limit in scene.arm_limits)
+    free, touching = REACHING, REACHING
+    while not scene.violations():
+        touching = rng.uniform(lower, upper)
+        scene.set_arm(touching)
+    # A millimetre of motion and less.
+    while np.abs(touching - free).max() > 1e-3:
+        middle = 0.5 * (free + touching)
+        scene.set_arm(middle)
+        free, touching = (free, middle) if scene.violations() else (middle, touching)
+    scene.set_arm(free)
+    assert neighbours.violations() == ()
+    scene.set_arm(touching)
+    assert neighbours.violations()
