@@ -11,10 +11,11 @@ PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
 # that of `tests/conftest.py`: by number of tests, the longest files would come last.
 PROCESSES ?= 2
 SHARED := --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
+CHOSEN := -m "not slow"
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint wheel docs format figures benchmark benchmark-robots benchmark-peers \
+.PHONY: help demo test test-all run-tests lint wheel docs format figures benchmark benchmark-robots benchmark-peers \
   benchmark-save clean
 
 help:  ## List the targets
@@ -24,13 +25,16 @@ demo: $(STAMP)  ## Score, choose, verify and draw shaving in the wheelchair; res
 	@mkdir -p $(OUT)
 	$(BIN)/python scripts/demo.py --out $(OUT)/demo
 
-test: lint  ## Format, lint, types, import rules, doctests and tests: what CI runs
-	@mkdir -p $(OUT)
-	$(PYTEST) $(SHARED) -m "not slow"
+test: $(STAMP)  ## Format, lint, types, import rules, doctests and tests: what CI runs
+	@$(MAKE) --no-print-directory --jobs=2 lint run-tests
 
-test-all: lint  ## The same with the slow tests
+test-all: $(STAMP)  ## The same with the slow tests
+	@$(MAKE) --no-print-directory --jobs=2 lint run-tests CHOSEN=
+
+# At the same time as `lint`, most of which is one process.
+run-tests: $(STAMP)
 	@mkdir -p $(OUT)
-	$(PYTEST) $(SHARED)
+	$(PYTEST) $(SHARED) $(CHOSEN)
 
 lint: $(STAMP)  ## Format, lint, types and import rules
 	$(BIN)/ruff format --check .

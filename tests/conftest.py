@@ -14,9 +14,14 @@ from tcs.model.scene import Scene, SceneSpec, load_environment, lower
 from tcs.model.tasks import load_task
 
 HERE = Path(__file__).parent
-FIRST = ("docs/test_site.py", "kernel/test_sweep.py", "kernel/test_numeric_sweep.py")
-"""Files that `make test` begins with: one process builds the site while the other compiles the
-kernel, so that neither compiles what the other is compiling."""
+FIRST = (
+    "model/robots/fitting/test_enclosure.py",
+    "kernel/test_sweep.py",
+    "model/robots/fitting/test_fitting.py",
+    "kernel/test_numeric_sweep.py",
+)
+"""Files that `make test` begins with: one process fits shapes while the other compiles the kernel,
+so that neither compiles what the other is compiling."""
 
 
 def pytest_collection_modifyitems(items):

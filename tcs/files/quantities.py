@@ -41,6 +41,8 @@ class Quantity:
 
     def admits(self, value: object) -> bool:
         """Return whether a value is a number in the range; NaN and booleans are not."""
+        if type(value) is float:  # Files hold tens of thousands; the protocol is slow to ask.
+            return self.low <= value <= self.high
         if isinstance(value, bool) or not isinstance(value, SupportsFloat):
             return False
         try:

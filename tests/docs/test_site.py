@@ -15,6 +15,9 @@ from tcs.placement.selection import select, shortest_tour, utility
 from tcs.placement.tables import tc_manipulability, tc_reachability
 from tests.docs.building import CHECKOUT, DOCS, build
 
+# Building takes more than a minute; CI runs this file by itself.
+pytestmark = pytest.mark.slow
+
 # The command line has pages of its own, and no names that others import.
 WITHOUT_PAGE = {("cli",), ("__main__",)}
 

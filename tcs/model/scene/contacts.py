@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 from pydrake.geometry import (
     Box,
     Capsule,
@@ -19,7 +21,7 @@ from pydrake.geometry import (
 from pydrake.multibody.tree import BodyIndex
 
 from tcs.errors import EnvironmentFileError, UnknownNameError
-from tcs.kernel.arrays import BOX, CAPSULE, SPHERE
+from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, BoolArray
 from tcs.model.scene.environment import FLOOR
 
 
@@ -48,6 +50,11 @@ class Part:
     """Name under which its contacts are reported, e.g. "person::head_center"."""
     pad: float
     """Greatest distance by which the true surface may exceed the shape [m]."""
+
+    @property
+    def kind(self) -> tuple[Group, int, str]:
+        """What the contact rule looks at: a body has hundreds of shapes of one kind."""
+        return self.group, self.carrier, self.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +123,37 @@ class ContactRule:
             return False
         return names not in self.allowed_contacts
 
+    def checked(self, first: list[Part], second: list[Part]) -> BoolArray:
+        """Return which pairs of parts are checked, shape (first, second)."""
+        row_of, rows = _kinds(first)
+        column_of, columns = _kinds(second)
+        of_kinds = [[self.is_checked(a, b) for b in columns] for a in rows]
+        table = np.array(of_kinds, dtype=np.bool_).reshape(len(rows), len(columns))
+        return table[np.ix_(row_of, column_of)]
+
+
+def _kinds(parts: Sequence[Part]) -> tuple[list[int], list[Part]]:
+    """Return for each part the number of its kind, and the first part of each kind."""
+    first_of: dict[tuple[Group, int, str], Part] = {}
+    for part in parts:
+        first_of.setdefault(part.kind, part)
+    number = {kind: i for i, kind in enumerate(first_of)}
+    return [number[part.kind] for part in parts], list(first_of.values())
+
 
 def apply_rule(scene_graph: SceneGraph, parts: tuple[Part, ...], rule: ContactRule) -> None:
     """Make Drake check exactly the pairs of the rule."""
     everything = GeometrySet([part.geometry for part in parts])
     declaration = CollisionFilterDeclaration().ExcludeWithin(everything)
-    for i, part in enumerate(parts):
-        partners = [p.geometry for p in parts[i + 1 :] if rule.is_checked(part, p)]
+    number_of, kinds = _kinds(parts)
+    geometries = defaultdict(list)
+    for part, number in zip(parts, number_of, strict=True):
+        geometries[number].append(part.geometry)
+    for i, kind in enumerate(kinds):
+        others = range(i + 1, len(kinds))
+        partners = [g for j in others if rule.is_checked(kind, kinds[j]) for g in geometries[j]]
         if partners:
-            declaration.AllowBetween(GeometrySet([part.geometry]), GeometrySet(partners))
+            declaration.AllowBetween(GeometrySet(geometries[i]), GeometrySet(partners))
     scene_graph.collision_filter_manager().Apply(declaration)
 
 

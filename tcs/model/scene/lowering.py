@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
 from tcs.errors import UnknownNameError
-from tcs.kernel.arrays import BoolArray, Chain, FloatArray, GridArrays, SceneArrays, Shapes
+from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.model.grid import Grid
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
@@ -77,10 +77,10 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
         body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
         environment=_shapes(scene, environment_parts, environment_bodies, environment_poses),
-        arm_vs_arm=_checked(rule, arm, arm),
-        arm_vs_body=_checked(rule, arm, body),
-        arm_vs_environment=_checked(rule, arm, environment_parts),
-        body_vs_environment=_checked(rule, body, environment_parts),
+        arm_vs_arm=rule.checked(arm, arm),
+        arm_vs_body=rule.checked(arm, body),
+        arm_vs_environment=rule.checked(arm, environment_parts),
+        body_vs_environment=rule.checked(body, environment_parts),
         margin=scene.spec.environment.contact_margin,
         self_margin=scene.spec.robot.self_margin,
         goal_R=_rotations(goal_matrices),
@@ -263,12 +263,6 @@ def _shapes(scene: Scene, parts: list[Part], names: tuple[str, ...], states: Flo
         R=_rotations(states),
         p=_origins(states),
     )
-
-
-def _checked(rule: ContactRule, first: list[Part], second: list[Part]) -> BoolArray:
-    """Return which pairs are checked, shape (first, second)."""
-    checked = [[a is not b and rule.is_checked(a, b) for b in second] for a in first]
-    return np.array(checked, dtype=np.bool_).reshape(len(first), len(second))
 
 
 def _matrices(states: list[list[RigidTransform]]) -> FloatArray:

@@ -33,6 +33,28 @@ def test_pose_is_that_of_the_shape_in_the_body():
     assert not turned.contains(np.array([10.0, 1.1, 0.0]))
 
 
+@pytest.mark.parametrize(
+    ("kind", "size"), [("box", (2.0, 1.0, 4.0)), ("capsule", (1.0, 2.0)), ("sphere", (2.0,))]
+)
+def test_bounds_are_the_tight_box_around_a_shape(kind, size, rng):
+    turned = shape(kind, size, (3.0, 1.0, -2.0), quaternion_of_rpy((0.3, -0.5, 1.2)))
+    directions = rng.normal(size=(20_000, 3))
+    # The surface along each direction from the centre, by halving.
+    inner, outer = np.zeros((20_000, 1)), np.full((20_000, 1), 4.0)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for _ in range(30):
+        middle = (inner + outer) / 2
+        inside = turned.contains(turned.xyz + middle * directions)[:, None]
+        inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
+    surface = turned.xyz + inner * directions
+    least, greatest = turned.bounds
+    assert (surface >= least - 1e-6).all()
+    assert (surface <= greatest + 1e-6).all()
+    # Corners are what 20,000 directions come closest to least: by centimetres of 4 m.
+    np.testing.assert_allclose(surface.min(axis=0), least, atol=0.05)
+    np.testing.assert_allclose(surface.max(axis=0), greatest, atol=0.05)
+
+
 def test_rotation_is_that_of_roll_pitch_yaw():
     c, s = np.cos(0.3), np.sin(0.3)
     np.testing.assert_allclose(
