@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tcs.model.scene import Observation
     from tcs.motion import MotionPlan, examine, plan
     from tcs.placement.constraints import Constraints, Obstacle, Region
+    from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
     from tcs.placement.robustness import Evaluation, evaluate, robustify
     from tcs.placement.scoring import (
@@ -46,6 +47,7 @@ __all__ = [
     "MotionPlan",
     "Observation",
     "Obstacle",
+    "Population",
     "Region",
     "ScoreFile",
     "TcsError",
@@ -59,6 +61,7 @@ __all__ = [
     "explain",
     "load",
     "plan",
+    "population",
     "robustify",
     "save",
     "score",
@@ -78,6 +81,7 @@ _HOMES = {
     "MotionPlan": ("tcs.motion", "MotionPlan"),
     "Observation": ("tcs.model.scene", "Observation"),
     "Obstacle": ("tcs.placement.constraints", "Obstacle"),
+    "Population": ("tcs.placement.population", "Population"),
     "Region": ("tcs.placement.constraints", "Region"),
     "ScoreFile": ("tcs.placement.store", "ScoreFile"),
     "TcsError": ("tcs.errors", "TcsError"),
@@ -90,6 +94,7 @@ _HOMES = {
     "explain": ("tcs.placement.reasons", "explain"),
     "load": ("tcs.placement.store", "load_scores"),
     "plan": ("tcs.motion", "plan"),
+    "population": ("tcs.placement.population", "population"),
     "robustify": ("tcs.placement.robustness", "robustify"),
     "save": ("tcs.placement.store", "save_scores"),
     "score": ("tcs.placement.scoring", "score"),

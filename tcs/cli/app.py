@@ -13,6 +13,7 @@ from tcs.cli import (
     motion,
     options,
     pictures,
+    population,
     report,
     robots,
     robustness,
@@ -74,6 +75,7 @@ for command in (
     score.export,
     robustness.evaluate,
     robustness.robustify,
+    population.population,
     view.view,
     locate.locate,
 ):

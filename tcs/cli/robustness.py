@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from tcs.cli import options
 from tcs.cli.values import observed_settings
 from tcs.output import terminal
 from tcs.output.terminal import robustness_tables
+
+if TYPE_CHECKING:
+    from tcs.placement.store import ScoreFile
 
 _Errors = Annotated[
     Path | None,
@@ -72,7 +75,7 @@ def evaluate(
     import tcs
 
     loaded = tcs.load(file)
-    table = _table(loaded, observed)
+    table = table_of(loaded, observed)
     with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
             loaded,
@@ -120,7 +123,7 @@ def robustify(
     path = out or file
     check_writable(path)
     loaded = tcs.load(file)
-    table = _table(loaded, observed)
+    table = table_of(loaded, observed)
     with terminal.progress_bar("rounds") as on_progress:
         done = tcs.robustify(
             loaded,
@@ -139,7 +142,7 @@ def robustify(
     terminal.print_result(result, robustness_tables.report_robustified, as_json=as_json)
 
 
-def _table(loaded: Any, observed: list[str] | None) -> int | None:
+def table_of(loaded: ScoreFile, observed: list[str] | None) -> int | None:
     """Return the number of the table nearest to the observation, None without an observation."""
     if not observed:
         return None

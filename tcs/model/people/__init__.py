@@ -1,15 +1,23 @@
 """People: sizes of bodies, measured, by percentile or drawn at random.
 
-In: sex, and percentiles or measured values of some measures. Out: all 58 measures of the survey of
-bodies, each with its own distribution and correlated as in the survey, and the sizes of the links
-of a person's model relative to those of the papers' average man.
+In: sex, and percentiles or measured values of some measures, also of many people in a table. Out:
+all 58 measures of the survey of bodies, each with its own distribution and correlated as in the
+survey, and the sizes of the links of a person's model relative to the papers' average man.
 """
 
 from __future__ import annotations
 
 from tcs.model.people.bodies import Bodies, Body, body, draw_bodies
+from tcs.model.people.people_file import load_people
 from tcs.model.people.person import Person, PersonEntry, PersonLike, load_person, person_keys
-from tcs.model.people.proportions import LINKS, PAPERS_MAN, Scale, link_scales, papers_man
+from tcs.model.people.proportions import (
+    LINKS,
+    PAPERS_MAN,
+    Scale,
+    link_scales,
+    papers_man,
+    scales_of_people,
+)
 from tcs.model.people.survey import SEXES, Survey, load_survey
 
 __all__ = [
@@ -26,8 +34,10 @@ __all__ = [
     "body",
     "draw_bodies",
     "link_scales",
+    "load_people",
     "load_person",
     "load_survey",
     "papers_man",
     "person_keys",
+    "scales_of_people",
 ]

@@ -98,11 +98,12 @@ PersonLike = Person | Mapping[str, Any] | str | Path
 """A person, its keys and values, or the path of a YAML file of them."""
 
 
-def load_person(person: PersonLike) -> Person:
+def load_person(person: PersonLike, *, where: str = "person") -> Person:
     """Return a person with a body.
 
     Args:
         person: A person, the keys and values of one, or the path of a YAML file of them.
+        where: Location of the person for messages, unless it is a file.
 
     Raises:
         UnknownNameError: If there is no measure of a name.
@@ -113,9 +114,8 @@ def load_person(person: PersonLike) -> Person:
     110.695
     """
     if isinstance(person, Person):
-        found, where = person, "person"
+        found = person
     else:
-        where = "person"
         if isinstance(person, str | Path):
             where = f"person file '{person}'"
             person = person_keys(person)

@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
+import numpy as np
+
 from tcs.errors import DataFileError
-from tcs.model.people.bodies import Body, body
+from tcs.kernel.arrays import FloatArray
+from tcs.model.people.bodies import Bodies, Body, body
 
 PAPERS_MAN: Mapping[str, float] = {
     # From the underside of the thighs to the crown, seated.
@@ -110,22 +113,56 @@ def link_scales(person: Body) -> dict[str, Scale]:
     Raises:
         DataFileError: If measures contradict each other, so that a link has no length left.
     """
-    return {
-        link: (_ratio(person, link, x), _ratio(person, link, y), _ratio(person, link, z))
-        for link, (x, y, z) in LINKS.items()
-    }
+    values = {name: np.array([value]) for name, value in person.measures.items()}
+    return {link: _triple(ratios[0]) for link, ratios in _ratios(values, ("person",)).items()}
 
 
-def _ratio(person: Body, link: str, measures: Sum) -> float:
+def scales_of_people(people: Bodies) -> list[dict[str, Scale]]:
+    """Return what `link_scales` returns for each of many people.
+
+    Raises:
+        DataFileError: If the measures of a person contradict each other.
+    """
+    values = dict(zip(people.measures, people.values.T, strict=True))
+    names = tuple(f"person {number}" for number in range(len(people)))
+    ratios = {link: found.tolist() for link, found in _ratios(values, names).items()}
+    return [
+        {link: _triple(found[number]) for link, found in ratios.items()}
+        for number in range(len(people))
+    ]
+
+
+def _triple(ratios: FloatArray | list[float]) -> Scale:
+    x, y, z = map(float, ratios)
+    return x, y, z
+
+
+def _ratios(values: Mapping[str, FloatArray], people: tuple[str, ...]) -> dict[str, FloatArray]:
+    """Return the ratios of each link, shapes (N, 3).
+
+    Args:
+        values: The measures of N people, shapes (N,).
+        people: What messages call each of them.
+    """
     reference = papers_man().measures
-    before = sum(factor * reference[name] for name, factor in measures.items())
-    after = sum(factor * person.measures[name] for name, factor in measures.items())
-    ratio = after / before
+    found = {}
+    for link, sums in LINKS.items():
+        columns = []
+        for measures in sums:
+            before = sum(factor * reference[name] for name, factor in measures.items())
+            after = sum(factor * values[name] for name, factor in measures.items())
+            columns.append(np.asarray(after / before))
+            _check(columns[-1], people, link, measures)
+        found[link] = np.stack(columns, axis=1)
+    return found
+
+
+def _check(ratios: FloatArray, people: tuple[str, ...], link: str, measures: Sum) -> None:
+    """Refuse people of whom a link would have no plausible size."""
     lower, upper = _RATIOS
-    if not lower <= ratio <= upper:
-        names = ", ".join(measures)
+    for number in np.flatnonzero(~((lower <= ratios) & (ratios <= upper)))[:1]:
         raise DataFileError(
-            f"person: {names} do not fit together: the {link.replace('_', ' ')} would be "
-            f"{ratio:.2g} times that of an average man. Check the measured values."
+            f"{people[number]}: {', '.join(measures)} do not fit together: the "
+            f"{link.replace('_', ' ')} would be {ratios[number]:.2g} times that of an average man. "
+            "Check the measured values."
         )
-    return ratio

@@ -22,6 +22,7 @@ from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
 from tcs.model.scene.neighbours import NeighbourList
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
+from tcs.model.scene.people_in_scene import PeopleInScene
 from tcs.model.scene.person_goals import goals_on_person
 from tcs.model.scene.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
@@ -38,6 +39,7 @@ __all__ = [
     "NeighbourList",
     "Observation",
     "Obstacle",
+    "PeopleInScene",
     "Posture",
     "Scene",
     "SceneSpec",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Self
 
 import numpy as np
 
@@ -39,22 +40,37 @@ def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
             goals.append(goal)
             continue
         padding = padding_of(environment, link, scales) - padding_of(environment, link, {})
-        goals.append(_moved(goal, shapes[link], scales[link], padding))
+        position = Anchor.of(goal, shapes[link]).position(scales[link], padding)
+        goals.append(dataclasses.replace(goal, position=position))
     return dataclasses.replace(task, goals=tuple(goals))
 
 
-def _moved(goal: Goal, shapes: list[LinkShape], scale: Scale, padding: float) -> Goal:
-    """Return a goal on a resized link.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Anchor:
+    """The point of a link's shapes that a goal belongs to."""
 
-    Args:
-        goal: The goal on the link of the papers' man.
-        shapes: The shapes of that link.
-        scale: How the link is stretched.
-        padding: By how much the padding of the link grows [m].
-    """
-    near = [(shape, *shape.nearest(goal.position)) for shape in shapes]
-    shape, distance, surface, normal = min(near, key=lambda found: found[1])
-    stretched = shape.stretch(scale)
-    at: FloatArray = shape.follow(surface, normal, stretched)
-    position = at + (distance + padding) * (stretched.R_LS @ normal)
-    return dataclasses.replace(goal, position=np.asarray(position))
+    shape: LinkShape
+    """The nearest shape of the link of the papers' man."""
+    distance: float
+    """Signed distance of the goal from it [m]."""
+    surface: FloatArray
+    """The point, in the frame of the shape [m], shape (3,)."""
+    normal: FloatArray
+    """Outward normal there, shape (3,)."""
+
+    @classmethod
+    def of(cls, goal: Goal, shapes: list[LinkShape]) -> Self:
+        """Return the anchor of a goal on the shapes of its link."""
+        near = [(shape, *shape.nearest(goal.position)) for shape in shapes]
+        return cls(*min(near, key=lambda found: found[1]))
+
+    def position(self, scale: Scale, padding: float) -> FloatArray:
+        """Return the position of the goal on a resized link [m], shape (3,).
+
+        Args:
+            scale: How the link is stretched.
+            padding: By how much the padding of the link grows [m].
+        """
+        stretched = self.shape.stretch(scale)
+        at = self.shape.follow(self.surface, self.normal, stretched)
+        return np.asarray(at + (self.distance + padding) * (stretched.R_LS @ self.normal))

@@ -38,9 +38,10 @@ _LIMBS = (
     ("calf", "quad"),
     ("foot", "calf"),
 )
-_ROOT = "head_center"
+ROOT = "head_center"
+"""The link from which the person is resized."""
 PARENTS: Mapping[str, str] = {
-    "neck_link": _ROOT,
+    "neck_link": ROOT,
     "upper_body_link": "neck_link",
     "mid_body_link": "upper_body_link",
     "lower_body_link": "mid_body_link",
@@ -64,7 +65,7 @@ def part_of(link: str) -> str:
     >>> part_of("quad_left_link"), part_of("head_center")
     ('quad', 'head')
     """
-    if link == _ROOT:
+    if link == ROOT:
         return "head"
     name = link.removesuffix("_link").removesuffix("_left").removesuffix("_right")
     return _SAME_FRAME.get(link, name)
@@ -80,8 +81,17 @@ def scales_of(environment: EnvironmentFile) -> dict[str, Scale]:
     if person is None or not person.has_body:
         return {}
     scales = link_scales(person.body(f"environment '{environment.name}', person"))
-    model = environment.person_model
-    return {f"{model}::{link}": scales[part_of(link)] for link in (_ROOT, *PARENTS)}
+    return scales_by_link(environment.person_model, scales)
+
+
+def scales_by_link(model: str, scales: Mapping[str, Scale]) -> dict[str, Scale]:
+    """Return the scales of the parts of a person by "model::link".
+
+    Args:
+        model: Name of the model of the person.
+        scales: By the keys of `LINKS` of `tcs.model.people`.
+    """
+    return {f"{model}::{link}": scales[part_of(link)] for link in (ROOT, *PARENTS)}
 
 
 def padding_of(environment: EnvironmentFile, link: str, scales: Mapping[str, Scale]) -> float:
@@ -102,10 +112,20 @@ def person_shapes(environment: EnvironmentFile) -> dict[str, list[LinkShape]]:
         EnvironmentFileError: If the file cannot be read or a shape is no box or capsule.
     """
     model = environment.person_model
-    (entry,) = (entry for entry in environment.models if entry.name == model)
-    where = f"environment '{environment.name}', '{model}'"
-    root = read_xml(Path(entry.file), where, EnvironmentFileError)
+    root, where = _model_file(environment)
     return {f"{model}::{link}": shapes for link, shapes in _shapes(root, where).items()}
+
+
+def poses_in_file(environment: EnvironmentFile) -> Poses:
+    """Return the poses of the links of the model's file in the model frame, by link.
+
+    The joints have the positions of the environment file.
+
+    Raises:
+        EnvironmentFileError: If the file cannot be read.
+    """
+    root, _ = _model_file(environment)
+    return _link_poses(root, _joints(environment))
 
 
 def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
@@ -121,7 +141,7 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
     """
     root = read_xml(path, where, EnvironmentFileError)
     links = {link.get("name", ""): link for link in root.iter("link")}
-    for name in (_ROOT, *PARENTS):
+    for name in (ROOT, *PARENTS):
         if name not in links:
             raise EnvironmentFileError(
                 f"{where}: '{path}' has no link '{name}', so that the person cannot be resized. "
@@ -132,23 +152,31 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
         scales[alias] = next(s for name, s in scales.items() if part_of(name) == part)
     joints = _joints(environment)
     before, shapes = _link_poses(root, joints), _shapes(root, where)
-    for name in (_ROOT, *PARENTS):
+    for name in (ROOT, *PARENTS):
         for element in (*links[name].findall("collision"), *links[name].findall("visual")):
             write_shape(element, read_shape(element, where).stretch(scales[name]))
     _move_joints(links, before, scales)
     after, resized = _link_poses(root, joints), _shapes(root, where)
-    shift = _shift(before, shapes, after, resized)
-    for name in (_ROOT, *PARENTS):
+    shift = motion_to_support(before, shapes, after, resized)
+    for name in (ROOT, *PARENTS):
         pose = _pose(_carrier(links, name))
         if (over := pose.get("relative_to", "")) not in scales:
             write_position(pose, read_pose(pose)[1] + before[over][0].T @ shift)
     return ElementTree.tostring(root, encoding="unicode")
 
 
+def _model_file(environment: EnvironmentFile) -> tuple[ElementTree.Element, str]:
+    """Return the content of the person's model file, and its name for messages."""
+    model = environment.person_model
+    (entry,) = (entry for entry in environment.models if entry.name == model)
+    where = f"environment '{environment.name}', '{model}'"
+    return read_xml(Path(entry.file), where, EnvironmentFileError), where
+
+
 def _carrier(links: Mapping[str, ElementTree.Element], name: str) -> ElementTree.Element:
     """Return the link that places a link: itself, or the one whose frame it shares."""
     over = _pose(links[name]).get("relative_to", "")
-    return links[over] if over in _SAME_FRAME and name == _ROOT else links[name]
+    return links[over] if over in _SAME_FRAME and name == ROOT else links[name]
 
 
 def _move_joints(
@@ -156,13 +184,11 @@ def _move_joints(
 ) -> None:
     """Stretch the positions of the joints on each link, in place."""
     # What each origin moves by, so that a person of the same size keeps every digit.
-    moved = {_ROOT: np.zeros(3)}
-    for name, parent in PARENTS.items():
-        R, p = before[parent]
-        offset = R.T @ (before[name][1] - p)
-        moved[name] = moved[parent] + R @ ((np.array(scales[parent]) - 1.0) * offset)
+    moved = {ROOT: np.zeros(3)}
+    for name, step in steps_of_joints(before, scales).items():
+        moved[name] = moved[PARENTS[name]] + step
     for name, link in links.items():
-        if name not in scales or name == _ROOT:
+        if name not in scales or name == ROOT:
             continue
         pose = _pose(link)
         over = pose.get("relative_to", "")
@@ -172,7 +198,25 @@ def _move_joints(
             write_position(pose, read_pose(pose)[1] + before[over][0].T @ moved[name])
 
 
-def _shift(
+def steps_of_joints(before: Poses, scales: Mapping[str, Scale]) -> dict[str, FloatArray]:
+    """Return how far each link moves relative to its parent, in the model frame [m].
+
+    Args:
+        before: Poses of the links before resizing.
+        scales: How each link is stretched, by its name.
+
+    Returns:
+        By the keys of `PARENTS`, in their order, shapes (3,).
+    """
+    steps = {}
+    for name, parent in PARENTS.items():
+        R, p = before[parent]
+        offset = R.T @ (before[name][1] - p)
+        steps[name] = R @ ((np.array(scales[parent]) - 1.0) * offset)
+    return steps
+
+
+def motion_to_support(
     before: Poses,
     shapes: Mapping[str, list[LinkShape]],
     after: Poses,
@@ -203,7 +247,7 @@ def _shapes(root: ElementTree.Element, where: str) -> dict[str, list[LinkShape]]
     return {
         name: [read_shape(element, where) for element in link.findall("collision")]
         for link in root.iter("link")
-        if (name := link.get("name", "")) == _ROOT or name in PARENTS
+        if (name := link.get("name", "")) == ROOT or name in PARENTS
     }
 
 

@@ -12,6 +12,7 @@ from tcs.output.draw.files import FORMATS, check_format, save_figure
 from tcs.output.draw.floor_plan import BaseFootprint
 from tcs.output.draw.map import draw_map
 from tcs.output.draw.picture import ScenePanel, draw_scene
+from tcs.output.draw.population import population_figure
 from tcs.output.draw.scatter import Cloud, draw_clouds
 from tcs.output.draw.solids import Category, Solid, primitive_corners
 from tcs.output.draw.states import StatePanel, draw_states
@@ -36,6 +37,7 @@ __all__ = [
     "draw_map",
     "draw_scene",
     "draw_states",
+    "population_figure",
     "primitive_corners",
     "save_figure",
 ]

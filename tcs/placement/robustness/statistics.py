@@ -79,6 +79,25 @@ def intervals_of(
     return mean, low, np.maximum(np.minimum(middle + half, 1.0), mean)
 
 
+def binomial_interval(successes: int, trials: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of a probability, by Clopper and Pearson.
+
+    Args:
+        successes: Number of successes, 0 to `trials`.
+        trials: Number of independent trials, 1 or more.
+
+    >>> low, high = binomial_interval(0, 100)
+    >>> low, round(high, 4)
+    (0.0, 0.0362)
+    """
+    from scipy.special import betaincinv
+
+    tail, failures = (1.0 - CONFIDENCE) / 2.0, trials - successes
+    low = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
+    high = float(betaincinv(successes + 1, failures, 1.0 - tail)) if failures else 1.0
+    return low, high
+
+
 @dataclass(frozen=True, slots=True)
 class Difference:
     """Difference between the samples of two methods, with a test of its significance."""

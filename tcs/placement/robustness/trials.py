@@ -181,7 +181,7 @@ class Trials:
         Raises:
             GridError: If there is no such configuration.
         """
-        poses = self._poses(members)
+        poses = self.poses(members)
         samples = samples_of(offsets)
         out = np.zeros((poses.state.size, samples, self.weights.size), dtype=np.bool_)
         step = _counter(poses.state.size * samples, on_progress)
@@ -223,7 +223,7 @@ class Trials:
             GridError: If there is no such configuration.
             TcsError: If there are more or fewer configurations than samples.
         """
-        poses = self._poses(members)
+        poses = self.poses(members)
         if poses.state.size != samples_of(offsets):
             raise TcsError(
                 f"{poses.state.size} configurations for {samples_of(offsets)} samples; must be "
@@ -248,7 +248,7 @@ class Trials:
         Raises:
             GridError: If there is no such configuration.
         """
-        poses = self._poses([member])
+        poses = self.poses([member])
         columns = np.arange(samples_of(offsets))
         scenes = self._scenes(int(poses.state[0]), offsets, columns)
         return scenes.scores(poses, Run(0, 0, columns.size))
@@ -277,10 +277,15 @@ class Trials:
         state = members // self.scored.sets.state_size
         beyond = np.zeros(samples_of(offsets), dtype=np.bool_)
         for number in np.unique(state):
-            beyond |= self._positions(int(number), offsets)[1] & (state == number).any(axis=1)
+            beyond |= self.positions(int(number), offsets)[1] & (state == number).any(axis=1)
         return int(np.count_nonzero(beyond))
 
-    def _poses(self, members: ArrayLike) -> BasePoses:
+    def poses(self, members: ArrayLike) -> BasePoses:
+        """Return the base poses of configurations, given by flat index.
+
+        Raises:
+            GridError: If there is no such configuration.
+        """
         grid = self.grid
         flat = np.asarray(members, dtype=np.int64)
         at = grid.values(flat)
@@ -292,7 +297,19 @@ class Trials:
             torso=flat % grid.axis("torso").count,
         )
 
-    def _positions(
+    def nominal(self, state: int) -> dict[str, float]:
+        """Return the positions of the joints of a state without error, by name [m or rad].
+
+        Args:
+            state: Number of arm and environment state, as in `BasePoses`.
+        """
+        axes = self.grid.environment_axes
+        of_arm = state % (self.grid.arm_size // self.grid.state_size)
+        along = np.unravel_index(of_arm, self.grid.environment_shape) if axes else ()
+        chosen = {axis.name: float(axis.values[i]) for axis, i in zip(axes, along, strict=True)}
+        return {**self.observed, **chosen}
+
+    def positions(
         self, state: int, offsets: Offsets
     ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
         """Return joint positions in each sample, and whether a joint was held at its limit.
@@ -301,13 +318,7 @@ class Trials:
             state: Number of arm and environment state, as in `BasePoses`.
             offsets: Errors of the joints, shapes (samples,).
         """
-        axes = self.grid.environment_axes
-        of_arm = state % (self.grid.arm_size // self.grid.state_size)
-        along = np.unravel_index(of_arm, self.grid.environment_shape) if axes else ()
-        nominal = {
-            **self.observed,
-            **{axis.name: float(axis.values[i]) for axis, i in zip(axes, along, strict=True)},
-        }
+        nominal = self.nominal(state)
         samples = samples_of(offsets)
         positions = {name: np.full(samples, value) for name, value in nominal.items()}
         limited = np.zeros(samples, dtype=np.bool_)
@@ -327,7 +338,7 @@ class Trials:
         columns: IntArray,
     ) -> PerturbedScenes:
         """Return one state of the environment, with its arm, in some of the samples, as arrays."""
-        positions, _ = self._positions(state, {name: v[columns] for name, v in offsets.items()})
+        positions, _ = self.positions(state, {name: v[columns] for name, v in offsets.items()})
         states = (
             {name: float(values[i]) for name, values in positions.items()}
             for i in range(columns.size)

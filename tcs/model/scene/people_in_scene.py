@@ -1,0 +1,241 @@
+"""Many people in one scene as arrays, without a Drake plant for each.
+
+On a resized person every link keeps the orientation that it has on the papers' man; sizes of
+shapes, positions of joints, padding and goals differ. The poses of his links are read from Drake,
+and the differences are added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.multibody.tree import RigidBody
+
+from tcs.errors import EnvironmentFileError
+from tcs.kernel.arrays import FloatArray, IntArray, SceneArrays
+from tcs.model.people import Scale
+from tcs.model.scene.contacts import Group
+from tcs.model.scene.lowered_scene import LoweredScene
+from tcs.model.scene.lowering import environment_at
+from tcs.model.scene.person_goals import Anchor
+from tcs.model.scene.person_shapes import LinkShape
+from tcs.model.scene.resized_person import (
+    PARENTS,
+    ROOT,
+    motion_to_support,
+    padding_of,
+    person_shapes,
+    poses_in_file,
+    scales_by_link,
+    steps_of_joints,
+)
+from tcs.model.scene.scene import Scene
+from tcs.model.tasks import Task
+
+_LINKS = (ROOT, *PARENTS)
+"""The links of a person, each after its parent."""
+_NECK = "neck_rotation"
+"""Link between head and neck of a lying person, at the origin of the neck: what it turns by does
+not move that origin."""
+
+
+class _PartOfLink(NamedTuple):
+    """A shape of the person among those of the environment."""
+
+    row: int
+    """Its number among the shapes of the environment."""
+    link: int
+    """Number of its link in `_LINKS`."""
+    shape: int
+    """Its number among the shapes of the link."""
+
+
+class _LinkPoses(NamedTuple):
+    """Links of the papers' man in S states."""
+
+    R: FloatArray
+    """Orientations in W, shape (S, links, 3, 3)."""
+    p: FloatArray
+    """Origins in W [m], shape (S, links, 3)."""
+    turn: FloatArray
+    """Rotation from the model frame in the state of the file to W, of what carries each link,
+    shape (S, links, 3, 3)."""
+
+
+class PeopleInScene:
+    """The environment of a scene in several states, in which the person may have any body."""
+
+    def __init__(
+        self,
+        lowered: LoweredScene,
+        scene: Scene,
+        task: Task,
+        states: Sequence[Mapping[str, float]],
+    ) -> None:
+        """Read the scene of the papers' man.
+
+        Args:
+            lowered: The scene as arrays.
+            scene: The scene itself, its person not resized; its state is restored.
+            task: The goals on the papers' man.
+            states: Positions of the environment's joints by name [m or rad], for each of S states.
+
+        Raises:
+            EnvironmentFileError: If there is no person that can be resized.
+            TcsError: If a joint cannot take a position.
+        """
+        self._environment = environment = scene.spec.environment
+        bodies = _person_bodies(scene)
+        self._names = tuple(f"{environment.person_model}::{link}" for link in _LINKS)
+        self._arrays = environment_at(lowered, scene, task, states)
+        shapes = person_shapes(environment)
+        self._shapes = {link: shapes[self._names[i]] for i, link in enumerate(_LINKS)}
+        self._before = poses_in_file(environment)
+        self._poses = self._read_poses(scene, bodies, states)
+        self._parts = _parts(scene, bodies)
+        self._anchors = self._read_anchors(task)
+
+    def arrays_for(self, scales: Mapping[str, Scale], states: IntArray) -> SceneArrays:
+        """Return the arrays of some of the states, with a person in them.
+
+        They equal the lowering of the resized scene within a micrometre: the model files round
+        orientations to seven digits, so that Drake's products of them are rotations to 1e-7 only.
+
+        Args:
+            scales: How the parts of the person are stretched, by the keys of
+                `tcs.model.people.LINKS`.
+            states: Numbers of the states, shape (s,).
+        """
+        of_names = scales_by_link(self._environment.person_model, scales)
+        of_links = [of_names[name] for name in self._names]
+        stretched = {
+            link: [shape.stretch(scale) for shape in self._shapes[link]]
+            for link, scale in zip(_LINKS, of_links, strict=True)
+        }
+        R, p = self._poses.R[states], self._origins(of_links, stretched, states)
+        pads = [padding_of(self._environment, name, of_names) for name in self._names]
+        whole = self._arrays.environment
+        sizes, paddings, centres = whole.size.copy(), whole.pad.copy(), whole.p[states]
+        for part in self._parts:
+            shape = stretched[_LINKS[part.link]][part.shape]
+            sizes[part.row, : shape.size.size] = shape.size
+            paddings[part.row] = pads[part.link]
+            centres[:, part.row] = p[:, part.link] + R[:, part.link] @ shape.p_LoSo_L
+        goal_p = self._arrays.goal_p[states]
+        for goal, (link, anchor) in self._anchors.items():
+            padding = pads[link] - padding_of(self._environment, self._names[link], {})
+            position = anchor.position(of_links[link], padding)
+            goal_p[:, goal] = p[:, link] + R[:, link] @ position
+        environment = whole._replace(size=sizes, pad=paddings, R=whole.R[states], p=centres)
+        return self._arrays._replace(
+            environment=environment, goal_R=self._arrays.goal_R[states], goal_p=goal_p
+        )
+
+    def _origins(
+        self,
+        scales: list[Scale],
+        stretched: Mapping[str, list[LinkShape]],
+        states: IntArray,
+    ) -> FloatArray:
+        """Return the origins of the links of a person in W [m], shape (s, links, 3)."""
+        steps = steps_of_joints(self._before, dict(zip(_LINKS, scales, strict=True)))
+        moved = {ROOT: np.zeros(3)}
+        for link, step in steps.items():
+            moved[link] = moved[PARENTS[link]] + step
+        after = {
+            link: (R, p + moved[link]) for link, (R, p) in self._before.items() if link in moved
+        }
+        steps[ROOT] = motion_to_support(self._before, self._shapes, after, stretched)
+        motions = [self._poses.turn[states, i] @ steps[link] for i, link in enumerate(_LINKS)]
+        turned = np.stack(motions, axis=1)
+        for i, link in enumerate(_LINKS[1:], 1):
+            turned[:, i] += turned[:, _LINKS.index(PARENTS[link])]
+        return np.asarray(self._poses.p[states] + turned)
+
+    def _read_poses(
+        self, scene: Scene, bodies: Mapping[str, RigidBody], states: Sequence[Mapping[str, float]]
+    ) -> _LinkPoses:
+        """Return the links of the papers' man in each state, read from Drake."""
+        carriers = _carriers(scene, bodies)
+        reference = np.stack([self._before[carriers[link].name()][0] for link in _LINKS])
+        bodies_read = [*(bodies[link] for link in _LINKS), *(carriers[link] for link in _LINKS)]
+        plant, context = scene.built.plant, scene.plant_context
+        before, found = scene.positions(), []
+        try:
+            for state in states:
+                for name, value in state.items():
+                    scene.set_joint(name, value)
+                poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies_read]
+                found.append([X.GetAsMatrix34() for X in poses])
+        finally:
+            scene.restore(before)
+        X = np.array(found).reshape(len(states), 2, len(_LINKS), 3, 4)
+        turn = X[:, 1, ..., :3] @ np.swapaxes(reference, 1, 2)
+        return _LinkPoses(R=X[:, 0, ..., :3], p=X[:, 0, ..., 3], turn=turn)
+
+    def _read_anchors(self, task: Task) -> dict[int, tuple[int, Anchor]]:
+        """Return number of the link, and anchor on it, of each goal on the person."""
+        anchors = {}
+        for number, goal in enumerate(task.goals):
+            name = self._environment.body_frames[goal.body_frame]
+            if name in self._names:
+                link = self._names.index(name)
+                anchors[number] = link, Anchor.of(goal, self._shapes[_LINKS[link]])
+        return anchors
+
+
+def _person_bodies(scene: Scene) -> dict[str, RigidBody]:
+    """Return the bodies of the person by link.
+
+    Raises:
+        EnvironmentFileError: If there is no person that can be resized.
+    """
+    environment, plant = scene.spec.environment, scene.built.plant
+    model, where = environment.person_model, f"environment '{environment.name}'"
+    if not environment.is_person(model):
+        raise EnvironmentFileError(f"{where} has no person, so there is nobody to replace.")
+    if environment.has_body:
+        raise EnvironmentFileError(f"{where}: the person is resized already.")
+    instance = plant.GetModelInstanceByName(model)
+    bodies = {body.name(): body for body in map(plant.get_body, plant.GetBodyIndices(instance))}
+    missing = [link for link in _LINKS if link not in bodies]
+    if missing:
+        raise EnvironmentFileError(
+            f"{where}: '{model}' has no link '{missing[0]}', so that the person cannot be resized. "
+            "Use person_seated.sdf or person_lying.sdf."
+        )
+    for entry in environment.models:
+        if entry.parent.startswith(f"{model}::"):
+            raise EnvironmentFileError(
+                f"{where}: '{entry.name}' is fixed to the person, so that it is unknown where it "
+                "is on other people. Fix it to the furniture."
+            )
+    return bodies
+
+
+def _carriers(scene: Scene, bodies: Mapping[str, RigidBody]) -> dict[str, RigidBody]:
+    """Return the body that the joint of each link is fixed to."""
+    plant = scene.built.plant
+    above = {
+        joint.child_body().name(): joint.parent_body()
+        for joint in map(plant.get_joint, plant.GetJointIndices(bodies[ROOT].model_instance()))
+    }
+    if _NECK in above:
+        above["neck_link"] = above[_NECK]
+    return {link: above[link] for link in _LINKS}
+
+
+def _parts(scene: Scene, bodies: Mapping[str, RigidBody]) -> list[_PartOfLink]:
+    """Return the shapes of the person among those of the environment."""
+    index = {bodies[link].index(): i for i, link in enumerate(_LINKS)}
+    count = [0] * len(_LINKS)
+    parts = []
+    found = (part for part in scene.built.parts if part.group is Group.ENVIRONMENT)
+    for row, part in enumerate(found):
+        if part.body in index:
+            link = index[part.body]
+            parts.append(_PartOfLink(row, link, count[link]))
+            count[link] += 1
+    return parts

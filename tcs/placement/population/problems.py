@@ -1,0 +1,60 @@
+"""The kernel's problem with another person in it: what depends on the person is arranged anew."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
+from tcs.kernel.collide import pack
+from tcs.kernel.groups import with_group_rows
+from tcs.kernel.problem import TOUCH, UNCHECKED, Problem, build_problem
+
+
+class PersonProblems:
+    """Problems of one robot in one environment, for one person after the other.
+
+    Arranging the robot takes a hundred times as long as what a person changes.
+    """
+
+    def __init__(self, arrays: SceneArrays, measure: str) -> None:
+        """Arrange the robot.
+
+        Args:
+            arrays: The scene with any person.
+            measure: Name of the dexterity measure.
+        """
+        states, origin = len(arrays.goal_p), np.zeros(1)
+        grid = GridArrays(states, origin, origin, origin, len(arrays.arm_base_p))
+        self._problem = problem = build_problem(arrays, grid, measure)
+        # The order of the arm's shapes in a problem: nearest to the tool first.
+        order = np.argsort(-arrays.arm.frame.astype(np.int64), kind="stable")
+        self._pads = arrays.arm.pad[order], arrays.body.pad
+        self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
+        self._first = problem.link_first, problem.body_first
+        self._margin = arrays.margin
+
+    def of(self, arrays: SceneArrays) -> Problem:
+        """Return the problem of a person.
+
+        Args:
+            arrays: The same scene with the person; only its environment and goals are read.
+        """
+        before, pad = self._problem, arrays.environment.pad
+        widest = max(before.widest_gap, 2.0 * float(pad.max(initial=0.0)))
+        arm, body = (self._gaps(group, pad) for group in range(2))
+        return before._replace(
+            environment=pack(arrays.environment),
+            gap_environment=arm,
+            gap_base=body,
+            widest_gap=widest,
+            arm_radius=before.arm_radius + (widest - before.widest_gap),
+            goal_R=np.array(arrays.goal_R),
+            goal_p=np.array(arrays.goal_p),
+            environment_states=len(arrays.goal_p),
+        )
+
+    def _gaps(self, group: int, pad: FloatArray) -> FloatArray:
+        """Return the distances that arm (0) or body (1) keep from the environment [m]."""
+        required = np.maximum(max(self._margin, TOUCH), self._pads[group][:, None] + pad)
+        gaps = np.where(self._checked[group], required, UNCHECKED)
+        return with_group_rows(np.ascontiguousarray(gaps), self._first[group])

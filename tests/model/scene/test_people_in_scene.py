@@ -1,0 +1,50 @@
+"""People in a scene without a plant of their own: the arrays that the resized scene lowers to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.errors import EnvironmentFileError
+from tcs.model.people import draw_bodies, scales_of_people
+from tcs.model.scene import PeopleInScene, environment_at
+from tcs.placement.scoring import load_job
+
+WITHIN = 1e-6
+"""Link orientations in the model files are rounded to seven digits [m]."""
+PEOPLE = draw_bodies(2, seed=3)
+# Joints keep the positions that a state does not name.
+STATES = {
+    "wheelchair": (
+        {"person_x": 0.02, "person_yaw": 0.0, "wheelchair_yaw": 0.0, "head_tilt": 0.0},
+        {"person_x": 0.01, "person_yaw": 0.2, "wheelchair_yaw": -0.3, "head_tilt": 0.2},
+    ),
+    "bed": (
+        {"head_rest": 0.0, "person_x": 0.01, "head_tilt": 0.0, "head_neck_1": 0.0},
+        {"head_rest": 1.2, "person_x": 0.02, "head_tilt": 0.2, "head_neck_1": 0.3},
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "number"),
+    [("bed", "bathing", 0), pytest.param("wheelchair", "shaving", 1, marks=pytest.mark.slow)],
+)
+def test_arrays_equal_those_of_the_resized_scene(name, task, number):
+    job = load_job(task, name, "pr2")
+    scene = job.scene()
+    people = PeopleInScene(job.lowered(scene), scene, job.task, STATES[name])
+    found = people.arrays_for(scales_of_people(PEOPLE)[number], np.array([1, 0]))
+
+    body = PEOPLE[number]
+    alone = load_job(task, name, "pr2", person={"sex": body.sex, **body.measures})
+    resized = alone.scene()
+    expected = environment_at(alone.lowered(resized), resized, alone.task, STATES[name][::-1])
+    for key in ("type", "size", "pad", "R"):
+        of_found, of_expected = (getattr(one.environment, key) for one in (found, expected))
+        np.testing.assert_array_equal(of_found, of_expected)
+    np.testing.assert_allclose(found.environment.p, expected.environment.p, atol=WITHIN)
+    np.testing.assert_allclose(found.goal_p, expected.goal_p, atol=WITHIN)
+    np.testing.assert_allclose(found.goal_R, expected.goal_R, atol=1e-12)
+    with pytest.raises(EnvironmentFileError, match="resized already"):
+        PeopleInScene(alone.lowered(resized), resized, alone.task, STATES[name])
