@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
+    from tcs.placement.refinement import refine
     from tcs.placement.robustness import Evaluation, evaluate, robustify
     from tcs.placement.scoring import (
         LiveScorer,
@@ -62,6 +63,7 @@ __all__ = [
     "load",
     "plan",
     "population",
+    "refine",
     "robustify",
     "save",
     "score",
@@ -95,6 +97,7 @@ _HOMES = {
     "load": ("tcs.placement.store", "load_scores"),
     "plan": ("tcs.motion", "plan"),
     "population": ("tcs.placement.population", "population"),
+    "refine": ("tcs.placement.refinement", "refine"),
     "robustify": ("tcs.placement.robustness", "robustify"),
     "save": ("tcs.placement.store", "save_scores"),
     "score": ("tcs.placement.scoring", "score"),

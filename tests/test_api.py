@@ -33,6 +33,7 @@ PROMISED = [
     "load",
     "plan",
     "population",
+    "refine",
     "robustify",
     "save",
     "score",

@@ -14,6 +14,7 @@ from tcs.cli import (
     options,
     pictures,
     population,
+    refinement,
     report,
     robots,
     robustness,
@@ -76,6 +77,7 @@ for command in (
     robustness.evaluate,
     robustness.robustify,
     population.population,
+    refinement.refine,
     view.view,
     locate.locate,
 ):

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,28 @@ class AxisCondition:
                 satisfies the condition.
         """
         axis = self.axis_of(grid)
-        values = axis.start + np.arange(axis.count) * axis.step
+        admitted = self._satisfied(axis, axis.start + np.arange(axis.count) * axis.step)
+        if not np.any(admitted):
+            raise GridError(
+                f"Condition '{self.text}' leaves nothing: the grid has {axis.name} "
+                f"{values_text(axis)}."
+            )
+        return admitted
+
+    def satisfied(self, axis: Axis, values: NDArray[np.float64]) -> BoolArray:
+        """Return which values of an axis satisfy the condition, on the grid or not, shape (n,).
+
+        Args:
+            axis: The axis of the condition.
+            values: Values [m or rad], shape (n,).
+
+        Raises:
+            GridError: If the unit is not that of the axis, or the range is reversed.
+        """
+        return self._satisfied(axis, np.rad2deg(values) if axis.unit == "deg" else values)
+
+    def _satisfied(self, axis: Axis, values: NDArray[np.floating[Any]]) -> BoolArray:
+        """Return which values, in the unit of their axis, satisfy the condition."""
         low, high = self._in_unit_of(axis)
         if axis.name == "base_yaw" and self.comparison == "=":
             span = 0.0 if self.high is None else high - low
@@ -127,11 +148,6 @@ class AxisCondition:
             admitted = values <= low + (TOLERANCE if self.comparison == "<=" else -TOLERANCE)
         else:
             admitted = values >= low + (-TOLERANCE if self.comparison == ">=" else TOLERANCE)
-        if not np.any(admitted):
-            raise GridError(
-                f"Condition '{self.text}' leaves nothing: the grid has {axis.name} "
-                f"{values_text(axis)}."
-            )
         return np.asarray(admitted)
 
     def _in_unit_of(self, axis: Axis) -> tuple[float, float]:

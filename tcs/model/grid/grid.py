@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -241,7 +241,22 @@ class Grid:
         Raises:
             GridError: If the index is not one of this grid.
         """
-        at = {name: float(value) for name, value in self.values(flat_index).items()}
+        values = [float(value) for value in self.values(flat_index).values()]
+        return self.between(values, flat_index)
+
+    def between(self, values: Sequence[float], near: int) -> InitialConfiguration:
+        """Return a configuration that need not be on the grid.
+
+        Args:
+            values: Values in the order of the axes [m or rad].
+            near: Flat index of a configuration with the same arm.
+
+        Raises:
+            GridError: If the index is not one of this grid, or a value is missing.
+        """
+        if len(values) != len(self.axes):
+            raise GridError(f"grid: {len(values)} values for {len(self.axes)} axes.")
+        at = {axis.name: float(v) for axis, v in zip(self.axes, values, strict=True)}
         return InitialConfiguration(
             base_x=at["base_x"],
             base_y=at["base_y"],
@@ -249,7 +264,7 @@ class Grid:
             torso=at["torso"],
             environment=tuple((axis.name, at[axis.name]) for axis in self.environment_axes),
             environment_units=tuple(axis.held_unit for axis in self.environment_axes),
-            arm=self.arm_of(flat_index),
+            arm=self.arm_of(near),
         )
 
     def overridden(self, changes: Mapping[str, Mapping[str, object]], *, where: str = "") -> Self:

@@ -19,7 +19,13 @@ from tcs.model.scene.environment import (
 from tcs.model.scene.environment_shapes import environment_shapes
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.lowered_scene import LoweredScene
-from tcs.model.scene.lowering import arm_chain, environment_at, goal_poses, lower
+from tcs.model.scene.lowering import (
+    arm_chain,
+    environment_at,
+    goal_poses,
+    lower,
+    torso_at,
+)
 from tcs.model.scene.neighbours import NeighbourList
 from tcs.model.scene.observation import JointEstimate, Observation, estimate_joints
 from tcs.model.scene.people_in_scene import PeopleInScene
@@ -53,5 +59,6 @@ __all__ = [
     "goals_on_person",
     "load_environment",
     "lower",
+    "torso_at",
     "with_person",
 ]

@@ -141,7 +141,7 @@ def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> l
 
 
 def _torso_states(
-    scene: Scene, parts: list[Part], levels: FloatArray
+    scene: Scene, parts: list[Part], levels: Iterable[float]
 ) -> tuple[list[RigidTransform], list[list[RigidTransform]]]:
     """Return X_BA, and the poses of the rest of the robot in B, for each torso level."""
     arm_base, poses = [], []
@@ -188,6 +188,34 @@ def environment_at(
     )
     return lowered.arrays._replace(
         environment=moved, goal_R=_rotations(goal_matrices), goal_p=_origins(goal_matrices)
+    )
+
+
+def torso_at(lowered: LoweredScene, scene: Scene, levels: Iterable[float]) -> SceneArrays:
+    """Return the arrays of a lowered scene with the torso at other heights than the grid's.
+
+    Args:
+        lowered: The scene as arrays.
+        scene: The scene itself; its state is restored.
+        levels: Torso heights [m].
+
+    Returns:
+        Arrays of these torso levels; for a level of the grid, the same numbers as lowering the
+        grid gives.
+    """
+    before = scene.positions()
+    body = [part for part in scene.built.parts if part.group is Group.BODY]
+    try:
+        scene.place_base(0.0, 0.0, 0.0)
+        scene.set_arm(np.zeros(len(scene.built.arm_joints)))
+        arm_base, poses = _torso_states(scene, body, levels)
+    finally:
+        scene.restore(before)
+    matrices, arm_bases = _matrices(poses), _matrices([arm_base])
+    return lowered.arrays._replace(
+        arm_base_R=_rotations(arm_bases)[0],
+        arm_base_p=_origins(arm_bases)[0],
+        body=lowered.arrays.body._replace(R=_rotations(matrices), p=_origins(matrices)),
     )
 
 

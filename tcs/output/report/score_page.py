@@ -13,8 +13,15 @@ from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.reproduce import commands, success_record
 from tcs.output.report.score_report import ScoreReport
 from tcs.output.report.score_summary import summary_blocks, unreached_everywhere
-from tcs.output.words import assigned_goals, frame_name, goals_text
+from tcs.output.words import (
+    assigned_goals,
+    frame_name,
+    goals_text,
+    member_text,
+    scores_text,
+)
 from tcs.output.words.robustness import BODY_COLLISIONS, error_width
+from tcs.placement.refinement import refinement_summary
 from tcs.placement.tables import SetTable
 
 
@@ -36,6 +43,7 @@ def make_score_page(report: ScoreReport, *, command: str) -> Page:
         Section("Reasons over the grid", _reasons(report)),
         Section("Verification", _verification(report)),
         Section("Success under error", _success(report)),
+        *_refined(report),
         Section("How to reproduce", _provenance(report, command)),
     ]
     return Page(
@@ -158,6 +166,29 @@ def _success(report: ScoreReport) -> list[Block]:
             )
         )
     return blocks
+
+
+def _refined(report: ScoreReport) -> list[Section]:
+    """Return what the refinement of the table gained, if there was one."""
+    if report.scored.refined is None:
+        return []
+    found = refinement_summary(report.file, report.shown.table)
+    before, after = (
+        scores_text(found[key]["reachability"], found[key]["manipulability"], report.measure)
+        for key in ("before", "after")
+    )
+    stops = "; ".join(member_text(member) for member in found["after"]["members"])
+    return [
+        Section(
+            "Between the grid points",
+            [
+                Text(
+                    f"Best set of the grid: {before}. Refined: {after}, from {stops}. No set "
+                    f"between the ends of the grid has P_R + P_M above {found['bound']:.4f}."
+                )
+            ],
+        )
+    ]
 
 
 def _provenance(report: ScoreReport, command: str) -> list[Block]:

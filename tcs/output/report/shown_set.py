@@ -45,7 +45,7 @@ class ShownSet:
         table = nearest_table(file, here, observed).index
         sets = file.tables[table].sets
         if here is not None:
-            choice = select(file, here, max_members=max_members, observed=observed)
+            choice = select(file, here, max_members=max_members, observed=observed, refined=False)
             members = tuple(choice.members[i] for i in choice.order)
             indices = tuple(choice.indices[i] for i in choice.order)
             what = (
@@ -78,4 +78,5 @@ def _best_of(file: ScoreFile, table: int, max_members: int | None) -> tuple[int,
     anywhere = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
     free = UtilityWeights(travel=0.0, places=0.0, environment=0.0)
     tables = SelectionTables.of(file, table)
-    return select(tables, anywhere, weights=free, max_members=max_members).indices
+    choice = select(tables, anywhere, weights=free, max_members=max_members, refined=False)
+    return choice.indices

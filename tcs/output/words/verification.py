@@ -39,6 +39,7 @@ def check_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
         shortfall = f"{found['mean_shortfall']:.1e}"
     return (
         CheckLine("reached pairs re-checked with Drake", f"{found['checked']:,}"),
+        *_refined_line(found),
         CheckLine("false", f"{found['false_reached']:,}", is_detail=True),
         CheckLine("joints beyond their limits", f"{found['limit_violations']:,}", is_detail=True),
         CheckLine("greatest position error", greatest("max_position_error", " m"), is_detail=True),
@@ -53,6 +54,12 @@ def check_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
         CheckLine("recall", recall_text(found)),
         CheckLine(f"mean shortfall of {measure}", shortfall),
     )
+
+
+def _refined_line(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
+    """Return the number of re-checked pairs of refined sets, if there are any."""
+    count = found["refined_checked"]
+    return (CheckLine("of refined sets", f"{count:,}", is_detail=True),) if count else ()
 
 
 def _stratum_line(stratum: Mapping[str, Any]) -> CheckLine:

@@ -51,6 +51,49 @@ class ArmTrials:
     """The pairs of body and environment shapes whose collisions count, shape (n_body,
     n_environment)."""
 
+    def displaced(
+        self, nominal: Mapping[str, float], offsets: Offsets
+    ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
+        """Return joint positions in each sample, and whether a joint was held at its limit.
+
+        Args:
+            nominal: Positions without error, by joint [m or rad]; other joints are where the
+                environment file has them.
+            offsets: Errors of the joints, shapes (samples,).
+        """
+        samples = samples_of(offsets)
+        positions = {name: np.full(samples, value) for name, value in nominal.items()}
+        limited = np.zeros(samples, dtype=np.bool_)
+        for name, error in offsets.items():
+            center = nominal.get(name, self.job.spec.environment.joints.get(name, 0.0))
+            lower, upper = self.scene.built.environment_joints.limits(name)
+            # Rounding may put the last grid value beyond the limit, where it must remain.
+            displaced = center + np.asarray(error, dtype=np.float64)
+            positions[name] = np.clip(displaced, min(lower, center), max(upper, center))
+            limited |= positions[name] != displaced
+        return positions, limited
+
+    def scenes(
+        self, positions: Mapping[str, FloatArray], lowered: LoweredScene, measure: str
+    ) -> PerturbedScenes:
+        """Return the environment with its joints at each sample's positions, as arrays.
+
+        Args:
+            positions: Joint positions [m or rad], shapes (samples,).
+            lowered: The scene with the torso heights.
+            measure: Name of the dexterity measure.
+        """
+        samples = samples_of(positions)
+        states = (
+            {name: float(values[i]) for name, values in positions.items()} for i in range(samples)
+        )
+        arrays = environment_at(lowered, self.scene, self.job.task, states)
+        arrays = arrays._replace(body_vs_environment=self.body_pairs)
+        origin = np.zeros(1)
+        grid = GridArrays(samples, origin, origin, origin, len(arrays.arm_base_p))
+        problem = build_problem(arrays, grid, measure)
+        return PerturbedScenes(problem, gripper_contacts(problem))
+
 
 @dataclass(frozen=True, eq=False)
 class Trials:
@@ -318,18 +361,7 @@ class Trials:
             state: Number of arm and environment state, as in `BasePoses`.
             offsets: Errors of the joints, shapes (samples,).
         """
-        nominal = self.nominal(state)
-        samples = samples_of(offsets)
-        positions = {name: np.full(samples, value) for name, value in nominal.items()}
-        limited = np.zeros(samples, dtype=np.bool_)
-        for name, error in offsets.items():
-            center = nominal.get(name, self.job.spec.environment.joints.get(name, 0.0))
-            lower, upper = self.scene.built.environment_joints.limits(name)
-            # Rounding may put the last grid value beyond the limit, where it must remain.
-            displaced = center + np.asarray(error, dtype=np.float64)
-            positions[name] = np.clip(displaced, min(lower, center), max(upper, center))
-            limited |= positions[name] != displaced
-        return positions, limited
+        return self.arms[0].displaced(self.nominal(state), offsets)
 
     def _scenes(
         self,
@@ -339,18 +371,8 @@ class Trials:
     ) -> PerturbedScenes:
         """Return one state of the environment, with its arm, in some of the samples, as arrays."""
         positions, _ = self.positions(state, {name: v[columns] for name, v in offsets.items()})
-        states = (
-            {name: float(values[i]) for name, values in positions.items()}
-            for i in range(columns.size)
-        )
         arm = self.arm_of(state * self.grid.state_size)
-        arrays = environment_at(arm.lowered, arm.scene, arm.job.task, states)
-        arrays = arrays._replace(body_vs_environment=arm.body_pairs)
-        torso_levels = len(arrays.arm_base_p)
-        origin = np.zeros(1)
-        grid = GridArrays(columns.size, origin, origin, origin, torso_levels)
-        problem = build_problem(arrays, grid, str(self.file.metadata["measure"]))
-        return PerturbedScenes(problem, gripper_contacts(problem))
+        return arm.scenes(positions, arm.lowered, str(self.file.metadata["measure"]))
 
 
 def samples_of(offsets: Offsets) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -61,6 +61,8 @@ class Verification:
     """Number of reached pairs re-checked with Drake."""
     false_reached: int
     """Number of these that miss the goal, exceed a joint limit or are in contact."""
+    refined_checked: int
+    """Number of these that are of refined sets: all of them are re-checked."""
     max_position_error: float | None
     """Greatest distance of the tool from its goal [m]."""
     max_rotation_error: float | None
@@ -151,11 +153,12 @@ def verify(
     """Check a score file against Drake and against a dense scan.
 
     Random reached pairs are re-checked with Drake: forward kinematics at the goal, joint limits,
-    contacts, and dexterity by the file's measure. Random unreached pairs, stratified over those
-    whose body and gripper are free of contact and whose goal is within reach, are scanned densely;
-    so are random reached pairs, for dexterity that the search missed. A dense scan tries 11,520
-    values of the free joint or, for an arm without a closed form, 400 starts over its joint limits.
-    Drake must confirm each solution that the scan finds at an unreached pair.
+    contacts, and dexterity by the file's measure; so is every solution of the refined sets. Random
+    unreached pairs, stratified over those whose body and gripper are free of contact and whose goal
+    is within reach, are scanned densely; so are random reached pairs, for dexterity that the search
+    missed. A dense scan tries 11,520 values of the free joint or, for an arm without a closed form,
+    400 starts over its joint limits. Drake must confirm each solution that the scan finds at an
+    unreached pair.
 
     Args:
         file: A score file.
@@ -188,14 +191,15 @@ def verify(
     counts = dict.fromkeys(STRATA, limit) if strata else scan_counts(reason, dense)
     unreached = {r: random_pairs(rng, reason == r, count) for r, count in counts.items()}
     again = random_pairs(rng, reason == Reason.REACHED, dense)
-    total = len(reached) + sum(map(len, unreached.values())) + len(again)
+    of_refined = checker.refined_pairs()
+    total = len(reached) + len(of_refined) + sum(map(len, unreached.values())) + len(again)
     count = itertools.count(1)
 
     def step() -> None:
         if on_progress is not None:
             on_progress(next(count), total)
 
-    findings = checker.stored(reached, step)
+    findings = checker.stored(reached, step) + checker.refined(of_refined, step)
     begun = time.perf_counter()
     hits = {r: checker.hits(part, step) for r, part in unreached.items()}
     scan_seconds = time.perf_counter() - begun
@@ -211,6 +215,7 @@ def verify(
         measure=measure,
         ik=checker.ik,
         checked=len(findings),
+        refined_checked=len(of_refined),
         false_reached=sum(not finding.is_true for finding in findings),
         max_position_error=max((finding.position_error for finding in findings), default=None),
         max_rotation_error=max((finding.rotation_error for finding in findings), default=None),
@@ -241,6 +246,15 @@ def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -
     """
     checker = _FileChecker.of(file, jobs=1)
     return checker.stored([(table * checker.size + h, g) for h, g in pairs], lambda: None)
+
+
+class RefinedPair(NamedTuple):
+    """A goal that a member of a refined set reaches, by their numbers."""
+
+    table: int
+    set: int
+    member: int
+    goal: int
 
 
 @dataclass(frozen=True)
@@ -306,6 +320,36 @@ class _FileChecker:
             table, row = divmod(h, self.size)
             q = np.asarray(self.tables[table].scores.joints_of(row, g), dtype=np.float64)
             findings.append(self.check(h, g, q, self.dexterity(h, g)))
+            step()
+        return findings
+
+    def refined_pairs(self) -> list[RefinedPair]:
+        """Return every goal that a member of a refined set reaches."""
+        return [
+            RefinedPair(table, int(k), int(i), int(g))
+            for table, tables in enumerate(self.tables)
+            if tables.refined is not None
+            for k, i, g in np.argwhere(tables.refined.reached)
+        ]
+
+    def refined(self, pairs: Sequence[RefinedPair], step: Callable[[], None]) -> list[Finding]:
+        """Return Drake's findings on the solutions of refined sets."""
+        findings = []
+        for pair in pairs:
+            refined = self.tables[pair.table].refined
+            assert refined is not None
+            at = pair.set, pair.member
+            # The origin has the arm and the observed state of the refined member.
+            origin = pair.table * self.size + int(refined.origin[at])
+            arm, scored = self.scored(origin)
+            findings.append(
+                self.drakes[arm].check_at(
+                    self.drakes[arm].values(scored, refined.values[at]),
+                    pair.goal,
+                    refined.arm_joints[*at, pair.goal].astype(np.float64),
+                    float(refined.dexterity[*at, pair.goal]),
+                )
+            )
             step()
         return findings
 
@@ -391,12 +435,30 @@ class _DrakeChecker:
 
     def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
         """Return the finding for configuration h, goal g and joint angles q."""
+        return self.check_at(self.values(h), g, q, value)
+
+    def values(self, h: int, off_grid: NDArray[np.float64] | None = None) -> dict[str, float]:
+        """Return the values of all axes at configuration h [m or rad].
+
+        Args:
+            h: Index in the scored grid.
+            off_grid: Values of the axes that can be chosen, the last ones, in place of those of h.
+        """
+        at = {name: float(value) for name, value in self._grid.values(h).items()}
+        if off_grid is not None:
+            names = [axis.name for axis in self._job.grid.axes]
+            at |= dict(zip(names, map(float, off_grid), strict=True))
+        return at
+
+    def check_at(
+        self, at: Mapping[str, float], g: int, q: NDArray[np.float64], value: float
+    ) -> Finding:
+        """Return the finding at values of all axes [m or rad], for goal g and joint angles q."""
         scene = self._scene
-        at = self._grid.values(np.array([h]))
-        scene.place_base(*(float(at[name][0]) for name in ("base_x", "base_y", "base_yaw")))
-        scene.set_torso(float(at["torso"][0]))
+        scene.place_base(at["base_x"], at["base_y"], at["base_yaw"])
+        scene.set_torso(at["torso"])
         for name in self._axes:
-            scene.set_joint(name, float(at[name][0]))
+            scene.set_joint(name, at[name])
         scene.set_arm(q)
         X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
         X_TG = X_WT.inverse() @ X_WG

@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import InitialConfiguration
-from tcs.placement.constraints import SAME_VALUE, Constraints, disliked_candidates
+from tcs.placement.constraints import Constraints, disliked_candidates
 from tcs.placement.selection.admission import Admitted, admitted_candidates
 from tcs.placement.selection.alternatives import Distinct, Top
 from tcs.placement.selection.bounds import Bounds
-from tcs.placement.selection.choice import Choice, SelectionTables
+from tcs.placement.selection.choice import Choice, SelectionTables, changed_axes
 from tcs.placement.selection.coverage import warning_outside
 from tcs.placement.selection.estimated import Candidates, best_estimated, check_estimated
 from tcs.placement.selection.executable import admitted_executable, motions_at
 from tcs.placement.selection.limbs import admitted_at_limbs
 from tcs.placement.selection.observed import Match, nearest_table
 from tcs.placement.selection.penalties import Penalties, penalties_of
+from tcs.placement.selection.refined import RefinedQuery, grid_only
 from tcs.placement.selection.search import best_set
 from tcs.placement.selection.travel import Legs, TravelWeights, legs_from, shortest_tour
 from tcs.placement.selection.utility import UtilityWeights, utility
@@ -48,6 +49,7 @@ def select(
     observed: Mapping[str, float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
     motions: MotionFile | None = None,
+    refined: bool = True,
 ) -> Choice:
     """Return the stored set with the greatest utility from the current state.
 
@@ -73,6 +75,9 @@ def select(
             each goal also has to be reached in the table nearest to its own frame.
         motions: The motions of the score file, by `tcs.examine`: only goals to which one was found
             count, and only configurations that were examined are selected.
+        refined: Whether the refined sets of the file, by `tcs.refine`, are compared too. They are
+            not, and a warning says so, where something is requested that only the sets of the grid
+            answer: obstacles, preferences, limbs in several tables, motions, success under error.
 
     Raises:
         StoreMismatchError: If the motions were planned for other scores.
@@ -134,6 +139,11 @@ def select(
     outside = warning_outside(legs, here, query.tour(best), tables.grid)
     if outside is not None:
         best = replace(best, warnings=(*best.warnings, outside))
+    if refined and tables.refined is not None:
+        compared = RefinedQuery(tables, tables.refined, here, legs, travel, weights, max_members)
+        limbs = match is not None and len(match.by_frame) > 1
+        only_grid = grid_only(constraints, weights, limbs=limbs, motions=motions is not None)
+        best, *others = compared.beside([best, *others], constraints, only_grid, top)
     seconds = time.perf_counter() - start
     return replace(best, alternatives=tuple(others), match=match, seconds=seconds)
 
@@ -314,7 +324,7 @@ class _Query:
             cost=cost,
             utility=utility(*scores, self.weights, low),
             net_utility=net,
-            moves=_moves(self.here, members),
+            moves=changed_axes(self.here, members),
             success=success,
             success_ci95=interval,
             unreachable=int(np.count_nonzero(~legs.reachable[tables.sets.cell])),
@@ -323,18 +333,3 @@ class _Query:
             warnings=self.found.warnings if self.found is not None else (),
             seconds=0.0,
         )
-
-
-def _moves(
-    here: InitialConfiguration, members: tuple[InitialConfiguration, ...]
-) -> tuple[str, ...]:
-    """Return the environment axes that change from the present state, or between members."""
-    now = dict(here.environment)
-    return tuple(
-        name
-        for name, first in members[0].environment
-        if any(
-            abs(dict(member.environment)[name] - now.get(name, first)) > SAME_VALUE
-            for member in members
-        )
-    )

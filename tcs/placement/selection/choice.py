@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.model.grid import Grid, InitialConfiguration
-from tcs.placement.constraints import Footprint, Postures
+from tcs.placement.constraints import SAME_VALUE, Footprint, Postures
 from tcs.placement.selection.admission import Left
 from tcs.placement.selection.index import SetIndex
 from tcs.placement.selection.observed import Match
 from tcs.placement.store import ScoreFile, files_of_arms
 from tcs.placement.store.robot_shapes import RobotShapes
-from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
+from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
 
 FloatArray = NDArray[np.float64]
 
@@ -45,6 +45,8 @@ class SelectionTables:
     """Returns the positions of the body frames in W for each environment state [m], (states, 3)."""
     read_arms: Callable[[], tuple[SelectionTables, ...]] | None = None
     """Returns the tables of each arm, in a file of several; None for one arm."""
+    refined: RefinedTable | None = None
+    """Sets refined between the grid points, if any."""
     derived: dict[str, Any] = field(default_factory=dict, repr=False)
     """What was derived from the sets, by name; of a file, kept for its next selection."""
 
@@ -61,6 +63,7 @@ class SelectionTables:
             partial(getattr, chosen, "scores"),
             partial(_frames, file, number),
             partial(_of_arms, file, number) if file.arms else None,
+            chosen.refined,
             chosen.derived,
         )
 
@@ -104,6 +107,21 @@ class SelectionTables:
         return index_of(self.sets, self.derived)
 
 
+def changed_axes(
+    here: InitialConfiguration, members: tuple[InitialConfiguration, ...]
+) -> tuple[str, ...]:
+    """Return the environment axes that change from the present state, or between members."""
+    now = dict(here.environment)
+    return tuple(
+        name
+        for name, first in members[0].environment
+        if any(
+            abs(dict(member.environment)[name] - now.get(name, first)) > SAME_VALUE
+            for member in members
+        )
+    )
+
+
 def index_of(sets: SetTable, derived: dict[str, Any]) -> SetIndex:
     """Return the index of sets, made on the first call.
 
@@ -136,7 +154,8 @@ class Choice:
     members: tuple[InitialConfiguration, ...]
     """The members, in the order of their configuration indices."""
     indices: tuple[int, ...]
-    """Flat configuration indices of the members, ascending."""
+    """Flat configuration indices of the members, ascending; of a refined set, those of the grid
+    from which it was refined."""
     order: tuple[int, ...]
     """Order in which to visit `members`: the shortest tour."""
     reachability: float
@@ -169,15 +188,17 @@ class Choice:
     """Environment axes that change from the present state to the members, or between these."""
     alternatives: tuple[Choice, ...] = ()
     """Further sets, the best first, if they were requested."""
+    refined: int | None = None
+    """Number of the refined set; None for a set of the grid."""
     warnings: tuple[str, ...] = ()
     """What the user should know about the choice, one sentence each."""
 
     def to_json(self, measure: str) -> dict[str, Any]:
         """Return the choice as plain containers, as printed by `tcs select --json`.
 
-        Members are in the order of the tour. Keys of success, observation, constraints and
-        warnings are there only if success was estimated, the file has observed axes, there are
-        constraints or warnings.
+        Members are in the order of the tour. Keys of success, observation, refined set,
+        constraints and warnings are there only if success was estimated, the file has observed
+        axes, a refined set is chosen, there are constraints or warnings.
 
         Args:
             measure: Name of the dexterity measure behind the manipulability.
@@ -199,6 +220,8 @@ class Choice:
             plain |= {"success": self.success, "success_ci95": list(self.success_ci95)}
         if self.match is not None and self.match.state:
             plain |= self.match.to_json()
+        if self.refined is not None:
+            plain["refined"] = self.refined
         if self.constraints:
             plain["constraints"] = [left.to_json() for left in self.constraints]
         if self.footprint is not None:

@@ -13,6 +13,7 @@ from tcs.files.compression import check_claims, compress, decompress, smallest_u
 from tcs.files.joblib_file import check_header, header
 from tcs.files.reader import explained
 from tcs.model.grid import Grid
+from tcs.placement.store.refined_encoding import decode_refined, encode_refined
 from tcs.placement.store.score_file import (
     DESCRIPTIONS,
     ScoreFile,
@@ -44,6 +45,7 @@ def encode(file: ScoreFile) -> dict[str, Any]:
                 "sets": encode_sets(table.sets),
                 "scores": _encode_scores(table.scores, table.sets),
                 "success": encode_success(table.success),
+                "refined": encode_refined(table.refined),
             }
             for table in file.tables
         ],
@@ -81,7 +83,8 @@ def _decode_table(encoded: dict[str, Any], grid: Grid, path: Path | None) -> Sta
     sets = decode_sets(_dict(encoded.get("sets"), "sets"), grid)
     scores = _dict(encoded.get("scores"), "scores")
     success = decode_success(encoded.get("success"))
-    return StateTables(sets, partial(_read_scores, scores, sets, grid.size, path), success)
+    refined = decode_refined(encoded.get("refined"), sets.weights)
+    return StateTables(sets, partial(_read_scores, scores, sets, grid.size, path), success, refined)
 
 
 def _read_scores(

@@ -15,7 +15,7 @@ from tcs.errors import StoreError, StoreMismatchError
 from tcs.files.plain import plain
 from tcs.model.grid import Axis, Grid
 from tcs.placement.store.robot_shapes import RobotShapes
-from tcs.placement.tables import ScoreTable, SetTable, SuccessTable
+from tcs.placement.tables import RefinedTable, ScoreTable, SetTable, SuccessTable
 from tcs.placement.tables.rules import candidates_of
 from tcs.placement.tables.sets import DISTANCE_TOLERANCE
 from tcs.placement.tables.success import NO_MEMBER
@@ -57,6 +57,8 @@ class StateTables:
     """Returns the scores of every configuration at every goal."""
     success: SuccessTable | None = None
     """Estimated success of some of the sets under error, if `tcs robustify` estimated it."""
+    refined: RefinedTable | None = None
+    """Sets refined between the grid points, if `tcs refine` refined any."""
 
     @classmethod
     def of(cls, scores: ScoreTable, sets: SetTable) -> Self:
@@ -197,6 +199,7 @@ class ScoreFile:
             if (sets.state_size, sets.arm_size) != (grid.state_size, grid.arm_size):
                 raise StoreError("sets have another number of environment states than the grid.")
             _check_success(table.success, sets)
+            _check_refined(table.refined, sets, grid)
             places = grid.values(sets.candidates)
             for column, name in enumerate(("base_x", "base_y")):
                 gap = np.abs(sets.cell_xy[sets.cell, column] - places[name])
@@ -273,6 +276,19 @@ def _check_success(success: SuccessTable | None, sets: SetTable) -> None:
     named = success.members[success.members != NO_MEMBER]
     if success.members.shape[1] > sets.max_members or not np.all(np.isin(named, sets.candidates)):
         raise StoreError("estimates of success for sets that the table does not have.")
+
+
+def _check_refined(refined: RefinedTable | None, sets: SetTable, grid: Grid) -> None:
+    """Check that the refined sets start from candidates, and have values of the grid's axes."""
+    if refined is None:
+        return
+    named = refined.origin[refined.origin != NO_MEMBER]
+    if (
+        refined.values.shape[2] != len(grid.axes)
+        or not np.all(np.isin(named, sets.candidates))
+        or not np.array_equal(refined.weights, sets.weights)
+    ):
+        raise StoreError("refined sets that do not belong to the sets of the table.")
 
 
 def _are_numbers(values: object, count: int) -> bool:

@@ -1,7 +1,7 @@
 """Tables of placement: scores, sets, success under error, motions, the base lattice, place maps.
 
-In: arrays from scoring, estimation or a score file. Out: frozen tables with checked, read-only
-arrays, and the equations over them; numpy only.
+In: arrays from scoring, estimation, refinement or a score file. Out: frozen tables with checked,
+read-only arrays, and the equations over them; numpy only.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from tcs.placement.tables.base_lattice import BaseLattice
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 from tcs.placement.tables.motions import MotionOutcome, MotionTable
+from tcs.placement.tables.refined import RefinedTable
 from tcs.placement.tables.scores import Reason, ScoreTable
 from tcs.placement.tables.sets import SetTable
 from tcs.placement.tables.success import SuccessTable
@@ -18,6 +19,7 @@ __all__ = [
     "MotionOutcome",
     "MotionTable",
     "Reason",
+    "RefinedTable",
     "ScoreTable",
     "SetTable",
     "SuccessTable",

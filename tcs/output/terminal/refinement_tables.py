@@ -1,0 +1,36 @@
+"""Results of a refinement as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tcs.output.terminal.console import results_console
+from tcs.output.terminal.tables import members_table
+from tcs.output.words import scores_text
+
+
+def report_refined(result: Mapping[str, Any]) -> None:
+    """Print the best refined set, what it gained, and what any set could gain at most."""
+    out = results_console()
+    before, after = result["before"], result["after"]
+    out.print(members_table(after["members"]))
+    for name, found in (("best of the grid", before), ("refined", after)):
+        scores = scores_text(found["reachability"], found["manipulability"], result["measure"])
+        out.print(f"{name}: {scores}")
+    total = after["reachability"] + after["manipulability"]
+    gain = total - before["reachability"] - before["manipulability"]
+    out.print(
+        f"P_R + P_M changes by {gain:+.4f} to {total:.4f}; no set between the grid's ends exceeds "
+        f"{result['bound']:.4f}"
+    )
+    if result["success"] is not None:
+        success = result["success"]
+        out.print(
+            f"success under error from {success['before']:.1%} to {success['after']:.1%}, in "
+            f"{success['samples']:,} other samples than those that chose the set"
+        )
+    out.print(
+        f"{result['sets']} sets refined, {result['scored']:,} configurations scored in "
+        f"{result['seconds']:.1f} s; wrote {result['file']}"
+    )

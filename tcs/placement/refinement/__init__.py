@@ -1,0 +1,25 @@
+"""Refinement: the best sets of a score file, moved between the grid points.
+
+In: a score file. Out: the file with refined sets beside those of its grid, and an upper bound of
+what any set could reach.
+"""
+
+from __future__ import annotations
+
+from tcs.placement.refinement.points import Points, PointScorer, PointScores
+from tcs.placement.refinement.refined_file import (
+    OBJECTIVES,
+    refine,
+    refined_members,
+    refinement_summary,
+)
+
+__all__ = [
+    "OBJECTIVES",
+    "PointScorer",
+    "PointScores",
+    "Points",
+    "refine",
+    "refined_members",
+    "refinement_summary",
+]

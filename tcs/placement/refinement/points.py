@@ -1,0 +1,206 @@
+"""Scores of configurations anywhere between the grid points of a score file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from tcs.errors import SelectionError
+from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.problem import Problem, build_problem
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.model.grid import ROBOT_AXES, Grid
+from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
+from tcs.placement.constraints import Footprint
+from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.scoring.sweep import warm_up
+from tcs.placement.store import ScoreFile, files_of_arms
+from tcs.placement.tables import Reason
+
+BATCH = 32
+"""Configurations that a thread scores at a time: some milliseconds of work."""
+
+
+class Points(NamedTuple):
+    """Configurations by the values of the grid's axes."""
+
+    values: FloatArray
+    """Values in the order of the axes [m or rad], shape (n, axes)."""
+    arm: IntArray
+    """Number of the arm that each uses, 0 in a file of one arm, shape (n,)."""
+
+
+class PointScores(NamedTuple):
+    """What configurations reach."""
+
+    reached: BoolArray
+    """Whether a configuration reaches a goal, shape (n, G)."""
+    dexterity: NDArray[np.float32]
+    """Its dexterity there, 0 where not reached, shape (n, G)."""
+    joints: NDArray[np.float32]
+    """Arm joints of the best solution [rad], 0 where not reached, shape (n, G, 7)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Arm:
+    """The robot with one of its arms."""
+
+    job: Job
+    scene: Scene
+    lowered: LoweredScene
+
+
+@dataclass(frozen=True, eq=False)
+class PointScorer:
+    """One table of a score file, prepared for scoring configurations off its grid.
+
+    The code that scores the grid scores them: at a grid point it gives the stored scores.
+    Construction builds Drake's plant, which takes half a second.
+    """
+
+    arms: tuple[_Arm, ...]
+    """The robot with each arm, in the order of the grid."""
+    grid: Grid
+    """The grid of the file."""
+    measure: str
+    """Name of the dexterity measure."""
+    observed: Mapping[str, float]
+    """Observed state of the table, by joint [m or rad]."""
+    footprint: Footprint
+    """The floor that the robot covers, for forbidden regions."""
+    jobs: int
+    """Number of threads; the scores do not depend on it."""
+
+    @classmethod
+    def of(cls, file: ScoreFile, table: int, jobs: int = 2) -> Self:
+        """Return the scorer of one table of a score file.
+
+        Raises:
+            StoreMismatchError: If the file was made from other models.
+            SelectionError: If the file was scored with approach.
+        """
+        if "approach" in file.metadata:
+            raise SelectionError(
+                "Configurations off the grid are scored without approach only. Score the task "
+                "again with --no-approach."
+            )
+        arms = tuple(_Arm(*rebuild_scene(of_arm)) for of_arm in files_of_arms(file))
+        return cls(
+            arms,
+            file.configurations,
+            str(file.metadata["measure"]),
+            file.observed_states[table],
+            Footprint.of(file.robot_shapes),
+            jobs,
+        )
+
+    def warm_up(self, on_compile: Callable[[], None] | None = None) -> None:
+        """Compile the kernel or load its machine code.
+
+        Args:
+            on_compile: Called first if the kernel has to be compiled.
+        """
+        for arm in self.arms:
+            problem = build_problem(arm.lowered.arrays, arm.lowered.grid, self.measure)
+            warm_up(problem, on_compile)
+
+    @property
+    def goals(self) -> int:
+        """Number of goals."""
+        return len(self.arms[0].job.task.goals)
+
+    def score(self, points: Points) -> PointScores:
+        """Return the scores of configurations; one on a forbidden region reaches nothing."""
+        count = len(points.values)
+        found = Scores(
+            reason=np.full((count, self.goals), Reason.EXCLUDED, np.uint8),
+            contact=np.empty((count, self.goals), np.int32),
+            dexterity=np.zeros((count, self.goals), np.float32),
+            joints=np.zeros((count, self.goals, 7), np.float32),
+        )
+        admitted = ~self._forbidden(points)
+        for number, arm in enumerate(self.arms):
+            rows = np.flatnonzero(admitted & (points.arm == number))
+            if rows.size:
+                self._score_arm(arm, points.values, rows, found)
+        reached = found.reason == Reason.REACHED
+        found.dexterity[~reached], found.joints[~reached] = 0.0, 0.0
+        return PointScores(reached, found.dexterity, found.joints)
+
+    def never_reached(self) -> BoolArray:
+        """Return the goals at which the gripper of every arm is in contact, shape (G,).
+
+        The gripper at a goal touches the environment or not whatever the base pose and the torso
+        height. With axes that move the environment, no goal counts.
+        """
+        if self.grid.environment_axes:
+            return np.zeros(self.goals, dtype=np.bool_)
+        blocked = np.ones(self.goals, dtype=np.bool_)
+        for arm in self.arms:
+            problem = self._problem(arm, np.empty((1, 0)), np.zeros(1))
+            blocked &= gripper_contacts(problem)[0] != NO_CONTACT
+        return blocked
+
+    def _forbidden(self, points: Points) -> BoolArray:
+        """Return which configurations stand on a forbidden region, shape (n,)."""
+        base = self._columns(points.values, "base_x", "base_y", "base_yaw")
+        forbidden = np.zeros(len(base), dtype=np.bool_)
+        for region in self.arms[0].job.constraints.forbid:
+            forbidden |= self.footprint.overlaps(region, base)
+        return forbidden
+
+    def _columns(self, values: FloatArray, *names: str) -> FloatArray:
+        """Return the columns of some of the robot's axes, shape (n, names)."""
+        order = list(ROBOT_AXES)
+        return values[:, [order.index(name) - len(order) for name in names]]
+
+    def _score_arm(self, arm: _Arm, values: FloatArray, rows: IntArray, found: Scores) -> None:
+        """Fill the scores of some configurations, all with one arm."""
+        chosen = values[rows]
+        states, state = np.unique(chosen[:, : -len(ROBOT_AXES)], axis=0, return_inverse=True)
+        levels, level = np.unique(self._columns(chosen, "torso")[:, 0], return_inverse=True)
+        problem = self._problem(arm, states, levels)
+        grippers = gripper_contacts(problem)
+        base = self._columns(chosen, "base_x", "base_y", "base_yaw")
+        index = state.ravel() * levels.size + level
+
+        def score_batch(start: int) -> None:
+            for i in range(start, min(start + BATCH, rows.size)):
+                at = problem._replace(
+                    base_x=base[i, :1].copy(),
+                    base_y=base[i, 1:2].copy(),
+                    base_yaw=base[i, 2:].copy(),
+                )
+                row = slice(rows[i], rows[i] + 1)
+                part = Scores(
+                    found.reason[row], found.contact[row], found.dexterity[row], found.joints[row]
+                )
+                score_slice(at, grippers, int(index[i]), int(index[i]) + 1, part)
+
+        Parallel(n_jobs=self.jobs, prefer="threads")(
+            delayed(score_batch)(start) for start in range(0, rows.size, BATCH)
+        )
+
+    def _problem(self, arm: _Arm, states: FloatArray, levels: FloatArray) -> Problem:
+        """Return the kernel's problem of environment states and torso heights."""
+        names = [axis.name for axis in self.grid.environment_axes]
+        positions = (
+            {**self.observed, **dict(zip(names, map(float, state), strict=True))}
+            for state in states
+        )
+        moved = environment_at(arm.lowered, arm.scene, arm.job.task, positions)
+        raised = torso_at(arm.lowered, arm.scene, levels)
+        arrays = moved._replace(
+            arm_base_R=raised.arm_base_R, arm_base_p=raised.arm_base_p, body=raised.body
+        )
+        origin = np.zeros(1)
+        grid = GridArrays(len(states), origin, origin, origin, levels.size)
+        return build_problem(arrays, grid, self.measure)

@@ -1,0 +1,274 @@
+"""Refinement of a score file: its best sets, moved to the best place between the grid points."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from tcs.errors import SelectionError, TcsError, UnknownNameError
+from tcs.model.grid import InitialConfiguration
+from tcs.model.random_streams import check_draws, named_generator
+from tcs.placement.refinement.bound import upper_bound
+from tcs.placement.refinement.objectives import Objective, ScoreObjective, SuccessObjective
+from tcs.placement.refinement.perturbed import PerturbedPoints
+from tcs.placement.refinement.points import Points, PointScorer
+from tcs.placement.refinement.search import LocalSearch, Walk
+from tcs.placement.refinement.space import Space
+from tcs.placement.robustness import Trials
+from tcs.placement.selection import Top, UtilityWeights, select
+from tcs.placement.selection.choice import SelectionTables
+from tcs.placement.store import ScoreFile
+from tcs.placement.tables import RefinedTable, tc_reachability
+from tcs.placement.tables.success import NO_MEMBER
+
+OBJECTIVES = ("score", "success")
+"""What a refinement maximises: P_R + P_M, or the success under error."""
+KEY = "refinement"
+"""Entry of the metadata: for each table, None or the settings and figures of its refinement."""
+MOST_STARTS = 50
+"""Greatest number of sets to start from."""
+MOST_ROUNDS = 1000
+"""Greatest number of rounds."""
+APART = 0.3
+"""Distance of base positions [m] at which sets count as different basins."""
+SINGLES = 3
+"""Most single configurations to start from."""
+STREAM = "refinement"
+"""Name of the random stream of the search."""
+SAMPLES_STREAM = "refinement samples"
+"""Name of the random stream of the samples of the success."""
+FRESH_SAMPLES = 1000
+"""Samples on which the refined set is judged."""
+CHECK_STREAM = "refinement check"
+"""Name of their random stream."""
+_SCORE_ONLY = UtilityWeights(travel=0.0, places=0.0, environment=0.0)
+
+
+def refine(
+    file: ScoreFile,
+    *,
+    objective: str = "score",
+    starts: int = 6,
+    rounds: int = 40,
+    samples: int = 64,
+    seed: int = 0,
+    table: int | None = None,
+    jobs: int = 2,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_compile: Callable[[], None] | None = None,
+) -> ScoreFile:
+    """Return a score file with its best sets refined between the grid points.
+
+    The sets with the greatest P_R + P_M that differ by their base positions or their environment
+    start a local search over all axes of the grid, all members of a set jointly: configurations
+    around the members are scored by the kernel, the best combination is taken, and where none is
+    better the cells are halved. The range of an axis is that of the grid.
+
+    Args:
+        file: A score file, which is not modified.
+        objective: "score", P_R + P_M; or "success", the mean of P_R under the errors of the
+            environment, over samples that are the same for all configurations.
+        starts: Number of sets to start from; up to three single configurations come on top.
+        rounds: Greatest number of rounds of the search.
+        samples: Number of samples of the success.
+        seed: Seed of the search and of the samples; the result is the same for any number of
+            jobs.
+        table: Number of the table; by default the nominal one. The others keep what they have.
+        jobs: Number of threads.
+        on_progress: Called with the number of rounds done and their greatest number.
+        on_compile: Called first if the kernel has to be compiled.
+
+    Returns:
+        The file with a table of refined sets beside the sets of the grid, the best first.
+
+    Raises:
+        StoreMismatchError: If the file was made from other models.
+        UnknownNameError: If there is no such objective.
+        SelectionError: If no configuration reaches a goal, there is no such table, or the file was
+            scored with approach.
+        TcsError: If a number is out of range.
+    """
+    check_draws(samples, seed)
+    if objective not in OBJECTIVES:
+        raise UnknownNameError("objective", objective, OBJECTIVES, where="refine")
+    if not 1 <= starts <= MOST_STARTS:
+        raise TcsError(f"starts is {starts}; must be 1 to {MOST_STARTS}.")
+    if not 1 <= rounds <= MOST_ROUNDS:
+        raise TcsError(f"rounds is {rounds}; must be 1 to {MOST_ROUNDS:,}.")
+    number = file.nominal_index if table is None else table
+    if not 0 <= number < len(file.tables):
+        raise SelectionError(
+            f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
+        )
+    begun = time.perf_counter()
+    scorer = PointScorer.of(file, number, jobs)
+    scorer.warm_up(on_compile)
+    search = LocalSearch(
+        scorer,
+        Space.of(file.configurations, file.tables[number].sets),
+        _objective(file, number, objective, samples, seed, jobs),
+        named_generator(seed, STREAM),
+    )
+    walks, scored = search.run(
+        starting_sets(file, number, starts), rounds, on_progress or (lambda done, total: None)
+    )
+    refined = _as_table(walks, file.tables[number].sets.weights)
+    success = None
+    if objective == "success":
+        fresh = _perturbed(file, number, FRESH_SAMPLES, seed, jobs, CHECK_STREAM)
+        success = _success(search, walks[0], fresh, file.tables[number].sets.best)
+    settings = {
+        "program_version": version("tcs"),
+        "objective": objective,
+        "starts": starts,
+        "rounds": rounds,
+        "samples": samples if objective == "success" else None,
+        "seed": seed,
+        "scored": scored,
+        "success": success,
+        "bound": upper_bound(file, number, scorer),
+        "seconds": time.perf_counter() - begun,
+    }
+    return _with_refined(file, number, refined, settings)
+
+
+def starting_sets(file: ScoreFile, table: int, count: int) -> list[tuple[int, ...]]:
+    """Return the best sets of a table that differ, and the best singles, by flat grid indices.
+
+    Raises:
+        SelectionError: If no configuration reaches a goal.
+    """
+    sets = file.tables[table].sets
+    if not sets.best:
+        raise SelectionError(
+            "Nothing to refine: no initial configuration reaches a goal. See the reasons with "
+            "`tcs explain`."
+        )
+    tables = SelectionTables.of(file, table)
+    here = tables.grid.configuration(sets.best[0])
+
+    def best(count: int, max_members: int) -> list[tuple[int, ...]]:
+        top = Top(count=count, min_apart=APART)
+        choice = select(
+            tables, here, weights=_SCORE_ONLY, top=top, max_members=max_members, refined=False
+        )
+        return [choice.indices, *(other.indices for other in choice.alternatives)]
+
+    found = [*dict.fromkeys([sets.best, *best(count, sets.max_members)])][:count]
+    found += [sets.best_single, *best(min(count, SINGLES), 1)]
+    robust = file.tables[table].success
+    if robust is not None:
+        found.append(robust.most_robust(sets))
+    return [start for start in dict.fromkeys(found) if start]
+
+
+def refinement_summary(file: ScoreFile, table: int | None = None) -> dict[str, Any]:
+    """Return what a refinement gained, as printed by `tcs refine --json`.
+
+    Args:
+        file: A score file with refined sets.
+        table: Number of the refined table; by default the nominal one.
+
+    Raises:
+        SelectionError: If the table was not refined.
+    """
+    number = file.nominal_index if table is None else table
+    scored = file.tables[number]
+    settings = file.metadata.get(KEY, [None] * len(file.tables))[number]
+    if scored.refined is None or settings is None:
+        raise SelectionError("No sets of this table were refined. Refine them: tcs refine FILE.")
+    reachability, manipulability = scored.sets.scores_of(scored.sets.best)
+    refined = scored.refined
+    return {
+        "measure": file.metadata["measure"],
+        **settings,
+        "before": {
+            "reachability": round(reachability, 12),
+            "manipulability": round(manipulability, 12),
+            "members": [file.configurations.configuration(h).to_json() for h in scored.sets.best],
+        },
+        "after": {
+            "reachability": round(float(refined.reachability[0]), 12),
+            "manipulability": round(float(refined.manipulability[0]), 12),
+            "members": [member.to_json() for member in refined_members(file, refined, 0)],
+        },
+        "sets": len(refined.origin),
+    }
+
+
+def refined_members(
+    file: ScoreFile, refined: RefinedTable, row: int
+) -> tuple[InitialConfiguration, ...]:
+    """Return the members of a refined set."""
+    return tuple(
+        file.configurations.between(refined.values[row, i], int(refined.origin[row, i]))
+        for i in range(int(refined.sizes[row]))
+    )
+
+
+def _objective(
+    file: ScoreFile, table: int, name: str, samples: int, seed: int, jobs: int
+) -> Objective:
+    """Return the objective of a name."""
+    weights = file.tables[table].sets.weights
+    if name == "score":
+        return ScoreObjective(weights)
+    perturbed = _perturbed(file, table, samples, seed, jobs, SAMPLES_STREAM)
+    return SuccessObjective(weights, perturbed)
+
+
+def _perturbed(
+    file: ScoreFile, table: int, samples: int, seed: int, jobs: int, stream: str
+) -> PerturbedPoints:
+    """Return samples of the errors of the environment, of a named stream."""
+    trials = Trials.of(file, table=table)
+    return PerturbedPoints(trials, trials.errors.draw(samples, seed, stream=stream), jobs)
+
+
+def _success(
+    search: LocalSearch, walk: Walk, fresh: PerturbedPoints, best: tuple[int, ...]
+) -> dict[str, Any]:
+    """Return the success of the best set of the grid and of a refined set in fresh samples."""
+    of_sets = []
+    for points in (search.points_of(best), Points(walk.present.values, walk.present.arm)):
+        reached = np.logical_or.reduce(fresh.reached(points), axis=0)
+        of_sets.append(float(tc_reachability(reached, fresh.trials.weights).mean()))
+    return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}
+
+
+def _as_table(walks: Sequence[Walk], weights: np.ndarray[Any, Any]) -> RefinedTable:
+    """Return refined sets as one table, in their order."""
+    width = max(walk.members for walk in walks)
+
+    def filled(arrays: Sequence[np.ndarray[Any, Any]], fill: float) -> np.ndarray[Any, Any]:
+        first = arrays[0]
+        out = np.full((len(arrays), width, *first.shape[1:]), fill, dtype=first.dtype)
+        for row, array in zip(out, arrays, strict=True):
+            row[: len(array)] = array
+        return out
+
+    return RefinedTable(
+        origin=filled([np.array(walk.origin, dtype=np.int32) for walk in walks], NO_MEMBER),
+        values=filled([walk.present.values for walk in walks], 0.0),
+        reached=filled([walk.present.reached for walk in walks], False),
+        dexterity=filled([walk.present.dexterity for walk in walks], 0.0),
+        arm_joints=filled([walk.present.joints for walk in walks], 0.0),
+        objective=np.array([walk.value for walk in walks]),
+        weights=weights,
+    )
+
+
+def _with_refined(
+    file: ScoreFile, table: int, refined: RefinedTable, settings: dict[str, Any]
+) -> ScoreFile:
+    """Return the file with the refined sets of one table."""
+    tables = list(file.tables)
+    tables[table] = dataclasses.replace(tables[table], refined=refined)
+    records = list(file.metadata.get(KEY, [None] * len(tables)))
+    records[table] = settings
+    return dataclasses.replace(file, metadata={**file.metadata, KEY: records}, tables=tuple(tables))

@@ -1,0 +1,92 @@
+"""Table of the refined sets: configurations between the grid points, and what they reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.scores import WEIGHT_SUM_TOLERANCE
+from tcs.placement.tables.sets import MOST_MEMBERS
+from tcs.placement.tables.success import NO_MEMBER
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RefinedTable(ArrayTable):
+    """K sets of configurations that need not be on the grid, best first; arrays are read-only.
+
+    Each was refined from a set of the grid. Rows of members that a set does not have hold zeros.
+    """
+
+    origin: NDArray[np.int32]
+    """Flat grid indices of the members that the refinement started from, NO_MEMBER after the last,
+    shape (K, m)."""
+    values: NDArray[np.float64]
+    """Values of the grid's axes, in their order [m or rad], shape (K, m, axes)."""
+    reached: NDArray[np.bool_]
+    """Whether a member reaches a goal, shape (K, m, G)."""
+    dexterity: NDArray[np.float32]
+    """Its dexterity there, 0 where not reached, shape (K, m, G)."""
+    arm_joints: NDArray[np.float32]
+    """Arm joints of the best solution [rad], 0 where not reached, shape (K, m, G, 7)."""
+    objective: NDArray[np.float64]
+    """Value of the objective that was maximised, shape (K,)."""
+    weights: NDArray[np.float64]
+    """Weights of the goals, sum 1, shape (G,)."""
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other and make them read-only.
+
+        Raises:
+            TcsError: If an array has the wrong type, shape or range.
+        """
+        count, goals = length_of(self.origin), length_of(self.weights)
+        width = self.origin.shape[1] if getattr(self.origin, "ndim", 0) == 2 else None
+        shapes: Shapes = {
+            "origin": (np.int32, (count, None)),
+            "values": (np.float64, (count, width, None)),
+            "reached": (np.bool_, (count, width, goals)),
+            "dexterity": (np.float32, (count, width, goals)),
+            "arm_joints": (np.float32, (count, width, goals, 7)),
+            "objective": (np.float64, (count,)),
+            "weights": (np.float64, (goals,)),
+        }
+        self._check_arrays("refined table", shapes)
+        is_member = self.origin != NO_MEMBER
+        require(
+            1 <= self.origin.shape[1] <= MOST_MEMBERS
+            and bool(np.all(self.origin >= NO_MEMBER) and np.all(is_member[:, :1]))
+            and bool(np.all(is_member[:, :-1] | ~is_member[:, 1:])),
+            f"refined table: sets must have 1 to {MOST_MEMBERS} members.",
+        )
+        numbers = (self.values, self.dexterity, self.arm_joints, self.objective, self.weights)
+        require(all(bool(np.all(np.isfinite(n))) for n in numbers), "refined table: not finite.")
+        require(
+            bool(np.all(self.dexterity >= 0.0))
+            and not np.any(self.dexterity[~self.reached])
+            and not np.any(self.reached[~is_member]),
+            "refined table: dexterity must be 0 or more, and 0 where a goal is not reached.",
+        )
+        require(
+            bool(np.all(self.weights >= 0.0))
+            and abs(float(self.weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
+            "refined table: weights must be >= 0 and sum to 1.",
+        )
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Number of members of each set, shape (K,)."""
+        return np.asarray(np.count_nonzero(self.origin != NO_MEMBER, axis=1), dtype=np.int64)
+
+    @property
+    def reachability(self) -> NDArray[np.float64]:
+        """P_R of each set, TCS eq. (1), shape (K,)."""
+        return tc_reachability(np.logical_or.reduce(self.reached, axis=1), self.weights)
+
+    @property
+    def manipulability(self) -> NDArray[np.float64]:
+        """P_M of each set, TCS eq. (4), shape (K,)."""
+        return tc_manipulability(self.dexterity.max(axis=1), self.weights)

@@ -1,0 +1,173 @@
+"""Refined sets: scores off the grid, laws of the search, storage, selection and re-check."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+import tcs
+from tcs.errors import SelectionError, StoreError, TcsError, UnknownNameError
+from tcs.model.grid import Grid
+from tcs.placement.refinement import Points, PointScorer, refinement_summary
+from tcs.placement.refinement.space import Space
+from tcs.placement.store.encoding import decode, encode
+
+BESIDE = """
+based_on: wheelchair
+name: beside
+title: A few places beside the wheelchair
+grid:
+  base_x: {unit: m, start: 0.6, step: 0.2, count: 4}
+  base_y: {unit: m, start: -0.95, step: 1.7, count: 2}
+  base_yaw: {unit: deg, start: 90, step: 90, count: 2}
+  torso: {unit: m, start: 0.15, step: 0.15, count: 2}
+"""
+HERE = tcs.InitialConfiguration(base_x=1.4, base_y=-1.2, base_yaw=3.14, torso=0.15)
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    environment = tmp_path_factory.mktemp("beside") / "beside.yaml"
+    environment.write_text(BESIDE)
+    return tcs.score("shaving", environment)
+
+
+@pytest.fixture(scope="module")
+def refined(scored):
+    return tcs.refine(scored, starts=2, rounds=3)
+
+
+def test_scores_at_grid_points_are_those_of_the_grid(scored):
+    grid = scored.configurations
+    at = np.stack([*grid.values(np.arange(grid.size)).values()], axis=1)
+    found = PointScorer.of(scored, 0).score(Points(at, np.zeros(len(at), dtype=np.int64)))
+    scores = scored.nominal.scores
+    np.testing.assert_array_equal(found.reached, scores.reached)
+    np.testing.assert_array_equal(found.dexterity, scores.dexterity)
+    np.testing.assert_array_equal(found.joints[found.reached], scores.arm_joints)
+
+
+def test_a_refined_set_is_not_worse_and_below_the_bound(refined):
+    found = refinement_summary(refined)
+    totals = [
+        found[key]["reachability"] + found[key]["manipulability"] for key in ("before", "after")
+    ]
+    assert totals[0] < totals[1] <= found["bound"]
+    table = refined.nominal.refined
+    assert np.all(np.diff(table.objective) <= 0.0)
+    np.testing.assert_allclose(table.reachability + table.manipulability, table.objective)
+
+
+def test_members_stay_between_the_ends_of_the_axes(refined):
+    table, space = refined.nominal.refined, Space.of(refined.configurations, refined.nominal.sets)
+    for k, size in enumerate(table.sizes):
+        values = table.values[k, :size]
+        assert np.all((values >= space.low) & (values <= space.high))
+        assert space.allowed(values[None])[0]
+
+
+def test_the_result_does_not_depend_on_the_number_of_threads(scored, refined):
+    again = tcs.refine(scored, starts=2, rounds=3, jobs=1).nominal.refined
+    np.testing.assert_array_equal(again.values, refined.nominal.refined.values)
+
+
+def test_drake_confirms_every_solution(refined):
+    found = tcs.verify(refined, pairs=0, dense=0)
+    assert found.refined_checked == np.count_nonzero(refined.nominal.refined.reached) > 0
+    assert found.false_reached == 0
+    assert found.is_sound
+
+
+def test_drake_refutes_a_displaced_member(refined):
+    table = refined.nominal.refined
+    moved = dataclasses.replace(table, values=table.values + 0.01)
+    nominal = dataclasses.replace(refined.nominal, refined=moved)
+    found = tcs.verify(dataclasses.replace(refined, tables=(nominal,)), pairs=0, dense=0)
+    assert found.false_reached == found.refined_checked
+
+
+def test_a_file_keeps_refined_sets(refined):
+    loaded = decode(encode(refined))
+    for field in dataclasses.fields(refined.nominal.refined):
+        np.testing.assert_array_equal(
+            getattr(loaded.nominal.refined, field.name),
+            getattr(refined.nominal.refined, field.name),
+        )
+    assert refinement_summary(loaded) == refinement_summary(refined)
+
+
+def test_refined_sets_of_another_grid_are_refused(refined):
+    table = refined.nominal.refined
+    left_out = np.setdiff1d(np.arange(31), refined.nominal.sets.candidates)[0]
+    other = dataclasses.replace(
+        table, origin=np.where(table.origin < 0, -1, left_out).astype(np.int32)
+    )
+    with pytest.raises(StoreError, match="refined sets that do not belong"):
+        dataclasses.replace(refined, tables=(dataclasses.replace(refined.nominal, refined=other),))
+
+
+def test_selection_compares_refined_sets(refined):
+    free = tcs.UtilityWeights(travel=0.0)
+    choice = tcs.select(refined, HERE, weights=free)
+    assert choice.refined == 0
+    grid = tcs.select(refined, HERE, weights=free, refined=False)
+    assert grid.refined is None
+    assert choice.net_utility > grid.net_utility
+    straight = tcs.select(refined, HERE, weights=tcs.UtilityWeights(travel=1e-6))
+    stops = [choice.members[i] for i in straight.order]
+    legs = [(HERE, stops[0]), *itertools.pairwise(stops)]
+    driven = sum(np.hypot(a.base_x - b.base_x, a.base_y - b.base_y) for a, b in legs)
+    assert straight.cost == pytest.approx(driven, rel=1e-12)
+
+
+def test_constraints_hold_for_refined_sets(refined):
+    least = refined.nominal.refined.values[0, :, 0].min()
+    beyond = tcs.Constraints(only=(f"base_x > {least + 1e-6} m",))
+    free = tcs.UtilityWeights(travel=0.0)
+    chosen = tcs.select(refined, HERE, weights=free, constraints=beyond)
+    assert all(member.base_x > least for member in chosen.members)
+    box = tcs.Obstacle(x=5.0, y=5.0, width=0.1, depth=0.1, yaw=0.0, z_low=0.0, z_high=1.0)
+    chosen = tcs.select(refined, HERE, constraints=tcs.Constraints(blocked=(box,)))
+    assert chosen.refined is None
+    assert "Refined sets are not compared: obstacles" in chosen.warnings[-1]
+
+
+def test_success_is_judged_on_other_samples(scored, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
+    found = tcs.refine(scored, objective="success", starts=1, rounds=1, samples=2)
+    found = refinement_summary(found)
+    assert found["success"]["samples"] == 30
+    assert 0.0 < found["success"]["before"] < 1.0
+    assert 0.0 < found["success"]["after"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"objective": "speed"}, UnknownNameError, "unknown objective 'speed'"),
+        ({"starts": 0}, TcsError, "starts is 0"),
+        ({"rounds": 0}, TcsError, "rounds is 0"),
+        ({"samples": 0}, TcsError, "samples is 0"),
+        ({"table": 3}, SelectionError, "no table 3"),
+    ],
+    ids=str,
+)
+def test_invalid_requests_are_refused(scored, options, error, message):
+    with pytest.raises(error, match=message):
+        tcs.refine(scored, **options)
+
+
+def test_files_scored_with_approach_are_refused(scored):
+    with_approach = dataclasses.replace(scored, metadata={**scored.metadata, "approach": {}})
+    with pytest.raises(SelectionError, match="without approach only"):
+        tcs.refine(with_approach)
+
+
+def test_headings_are_periodic_where_the_grid_covers_them(wheelchair, scored):
+    grid = Grid.from_spec(wheelchair.grid)
+    space = Space.of(grid, scored.nominal.sets)
+    moved = space.inside(np.array([[9.0, -9.0, -0.1, 0.2]]))
+    np.testing.assert_allclose(moved, [[1.5, -1.5, 2.0 * np.pi - 0.1, 0.2]])
