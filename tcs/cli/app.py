@@ -9,6 +9,7 @@ import typer
 from tcs.cli import (
     arplace,
     capability,
+    check,
     locate,
     motion,
     options,
@@ -79,6 +80,7 @@ for command in (
     population.population,
     refinement.refine,
     view.view,
+    check.check,
     locate.locate,
 ):
     app.command()(command)
