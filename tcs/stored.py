@@ -65,11 +65,11 @@ def check_file(path: str | os.PathLike[str]) -> StoredFile:
         kind, load = text
         return StoredFile(str(path), kind, None, _said(load(path)))
     content = read_joblib(path, _WHAT, _AGAIN)
-    if not isinstance(content, dict) or content.get("format") not in _JOBLIB_FILES:
+    if not isinstance(content, dict) or str(content.get("format")) not in _JOBLIB_FILES:
         raise StoreFormatError(f"{_WHAT} '{path}' is no file of tcs. {_AGAIN}")
     kind, load = _JOBLIB_FILES[content["format"]]
     loaded = load(path)
-    return StoredFile(str(path), kind, int(content["format_version"]), _said(loaded))
+    return StoredFile(str(path), kind, content["format_version"], _said(loaded))
 
 
 def _said(loaded: object) -> dict[str, Any]:

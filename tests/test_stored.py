@@ -6,6 +6,7 @@ import pytest
 from tcs.capability import save_map
 from tcs.capability.arplace import query, save_arplace, save_probability_map
 from tcs.errors import TcsError
+from tcs.files.joblib_file import write_joblib
 from tcs.placement.store import save_motions, save_scores
 from tcs.stored import check_file
 from tcs.teleop.runs.files import save_run
@@ -69,6 +70,14 @@ def test_every_changed_byte_and_every_cut_is_found(kind, tmp_path, rng):
         path.write_bytes(content[:place])
         with pytest.raises(TcsError):
             check_file(path)
+
+
+@pytest.mark.parametrize("content", [{}, {"format": []}, {"format": "tcs scores"}, [1]])
+def test_joblib_files_of_others_get_one_line(content, tmp_path):
+    write_joblib(tmp_path / "file", content, "File")
+    with pytest.raises(TcsError, match="file") as error:
+        check_file(tmp_path / "file")
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("name", ["page.html", "plan.json", "run.csv"])
