@@ -1,11 +1,12 @@
 """Reached goals that have no motion, and the best sets that can be executed, for each row.
 
-Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--jobs 2] [--seed 0]
+Usage: python benchmarks/motions.py FILE [FILE ...] [--most N] [--sample N] [--jobs 2] [--seed 0]
 
-All pairs of configuration and goal that a score file reaches in its nominal table are examined:
-from rest to the approach, straight in, out and back. Processor times are those of the whole
-process. A row whose motion file lies beside its score file, as the benchmark leaves it, is not
-examined again, so that an interrupted run continues; delete the files to begin anew.
+All pairs of configuration and goal that a score file reaches in its nominal table are examined, or
+those of a sample of the configurations: from rest to the approach, straight in, out and back.
+Processor times are those of the whole process. A row whose motion file lies beside its score file,
+as the benchmark leaves it, is not examined again, so that an interrupted run continues; delete the
+files to begin anew.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ def main() -> int:
     command_line = parser(__doc__)
     command_line.add_argument("files", nargs="+", type=Path)
     command_line.add_argument("--most", type=int, help="configurations, those of the best sets")
+    command_line.add_argument("--sample", type=int, help="configurations drawn at random")
     command_line.add_argument("--jobs", type=int, default=2)
     command_line.add_argument("--seed", type=int, default=0)
     options = command_line.parse_args()
@@ -42,7 +44,8 @@ def main() -> int:
         found = examination(file, motions, file.nominal_index)
         pairs, done = pairs + found["pairs"], done + found["done"]
         report(path.stem, found)
-        report_sets(path.stem, file, motions)
+        if options.sample is None:
+            report_sets(path.stem, file, motions)
         save(options)
     share = f"{1.0 - done / pairs:.1%}"
     row("all rows", f"{share} of {pairs:,} reached pairs without a motion")
@@ -57,7 +60,12 @@ def examined(path: Path, file: tcs.ScoreFile, options: argparse.Namespace) -> Mo
     if motion_path(path).exists():
         return motions_of(file, path)
     motions = tcs.examine(
-        file, within=None, most=options.most, seed=options.seed, jobs=options.jobs
+        file,
+        within=None,
+        most=options.most,
+        sample=options.sample,
+        seed=options.seed,
+        jobs=options.jobs,
     )
     save_motions(motion_path(path), motions)
     return motions
@@ -67,6 +75,7 @@ def report(name: str, found: dict) -> None:
     """Print and record which pairs can be done."""
     pairs, reasons = found["pairs"], found["not_done"]
     cells = {
+        "configurations": f"{found['configurations']:,} of {found['candidates']:,}",
         "reached": f"{pairs:,}",
         "no motion": f"{found['fraction_not_done']:.1%}",
         "rest in contact": f"{reasons['rest_blocked'] / pairs:.1%}",

@@ -159,6 +159,13 @@ def motions(
             "--pairs", help="Examine every configuration that reaches a goal, not only the best."
         ),
     ] = False,
+    sample: Annotated[
+        int | None,
+        typer.Option(
+            help="Examine this many of these configurations only, drawn at random.",
+            show_default="all",
+        ),
+    ] = None,
     observed: options.Observed = None,
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="FILE.motions")
@@ -185,6 +192,7 @@ def motions(
             loaded,
             within=None if pairs else within,
             most=most,
+            sample=sample,
             table=table,
             seed=seed,
             jobs=jobs,

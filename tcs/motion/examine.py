@@ -50,6 +50,7 @@ def examine(
     *,
     within: float | None = 0.05,
     most: int | None = None,
+    sample: int | None = None,
     table: int | None = None,
     seed: int = 0,
     jobs: int = 2,
@@ -63,6 +64,7 @@ def examine(
         within: Examine the candidates that are in a set whose P_R + P_M is at most this fraction
             below the best one; None for all candidates.
         most: Greatest number of candidates, those of the best sets first; None for no bound.
+        sample: Examine this many of these candidates, drawn at random; None for all.
         table: Number of the table, by default the nominal one.
         seed: Seed of the planner.
         jobs: Number of threads; the outcomes do not depend on it.
@@ -72,7 +74,7 @@ def examine(
     Raises:
         StoreMismatchError: If the models differ from those the file was made from.
         RobotError: If a velocity limit of the arm is unknown.
-        TcsError: If `within`, `most` or `jobs` is out of range.
+        TcsError: If `within`, `most`, `sample` or `jobs` is out of range.
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
@@ -82,7 +84,7 @@ def examine(
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
     sets = file.tables[number].sets
-    rows = worth_examining(sets, within, most)
+    rows = drawn(worth_examining(sets, within, most), sample, seed)
     stops = StopGrid.of(job, scene, job.scored_grid, lowered)
     first = number * job.grid.size
     slices = [rows[start : start + SLICE] for start in range(0, len(rows), SLICE)]
@@ -102,6 +104,7 @@ def examine(
         "seed": seed,
         "within": within,
         "most": most,
+        "sample": sample,
         "seconds": time.perf_counter() - begun,
         "processor_seconds": time.process_time() - processor,
     }
@@ -184,6 +187,27 @@ def worth_examining(sets: SetTable, within: float | None, most: int | None) -> N
     if within is not None and len(order):
         order = order[best[order] >= (1.0 - within) * best[order[0]]]
     return np.sort(order[:most])
+
+
+def drawn(rows: NDArray[np.intp], sample: int | None, seed: int) -> NDArray[np.intp]:
+    """Return some rows drawn at random, ascending; all of them if there are not more.
+
+    Args:
+        rows: Rows, ascending.
+        sample: How many to draw; None for all.
+        seed: Seed of the draw.
+
+    Raises:
+        TcsError: If the number is less than 1.
+
+    >>> len(drawn(np.arange(100), 7, seed=0))
+    7
+    """
+    if sample is not None and sample < 1:
+        raise TcsError(f"sample is {sample}; must be 1 or more configurations.")
+    if sample is None or sample >= len(rows):
+        return rows
+    return np.sort(np.random.default_rng(seed).choice(rows, sample, replace=False))
 
 
 def _examine_slice(

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray
+from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.motion.connect import Trees, new_trees
-from tcs.kernel.motion.edges import NO_PAIR, posture_contact, without_idle_pairs
+from tcs.kernel.motion.edges import NO_PAIR, list_needed, posture_contact
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
     motion_scene,
     new_motion_workspace,
+    with_pairs,
 )
 from tcs.kernel.problem import Problem, build_problem
 from tcs.model.grid import Axis, Grid, InitialConfiguration
@@ -36,17 +37,17 @@ class StopGrid:
     """The job's live scene."""
     configurations: Grid
     lowered: LoweredScene
-    """Scene and configurations as arrays."""
+    """Scene and configurations as arrays, with the boxes that paths keep out of."""
     problem: Problem
-    walled: LoweredScene
-    """The same with the boxes that paths keep out of; the same object if there are none."""
-    walled_problem: Problem
+    """The same as the kernel takes it."""
     rest: FloatArray
     """Rest posture of the arm [rad], shape (7,)."""
     velocity: FloatArray
     """Velocity limits [rad/s], shape (7,)."""
     acceleration: FloatArray
     """Acceleration limits [rad/s^2], shape (7,)."""
+    needed: dict[int, BoolArray] = field(default_factory=dict)
+    """For each torso level met so far, which pairs of the robot's own shapes may touch."""
 
     @classmethod
     def of(cls, job: Job, scene: Scene, grid: Grid, lowered: LoweredScene) -> StopGrid:
@@ -56,25 +57,20 @@ class StopGrid:
             job: Task, robot, environment and grid.
             scene: The job's live scene.
             grid: The configurations.
-            lowered: Scene and configurations as arrays.
+            lowered: Scene and configurations as arrays, without boxes that paths keep out of.
 
         Raises:
             RobotError: If a velocity limit is unknown.
         """
         velocity, acceleration = job.spec.robot.arm_rates()
-        problem = build_problem(lowered.arrays, lowered.grid)
-        walled, walled_problem = lowered, problem
         if job.task.keep_out:
-            walled = with_keep_out(lowered, job.task)
-            walled_problem = build_problem(walled.arrays, walled.grid)
+            lowered = with_keep_out(lowered, job.task)
         return cls(
             job=job,
             scene=scene,
             configurations=grid,
             lowered=lowered,
-            problem=problem,
-            walled=walled,
-            walled_problem=walled_problem,
+            problem=build_problem(lowered.arrays, lowered.grid),
             rest=np.array(job.spec.robot.arm_rest()),
             velocity=np.array(velocity),
             acceleration=np.array(acceleration),
@@ -87,13 +83,31 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        lines = without_idle_pairs(motion_scene(self.problem, configuration))
-        line_work = new_motion_workspace(lines)
-        motion, work = lines, line_work
-        if self.walled_problem is not self.problem:
-            motion = without_idle_pairs(motion_scene(self.walled_problem, configuration))
-            work = new_motion_workspace(motion)
+        motion = self._without_idle_pairs(motion_scene(self.problem, configuration), configuration)
+        work = new_motion_workspace(motion)
+        lines, line_work = motion, work
+        if self.job.task.keep_out:
+            # The boxes are the last bodies of the environment.
+            first = self.problem.environment_bodies - len(self.job.task.keep_out)
+            other = motion.body[motion.pair[:, 1]]
+            lines = with_pairs(motion, (other < first) | (other >= self.problem.environment_bodies))
+            line_work = new_motion_workspace(lines)
         return Stop(self, configuration, motion, work, lines, line_work, trees)
+
+    def _without_idle_pairs(self, scene: MotionScene, configuration: int) -> MotionScene:
+        """Return a scene without pairs of the robot's own shapes that never touch.
+
+        Which these are depends on the torso alone.
+        """
+        torso = configuration % self.problem.torso_levels
+        own = scene.body[scene.pair[:, 1]] >= self.problem.environment_bodies
+        if torso not in self.needed:
+            needed = np.ones(len(scene.pair), np.bool_)
+            list_needed(scene, new_motion_workspace(scene), needed)
+            self.needed[torso] = needed[own]
+        needed = np.ones(len(scene.pair), np.bool_)
+        needed[own] = self.needed[torso]
+        return with_pairs(scene, needed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,8 +240,7 @@ class Stop:
 
     def bodies(self, motion: MotionScene, pair: int) -> BodyPair:
         """Return the names of the bodies of a pair of shapes of one of the two scenes."""
-        walled = motion is self.motion
-        lowered = self.grid.walled if walled else self.grid.lowered
+        lowered = self.grid.lowered
         # Robot bodies are numbered after those of the environment.
         names = (*lowered.environment_bodies, *lowered.robot_bodies)
         first, second = (names[int(motion.body[i])] for i in motion.pair[pair, :2])

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import tcs
 from tcs.cli.app import app
 from tcs.errors import TcsError
-from tcs.motion.examine import worth_examining
+from tcs.motion.examine import drawn, worth_examining
 from tcs.placement.store import load_motions, motion_path
 from tcs.placement.tables import MotionOutcome
 from tests.placement.store.example import score_file
@@ -80,6 +80,19 @@ def test_the_best_candidates_come_first():
 def test_impossible_fractions_and_numbers_are_refused(wrong):
     with pytest.raises(TcsError, match=next(iter(wrong))):
         worth_examining(score_file().nominal.sets, **({"within": None, "most": None} | wrong))
+
+
+def test_a_sample_is_drawn_by_its_seed_without_repetition():
+    rows = np.arange(5, 45)
+    samples = [drawn(rows, 12, seed) for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(*samples[:2])
+    assert set(samples[0]) != set(samples[2])
+    for sample in samples:
+        assert np.all(np.diff(sample) > 0)
+        assert (len(sample), set(sample) <= set(rows)) == (12, True)
+    assert drawn(rows, None, 0) is drawn(rows, 40, 0) is rows
+    with pytest.raises(TcsError, match="sample"):
+        drawn(rows, 0, 0)
 
 
 def test_nothing_is_examined_by_no_thread(two_goals):
