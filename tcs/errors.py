@@ -14,7 +14,11 @@
     │   └── StoreMismatchError    made from models that have changed since
     ├── PerceptionError       scans in which no table is found, or that cannot be used
     ├── SelectionError        no set to choose from, or a state that is not stored
-    └── OutputError           a file or folder that cannot be written
+    ├── OutputError           a file or folder that cannot be written
+    └── ServiceError          a request that the service refuses, or a server that does not answer
+        ├── NotFoundError         a score file or job that the service does not hold
+        ├── BusyError             a full queue; the same request may succeed later
+        └── CancelledError        work that ended because it was cancelled
 
 A goal that cannot be reached has a score of zero and raises no exception.
 """
@@ -113,3 +117,19 @@ class SelectionError(TcsError):
 
 class OutputError(TcsError):
     """A file or folder that cannot be written."""
+
+
+class ServiceError(TcsError):
+    """A request that the service refuses, or a server that does not answer."""
+
+
+class NotFoundError(ServiceError):
+    """A score file or job that the service does not hold."""
+
+
+class BusyError(ServiceError):
+    """A full queue or too many requests at once; the same request may succeed later."""
+
+
+class CancelledError(ServiceError):
+    """Work that ended because it was cancelled."""

@@ -27,7 +27,8 @@ def dependencies() -> set[str]:
 def of_extras() -> set[str]:
     """Modules of the extras that the package itself imports where they are installed."""
     extras = PROJECT["optional-dependencies"]
-    names = {re.split(r"[^\w-]", line)[0] for line in (*extras["arplace"], *extras["bags"])}
+    lines = [line for name in ("arplace", "bags", "service") for line in extras[name]]
+    names = {re.split(r"[^\w-]", line)[0] for line in lines}
     return {MODULE_OF.get(name, name) for name in names}
 
 
@@ -46,8 +47,8 @@ def imported_modules() -> set[str]:
 def test_what_is_imported_is_what_is_depended_on():
     foreign = imported_modules() - set(sys.stdlib_module_names) - {"tcs"}
     modules = {MODULE_OF.get(name, name) for name in dependencies() - WITHOUT_MODULE}
-    # These come with pydantic and numba, in the versions those need.
-    assert foreign - {"llvmlite", "pydantic_core"} == modules | of_extras()
+    # These come with pydantic, numba and fastapi, in the versions those need.
+    assert foreign - {"anyio", "llvmlite", "pydantic_core"} == modules | of_extras()
 
 
 def test_readme_gives_a_reason_for_each_dependency():

@@ -21,6 +21,7 @@ from tcs.cli import (
     robustness,
     score,
     select,
+    serve,
     study,
     teleop,
     view,
@@ -82,6 +83,7 @@ for command in (
     view.view,
     check.check,
     locate.locate,
+    serve.serve,
 ):
     app.command()(command)
 app.command("map")(pictures.draw_map)

@@ -105,7 +105,7 @@ def select(
     """Select the set with the greatest utility from the current state."""
     import tcs
     from tcs.cli.values import current_state, frame_values, observed_settings
-    from tcs.placement.constraints import constraint_texts
+    from tcs.placement.constraints import scored_entries
     from tcs.placement.selection import Executability, same_set
     from tcs.placement.store import motions_of
 
@@ -146,10 +146,7 @@ def select(
             "covariance": covariance.tolist(),
             "same_set": same_set(partial(choose, motions=motions), here, covariance),
         }
-    if "person" in loaded.metadata:
-        result["person"] = loaded.metadata["person"]
-    if scored := constraint_texts(loaded):
-        result["scored_constraints"] = scored
+    result |= scored_entries(loaded)
     terminal.print_result(result, tables.report_choice, as_json=as_json)
 
 

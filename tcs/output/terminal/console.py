@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import typer
 from rich.console import Console
 
 from tcs.errors import TcsError
+from tcs.files.json_values import without_infinities
 from tcs.interrupts import raise_if_interrupted, remember_interrupts, report_interrupt
 
 _PIPE_WIDTH = 110
@@ -52,18 +52,9 @@ def print_result(
         as_json: Whether to print one JSON object; infinities and NaN are null in it.
     """
     if as_json:
-        typer.echo(json.dumps(_without_infinities(result), indent=2, allow_nan=False))
+        typer.echo(json.dumps(without_infinities(result), indent=2, allow_nan=False))
     else:
         report(result)
-
-
-def _without_infinities(value: Any) -> Any:
-    """Return plain containers with None for numbers that JSON cannot hold: infinities and NaN."""
-    if isinstance(value, dict):
-        return {key: _without_infinities(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_infinities(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def results_console(pipe_width: int = _PIPE_WIDTH) -> Console:

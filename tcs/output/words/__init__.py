@@ -26,6 +26,7 @@ from tcs.output.words.goals import goal_list, goals_by_reason, goals_text
 from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
 from tcs.output.words.numbers import p_value, percent, percentage, signed
 from tcs.output.words.people import person_text
+from tcs.output.words.places import RelativePlace, relative_place
 from tcs.output.words.reasons import (
     REASON_COLOURS,
     REASON_NAMES,
@@ -40,6 +41,7 @@ __all__ = [
     "REASON_COLOURS",
     "REASON_NAMES",
     "REASON_TEXTS",
+    "RelativePlace",
     "arm_text",
     "assign_goals",
     "assigned_goals",
@@ -64,6 +66,7 @@ __all__ = [
     "person_text",
     "quantity",
     "reason_of",
+    "relative_place",
     "scores_text",
     "setting_text",
     "settings_text",

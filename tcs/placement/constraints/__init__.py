@@ -21,6 +21,7 @@ from tcs.placement.constraints.scored import (
     excluded_configurations,
     recorded_constraints,
     scored_constraints,
+    scored_entries,
 )
 
 __all__ = [
@@ -42,4 +43,5 @@ __all__ = [
     "read_constraints",
     "recorded_constraints",
     "scored_constraints",
+    "scored_entries",
 ]

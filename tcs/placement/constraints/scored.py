@@ -112,3 +112,15 @@ def constraint_texts(file: ScoreFile) -> list[str]:
         *(f"forbid {region.name}" for region in found.forbid),
         *(f"blocked {box.name}" for box in found.blocked),
     ]
+
+
+def scored_entries(file: ScoreFile) -> dict[str, Any]:
+    """Return for whom and under which constraints a file was scored, where that is not the default.
+
+    The keys are `person` and `scored_constraints`, as `tcs select --json` prints them.
+    """
+    texts = constraint_texts(file)
+    return {
+        **({"person": file.metadata["person"]} if "person" in file.metadata else {}),
+        **({"scored_constraints": texts} if texts else {}),
+    }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from tcs.placement.reasons.changes import Change
 from tcs.placement.reasons.distribution import BlockingPair, CheckCount, Distribution
-from tcs.placement.reasons.explained import ExplainedConfiguration
+from tcs.placement.reasons.explained import ExplainedConfiguration, nearest_configuration
 from tcs.placement.reasons.explanation import Explanation, explain
 from tcs.placement.reasons.fix import Fix, fix_weights
 
@@ -23,4 +23,5 @@ __all__ = [
     "Fix",
     "explain",
     "fix_weights",
+    "nearest_configuration",
 ]

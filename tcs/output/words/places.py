@@ -1,0 +1,145 @@
+"""Where the robot is relative to the person, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+_LANDMARKS = {
+    "head": "head",
+    "chest": "chest",
+    "mid_body": "waist",
+    "lower_body": "hips",
+    "calf": "knees",
+    "foot": "feet",
+}
+"""Parts of the body by the start of the names of their frames; a calf begins at the knee."""
+_SEATED = ("hips", "knees", "feet")
+"""Parts that a robot can be beside where the person sits."""
+_BESIDE = 0.3
+"""Distance from the middle of the body beyond which a place is on one side [m]: half the width of a
+wheelchair, and more than half of a person."""
+_SITS = 0.35
+"""Height of the head above the hips beyond which a person sits [m]."""
+_SIDES = {
+    "left": "On the person's left",
+    "right": "On the person's right",
+    "front": "In front of the person",
+    "behind": "Behind the person",
+    "feet": "At the person's feet",
+    "head": "At the person's head",
+    "on": "Where the person is",
+}
+_FACINGS = {
+    "towards": "facing them",
+    "away": "facing away",
+    "left": "with them on its left",
+    "right": "with them on its right",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RelativePlace:
+    """Where the base is relative to the person."""
+
+    side: str
+    """One of left, right, front, behind, feet, head, on; left and right are the person's."""
+    beside: str | None
+    """The part of the body that it is beside: head, chest, waist, hips, knees or feet."""
+    facing: str
+    """Where the robot's front points: towards the person, away, or the side of the robot on which
+    the person is, left or right."""
+
+    @property
+    def text(self) -> str:
+        """The place as a sentence.
+
+        >>> RelativePlace("right", "knees", "towards").text
+        "On the person's right, beside the knees, facing them."
+        """
+        beside = [f"beside the {self.beside}"] if self.beside else []
+        return f"{', '.join([_SIDES[self.side], *beside, _FACINGS[self.facing]])}."
+
+
+def relative_place(
+    x: float, y: float, yaw: float, frames: Mapping[str, Sequence[float]]
+) -> RelativePlace | None:
+    """Return where a base is relative to the person; None without frames of both sides of a body.
+
+    Args:
+        x: x of the base in the environment frame [m].
+        y: y of the base [m].
+        yaw: Heading of the base [rad].
+        frames: Positions of the body frames in the environment frame [m].
+
+    >>> frames = {"head": (0.45, 0.0, 1.2), "lower_body": (0.44, 0.0, 0.6),
+    ...           "calf_left": (0.9, 0.1, 0.6), "calf_right": (0.9, -0.1, 0.6)}
+    >>> relative_place(0.9, -0.8, math.pi / 2, frames)
+    RelativePlace(side='right', beside='knees', facing='towards')
+    """
+    left, right = _middle(frames, "_left"), _middle(frames, "_right")
+    if left is None or right is None or "head" not in frames:
+        return None
+    width = math.dist(left, right)
+    if width < 1e-6:
+        return None
+    to_left = ((left[0] - right[0]) / width, (left[1] - right[1]) / width)
+    ahead = (to_left[1], -to_left[0])
+    origin = ((left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0)
+
+    def along(point: Sequence[float], axis: tuple[float, float]) -> float:
+        return (point[0] - origin[0]) * axis[0] + (point[1] - origin[1]) * axis[1]
+
+    parts = {
+        part: along(at, ahead)
+        for start, part in _LANDMARKS.items()
+        if (at := _middle(frames, start, at_start=True)) is not None
+    }
+    aside, forward = along((x, y), to_left), along((x, y), ahead)
+    low, high = min(parts.values()), max(parts.values())
+    sits = frames["head"][2] - frames.get("lower_body", frames["head"])[2] > _SITS
+    side = _side(aside, forward - low, high - forward, sits)
+    beside = None
+    if side in ("left", "right"):
+        # A sitting person's head and trunk are above the hips.
+        seen = [part for part in parts if not sits or part in _SEATED] or list(parts)
+        beside = min(seen, key=lambda part: abs(parts[part] - forward))
+    nearest = min(max(forward, low), high)
+    target = (origin[0] + nearest * ahead[0], origin[1] + nearest * ahead[1])
+    bearing = math.atan2(target[1] - y, target[0] - x) - yaw
+    return RelativePlace(side, beside, _facing(math.remainder(bearing, 2.0 * math.pi)))
+
+
+def _side(aside: float, after_head: float, before_feet: float, sits: bool) -> str:
+    """Return the side of the person; distances along the body are positive within it [m]."""
+    beyond = max(-after_head, -before_feet)
+    if beyond > 0.0 and beyond > abs(aside) - _BESIDE:
+        if -before_feet > 0.0:
+            return "front" if sits else "feet"
+        return "behind" if sits else "head"
+    if abs(aside) <= _BESIDE:
+        return "on"
+    return "left" if aside > 0.0 else "right"
+
+
+def _facing(bearing: float) -> str:
+    """Return where the front points, given the direction to the person in the base frame [rad]."""
+    if abs(bearing) <= math.pi / 4.0:
+        return "towards"
+    if abs(bearing) >= 3.0 * math.pi / 4.0:
+        return "away"
+    return "left" if bearing > 0.0 else "right"
+
+
+def _middle(
+    frames: Mapping[str, Sequence[float]], part: str, *, at_start: bool = False
+) -> tuple[float, float] | None:
+    """Return the mean position on the floor of the frames whose names end or start with a part."""
+    names = [n for n in frames if (n.startswith(part) if at_start else n.endswith(part))]
+    if not names:
+        return None
+    return (
+        sum(frames[name][0] for name in names) / len(names),
+        sum(frames[name][1] for name in names) / len(names),
+    )

@@ -1,0 +1,40 @@
+"""One engine for every program that asks: score, select, explain, evaluate and plan, as requests.
+
+In: requests as pydantic models, score files and task files as bytes. Out: the plain containers that
+the command line prints with `--json`, and the states of jobs. `Engine` answers in this process;
+`tcs.service.http` serves it over HTTP, and `tcs.service.client.Client` asks such a server with the
+same methods.
+"""
+
+from __future__ import annotations
+
+from tcs.service.engine import Engine
+from tcs.service.limits import Limits
+from tcs.service.requests import (
+    EvaluateRequest,
+    ExplainRequest,
+    FloorRequest,
+    OutcomeRequest,
+    PlanRequest,
+    SceneRequest,
+    ScoreHereRequest,
+    ScoreRequest,
+    SelectRequest,
+)
+from tcs.service.responses import FileEntry, JobStatus
+
+__all__ = [
+    "Engine",
+    "EvaluateRequest",
+    "ExplainRequest",
+    "FileEntry",
+    "FloorRequest",
+    "JobStatus",
+    "Limits",
+    "OutcomeRequest",
+    "PlanRequest",
+    "SceneRequest",
+    "ScoreHereRequest",
+    "ScoreRequest",
+    "SelectRequest",
+]

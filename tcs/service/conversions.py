@@ -1,0 +1,131 @@
+"""Values of requests as the arguments of the public functions: radians, states, constraints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from tcs.errors import SelectionError
+from tcs.model.grid import Axis, InitialConfiguration
+from tcs.placement.constraints import Constraints, Obstacle, Region
+from tcs.placement.selection import TravelWeights, UtilityWeights
+from tcs.service.requests import BasePose, Limited, SelectRequest, TravelCosts
+
+
+def settings_of(values: Mapping[str, float], where: str) -> dict[str, float]:
+    """Return values of axes or joints in m and rad.
+
+    Args:
+        values: Values in m, or in degrees under names that end in `_deg`.
+        where: Key of the request, for the message.
+
+    Raises:
+        SelectionError: If an axis is set twice.
+
+    >>> settings_of({"bed_height": 0.2, "head_rest_deg": 180.0}, "at")
+    {'bed_height': 0.2, 'head_rest': 3.141592653589793}
+    """
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        axis = name.removesuffix("_deg")
+        if axis in found:
+            raise SelectionError(f"'{where}' sets '{axis}' twice. Give it once.")
+        found[axis] = math.radians(value) if name.endswith("_deg") else float(value)
+    return found
+
+
+def observed_of(values: Mapping[str, float], axes: Sequence[Axis]) -> dict[str, float]:
+    """Return the observed state in m and rad.
+
+    Args:
+        values: Values in m, or in degrees under names that end in `_deg`.
+        axes: The observed axes of the score file; other names are passed on unchecked.
+
+    Raises:
+        SelectionError: If a value is in the unit of another axis, or an axis is set twice.
+    """
+    found = settings_of(values, "observed")
+    for axis in axes:
+        right = f"{axis.name}_deg" if axis.unit == "deg" else axis.name
+        if axis.name in found and right not in values:
+            raise SelectionError(
+                f"'observed': '{axis.name}' is scored in {axis.unit}. Use the key {right}."
+            )
+    return found
+
+
+def state_of(
+    here: BasePose, torso: float, at: Mapping[str, float], arm: str | None = None
+) -> InitialConfiguration:
+    """Return the state of robot and environment.
+
+    Args:
+        here: x [m], y [m] and heading [deg] in the environment frame.
+        torso: Torso height [m].
+        at: Settings of the environment in m, or in degrees under names that end in `_deg`.
+        arm: Name of the arm, where configurations use one of several.
+
+    Raises:
+        SelectionError: If an axis is set twice.
+    """
+    x, y, yaw_deg = here
+    return InitialConfiguration(
+        base_x=x,
+        base_y=y,
+        base_yaw=math.radians(yaw_deg),
+        torso=torso,
+        environment=tuple(settings_of(at, "at").items()),
+        environment_units=tuple("rad" if name.endswith("_deg") else "m" for name in at),
+        arm=arm,
+    )
+
+
+def constraints_of(request: Limited, prefer: Sequence[str] = ()) -> Constraints:
+    """Return the constraints of a request.
+
+    Raises:
+        TcsError: If one is not of its form.
+    """
+    regions = [
+        Region.parse(given) if isinstance(given, str) else Region.of(given, "'forbid'")
+        for given in request.forbid
+    ]
+    return Constraints(
+        only=tuple(request.only),
+        keep=tuple(request.keep),
+        forbid=tuple(regions),
+        blocked=tuple(Obstacle.parse(given) for given in request.blocked),
+        prefer=tuple(prefer),
+    )
+
+
+def travel_of(request: TravelCosts) -> TravelWeights:
+    """Return the weights of the travel cost.
+
+    Raises:
+        SelectionError: If a weight is invalid.
+    """
+    return TravelWeights(
+        metre=request.metre_weight,
+        turn=request.turn_weight,
+        torso=request.torso_weight,
+        environment=tuple(request.axis_weight.items()),
+        route=request.travel,
+    )
+
+
+def utility_of(request: SelectRequest) -> UtilityWeights:
+    """Return the weights of the utility.
+
+    Raises:
+        SelectionError: If a weight is invalid.
+    """
+    return UtilityWeights(
+        reachability=request.alpha,
+        manipulability=request.beta,
+        travel=request.gamma,
+        success=request.delta,
+        places=request.place_penalty,
+        environment=request.environment_penalty,
+        preference=request.preference_penalty,
+    )

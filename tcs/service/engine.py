@@ -1,0 +1,297 @@
+"""The engine: answers requests about score files, and does longer work as jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any, Self
+
+from tcs.errors import ServiceError, TcsError, UnknownNameError
+from tcs.files.json_values import without_infinities
+from tcs.files.writing import scratch_folder
+from tcs.model.catalogue import catalogue
+from tcs.placement.constraints import scored_entries
+from tcs.placement.reasons import explain, fix_weights
+from tcs.placement.selection import Top, nearest_table, select
+from tcs.placement.store import ScoreFile
+from tcs.service.conversions import (
+    constraints_of,
+    observed_of,
+    state_of,
+    travel_of,
+    utility_of,
+)
+from tcs.service.floor import floor_of, outcome_of
+from tcs.service.jobs import Jobs, Progress
+from tcs.service.limits import Limits
+from tcs.service.requests import (
+    EvaluateRequest,
+    ExplainRequest,
+    FloorRequest,
+    JobRequest,
+    OutcomeRequest,
+    PlanRequest,
+    SceneRequest,
+    ScoreHereRequest,
+    SelectRequest,
+)
+from tcs.service.responses import FileEntry, JobStatus
+from tcs.service.score_files import ScoreFiles
+from tcs.service.sent_documents import SentDocuments
+from tcs.service.work import SceneWork
+
+_DEFAULT_LIMITS = Limits()
+_POLL = 60.0
+"""Interval at which a waiting caller is woken without need [s]."""
+
+
+class Engine:
+    """Answers requests; a context manager that removes its temporary folder at the end.
+
+    Its methods may be called from several threads. Requests about one score file are answered one
+    after the other, and jobs run one at a time.
+    """
+
+    def __init__(self, limits: Limits = _DEFAULT_LIMITS) -> None:
+        """Start the thread of the jobs, and make the temporary folder.
+
+        Raises:
+            OutputError: If the folder cannot be made.
+        """
+        self._limits = limits
+        self._stack = ExitStack()
+        folder = self._stack.enter_context(scratch_folder())
+        self._files = ScoreFiles(folder, limits)
+        self._sent = SentDocuments(folder)
+        self._jobs = Jobs(limits)
+        self._work = SceneWork(self._files, self._sent, limits)
+
+    def __enter__(self) -> Self:
+        """Return the engine."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Cancel the jobs and remove the temporary folder."""
+        self.close()
+
+    def close(self) -> None:
+        """Cancel the jobs and remove the temporary folder."""
+        self._jobs.close()
+        self._stack.close()
+
+    @property
+    def limits(self) -> Limits:
+        """Its limits."""
+        return self._limits
+
+    def catalogue(self) -> dict[str, Any]:
+        """Return the tasks, environments and robots that ship with tcs, as `tcs list --json`."""
+        return catalogue()
+
+    def files(self) -> list[FileEntry]:
+        """Return the score files that are held."""
+        return self._files.entries()
+
+    def add_file(self, content: bytes) -> FileEntry:
+        """Check a score file that was sent and hold it; nothing in it is called or imported.
+
+        Raises:
+            StoreError: If it is not a score file.
+            ServiceError: If it is too large.
+        """
+        return self._files.add(content).entry
+
+    def open_file(self, path: Path) -> FileEntry:
+        """Hold a score file of this machine until the engine is closed; not for requests.
+
+        Raises:
+            StoreError: If it cannot be read, or is not a score file.
+        """
+        return self._files.read(path).entry
+
+    def content_of(self, file: str) -> bytes:
+        """Return the bytes of a score file.
+
+        Raises:
+            NotFoundError: If it is not held.
+        """
+        return self._files.content(file)
+
+    def select(self, request: SelectRequest) -> dict[str, Any]:
+        """Return the set with the greatest utility, as `tcs select --json`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            TcsError: As `tcs.select`.
+        """
+        with self._files.held(request.file).lock:
+            file = self._files.loaded(request.file)
+            choice = select(
+                file,
+                state_of(request.here, request.torso, request.at),
+                weights=utility_of(request),
+                travel=travel_of(request),
+                constraints=constraints_of(request, request.prefer),
+                top=None
+                if request.top is None
+                else Top(count=request.top, min_apart=request.min_apart),
+                max_members=request.max_members,
+                observed=observed_of(request.observed, file.observed_axes),
+                frames=request.frames,
+            )
+        result = {**choice.to_json(file.metadata["measure"]), **scored_entries(file)}
+        return dict(without_infinities(result))
+
+    def explain(self, request: ExplainRequest) -> dict[str, Any]:
+        """Return why a goal is not reached and the cheapest change, as `tcs explain --json`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            ServiceError: If both a configuration and a state are given.
+            TcsError: As `tcs.explain`.
+        """
+        if request.configuration is not None and request.here is not None:
+            raise ServiceError("give 'configuration' or 'here', not both.")
+        if request.here is None and (request.at or request.torso or request.arm):
+            raise ServiceError("'torso', 'at' and 'arm' require 'here'.")
+        with self._files.held(request.file).lock:
+            file = self._files.loaded(request.file)
+            explanation = explain(
+                file,
+                request.goal,
+                request.configuration
+                if request.here is None
+                else state_of(request.here, request.torso, request.at, request.arm),
+                weights=fix_weights(
+                    file.configurations,
+                    metre=request.metre_weight,
+                    turn=request.turn_weight,
+                    torso=request.torso_weight,
+                    environment=tuple(request.axis_weight.items()),
+                    route=request.travel,
+                ),
+                observed=observed_of(request.observed, file.observed_axes),
+                frames=request.frames,
+            )
+            result = {**explanation.to_json(), "measure": file.metadata["measure"]}
+        return dict(without_infinities(result))
+
+    def floor(self, request: FloorRequest) -> dict[str, Any]:
+        """Return the best scores at each base position, as `tcs.service.floor.floor_of`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            GridError: If there is no such state of the environment.
+        """
+        with self._files.held(request.file).lock:
+            file = self._files.loaded(request.file)
+            return floor_of(file, self._table(file, request), request.state)
+
+    def outcome(self, request: OutcomeRequest) -> dict[str, Any]:
+        """Return what is reached from a base pose, as `tcs.service.floor.outcome_of`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            SelectionError: If the base pose is beyond the grid, or an axis is missing.
+        """
+        with self._files.held(request.file).lock:
+            file = self._files.loaded(request.file)
+            stated = state_of(request.here, request.torso, request.at)
+            return outcome_of(file, self._table(file, request), stated, best=request.best)
+
+    def _table(self, file: ScoreFile, request: FloorRequest | OutcomeRequest) -> int:
+        """Return the number of the table nearest to what is observed."""
+        observed = observed_of(request.observed, file.observed_axes)
+        return nearest_table(file, None, observed, request.frames).index
+
+    def submit(self, request: JobRequest) -> JobStatus:
+        """Queue a job, and return its state.
+
+        Raises:
+            BusyError: If the queue is full.
+            NotFoundError: If the score file is not held.
+        """
+        what, work = self._work_of(request)
+        return self._jobs.submit(what, work)
+
+    def jobs(self) -> list[JobStatus]:
+        """Return the states of all jobs without their results, the oldest first."""
+        return self._jobs.all()
+
+    def job(self, name: str) -> JobStatus:
+        """Return the state of a job, with its result if it is done.
+
+        Raises:
+            NotFoundError: If there is no such job, or it ended long ago.
+        """
+        return self._jobs.status(name)
+
+    def next_state(self, name: str, known: JobStatus | None, seconds: float) -> JobStatus:
+        """Return the state of a job as soon as it differs from a known one, or after a time [s].
+
+        Raises:
+            NotFoundError: If there is no such job.
+        """
+        return self._jobs.wait_for_change(name, known, seconds)
+
+    def cancel(self, name: str) -> JobStatus:
+        """Cancel a job: a waiting one at once, a running one where it next reports its progress.
+
+        Raises:
+            NotFoundError: If there is no such job.
+        """
+        return self._jobs.cancel(name)
+
+    def wait(self, name: str, on_progress: Callable[[int, int], None] | None = None) -> JobStatus:
+        """Wait until a job has ended, and return its state.
+
+        Args:
+            name: The job.
+            on_progress: Called with the amounts of work done and in all, whenever they change.
+
+        Raises:
+            NotFoundError: If there is no such job.
+        """
+        status = self._jobs.wait_for_change(name, None, 0.0)
+        while not status.has_ended:
+            if on_progress is not None and status.total:
+                on_progress(status.done, status.total)
+            status = self._jobs.wait_for_change(name, status, _POLL)
+        return status
+
+    def _work_of(self, request: JobRequest) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
+        """Return what a job does and the function that does it, after quick checks."""
+        if isinstance(request, EvaluateRequest):
+            self._files.held(request.file)
+            return "evaluate", self._plainly(partial(self._work.evaluate, request))
+        if isinstance(request, PlanRequest):
+            self._files.held(request.file)
+            return "plan", self._plainly(partial(self._work.plan, request))
+        if isinstance(request, SceneRequest):
+            self._files.held(request.file)
+            return "scene", self._plainly(partial(self._work.scene, request))
+        if (request.task is None) == (request.task_yaml is None):
+            raise ServiceError("give 'task' or 'task_yaml', and not both.")
+        if isinstance(request, ScoreHereRequest):
+            return "score-here", self._plainly(partial(self._work.score_here, request))
+        return "score", self._plainly(partial(self._work.score, request))
+
+    def _plainly(
+        self, work: Callable[[Progress], dict[str, Any]]
+    ) -> Callable[[Progress], dict[str, Any]]:
+        """Return work whose result JSON can hold, and whose messages name no temporary folder."""
+
+        def done(progress: Progress) -> dict[str, Any]:
+            try:
+                return dict(without_infinities(work(progress)))
+            except UnknownNameError:
+                raise
+            except TcsError as error:
+                message = self._sent.without_folder(str(error))
+                if message == str(error):
+                    raise
+                raise ServiceError(message) from None
+
+        return done

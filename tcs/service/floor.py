@@ -1,0 +1,179 @@
+"""The floor of a score file: the best scores at each base position, and the outcome at one."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tcs.model.grid import Grid, InitialConfiguration
+from tcs.output.words import REASON_TEXTS, frame_name, pair_text, relative_place
+from tcs.placement.reasons import nearest_configuration
+from tcs.placement.store import ScoreFile
+from tcs.placement.tables import Reason, ScoreTable
+from tcs.placement.tables.equations import tc_manipulability, tc_reachability
+from tcs.placement.tables.place_map import PlaceMap
+
+_DECIMALS = 4
+"""Decimals of scores on a map."""
+
+
+def floor_of(file: ScoreFile, table: int, state: int) -> dict[str, Any]:
+    """Return the best scores at each base position in one state of the environment.
+
+    Args:
+        file: A score file.
+        table: Number of its table.
+        state: Number of the state of the environment, in C order over its axes.
+
+    Returns:
+        `x` and `y` of the positions [m]; `reachability`, `manipulability` and `free` (whether the
+        base touches nothing) as lists over x of lists over y; `states`, the settings of every state
+        of the environment; `frames`, the positions of the body frames [m].
+
+    Raises:
+        GridError: If there is no such state.
+    """
+    grid, scores = file.configurations, file.tables[table].scores
+    places = PlaceMap.of_state(scores, grid, state)
+    return {
+        "state": state,
+        "states": [settings_of_state(grid, i) for i in range(_states(grid))],
+        "x": np.round(places.x, 6).tolist(),
+        "y": np.round(places.y, 6).tolist(),
+        "reachability": np.round(places.reachability, _DECIMALS).tolist(),
+        "manipulability": np.round(places.manipulability, _DECIMALS).tolist(),
+        "free": places.free.astype(int).tolist(),
+        "frames": frames_of_state(file, table, state),
+        "headings_deg": np.round(np.degrees(grid.axis("base_yaw").values), 6).tolist(),
+        "torsos": np.round(grid.axis("torso").values, 6).tolist(),
+        "measure": file.metadata["measure"],
+    }
+
+
+def settings_of_state(grid: Grid, state: int) -> dict[str, float]:
+    """Return the settings of a state of the environment, angles under names in `_deg`."""
+    plain = grid.configuration(state * grid.state_size).to_json()
+    axes = {f"{a.name}_deg" if a.unit == "deg" else a.name for a in grid.environment_axes}
+    return {name: value for name, value in plain.items() if name in axes}
+
+
+def frames_of_state(file: ScoreFile, table: int, state: int) -> dict[str, list[float]]:
+    """Return the positions of the body frames in a state of the environment [m]."""
+    count = len(file.tables)
+    return {
+        name: np.reshape(at, (count, -1, 3))[table, state].tolist()
+        for name, at in file.body_frames.items()
+    }
+
+
+def outcome_of(
+    file: ScoreFile, table: int, stated: InitialConfiguration, *, best: bool = False
+) -> dict[str, Any]:
+    """Return what is reached from a base pose.
+
+    Args:
+        file: A score file.
+        table: Number of its table.
+        stated: The configuration; the nearest one of the grid is read.
+        best: Whether to take the heading and the torso height with the greatest P_R + P_M at that
+            base position, where any goal is reached from it.
+
+    Returns:
+        The configuration that was read, the place relative to the person, its scores, and `goals`:
+        for each its name, whether it is reached, and the reason.
+
+    Raises:
+        SelectionError: If a value is not finite, or an axis is missing or exceeded.
+        UnknownNameError: If an environment axis has no such name.
+    """
+    grid, scores = file.configurations, file.tables[table].scores
+    index, _ = nearest_configuration(grid, stated)
+    if best:
+        index = _best_at(grid, scores, index)
+    rows = np.arange(index, grid.size, grid.arm_size) if grid.arms else np.array([index])
+    goals = [_goal(file, scores, rows, goal) for goal in range(scores.goals)]
+    reached, dexterity = scores.reached[rows].any(axis=0), scores.dexterity[rows].max(axis=0)
+    state = int(grid.state_of(np.array([index]))[0])
+    member = grid.configuration(index)
+    place = relative_place(
+        member.base_x, member.base_y, member.base_yaw, frames_of_state(file, table, state)
+    )
+    count = int(reached.sum())
+    summary = f"{count} of {len(goals)} places reached."
+    return {
+        "configuration": index,
+        "state": state,
+        "members": [member.to_json()],
+        "place": None
+        if place is None
+        else {"side": place.side, "beside": place.beside, "facing": place.facing},
+        "sentence": summary if place is None else f"{place.text} {summary}",
+        "reached": count,
+        "reachability": round(float(tc_reachability(reached, scores.weights)), 12),
+        "manipulability": round(float(tc_manipulability(dexterity, scores.weights)), 12),
+        "goals": goals,
+        "measure": file.metadata["measure"],
+    }
+
+
+def _best_at(grid: Grid, scores: ScoreTable, index: int) -> int:
+    """Return the configuration with the best heading and torso height at the same base position."""
+    along = grid.indices(np.array([index]))[0].tolist()
+    names = [axis.name for axis in grid.axes]
+    free = [names.index("base_yaw"), names.index("torso")]
+    candidates = []
+    for values in itertools.product(*(range(grid.axes[i].count) for i in free)):
+        for i, value in zip(free, values, strict=True):
+            along[i] = value
+        candidates.append(int(grid.flat(along)))
+    found = np.array(candidates)
+    if grid.arms:
+        rows = found[:, None] + grid.arm_size * np.arange(len(grid.arms))
+    else:
+        rows = found[:, None]
+    reached = np.asarray(scores.reached[rows].any(axis=1))
+    dexterity = np.asarray(scores.dexterity[rows].max(axis=1))
+    worth = tc_reachability(reached, scores.weights) + tc_manipulability(dexterity, scores.weights)
+    return int(found[np.argmax(worth)]) if worth.max() > 0.0 else index
+
+
+def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str, Any]:
+    """Return the outcome at a goal, by the first arm that reaches it."""
+    row = rows[int(np.argmax(scores.reached[rows, goal]))]
+    reason = Reason(scores.reason[row, goal])
+    number = int(scores.pair[row, goal])
+    pair = scores.pair_names[number] if number >= 0 else None
+    contact = f" ({pair_text(pair)})" if pair is not None else ""
+    frame = _frame_of(file.task, goal)
+    return {
+        "goal": goal,
+        "name": f"{frame_name(frame)}, {_place_number(file.task, goal, frame)}" if frame else None,
+        "body_frame": frame,
+        "reached": reason == Reason.REACHED,
+        "reason": reason.name.lower(),
+        "words": f"{REASON_TEXTS[reason]}{contact}",
+        "pair": None if pair is None else list(pair),
+        "dexterity": float(scores.dexterity[row, goal]),
+    }
+
+
+def _frame_of(task: Mapping[str, Any], goal: int) -> str | None:
+    """Return the body frame of a goal, None if the file does not state it."""
+    goals = task.get("goals")
+    if not isinstance(goals, Sequence) or goal >= len(goals) or not isinstance(goals[goal], dict):
+        return None
+    frame = goals[goal].get("body_frame")
+    return frame if isinstance(frame, str) else None
+
+
+def _place_number(task: Mapping[str, Any], goal: int, frame: str) -> str:
+    """Return the number of a goal among those on its frame, from 1: "place 2"."""
+    return f"place {sum(_frame_of(task, g) == frame for g in range(goal + 1))}"
+
+
+def _states(grid: Grid) -> int:
+    return math.prod(grid.environment_shape)

@@ -1,0 +1,228 @@
+"""The application: each request is one call of the engine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import partial
+from typing import Any
+
+import anyio.to_thread
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import HTMLResponse, StreamingResponse
+
+from tcs.errors import BusyError, DataFileError, TcsError
+from tcs.files.documents import checked
+from tcs.service.engine import Engine
+from tcs.service.http import description
+from tcs.service.http.guard import Access, Guard
+from tcs.service.http.problems import problem, problem_of
+from tcs.service.operations import OPERATIONS, Operation
+from tcs.service.responses import JobStatus
+
+_ABOUT = (
+    "Where should an assistive robot stand? Requests have the options of the command line with the "
+    "same names, and answers the keys that it prints with --json. A request names a score file by "
+    "the SHA-256 of its content: send one with POST /v1/files, or make one with POST /v1/score. "
+    "Metres, and degrees under keys that end in _deg."
+)
+_BEAT = 10.0
+"""Longest time between two events of a stream [s]."""
+_FILE = "application/octet-stream"
+
+
+def make_application(engine: Engine, access: Access) -> FastAPI:
+    """Return the application that answers requests with an engine.
+
+    Args:
+        engine: The engine.
+        access: Who may ask.
+    """
+    app = FastAPI(
+        title="tcs service", description=_ABOUT, docs_url=None, redoc_url=None, openapi_url=None
+    )
+    app.add_middleware(Guard, access=access, limits=engine.limits)
+    app.add_exception_handler(TcsError, _on_error)
+    app.add_exception_handler(404, _on_unknown_path)
+    app.add_exception_handler(405, _on_unknown_path)
+    for operation in OPERATIONS:
+        _add_operation(app, engine, operation)
+    _add_files(app, engine)
+    _add_jobs(app, engine)
+    _add_description(app, engine)
+    return app
+
+
+async def _on_error(_request: Request, error: Exception) -> Response:
+    assert isinstance(error, TcsError)
+    return problem_of(error)
+
+
+async def _on_unknown_path(request: Request, _error: Exception) -> Response:
+    path = request.url.path[:80]
+    return problem(404, "NotFoundError", f"there is no {request.method} {path}. See /docs.")
+
+
+def _add_operation(app: FastAPI, engine: Engine, operation: Operation) -> None:
+    """Add a request with a body of JSON."""
+    answer: Callable[[Any], Any] = engine.submit
+    if not operation.is_job:
+        answer = getattr(engine, operation.name)
+
+    async def endpoint(request: Request) -> Response:
+        content = await _json_of(request)
+        asked = checked(content, operation.request, "request", DataFileError)
+        result = await anyio.to_thread.run_sync(answer, asked)
+        if isinstance(result, JobStatus):
+            return _json(result.model_dump(), status=202)
+        return _json(result)
+
+    _route(
+        app, "POST", operation.path, endpoint, operation.summary, name=operation.name,
+        openapi_extra={"requestBody": description.body_of(operation.request.__name__)},
+    )  # fmt: skip
+
+
+def _add_files(app: FastAPI, engine: Engine) -> None:
+    """Add the requests about score files, and the catalogue."""
+
+    async def known() -> Response:
+        return _json(await anyio.to_thread.run_sync(engine.catalogue))
+
+    async def files() -> Response:
+        return _json([entry.model_dump() for entry in engine.files()])
+
+    async def send(request: Request) -> Response:
+        content = await request.body()
+        entry = await anyio.to_thread.run_sync(engine.add_file, content)
+        return _json(entry.model_dump(), status=201)
+
+    async def fetch(file: str) -> Response:
+        content = await anyio.to_thread.run_sync(engine.content_of, file)
+        return Response(content, media_type=_FILE)
+
+    body = {"required": True, "content": {_FILE: {"schema": {"type": "string"}}}}
+    _route(app, "GET", "/v1/list", known, "List tasks, environments and robots.")
+    _route(app, "GET", "/v1/files", files, "List the score files that are held.")
+    _route(
+        app, "POST", "/v1/files", send, "Send a score file, as the content of the request.",
+        openapi_extra={"requestBody": body},
+    )  # fmt: skip
+    _route(app, "GET", "/v1/files/{file}", fetch, "Fetch a score file.")
+
+
+def _add_jobs(app: FastAPI, engine: Engine) -> None:
+    """Add the requests about jobs."""
+    streams = 0
+
+    async def jobs() -> Response:
+        return _json([status.model_dump() for status in engine.jobs()])
+
+    async def job(job: str) -> Response:
+        return _json(engine.job(job).model_dump())
+
+    async def cancel(job: str) -> Response:
+        return _json(engine.cancel(job).model_dump())
+
+    async def events(job: str) -> Response:
+        nonlocal streams
+        status = engine.job(job)
+        if streams >= engine.limits.streams:
+            raise BusyError(f"{streams} streams of events are open, the most at once.")
+        streams += 1
+
+        async def closing() -> AsyncIterator[str]:
+            nonlocal streams
+            try:
+                async for event in _events(engine, status):
+                    yield event
+            finally:
+                streams -= 1
+
+        return StreamingResponse(closing(), media_type="text/event-stream")
+
+    _route(app, "GET", "/v1/jobs", jobs, "List the jobs, without their results.")
+    _route(app, "GET", "/v1/jobs/{job}", job, "Return the state of a job and its result.")
+    _route(app, "DELETE", "/v1/jobs/{job}", cancel, "Cancel a job.", name="cancel")
+    _route(
+        app, "GET", "/v1/jobs/{job}/events", events,
+        "Return the states of a job as server-sent events, until it has ended.",
+    )  # fmt: skip
+
+
+async def _events(engine: Engine, status: JobStatus) -> AsyncIterator[str]:
+    """Yield the states of a job as events named `progress`, and the last one as `end`."""
+    while True:
+        name = "end" if status.has_ended else "progress"
+        yield f"event: {name}\ndata: {json.dumps(status.model_dump())}\n\n"
+        if status.has_ended:
+            return
+        wait = partial(engine.next_state, status.job, status, _BEAT)
+        # A stream that is closed must not wait for the job.
+        status = await anyio.to_thread.run_sync(wait, abandon_on_cancel=True)
+
+
+def _add_description(app: FastAPI, engine: Engine) -> None:
+    """Add the OpenAPI description and its page."""
+    described: dict[str, Any] = {}
+
+    def openapi() -> dict[str, Any]:
+        if not described:
+            described.update(FastAPI.openapi(app))
+            described["components"] = {"schemas": description.schemas()}
+        return described
+
+    async def specification() -> Response:
+        return _json(openapi())
+
+    async def page() -> Response:
+        return HTMLResponse(description.page(openapi()))
+
+    async def about() -> Response:
+        from tcs import __version__
+
+        return _json({"program": "tcs", "version": __version__, "docs": "/docs"})
+
+    app.openapi = openapi  # type: ignore[method-assign]
+    app.add_api_route("/openapi.json", specification, include_in_schema=False)
+    app.add_api_route("/docs", page, include_in_schema=False)
+    _route(app, "GET", "/v1", about, "Return the version of the service.")
+
+
+def _route(
+    app: FastAPI,
+    verb: str,
+    path: str,
+    endpoint: Callable[..., Awaitable[Response]],
+    summary: str,
+    **options: Any,
+) -> None:
+    app.add_api_route(
+        path, endpoint, methods=[verb], summary=summary, response_model=None,
+        responses={422: description.problem_response("The request is refused.")}, **options,
+    )  # fmt: skip
+
+
+async def _json_of(request: Request) -> dict[str, Any]:
+    """Return the JSON object of a request.
+
+    Raises:
+        DataFileError: If it is not one.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "application/json":
+        raise DataFileError("request: the content type must be application/json.")
+    try:
+        content = json.loads(await request.body())
+    except (ValueError, RecursionError) as error:
+        why = "too deep" if isinstance(error, RecursionError) else str(error)
+        raise DataFileError(f"request is not valid JSON: {why}.") from None
+    if not isinstance(content, dict):
+        raise DataFileError("request must be a JSON object.")
+    return content
+
+
+def _json(content: Any, status: int = 200) -> Response:
+    return Response(
+        json.dumps(content, allow_nan=False), status_code=status, media_type="application/json"
+    )

@@ -1,0 +1,150 @@
+"""Who may ask, how much and how long: checked before a request reaches the engine."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Awaitable, Callable, MutableMapping
+from dataclasses import dataclass
+from typing import Any
+
+from tcs.service.http.problems import BUSY, problem
+from tcs.service.limits import Limits
+
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Application = Callable[[Message, Receive, Send], Awaitable[None]]
+
+_HEADERS = (
+    (b"cache-control", b"no-store"),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"x-frame-options", b"SAMEORIGIN"),
+)
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Access:
+    """Who may ask."""
+
+    token: str | None = None
+    """What requests must carry as `Authorization: Bearer TOKEN`; None for no token."""
+    names: frozenset[str] = frozenset({"127.0.0.1", "localhost", "[::1]", "::1"})
+    """Without a token: the names by which this machine may be called in a browser's address. A page
+    from elsewhere that resolves its own name to this machine is refused."""
+
+
+class TooLargeError(Exception):
+    """A request with more bytes than are accepted."""
+
+
+class TooSlowError(Exception):
+    """A request whose content takes too long to arrive."""
+
+
+class Guard:
+    """Refuses requests that may not be asked, are too large or too slow, or too many at once."""
+
+    def __init__(self, application: Application, access: Access, limits: Limits) -> None:
+        """Guard an application."""
+        self._application, self._access, self._limits = application, access, limits
+        self._at_once = 0
+
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+        """Answer a request, or pass it on."""
+        if scope["type"] != "http":
+            await self._application(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal is not None:
+            await refusal(scope, receive, send)
+            return
+        self._at_once += 1
+        try:
+            await self._answer(scope, receive, send)
+        finally:
+            self._at_once -= 1
+
+    async def _answer(self, scope: Message, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def send_guarded(message: Message) -> None:
+            nonlocal begun
+            if message["type"] == "http.response.start":
+                begun = True
+                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+            await send(message)
+
+        try:
+            await self._application(scope, _bounded(receive, self._limits, scope), send_guarded)
+        except TooLargeError as error:
+            await problem(413, "TooLarge", str(error))(scope, receive, send)
+        except TooSlowError as error:
+            await problem(408, "TooSlow", str(error))(scope, receive, send)
+        except Exception:
+            _LOG.exception("%s %s failed", scope["method"], scope["path"])
+            if begun:
+                raise
+            text = "a defect of the program; see the server's log."
+            await problem(500, "InternalError", text)(scope, receive, send)
+
+    def _refusal(self, scope: Message) -> Any:
+        """Return the response to a request that may not be asked, or None."""
+        headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
+        host = headers.get(b"host", "")
+        if self._access.token is None and _name_of(host) not in self._access.names:
+            text = "this server answers requests to this machine's own address only."
+            return problem(403, "Forbidden", text)
+        origin = headers.get(b"origin")
+        if origin is not None and origin.partition("://")[2] != host:
+            return problem(403, "Forbidden", "this server does not answer pages of other servers.")
+        if self._access.token is not None and not self._has_token(headers):
+            text = "the request lacks the token: Authorization: Bearer TOKEN."
+            return problem(401, "Unauthorized", text)
+        if self._at_once >= self._limits.requests_at_once:
+            text = f"{self._at_once} requests are being answered, the most at once. Try again."
+            return problem(BUSY, "BusyError", text)
+        return None
+
+    def _has_token(self, headers: dict[bytes, str]) -> bool:
+        scheme, _, given = headers.get(b"authorization", "").partition(" ")
+        expected = (self._access.token or "").encode()
+        return scheme.lower() == "bearer" and secrets.compare_digest(
+            given.strip().encode("utf-8", "replace"), expected
+        )
+
+
+def _name_of(host: str) -> str:
+    """Return the name or address of a Host header, without its port."""
+    name, colon, port = host.rpartition(":")
+    return (name if colon and port.isdecimal() else host).lower()
+
+
+def _bounded(receive: Receive, limits: Limits, scope: Message) -> Receive:
+    """Return `receive` with bounds on the number of bytes and on the time they take."""
+    most = limits.file_bytes if scope["path"] == "/v1/files" else limits.request_bytes
+    loop = asyncio.get_running_loop()
+    end = loop.time() + limits.request_seconds
+    size, is_complete = 0, False
+
+    async def receive_bounded() -> Message:
+        nonlocal size, is_complete
+        if is_complete:
+            # Only the end of the connection may follow, at any time.
+            return await receive()
+        try:
+            message = await asyncio.wait_for(receive(), end - loop.time())
+        except TimeoutError:
+            text = f"the content of the request took longer than {limits.request_seconds:g} s."
+            raise TooSlowError(text) from None
+        if message["type"] == "http.request":
+            size += len(message.get("body", b""))
+            is_complete = not message.get("more_body", False)
+            if size > most:
+                raise TooLargeError(f"the request has more than {most:,} bytes, the limit.")
+        return message
+
+    return receive_bounded

@@ -1,0 +1,115 @@
+"""A server for the application: on this machine alone unless there is a token."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import threading
+from types import TracebackType
+from typing import Any, Self
+
+import uvicorn
+
+from tcs.errors import OutputError, ServiceError
+from tcs.service.http.guard import Access
+
+_LEAST_TOKEN = 16
+"""Fewest characters of a token."""
+_GRACE = 2
+"""Longest wait for open requests at the end [s]."""
+_KEEP_ALIVE = 20
+"""Time after which an idle connection is closed [s]."""
+
+
+def checked_access(host: str, token: str | None) -> Access:
+    """Return who may ask a server at an address.
+
+    Args:
+        host: Name or address to listen at.
+        token: What requests must carry; None for no token.
+
+    Raises:
+        ServiceError: If other machines could ask without a token, or the token is short.
+
+    >>> checked_access("127.0.0.1", None).token is None
+    True
+    """
+    if token is not None and (len(token) < _LEAST_TOKEN or not token.isascii() or " " in token):
+        raise ServiceError(
+            f"the token must have at least {_LEAST_TOKEN} characters without spaces, e.g. of "
+            "`openssl rand -hex 16`."
+        )
+    if token is None and not _is_loopback(host):
+        raise ServiceError(
+            f"'{host}' can be reached from other machines. Give a token with --token or in "
+            "TCS_TOKEN, or listen at 127.0.0.1."
+        )
+    return Access(token=token)
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Server:
+    """A server on a port of its own; `run` blocks, a `with` statement runs it in a thread."""
+
+    def __init__(self, application: Any, *, host: str, port: int) -> None:
+        """Listen at a port.
+
+        Args:
+            application: The application.
+            host: Name or address to listen at.
+            port: The port; 0 for a free one.
+
+        Raises:
+            OutputError: If the port cannot be used.
+        """
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._socket = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise OutputError(
+                f"the server cannot listen at {host}, port {port}: {error.strerror or error}. Give "
+                "another one with --port."
+            ) from None
+        shown = f"[{host}]" if ":" in host else host
+        self.url = f"http://{shown}:{self._socket.getsockname()[1]}"
+        config = uvicorn.Config(
+            application, log_level="warning", access_log=False, server_header=False, lifespan="off",
+            timeout_graceful_shutdown=_GRACE, timeout_keep_alive=_KEEP_ALIVE, ws="none",
+        )  # fmt: skip
+        self._server = uvicorn.Server(config)
+        self._thread: threading.Thread | None = None
+
+    def run(self) -> None:
+        """Answer requests until interrupted."""
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._socket.close()
+
+    def __enter__(self) -> Self:
+        """Answer requests in a thread."""
+        self._thread = threading.Thread(target=self.run, name="tcs-http", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        """Stop answering."""
+        self._server.should_exit = True
+        if self._thread is not None:
+            self._thread.join()

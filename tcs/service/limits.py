@@ -1,0 +1,33 @@
+"""Limits of the service: what it holds in memory and on disk, and how much waits in its queue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of an engine and of its HTTP server."""
+
+    file_bytes: int = 64 * 1024**2
+    """Most bytes of a score file that is sent: fifteen times the largest of the paper's rows."""
+    stored_bytes: int = 512 * 1024**2
+    """Most bytes of all score files in the temporary folder; the least recently used go first."""
+    loaded_files: int = 8
+    """Most score files in memory, each of up to some hundred megabytes."""
+    queued_jobs: int = 8
+    """Most jobs that wait; one runs at a time, and uses all threads."""
+    kept_jobs: int = 100
+    """Most finished jobs whose result is kept."""
+    job_seconds: float = 1800.0
+    """Longest duration of a job [s]; it is checked where a job reports its progress."""
+    threads: int = 2
+    """Threads of a job; the results do not depend on it."""
+    request_bytes: int = 1024**2
+    """Most bytes of a request other than a score file."""
+    requests_at_once: int = 128
+    """Most requests that are answered at the same time."""
+    request_seconds: float = 30.0
+    """Longest wait for the content of a request [s]."""
+    streams: int = 32
+    """Most streams of events at the same time."""

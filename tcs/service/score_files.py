@@ -1,0 +1,183 @@
+"""Score files of the service, by the digest of their content, bounded in number and size."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tcs.errors import BusyError, NotFoundError, ServiceError, StoreError
+from tcs.files.paths import is_path
+from tcs.files.reading import read_bytes
+from tcs.placement.store import ScoreFile, load_scores
+from tcs.service.limits import Limits
+from tcs.service.responses import FileEntry
+
+
+@dataclass(eq=False)
+class HeldFile:
+    """A score file that the service holds."""
+
+    entry: FileEntry
+    path: Path
+    """Its copy in the temporary folder."""
+    is_ours: bool
+    """Whether it was made here or named by whoever started the service, rather than sent."""
+    is_pinned: bool
+    """Whether it stays until the service ends."""
+    lock: threading.RLock = field(default_factory=threading.RLock)
+    """Held while the file is read: what selection derives from it is kept in it."""
+
+
+class ScoreFiles:
+    """Score files in a temporary folder; the most recently used are in memory."""
+
+    def __init__(self, folder: Path, limits: Limits) -> None:
+        """Hold no file yet.
+
+        Args:
+            folder: An empty folder for the copies.
+            limits: Bounds of number and size.
+        """
+        self._folder, self._limits = folder, limits
+        self._lock = threading.RLock()
+        self._held: OrderedDict[str, HeldFile] = OrderedDict()
+        self._loaded: OrderedDict[str, ScoreFile] = OrderedDict()
+
+    def add(self, content: bytes, *, is_ours: bool = False, is_pinned: bool = False) -> HeldFile:
+        """Check a score file and hold it; the same content is held once.
+
+        Args:
+            content: The bytes of the file.
+            is_ours: Whether it was made here or named by whoever started the service.
+            is_pinned: Whether it stays until the service ends.
+
+        Raises:
+            StoreError: If it is not a score file.
+            BusyError: If it does not fit beside the pinned files.
+        """
+        if len(content) > self._limits.file_bytes and not is_ours:
+            raise ServiceError(
+                f"the score file has {len(content):,} bytes; at most {self._limits.file_bytes:,} "
+                "are accepted."
+            )
+        digest = hashlib.sha256(content).hexdigest()
+        with self._lock:
+            if digest not in self._held:
+                self._make_space(len(content))
+                path = self._folder / f"{digest}.tcs"
+                path.write_bytes(content)
+                try:
+                    loaded = load_scores(path)
+                except StoreError as error:
+                    path.unlink()
+                    raise type(error)(str(error).replace(f" '{path}'", " that was sent")) from None
+                self._held[digest] = HeldFile(
+                    _entry(digest, len(content), loaded), path, is_ours, is_pinned
+                )
+                self._remember(digest, loaded)
+            held = self._held[digest]
+            held.is_ours |= is_ours
+            held.is_pinned |= is_pinned
+            self._held.move_to_end(digest)
+            return held
+
+    def read(self, path: Path) -> HeldFile:
+        """Hold a file that whoever starts the service names, until the service ends.
+
+        Raises:
+            StoreError: If it cannot be read, or is not a score file.
+        """
+        content = read_bytes(
+            path, f"Score file '{path}'", StoreError, limit=self._limits.stored_bytes
+        )
+        return self.add(content, is_ours=True, is_pinned=True)
+
+    def entries(self) -> list[FileEntry]:
+        """Return the files that are held, the least recently used first."""
+        with self._lock:
+            return [held.entry for held in self._held.values()]
+
+    def held(self, digest: str) -> HeldFile:
+        """Return a file that is held.
+
+        Raises:
+            NotFoundError: If there is none of that digest.
+        """
+        with self._lock:
+            if digest not in self._held:
+                raise NotFoundError(
+                    f"no score file {digest[:12]}... is held; send it again. Files that were not "
+                    "used for long are removed."
+                )
+            self._held.move_to_end(digest)
+            return self._held[digest]
+
+    def content(self, digest: str) -> bytes:
+        """Return the bytes of a file.
+
+        Raises:
+            NotFoundError: If there is none of that digest.
+        """
+        with self._lock:
+            return self.held(digest).path.read_bytes()
+
+    def loaded(self, digest: str) -> ScoreFile:
+        """Return the content of a file.
+
+        Raises:
+            NotFoundError: If there is none of that digest.
+        """
+        with self._lock:
+            held = self.held(digest)
+            if digest not in self._loaded:
+                self._remember(digest, load_scores(held.path))
+            self._loaded.move_to_end(digest)
+            return self._loaded[digest]
+
+    def for_scene(self, digest: str) -> ScoreFile:
+        """Return the content of a file whose scene may be built.
+
+        Raises:
+            NotFoundError: If there is none of that digest.
+            ServiceError: If it was sent, and refers to a task, environment or robot by a path.
+        """
+        file = self.loaded(digest)
+        if not self.held(digest).is_ours:
+            for key in ("task", "environment", "robot"):
+                if is_path(file.metadata[key]):
+                    raise ServiceError(
+                        f"the score file names its {key} by a path, which is not opened for a file "
+                        "that was sent. Score the task on this server."
+                    )
+        return file
+
+    def _remember(self, digest: str, file: ScoreFile) -> None:
+        self._loaded[digest] = file
+        while len(self._loaded) > self._limits.loaded_files:
+            self._loaded.popitem(last=False)
+
+    def _make_space(self, size: int) -> None:
+        """Remove the least recently used files until another one fits."""
+        while sum(held.entry.bytes for held in self._held.values()) + size > (
+            self._limits.stored_bytes
+        ):
+            oldest = next((d for d, held in self._held.items() if not held.is_pinned), None)
+            if oldest is None:
+                raise BusyError("the score file does not fit beside those that are kept.")
+            self._held.pop(oldest).path.unlink(missing_ok=True)
+            self._loaded.pop(oldest, None)
+
+
+def _entry(digest: str, size: int, file: ScoreFile) -> FileEntry:
+    return FileEntry(
+        file=digest,
+        bytes=size,
+        task=str(file.task.get("name", file.metadata["task"])),
+        environment=str(file.environment.get("name", file.metadata["environment"])),
+        robot=str(file.robot.get("name", file.metadata["robot"])),
+        goals=file.nominal.sets.weights.size,
+        configurations=file.configurations.size,
+    )

@@ -1,0 +1,85 @@
+"""Task and environment files that are sent as text: the usual checks, and no path is opened."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from tcs.errors import DataFileError, EnvironmentFileError, ServiceError, TaskError, one_line
+from tcs.files.documents import read_mapping
+from tcs.files.paths import is_path
+
+
+class SentDocuments:
+    """YAML files that were sent, kept in a folder of the service by the digest of their text."""
+
+    def __init__(self, folder: Path) -> None:
+        """Keep files in an empty folder."""
+        self._folder = folder
+
+    def task(self, text: str) -> Path:
+        """Return the path of a task file that was sent.
+
+        Raises:
+            ServiceError: If the text is not a mapping in YAML.
+        """
+        return self._saved("task", text, TaskError)[0]
+
+    def environment(self, text: str) -> Path:
+        """Return the path of an environment file that was sent.
+
+        Raises:
+            ServiceError: If the text is not a mapping in YAML, is based on another file than an
+                environment that ships, or names a model that does not ship.
+        """
+        path, content = self._saved("environment", text, EnvironmentFileError)
+        base = content.get("based_on")
+        if isinstance(base, str) and is_path(base):
+            raise ServiceError(
+                f"sent environment: 'based_on' is '{one_line(base)}'; must be the name of an "
+                "environment that ships, e.g. wheelchair."
+            )
+        for file in _files_of(content):
+            if not _is_below(file):
+                raise ServiceError(
+                    f"sent environment: 'file' is '{one_line(file)}'; must name a model file that "
+                    "ships, relative to the data folder."
+                )
+        return path
+
+    def without_folder(self, message: str) -> str:
+        """Return a message with the names of sent files instead of their paths."""
+        return message.replace(f"{self._folder}/", "")
+
+    def _saved(
+        self, what: str, text: str, error: type[DataFileError]
+    ) -> tuple[Path, Mapping[str, Any]]:
+        """Save a text; return its path and what it contains."""
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        path = self._folder / f"sent-{what}-{digest[:16]}.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path, read_mapping(path, f"sent {what}", error, known=("name", "title"))
+
+
+def _files_of(value: Any) -> Iterator[str]:
+    """Yield every text under a key `file`, however deep."""
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            if key == "file" and isinstance(entry, str):
+                yield entry
+            yield from _files_of(entry)
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        for entry in value:
+            yield from _files_of(entry)
+
+
+def _is_below(file: str) -> bool:
+    """Return whether a path stays below the folder that it starts from.
+
+    >>> _is_below("models/bed.sdf"), _is_below("/etc/passwd"), _is_below("a/../../b")
+    (True, False, False)
+    """
+    path = PurePosixPath(file)
+    return not (path.is_absolute() or ".." in path.parts or file.startswith("~") or "\\" in file)

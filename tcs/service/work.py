@@ -1,0 +1,206 @@
+"""The work of jobs that build a scene: scoring, scoring as observed, evaluation and plans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from tcs.errors import SelectionError
+from tcs.placement.selection import nearest_table
+from tcs.placement.store import ScoreFile, save_scores
+from tcs.service.conversions import constraints_of, observed_of, settings_of, state_of
+from tcs.service.jobs import Progress
+from tcs.service.limits import Limits
+from tcs.service.requests import (
+    EvaluateRequest,
+    PlanRequest,
+    SceneRequest,
+    ScoreHereRequest,
+    ScoreRequest,
+)
+from tcs.service.score_files import ScoreFiles
+from tcs.service.sent_documents import SentDocuments
+
+if TYPE_CHECKING:
+    from tcs.model.grid import InitialConfiguration
+    from tcs.placement.scoring import LiveScorer
+
+# Drake and the compiler are loaded by the first job: choosing from files does without.
+
+
+class SceneWork:
+    """Does the work of jobs, one at a time."""
+
+    def __init__(self, files: ScoreFiles, sent: SentDocuments, limits: Limits) -> None:
+        """Work with the files of a service."""
+        self._files, self._sent, self._limits = files, sent, limits
+        self._scorer: tuple[str, LiveScorer] | None = None
+        """The last live scorer and the request that it is for: building it takes a second."""
+
+    def score(self, request: ScoreRequest, progress: Progress) -> dict[str, Any]:
+        """Return the summary of a scored task, as `tcs score --json`, with the digest as `file`.
+
+        Raises:
+            TcsError: As `tcs.score`.
+        """
+        from tcs.placement.scoring import score
+
+        scored = score(
+            *self._models(request),
+            arms=request.arms,
+            on_progress=progress,
+            on_compile=progress.compiling,
+            **self._options(request),
+        )
+        return self._held(scored)
+
+    def score_here(self, request: ScoreHereRequest, progress: Progress) -> dict[str, Any]:
+        """Return the summary of the task scored in the observed scene; as `score`.
+
+        Raises:
+            TcsError: As `tcs.LiveScorer`.
+        """
+        from tcs.model.scene import Observation, load_environment
+        from tcs.placement.scoring import LiveScorer
+
+        if request.arms is not None:
+            raise SelectionError("'arms' is not for an observed environment. Name the robot of it.")
+        task, environment, robot = self._models(request)
+        key = request.model_copy(update={"observed": {}, "frames": {}}).model_dump_json()
+        if self._scorer is None or self._scorer[0] != key:
+            self._scorer = None
+            scorer = LiveScorer(
+                task, environment, robot, on_compile=progress.compiling, **self._options(request)
+            )
+            self._scorer = (key, scorer)
+        progress(0, 1)
+        scored = self._scorer[1].score(
+            Observation(
+                joints=observed_of(request.observed, load_environment(environment).observable_axes),
+                frames=request.frames,
+                setting=settings_of(request.at, "at"),
+            )
+        )
+        progress(1, 1)
+        return {**self._held(scored), "observation": scored.metadata["observation"]}
+
+    def evaluate(self, request: EvaluateRequest, progress: Progress) -> dict[str, Any]:
+        """Return the success of a set under random errors, as `tcs evaluate --json`.
+
+        Raises:
+            TcsError: As `tcs.evaluate`.
+        """
+        from tcs.placement.robustness import evaluate
+
+        file = self._files.for_scene(request.file)
+        found = evaluate(
+            file,
+            samples=request.samples,
+            seed=request.seed,
+            select=request.select,
+            members=request.members,
+            table=self._table(file, request) if request.observed or request.frames else None,
+            body_collisions=request.body_collisions,
+            jobs=self._limits.threads,
+            on_progress=progress,
+            on_compile=progress.compiling,
+        )
+        return found.to_json()
+
+    def plan(self, request: PlanRequest, progress: Progress) -> dict[str, Any]:
+        """Return the motions from the stops of a set, as `tcs plan --json`.
+
+        Raises:
+            TcsError: As `tcs.plan`.
+        """
+        from tcs.motion import plan
+
+        file = self._files.for_scene(request.file)
+        found = plan(
+            file,
+            self._stops(file, request),
+            order=request.order,
+            seed=request.seed,
+            on_progress=progress,
+            on_compile=progress.compiling,
+        )
+        return found.to_json()
+
+    def scene(self, request: SceneRequest, progress: Progress) -> dict[str, Any]:
+        """Return the outlines of the scene from above.
+
+        Raises:
+            StoreMismatchError: If the models are not those the file was made from.
+        """
+        from tcs.service.scene_outlines import scene_outlines
+
+        file = self._files.for_scene(request.file)
+        return scene_outlines(file, progress)
+
+    def _models(self, request: ScoreRequest) -> tuple[Any, Any, str]:
+        """Return task, environment and robot by name, or by the path of what was sent."""
+        task: Any = request.task
+        if request.task_yaml is not None:
+            task = self._sent.task(request.task_yaml)
+        environment: Any = request.environment
+        if request.environment_yaml is not None:
+            environment = self._sent.environment(request.environment_yaml)
+        return task, environment, request.robot
+
+    def _options(self, request: ScoreRequest) -> dict[str, Any]:
+        return {
+            "measure": request.measure,
+            "approach": request.approach,
+            "rule": request.rules,
+            "same_environment": request.same_environment,
+            "max_members": request.max_members,
+            "constraints": constraints_of(request),
+            "now": settings_of(request.at, "at"),
+            "person": request.person,
+            "jobs": self._limits.threads,
+        }
+
+    def _held(self, scored: ScoreFile) -> dict[str, Any]:
+        """Hold a new score file and return its summary."""
+        from tcs.files.writing import scratch_folder
+        from tcs.placement.scoring import summary
+
+        with scratch_folder() as folder:
+            path = folder / "scored.tcs"
+            save_scores(path, scored)
+            entry = self._files.add(path.read_bytes(), is_ours=True).entry
+        return {
+            "task": entry.task,
+            "environment": entry.environment,
+            **summary(scored),
+            "file": entry.file,
+            "file_bytes": entry.bytes,
+        }
+
+    def _table(self, file: ScoreFile, request: EvaluateRequest | PlanRequest) -> int:
+        """Return the number of the table nearest to what is observed."""
+        observed = observed_of(request.observed, file.observed_axes)
+        return nearest_table(file, None, observed, request.frames).index
+
+    def _stops(self, file: ScoreFile, request: PlanRequest) -> Sequence[int] | InitialConfiguration:
+        """Return the stops of a plan, as `tcs plan` chooses them."""
+        from tcs.motion.plans import exact_state
+        from tcs.output.report.shown_set import ShownSet
+
+        observed = observed_of(request.observed, file.observed_axes)
+        here = None
+        if request.here is not None:
+            here = state_of(request.here, request.torso, request.at)
+        if request.exactly:
+            if here is None:
+                raise SelectionError("'exactly' requires 'here'.")
+            return exact_state(file, here, observed)
+        table, indices = self._table(file, request), tuple(request.configuration)
+        if not indices:
+            shown = ShownSet.of(file, here, request.max_members, observed)
+            table, indices = shown.table, shown.indices
+        size = file.configurations.size
+        for h in indices:
+            if not 0 <= h < size:
+                raise SelectionError(f"{h} is not a configuration; there are {size:,}, from 0.")
+        return [table * size + h for h in indices]

@@ -1,0 +1,272 @@
+"""What every adapter answers: the engine in this process, and the client of a server over HTTP."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from tcs.errors import BusyError, NotFoundError, StoreError, TcsError
+from tcs.placement.store import save_scores
+from tcs.placement.tables import Reason, tc_manipulability, tc_reachability
+from tcs.service import (
+    Engine,
+    EvaluateRequest,
+    ExplainRequest,
+    FloorRequest,
+    Limits,
+    OutcomeRequest,
+    PlanRequest,
+    ScoreRequest,
+    SelectRequest,
+)
+from tcs.service.client import Client
+from tcs.service.http import Access, Server, make_application
+from tests.placement.store.example import METADATA, score_file
+
+HERE = (1.4, -1.2, 180.0)
+AT = {"bed_height": 0.0}
+UNKNOWN = "0" * 64
+
+
+@pytest.fixture(scope="module")
+def engine():
+    with Engine(Limits(queued_jobs=2, kept_jobs=3)) as engine:
+        yield engine
+
+
+@pytest.fixture(scope="module")
+def client(engine):
+    with (
+        Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server,
+        Client(server.url) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(params=["engine", "http"])
+def service(request, engine, client):
+    """The engine, directly and over HTTP."""
+    return engine if request.param == "engine" else client
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory) -> bytes:
+    path = tmp_path_factory.mktemp("service") / "small.tcs"
+    save_scores(path, score_file())
+    return path.read_bytes()
+
+
+@pytest.fixture
+def file(service, content) -> str:
+    return service.add_file(content).file
+
+
+@pytest.fixture
+def slow_job(monkeypatch):
+    """Jobs that count to 1,000 until they are released; yields the function that releases them."""
+    released = threading.Event()
+
+    def score(*_arguments, on_progress, **_options):
+        for done in range(1000):
+            on_progress(done, 1000)
+            if released.wait(0.01):
+                return score_file(metadata={**METADATA, "timings": TIMINGS})
+        raise AssertionError("not released")
+
+    monkeypatch.setattr("tcs.placement.scoring.score", score)
+    yield released.set
+    released.set()
+
+
+TIMINGS = dict.fromkeys(
+    ("compile_seconds", "scoring_seconds", "sets_seconds", "total_seconds"), 0.5
+)
+
+
+def test_catalogue(service):
+    assert "shaving" in [task["name"] for task in service.catalogue()["tasks"]]
+
+
+def test_file_is_held_once_and_comes_back(service, content):
+    entry = service.add_file(content)
+    assert service.add_file(content) == entry
+    assert (entry.task, entry.goals, entry.bytes) == ("shaving", 5, len(content))
+    assert entry in service.files()
+    assert service.content_of(entry.file) == content
+
+
+@pytest.mark.parametrize("content", [b"", b"cos\nsystem\n(S'true'\ntR.", b"not a score file"])
+def test_other_content_is_refused_without_a_path_of_the_server(service, content):
+    with pytest.raises((StoreError, TcsError)) as caught:
+        service.add_file(content)
+    assert "/tmp" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_select_has_the_keys_of_the_command(service, file, content, tcs_json):
+    answer = service.select(SelectRequest(file=file, here=HERE, at=AT, top=2))
+    expected = tcs_json("select", "--here", *HERE, "--at", "bed_height=0", "--top", 2)
+    answer.pop("seconds"), expected.pop("seconds")
+    assert answer == expected
+
+
+def test_explain_has_the_keys_of_the_command(service, file, tcs_json):
+    answer = service.explain(ExplainRequest(file=file, goal=2, configuration=7))
+    assert answer == tcs_json("explain", "--goal", 2, "--configuration", 7)
+
+
+def test_floor_has_the_scores_of_the_table(service, file):
+    held, grid = score_file(), score_file().configurations
+    floor = service.floor(FloorRequest(file=file, state=1))
+    assert floor["states"] == [{"bed_height": 0.0}, {"bed_height": 0.1}]
+    reachability = tc_reachability(held.nominal.scores.reached, held.nominal.scores.weights)
+    at = grid.values(np.arange(grid.size))
+    for i, x in enumerate(floor["x"]):
+        for j, y in enumerate(floor["y"]):
+            here = np.isclose(at["base_x"], x) & np.isclose(at["base_y"], y)
+            here &= np.isclose(at["bed_height"], 0.1)
+            assert floor["reachability"][i][j] == pytest.approx(reachability[here].max(), abs=1e-4)
+    with pytest.raises(TcsError, match="no state 2"):
+        service.floor(FloorRequest(file=file, state=2))
+
+
+def test_outcome_is_that_of_the_nearest_configuration(service, file):
+    held = score_file()
+    scores, grid = held.nominal.scores, held.configurations
+    member = grid.configuration(37).to_json()
+    here = (member["base_x"] + 0.02, member["base_y"], member["base_yaw_deg"])
+    asked = {"file": file, "here": here, "torso": member["torso"]}
+    asked["at"] = {"bed_height": member["bed_height"]}
+    outcome = service.outcome(OutcomeRequest(**asked))
+    assert outcome["configuration"] == 37
+    assert outcome["members"] == [member]
+    assert [goal["reached"] for goal in outcome["goals"]] == scores.reached[37].tolist()
+    assert [Reason[g["reason"].upper()] for g in outcome["goals"]] == scores.reason[37].tolist()
+    assert outcome["sentence"].endswith(f"{scores.reached[37].sum()} of 5 places reached.")
+    best = service.outcome(OutcomeRequest(**asked, best=True))
+    at = grid.values(np.arange(grid.size))
+    same = [np.isclose(at[name], at[name][37]) for name in ("base_x", "base_y", "bed_height")]
+    values = tc_reachability(scores.reached, scores.weights) + tc_manipulability(
+        scores.dexterity, scores.weights
+    )
+    expected = values[np.logical_and.reduce(same)].max()
+    assert best["reachability"] + best["manipulability"] == pytest.approx(expected)
+    with pytest.raises(TcsError, match="beyond the grid"):
+        service.outcome(OutcomeRequest(**{**asked, "here": (9.0, 0.0, 0.0)}))
+
+
+def test_a_file_that_is_not_held(service):
+    with pytest.raises(NotFoundError, match="send it again"):
+        service.select(SelectRequest(file=UNKNOWN, here=HERE))
+    with pytest.raises(NotFoundError):
+        service.submit(EvaluateRequest(file=UNKNOWN))
+    with pytest.raises(NotFoundError):
+        service.content_of(UNKNOWN)
+
+
+def test_errors_of_the_library_keep_their_line(service, file):
+    with pytest.raises(TcsError, match="There is no goal 9: task 'shaving' has 5"):
+        service.explain(ExplainRequest(file=file, goal=9))
+    with pytest.raises(TcsError, match="give 'configuration' or 'here'"):
+        service.explain(ExplainRequest(file=file, goal=0, configuration=1, here=HERE))
+
+
+def test_job_has_progress_and_a_result(service, slow_job):
+    status = service.submit(ScoreRequest(task="shaving"))
+    seen = []
+
+    def on_progress(done, total):
+        seen.append((done, total))
+        if len(seen) == 2:
+            slow_job()
+
+    ended = service.wait(status.job, on_progress)
+    assert ended.state == "done"
+    assert seen[0][0] < seen[1][0] <= seen[1][1] == 1000
+    assert ended.result["goals"] == 5
+    held = service.add_file(service.content_of(ended.result["file"]))
+    assert held.bytes == ended.result["file_bytes"]
+    json.dumps(ended.result, allow_nan=False)
+
+
+def test_jobs_are_cancelled_and_the_queue_is_bounded(service, slow_job):
+    running, *waiting = [service.submit(ScoreRequest(task="shaving")) for _ in range(2)]
+    while service.job(running.job).state != "running":
+        time.sleep(0.01)
+    waiting.append(service.submit(ScoreRequest(task="shaving")))
+    with pytest.raises(BusyError, match="2 jobs are waiting"):
+        service.submit(ScoreRequest(task="shaving"))
+    assert [service.cancel(one.job).state for one in waiting] == ["cancelled"] * 2
+    service.cancel(running.job)
+    assert service.wait(running.job).state == "cancelled"
+    assert service.job(running.job).result is None
+    assert running.job in [one.job for one in service.jobs()]
+
+
+def test_failed_job_has_one_line(service, tmp_path):
+    path = tmp_path / "unknown.tcs"
+    save_scores(path, score_file(metadata={**METADATA, "task": "shavign"}))
+    file = service.add_file(path.read_bytes()).file
+    for request in (PlanRequest(file=file, configuration=[0]), EvaluateRequest(file=file)):
+        status = service.wait(service.submit(request).job)
+        assert status.state == "failed"
+        assert "unknown task 'shavign'" in status.problem
+        assert "\n" not in status.problem
+    with pytest.raises(TcsError, match="'task' or 'task_yaml'"):
+        service.submit(ScoreRequest())
+
+
+def test_sent_documents_open_no_path(service):
+    cases = {
+        "environment_yaml": (
+            "based_on: /etc/passwd\nname: x\ntitle: x\n",
+            "based_on: wheelchair\nname: x\ntitle: x\nobstacles:\n"
+            "  - {name: a, file: ../../../etc/hosts, xyz: [0, 0, 0]}\n",
+        ),
+        "task_yaml": ("- a list\n", "name: [1\n", "name: x\n"),
+    }
+    for key, texts in cases.items():
+        for text in texts:
+            rest = {"task": "shaving"} if key == "environment_yaml" else {}
+            status = service.wait(service.submit(ScoreRequest(**{key: text, **rest})).job)
+            assert status.state == "failed"
+            assert "/tmp" not in status.problem
+            assert "passwd'" not in status.problem or "based_on" in status.problem
+
+
+def test_files_that_were_sent_do_not_name_paths(service, tmp_path):
+    path = tmp_path / "path.tcs"
+    save_scores(path, score_file(metadata={**METADATA, "environment": "/etc/passwd"}))
+    file = service.add_file(path.read_bytes()).file
+    status = service.wait(service.submit(EvaluateRequest(file=file, samples=1)).job)
+    assert "names its environment by a path" in status.problem
+
+
+def test_requests_from_many_threads_agree(service, file):
+    request = SelectRequest(file=file, here=HERE, at=AT)
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: service.select(request), range(40)))
+    assert len({json.dumps({**one, "seconds": 0}) for one in answers}) == 1
+
+
+@pytest.fixture
+def tcs_json(content, tmp_path):
+    """Function that returns what a command of the file prints with `--json`."""
+    from typer.testing import CliRunner
+
+    from tcs.cli.app import app
+
+    path = tmp_path / "small.tcs"
+    path.write_bytes(content)
+
+    def run(verb, *words):
+        done = CliRunner().invoke(app, [verb, str(path), *map(str, words), "--json"])
+        assert done.exit_code == 0, done.output
+        return json.loads(done.stdout)
+
+    return run

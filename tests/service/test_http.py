@@ -1,0 +1,168 @@
+"""The server over HTTP: errors as problems, limits, and who may ask."""
+
+from __future__ import annotations
+
+import json
+import random
+import socket
+
+import httpx
+import pytest
+
+from tcs.errors import OutputError, ServiceError
+from tcs.placement.store import save_scores
+from tcs.service import Engine, Limits, SelectRequest
+from tcs.service.client import Client
+from tcs.service.http import Access, Server, checked_access, make_application
+from tests.placement.store.example import score_file
+
+TOKEN = "a-token-of-24-characters"
+
+
+@pytest.fixture(scope="module")
+def engine():
+    with Engine(Limits(request_bytes=20_000, file_bytes=100_000, request_seconds=0.5)) as engine:
+        yield engine
+
+
+@pytest.fixture(scope="module")
+def server(engine):
+    with Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def http(server):
+    with httpx.Client(base_url=server.url, trust_env=False) as http:
+        yield http
+
+
+@pytest.fixture(scope="module")
+def valid(engine, tmp_path_factory) -> dict:
+    path = tmp_path_factory.mktemp("http") / "small.tcs"
+    save_scores(path, score_file())
+    return {"file": engine.open_file(path).file, "here": [1.4, -1.2, 180], "at": {"bed_height": 0}}
+
+
+def refused(response: httpx.Response, status: int) -> str:
+    """Check that a response is a problem of one line; return the line."""
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.json()["status"] == status
+    assert "\n" not in response.json()["detail"]
+    return response.json()["detail"]
+
+
+def test_faults_are_located(http, valid):
+    def detail(status=422, **changes):
+        return refused(http.post("/v1/select", json={**valid, **changes}), status)
+
+    assert detail(heer=1).startswith("request: unknown key 'heer'. Known: ")
+    assert detail(heer=1).endswith("Did you mean 'here'?")
+    assert detail(here=[1, 2]).startswith("request, field 'here[2]' is missing.")
+    assert "field 'alpha' is 'a'" in detail(alpha="a")
+    assert "field 'file'" in detail(file="../../etc/passwd")
+    assert "no score file 000000000000..." in detail(404, file="0" * 64)
+    assert refused(http.post("/v1/nothing", json={}), 404).startswith("there is no POST")
+    assert refused(http.delete("/v1/select"), 404)
+    assert "application/json" in refused(http.post("/v1/select", content=b"{}"), 422)
+
+
+def test_sizes_and_times_are_limited(http, server, valid):
+    assert "20,000 bytes" in refused(
+        http.post("/v1/select", json={**valid, "only": ["x" * 900] * 40}), 413
+    )
+    assert "100,000 bytes" in refused(http.post("/v1/files", content=b"x" * 100_001), 413)
+    address = httpx.URL(server.url)
+    with socket.create_connection((address.host, address.port)) as slow:
+        slow.sendall(
+            b"POST /v1/select HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n"
+            b"Content-Type: application/json\r\n\r\n{"
+        )
+        assert b"408" in slow.recv(4096)
+
+
+def test_too_many_requests_at_once_are_refused(engine, monkeypatch):
+    few = Limits(requests_at_once=0)
+    monkeypatch.setattr(Engine, "limits", few)
+    with (
+        Server(make_application(engine, Access()), host="127.0.0.1", port=0) as server,
+        httpx.Client(base_url=server.url, trust_env=False) as http,
+    ):
+        response = http.get("/v1")
+    refused(response, 503)
+    assert response.headers["retry-after"] == "1"
+
+
+def test_pages_of_other_servers_are_refused(http):
+    assert http.get("/v1").status_code == 200
+    refused(http.get("/v1", headers={"Origin": "http://evil.example"}), 403)
+    refused(http.get("/v1", headers={"Host": "evil.example"}), 403)
+
+
+def test_token(engine, valid):
+    access = Access(token=TOKEN)
+    with Server(make_application(engine, access), host="127.0.0.1", port=0) as server:
+        with httpx.Client(base_url=server.url, trust_env=False) as http:
+            assert "Authorization" in refused(http.get("/v1"), 401)
+            refused(http.get("/v1", headers={"Authorization": "Bearer no"}), 401)
+        with Client(server.url, token=TOKEN) as client:
+            assert client.select(SelectRequest(**valid))["members"]
+
+
+def test_only_this_machine_without_a_token():
+    with pytest.raises(ServiceError, match="can be reached from other machines"):
+        checked_access("0.0.0.0", None)
+    with pytest.raises(ServiceError, match="at least 16 characters"):
+        checked_access("0.0.0.0", "short")
+    assert checked_access("0.0.0.0", TOKEN).token == TOKEN
+    assert checked_access("::1", None).token is None
+
+
+def test_port_in_use_is_one_line(server):
+    with pytest.raises(OutputError, match="Give another one with --port"):
+        Server(None, host="127.0.0.1", port=httpx.URL(server.url).port)
+
+
+def test_description_names_every_request_and_loads_nothing(http):
+    description = http.get("/openapi.json").json()
+    assert {"/v1/select", "/v1/score-here", "/v1/jobs/{job}/events"} <= set(description["paths"])
+    known = description["components"]["schemas"]
+    for path in description["paths"].values():
+        for one in path.values():
+            for name in json.dumps(one).split("#/components/schemas/")[1:]:
+                assert name.partition('"')[0] in known
+    page = http.get("/docs").text
+    assert "POST /v1/select" in page
+    assert "src=" not in page
+    assert "//" not in page.replace("http://127.0.0.1:8000", "").replace("<!", "")
+
+
+def malformed(rng: random.Random, valid: dict) -> tuple[str, bytes]:
+    """Return a request that is not valid, or only by chance."""
+    content = json.dumps(valid).encode()
+    path = rng.choice(["/v1/select", "/v1/explain", "/v1/score", "/v1/files", "/v1/plan"])
+    change = rng.randrange(5)
+    if change == 0:
+        cut = bytearray(content)
+        for _ in range(rng.randrange(1, 6)):
+            cut[rng.randrange(len(cut))] = rng.randrange(256)
+        return path, bytes(cut)
+    if change == 1:
+        return path, content[: rng.randrange(len(content))]
+    odd = [None, True, -1, 1e308, "", "x" * 2000, [], {}, [[]], {"a": None}, "\u0000", 2**70]
+    key = rng.choice([*valid, "goal", "top", "only", "forbid", "blocked", "travel", "frames", "x"])
+    if change == 2:
+        return path, b"[" * rng.randrange(1, 20_000)
+    return path, json.dumps({**valid, key: rng.choice(odd)}).encode()
+
+
+def test_malformed_requests_are_answered(http, valid, caplog):
+    rng = random.Random(0)
+    for _ in range(150):
+        path, content = malformed(rng, valid)
+        response = http.post(path, content=content, headers={"Content-Type": "application/json"})
+        assert response.status_code in (200, 202, 404, 422, 413, 503), (path, content)
+        if response.status_code != 200 and response.status_code != 202:
+            refused(response, response.status_code)
+    assert [record for record in caplog.records if record.exc_info] == []
