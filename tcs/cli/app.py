@@ -84,6 +84,7 @@ for command in (
     check.check,
     locate.locate,
     serve.serve,
+    serve.app,
 ):
     app.command()(command)
 app.command("map")(pictures.draw_map)

@@ -1,20 +1,31 @@
-"""The command `tcs serve`: answer requests of robots and programs over HTTP."""
+"""The commands `tcs serve` and `tcs app`: the service for programs, and the page for people."""
 
 from __future__ import annotations
 
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tcs.cli import options
+from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
+
+if TYPE_CHECKING:
+    from tcs.service import Engine
+
+Files = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="[FILE]...", help="Score files to hold, made by `tcs score`."),
+]
 
 
 def serve(
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[FILE]...", help="Score files to hold, made by `tcs score`."),
-    ] = None,
+    files: Files = None,
     host: Annotated[
         str,
         typer.Option(help="Address to listen at; other than of this machine requires a token."),
@@ -31,25 +42,65 @@ def serve(
             show_default=False,
         ),
     ] = None,
-    jobs: Annotated[
-        int, typer.Option(min=1, max=1024, help="Number of threads of a scoring job.")
-    ] = 2,
+    jobs: options.Jobs = 2,
 ) -> None:
     """Serve the engine over HTTP: score, select, explain, evaluate and plan as requests."""
-    from tcs.errors import ServiceError
-    from tcs.service import Engine, Limits
-
-    try:
-        from tcs.service.http import Server, checked_access, make_application
-    except ModuleNotFoundError as error:
-        raise ServiceError(
-            f"`tcs serve` needs the package {error.name}: pip install 'tcs[service]'."
-        ) from None
-    access = checked_access(host, token)
-    with Engine(Limits(threads=jobs)) as engine:
-        for path in files or ():
-            entry = engine.open_file(path)
-            typer.echo(f"{entry.file} {path}")
-        server = Server(make_application(engine, access), host=host, port=port)
+    http = _http("serve")
+    access = http.checked_access(host, token)
+    with _engine(files, jobs, typer.echo) as engine:
+        server = http.Server(http.make_application(engine, access), host=host, port=port)
         terminal.note(f"{server.url}, requests at {server.url}/docs; Ctrl-C ends.")
         server.run()
+
+
+@expand_options
+def app(
+    files: Files = None,
+    *,
+    window: options.WindowOptions,
+    jobs: options.Jobs = 2,
+) -> None:
+    """Open the page for people: pick a task, click a place, read what can be done from there."""
+    http = _http("app")
+    from tcs.app import add_page
+
+    with _engine(files, jobs, terminal.note) as engine:
+        application = http.make_application(engine, http.Access())
+        add_page(application)
+        server = http.Server(application, host="127.0.0.1", port=window.port or 0)
+        terminal.note(f"open {server.url} in a browser; Ctrl-C ends.")
+        if window.browser:
+            # Opening a browser may wait for the browser.
+            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        server.run(window.duration)
+
+
+def _http(command: str) -> Any:
+    """Return the package of the server.
+
+    Raises:
+        ServiceError: If a package that it needs is not installed.
+    """
+    from tcs.errors import ServiceError
+
+    try:
+        from tcs.service import http
+    except ModuleNotFoundError as error:
+        extra = "app" if command == "app" else "service"
+        raise ServiceError(
+            f"`tcs {command}` needs the package {error.name}: pip install 'tcs[{extra}]'."
+        ) from None
+    return http
+
+
+@contextmanager
+def _engine(
+    files: list[Path] | None, jobs: int, on_line: Callable[[str], None]
+) -> Iterator[Engine]:
+    """Yield an engine that holds the files, and name each with its digest."""
+    from tcs.service import Engine, Limits
+
+    with Engine(Limits(threads=jobs)) as engine:
+        for path in files or ():
+            on_line(f"{engine.open_file(path).file} {path}")
+        yield engine

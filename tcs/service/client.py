@@ -97,6 +97,10 @@ class Client:
         """
         return self._response("GET", f"/v1/files/{file}").content
 
+    def view_of(self, file: str) -> bytes:
+        """Return a page with the scene in 3-D, as `Engine.view_of`."""
+        return self._response("GET", f"/v1/files/{file}/view").content
+
     def select(self, request: SelectRequest) -> dict[str, Any]:
         """Return the set with the greatest utility, as `Engine.select`."""
         return dict(self._post(request))

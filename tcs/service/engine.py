@@ -40,6 +40,7 @@ from tcs.service.requests import (
 from tcs.service.responses import FileEntry, JobStatus
 from tcs.service.score_files import ScoreFiles
 from tcs.service.sent_documents import SentDocuments
+from tcs.service.views import Views
 from tcs.service.work import SceneWork
 
 _DEFAULT_LIMITS = Limits()
@@ -66,6 +67,7 @@ class Engine:
         self._files = ScoreFiles(folder, limits)
         self._sent = SentDocuments(folder)
         self._jobs = Jobs(limits)
+        self._views = Views(self._files)
         self._work = SceneWork(self._files, self._sent, limits)
 
     def __enter__(self) -> Self:
@@ -118,6 +120,16 @@ class Engine:
             NotFoundError: If it is not held.
         """
         return self._files.content(file)
+
+    def view_of(self, file: str) -> bytes:
+        """Return a page with the scene in 3-D, as `tcs view --export`; it takes some seconds.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            BusyError: If another page is being made.
+            ServiceError: If it cannot be made, e.g. because the models have changed.
+        """
+        return self._views.page(file)
 
     def select(self, request: SelectRequest) -> dict[str, Any]:
         """Return the set with the greatest utility, as `tcs select --json`.

@@ -84,7 +84,8 @@ def outcome_of(
 
     Returns:
         The configuration that was read, the place relative to the person, its scores, and `goals`:
-        for each its name, whether it is reached, and the reason.
+        for each its name, its number among those on the same body frame (`place`, from 1), whether
+        it is reached, and the reason.
 
     Raises:
         SelectionError: If a value is not finite, or an axis is missing or exceeded.
@@ -149,10 +150,12 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
     pair = scores.pair_names[number] if number >= 0 else None
     contact = f" ({pair_text(pair)})" if pair is not None else ""
     frame = _frame_of(file.task, goal)
+    place = sum(_frame_of(file.task, other) == frame for other in range(goal + 1))
     return {
         "goal": goal,
-        "name": f"{frame_name(frame)}, {_place_number(file.task, goal, frame)}" if frame else None,
+        "name": f"{frame_name(frame)}, place {place}" if frame else f"goal {goal}",
         "body_frame": frame,
+        "place": place,
         "reached": reason == Reason.REACHED,
         "reason": reason.name.lower(),
         "words": f"{REASON_TEXTS[reason]}{contact}",
@@ -168,11 +171,6 @@ def _frame_of(task: Mapping[str, Any], goal: int) -> str | None:
         return None
     frame = goals[goal].get("body_frame")
     return frame if isinstance(frame, str) else None
-
-
-def _place_number(task: Mapping[str, Any], goal: int, frame: str) -> str:
-    """Return the number of a goal among those on its frame, from 1: "place 2"."""
-    return f"place {sum(_frame_of(task, g) == frame for g in range(goal + 1))}"
 
 
 def _states(grid: Grid) -> int:

@@ -26,6 +26,8 @@ class FileEntry(BaseModel):
     """Name of the environment."""
     robot: str
     """Name of the robot."""
+    title: str
+    """Task, environment, robot, and the person if it is not that of the environment."""
     goals: int
     """Number of goals."""
     configurations: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from pathlib import Path
 from tcs.errors import BusyError, NotFoundError, ServiceError, StoreError
 from tcs.files.paths import is_path
 from tcs.files.reading import read_bytes
+from tcs.output.words import frame_name, person_text
 from tcs.placement.store import ScoreFile, load_scores
 from tcs.service.limits import Limits
 from tcs.service.responses import FileEntry
@@ -27,6 +29,8 @@ class HeldFile:
     """Whether it was made here or named by whoever started the service, rather than sent."""
     is_pinned: bool
     """Whether it stays until the service ends."""
+    number: int
+    """Number of the file, in the order in which they came."""
     lock: threading.RLock = field(default_factory=threading.RLock)
     """Held while the file is read: what selection derives from it is kept in it."""
 
@@ -45,6 +49,7 @@ class ScoreFiles:
         self._lock = threading.RLock()
         self._held: OrderedDict[str, HeldFile] = OrderedDict()
         self._loaded: OrderedDict[str, ScoreFile] = OrderedDict()
+        self._number = itertools.count()
 
     def add(self, content: bytes, *, is_ours: bool = False, is_pinned: bool = False) -> HeldFile:
         """Check a score file and hold it; the same content is held once.
@@ -75,7 +80,11 @@ class ScoreFiles:
                     path.unlink()
                     raise type(error)(str(error).replace(f" '{path}'", " that was sent")) from None
                 self._held[digest] = HeldFile(
-                    _entry(digest, len(content), loaded), path, is_ours, is_pinned
+                    _entry(digest, len(content), loaded),
+                    path,
+                    is_ours,
+                    is_pinned,
+                    next(self._number),
                 )
                 self._remember(digest, loaded)
             held = self._held[digest]
@@ -96,9 +105,10 @@ class ScoreFiles:
         return self.add(content, is_ours=True, is_pinned=True)
 
     def entries(self) -> list[FileEntry]:
-        """Return the files that are held, the least recently used first."""
+        """Return the files that are held, in the order in which they came."""
         with self._lock:
-            return [held.entry for held in self._held.values()]
+            held = sorted(self._held.values(), key=lambda one: one.number)
+            return [one.entry for one in held]
 
     def held(self, digest: str) -> HeldFile:
         """Return a file that is held.
@@ -172,12 +182,16 @@ class ScoreFiles:
 
 
 def _entry(digest: str, size: int, file: ScoreFile) -> FileEntry:
+    names = {
+        key: str(getattr(file, key).get("name", file.metadata[key]))
+        for key in ("task", "environment", "robot")
+    }
+    person = [person_text(file.metadata["person"])] if "person" in file.metadata else []
     return FileEntry(
         file=digest,
         bytes=size,
-        task=str(file.task.get("name", file.metadata["task"])),
-        environment=str(file.environment.get("name", file.metadata["environment"])),
-        robot=str(file.robot.get("name", file.metadata["robot"])),
+        **names,
+        title=" · ".join([*(frame_name(name) for name in names.values()), *file.arms, *person]),
         goals=file.nominal.sets.weights.size,
         configurations=file.configurations.size,
     )

@@ -101,6 +101,9 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
         content = await anyio.to_thread.run_sync(engine.content_of, file)
         return Response(content, media_type=_FILE)
 
+    async def view(file: str) -> Response:
+        return HTMLResponse(await anyio.to_thread.run_sync(engine.view_of, file))
+
     body = {"required": True, "content": {_FILE: {"schema": {"type": "string"}}}}
     _route(app, "GET", "/v1/list", known, "List tasks, environments and robots.")
     _route(app, "GET", "/v1/files", files, "List the score files that are held.")
@@ -109,6 +112,7 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
         openapi_extra={"requestBody": body},
     )  # fmt: skip
     _route(app, "GET", "/v1/files/{file}", fetch, "Fetch a score file.")
+    _route(app, "GET", "/v1/files/{file}/view", view, "Return a page with the scene in 3-D.")
 
 
 def _add_jobs(app: FastAPI, engine: Engine) -> None:

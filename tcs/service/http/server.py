@@ -90,12 +90,20 @@ class Server:
         self._server = uvicorn.Server(config)
         self._thread: threading.Thread | None = None
 
-    def run(self) -> None:
-        """Answer requests until interrupted."""
+    def run(self, duration: float | None = None) -> None:
+        """Answer requests for a duration [s], or until interrupted."""
+        end = threading.Timer(duration or 0.0, self._stop)
+        end.daemon = True
+        if duration is not None:
+            end.start()
         try:
             self._server.run(sockets=[self._socket])
         finally:
+            end.cancel()
             self._socket.close()
+
+    def _stop(self) -> None:
+        self._server.should_exit = True
 
     def __enter__(self) -> Self:
         """Answer requests in a thread."""
@@ -110,6 +118,6 @@ class Server:
         _trace: TracebackType | None,
     ) -> None:
         """Stop answering."""
-        self._server.should_exit = True
+        self._stop()
         if self._thread is not None:
             self._thread.join()

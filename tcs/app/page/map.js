@@ -1,0 +1,183 @@
+// The map of the floor: scores as colours, furniture and person to scale, the robot to drag and turn.
+
+const SVG = "http://www.w3.org/2000/svg";
+const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
+const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209] };
+const HANDLE = 0.62; // distance of the handle from the middle of the base [m]
+const DRAG = 4; // movement that makes a click a drag [px]
+const UNKNOWN_BASE = [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]]; // until the outline is there [m]
+
+function colour(fraction) {
+  const at = Math.min(Math.max(fraction, 0), 1) * (SCALE.length - 1);
+  const low = Math.min(Math.floor(at), SCALE.length - 2);
+  return SCALE[low].map((value, i) => Math.round(value + (at - low) * (SCALE[low + 1][i] - value)));
+}
+
+// Draws the scores on a canvas, one pixel for each base position, the greatest y at the top.
+export function paint(canvas, floor, score) {
+  const [columns, rows] = [floor.x.length, floor.y.length];
+  [canvas.width, canvas.height] = [columns, rows];
+  const context = canvas.getContext("2d");
+  const pixels = context.createImageData(columns, rows);
+  const values = floor[score];
+  const most = score === "reachability" ? 1 : Math.max(...values.flat(), 1e-9);
+  for (let i = 0; i < columns; i++) {
+    for (let j = 0; j < rows; j++) {
+      const free = floor.free[i][j];
+      const shown = !free ? COLOURS.blocked : values[i][j] > 0 ? colour(values[i][j] / most) : [255, 255, 255];
+      pixels.data.set([...shown, 255], 4 * ((rows - 1 - j) * columns + i));
+    }
+  }
+  context.putImageData(pixels, 0, 0);
+}
+
+function element(name, attributes, parent, text) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== undefined) made.textContent = text;
+  parent?.append(made);
+  return made;
+}
+
+const points = (list) => list.map(([x, y]) => `${x},${-y}`).join(" ");
+
+export class FloorMap {
+  // `onPose` is called with {x, y, yaw} [m, deg] and whether the base was put there by a click.
+  constructor(svg, onPose) {
+    this.svg = svg;
+    this.onPose = onPose;
+    this.pose = { x: 0, y: 0, yaw: 0 };
+    this.base = UNKNOWN_BASE;
+    this.canvas = document.createElement("canvas");
+    this.image = element("image", { preserveAspectRatio: "none" }, svg);
+    this.below = element("g", { "pointer-events": "none" }, svg);
+    this.stops = element("g", { "pointer-events": "none" }, svg);
+    this.robot = element("g", {}, svg);
+    this.goals = element("g", { "pointer-events": "none" }, svg);
+    svg.addEventListener("pointerdown", (event) => this.#down(event));
+  }
+
+  floor(floor, score) {
+    const step = (list) => (list.length > 1 ? list[1] - list[0] : 0.1);
+    const [dx, dy] = [step(floor.x), step(floor.y)];
+    this.step = Math.min(dx, dy);
+    const [left, right] = [floor.x[0] - dx / 2, floor.x.at(-1) + dx / 2];
+    const [low, high] = [floor.y[0] - dy / 2, floor.y.at(-1) + dy / 2];
+    this.svg.setAttribute("viewBox", `${left} ${-high} ${right - left} ${high - low}`);
+    paint(this.canvas, floor, score);
+    const place = { x: left, y: -high, width: right - left, height: high - low, href: this.canvas.toDataURL() };
+    for (const [key, value] of Object.entries(place)) this.image.setAttribute(key, value);
+    this.bounds = { left, right, low, high };
+    this.#ruler();
+  }
+
+  scene(outlines, base) {
+    this.below.replaceChildren();
+    this.base = base ?? UNKNOWN_BASE;
+    for (const { category, points: list } of outlines) {
+      element("polygon", { points: points(list), fill: COLOURS[category], stroke: "#00000088", "stroke-width": 0.01 }, this.below);
+    }
+    this.#ruler();
+    this.#draw();
+  }
+
+  #ruler() {
+    this.ruler?.remove();
+    if (!this.bounds) return;
+    const [x, y] = [this.bounds.left + 0.2, -this.bounds.low - 0.2];
+    this.ruler = element("g", { "pointer-events": "none" }, this.svg);
+    element("line", { x1: x, y1: y, x2: x + 1, y2: y, stroke: "#111", "stroke-width": 0.03 }, this.ruler);
+    element("text", { x: x + 0.5, y: y - 0.07, "font-size": 0.16, "text-anchor": "middle", fill: "#111", stroke: "#fff",
+      "stroke-width": 0.04, "paint-order": "stroke" }, this.ruler, "1 m");
+  }
+
+  // Goals as numbered marks: a disc where reached, a square where not.
+  marks(goals) {
+    this.goals.replaceChildren();
+    for (const { at, number, reached } of goals) {
+      const fill = reached ? "#00613f" : "#a3210f";
+      const [x, y] = [at[0], -at[1]];
+      const outline = { fill, stroke: "#fff", "stroke-width": 0.012 };
+      if (reached) element("circle", { cx: x, cy: y, r: 0.055, ...outline }, this.goals);
+      else element("rect", { x: x - 0.05, y: y - 0.05, width: 0.1, height: 0.1, ...outline }, this.goals);
+      element("text", { x, y: y + 0.026, "font-size": 0.075, "text-anchor": "middle", fill: "#fff" }, this.goals, number);
+    }
+  }
+
+  suggest(members) {
+    this.stops.replaceChildren();
+    members.forEach((member, i) => {
+      const at = `translate(${member.base_x} ${-member.base_y}) rotate(${-member.base_yaw_deg})`;
+      element("polygon", { points: points(this.base), transform: at, fill: "none", stroke: "#b3003b", "stroke-width": 0.03 }, this.stops);
+      element("text", { x: member.base_x, y: -member.base_y + 0.07, "font-size": 0.22, "text-anchor": "middle", fill: "#b3003b",
+        stroke: "#fff", "stroke-width": 0.05, "paint-order": "stroke" }, this.stops, i + 1);
+    });
+  }
+
+  place(pose) {
+    this.pose = pose;
+    this.#draw();
+  }
+
+  #draw() {
+    const { x, y, yaw } = this.pose;
+    this.robot.replaceChildren();
+    this.robot.setAttribute("transform", `translate(${x} ${-y}) rotate(${-yaw})`);
+    const line = { stroke: "#111", "stroke-width": 0.03 };
+    element("polygon", { points: points(this.base), class: "robot", fill: "#ffffffb0", ...line }, this.robot);
+    element("path", { d: `M0 0H${HANDLE}`, ...line }, this.robot);
+    element("path", { d: "M.16 .11L.36 0L.16 -.11Z", fill: "#111", class: "robot" }, this.robot);
+    element("circle", { cx: HANDLE, cy: 0, r: 0.22, fill: "transparent", class: "handle" }, this.robot);
+    element("circle", { cx: HANDLE, cy: 0, r: 0.085, fill: "#fff", class: "handle", ...line }, this.robot);
+  }
+
+  #at(event) {
+    const screen = this.svg.getScreenCTM().inverse();
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(screen);
+    return [point.x, -point.y];
+  }
+
+  #down(event) {
+    if (event.button) return;
+    const start = this.#at(event);
+    const before = this.pose;
+    const what = event.target.getAttribute("class");
+    let dragged = false;
+    this.svg.setPointerCapture(event.pointerId);
+    const move = (moved) => {
+      const far = Math.hypot(moved.clientX - event.clientX, moved.clientY - event.clientY);
+      if (!what || (!dragged && far < DRAG)) return;
+      dragged = true;
+      const [x, y] = this.#at(moved);
+      if (what === "handle") {
+        this.onPose({ ...before, yaw: (Math.atan2(y - before.y, x - before.x) * 180) / Math.PI }, false);
+      } else {
+        this.onPose({ ...before, ...this.#inside(before.x + x - start[0], before.y + y - start[1]) }, false);
+      }
+    };
+    const up = () => {
+      this.svg.removeEventListener("pointermove", move);
+      this.svg.removeEventListener("pointerup", up);
+      this.svg.removeEventListener("pointercancel", up);
+      if (!dragged && what !== "handle") this.onPose({ ...before, ...this.#inside(...start) }, true);
+    };
+    this.svg.addEventListener("pointermove", move);
+    this.svg.addEventListener("pointerup", up);
+    this.svg.addEventListener("pointercancel", up);
+  }
+
+  #inside(x, y) {
+    const { left, right, low, high } = this.bounds;
+    const edge = 0.001;
+    return { x: Math.min(Math.max(x, left + edge), right - edge), y: Math.min(Math.max(y, low + edge), high - edge) };
+  }
+
+  // Returns the pose after an arrow key or R, null for other keys.
+  keyed(event, turn) {
+    const { x, y, yaw } = this.pose;
+    const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (steps) return { yaw, ...this.#inside(x + steps[0] * this.step, y + steps[1] * this.step) };
+    if (event.key.toLowerCase() === "r" && !event.ctrlKey && !event.metaKey) return { x, y, yaw: yaw + (event.shiftKey ? -turn : turn) };
+    return null;
+  }
+}

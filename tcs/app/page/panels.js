@@ -1,0 +1,116 @@
+// The answer beside the map: goals, explanations, suggested places, and the details for experts.
+
+import { changes, goalName, named, setting, t } from "./texts.js";
+
+export const by = (id) => document.getElementById(id);
+
+export function made(name, text, parent, attributes = {}) {
+  const element = document.createElement(name);
+  if (text !== undefined) element.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  parent?.append(element);
+  return element;
+}
+
+export function options(select, pairs, chosen) {
+  select.replaceChildren();
+  for (const [value, text] of pairs) made("option", text, select, { value });
+  if (pairs.some(([value]) => String(value) === String(chosen))) select.value = chosen;
+}
+
+export function showGoals(outcome, onWhy, onFix) {
+  const list = by("goals");
+  list.replaceChildren();
+  for (const goal of outcome.goals) {
+    const item = made("li", undefined, list);
+    made("span", goal.reached ? "✓" : "✗", item, { class: `mark ${goal.reached ? "yes" : "no"}`, "aria-hidden": "true" });
+    const name = made("span", `${goal.goal + 1}. ${goalName(goal)}`, item, { class: "name" });
+    made("span", t(`reasons.${goal.reason}`), name, { class: "reason" });
+    if (goal.reached) continue;
+    const about = { goal: goalName(goal) };
+    made("button", t("why"), item, { type: "button", "aria-label": t("whyOf", about) }).onclick = () => onWhy(goal);
+    made("button", t("apply"), item, { type: "button", "aria-label": t("applyOf", about) }).onclick = () => onFix(goal);
+  }
+}
+
+export function showWhy(goal, explanation, goals, onFix) {
+  const card = by("why");
+  card.hidden = false;
+  card.replaceChildren();
+  const name = goalName(goal);
+  made("h3", t("whyOf", { goal: name }), card);
+  made("p", t("whyAnswer", { reason: t(`reasons.${explanation.explained.reason}`) }), card);
+  if (goal.pair) made("p", goal.pair.map((body) => body.split("::").at(-1).replace(/_link$/, "").replaceAll("_", " ")).join(" – "), card);
+  const fix = explanation.nearest_reaching;
+  if (!fix) {
+    made("p", t("noFix"), card);
+  } else {
+    made("p", t("fix", { change: changes(fix) }), card);
+    if (fix.lost_goals.length) {
+      made("p", t("loses", { goals: fix.lost_goals.map((number) => goalName(goals[number])).join("; ") }), card);
+    }
+    made("button", t("apply"), card, { type: "button" }).onclick = () => onFix(fix);
+  }
+  card.focus();
+}
+
+// `choices` are sets of one, two or three places, each with the greatest utility of its size.
+export function showCards(choices, onGo, onShow) {
+  const cards = by("cards");
+  cards.replaceChildren();
+  if (!choices.length) made("p", t("noAlternative"), cards);
+  for (const choice of choices) {
+    const card = made("div", undefined, cards, { class: "card" });
+    const percent = Math.round(100 * choice.reachability);
+    const count = choice.members.length;
+    made("h3", t(count === 1 ? "onePlace" : "places", { count, percent }), card);
+    made("p", t("travel", { metres: choice.cost.toFixed(1) }), card);
+    const axes = choice.moves.map((axis) => named("settings", axis)).join(", ");
+    made("p", axes ? t("moves", { axes }) : t("unmoved"), card);
+    card.onpointerenter = () => onShow(choice);
+    choice.members.forEach((member, i) => {
+      const button = made("button", t("go", { number: i + 1 }), card, { type: "button" });
+      button.onclick = () => onGo(member);
+      button.onfocus = () => onShow(choice);
+    });
+  }
+}
+
+export function showLegend() {
+  const list = by("legend");
+  list.replaceChildren();
+  const scale = made("li", undefined, list);
+  scale.append(`${t("legend.low")} `);
+  made("span", undefined, scale, { class: "scale" });
+  scale.append(t("legend.high"));
+  for (const [name, colour] of [["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"]]) {
+    const item = made("li", undefined, list);
+    made("span", undefined, item, { class: colour });
+    item.append(t(`legend.${name}`));
+  }
+}
+
+export function showStates(floors, score, state, paint, onState) {
+  const list = by("states");
+  list.replaceChildren();
+  by("environmentStates").hidden = floors.length < 2;
+  if (floors.length < 2) return;
+  floors.forEach((floor, i) => {
+    const text = Object.entries(floor.states[i]).map(([name, value]) => setting(name, value)).join(", ");
+    const button = made("button", undefined, list, { type: "button", "aria-pressed": i === state });
+    paint(made("canvas", undefined, button, { "aria-hidden": "true" }), floor, score);
+    for (const part of text.split(", ")) made("span", part, button);
+    button.onclick = () => onState(i);
+  });
+}
+
+export function showExpert(outcome, command) {
+  by("figures").textContent = t("figures", {
+    reachability: outcome.reachability.toFixed(3),
+    manipulability: outcome.manipulability.toFixed(3),
+    measure: outcome.measure,
+    configuration: outcome.configuration,
+  });
+  by("command").textContent = command;
+  by("json").textContent = JSON.stringify(outcome, null, 1);
+}

@@ -1,0 +1,56 @@
+// Texts of the page in the chosen language, and sentences made of them.
+
+let texts = {};
+
+export async function load(language) {
+  texts = await (await fetch(`app/${language}.json`)).json();
+  document.documentElement.lang = language;
+  for (const element of document.querySelectorAll("[data-t]")) element.textContent = t(element.dataset.t);
+}
+
+export function t(key, values = {}) {
+  const text = key.split(".").reduce((inner, part) => (inner === undefined ? undefined : inner[part]), texts);
+  if (typeof text !== "string") return text;
+  return text.replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
+}
+
+export function named(table, name) {
+  return t(`${table}.${name}`) ?? name.replaceAll("_", " ");
+}
+
+export function goalName(goal) {
+  if (!goal.body_frame) return t("goalNumber", { place: goal.goal + 1 });
+  return t("goalName", { frame: named("frames", goal.body_frame), place: goal.place });
+}
+
+export function sentence(outcome) {
+  const counts = { reached: outcome.reached, goals: outcome.goals.length };
+  if (!outcome.place) return t("shortSentence", counts);
+  const { side, beside, facing } = outcome.place;
+  return t("sentence", {
+    side: t(`side.${side}`),
+    beside: beside ? t("beside", { part: t(`parts.${beside}`) }) : "",
+    facing: t(`facing.${facing}`),
+    ...counts,
+  });
+}
+
+export function setting(name, value) {
+  const axis = name.replace(/_deg$/, "");
+  return `${named("settings", axis)} ${name.endsWith("_deg") ? `${+value.toFixed(1)}°` : `${value.toFixed(2)} m`}`;
+}
+
+export function changes(fix) {
+  const steps = [];
+  const cm = (metres) => +(100 * Math.abs(metres)).toFixed(1);
+  if (Math.abs(fix.ahead) >= 0.0005) steps.push(t(fix.ahead > 0 ? "forward" : "back", { cm: cm(fix.ahead) }));
+  if (Math.abs(fix.left) >= 0.0005) steps.push(t(fix.left > 0 ? "toLeft" : "toRight", { cm: cm(fix.left) }));
+  for (const { axis, change, unit } of fix.changes) {
+    const name = axis.replace(/_deg$/, "");
+    const amount = unit === "deg" ? `${+Math.abs(change).toFixed(1)}°` : `${cm(change)} cm`;
+    if (name === "base_x" || name === "base_y" || Math.abs(change) < (unit === "deg" ? 0.05 : 0.0005)) continue;
+    if (name === "base_yaw") steps.push(t(change > 0 ? "turnLeft" : "turnRight", { deg: +Math.abs(change).toFixed(1) }));
+    else steps.push(t(change > 0 ? "raise" : "lower", { what: named("axes", name), amount }));
+  }
+  return `${steps.join(", ") || t("nothing")}.`;
+}

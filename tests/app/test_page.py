@@ -1,0 +1,77 @@
+"""The page without a browser: parts, texts in every language, and nothing from elsewhere."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib.resources import files
+
+import httpx
+import pytest
+
+from tcs.app import LANGUAGES, add_page
+from tcs.placement.tables import Reason
+from tcs.service import Engine
+from tcs.service.http import Access, Server, make_application
+
+PAGE = files("tcs.app").joinpath("page")
+PARTS = [part.name for part in PAGE.iterdir()]
+TEXTS = {name: json.loads(PAGE.joinpath(f"{name}.json").read_text()) for name in LANGUAGES}
+SCRIPTS = "".join(PAGE.joinpath(name).read_text() for name in PARTS if name.endswith(".js"))
+
+
+@pytest.fixture(scope="module")
+def http():
+    with Engine() as engine:
+        application = make_application(engine, Access())
+        add_page(application)
+        with (
+            Server(application, host="127.0.0.1", port=0) as server,
+            httpx.Client(base_url=server.url, trust_env=False) as http,
+        ):
+            yield http
+
+
+def test_every_part_is_served(http):
+    page = http.get("/")
+    assert page.headers["content-security-policy"].startswith("default-src 'none'")
+    assert "<main>" in page.text
+    for name in PARTS:
+        if name != "index.html":
+            part = http.get(f"/app/{name}")
+            assert part.status_code == 200, name
+            assert part.content == PAGE.joinpath(name).read_bytes()
+    assert http.get("/app/..%2fpages.py").status_code == 404
+    assert http.get("/app/none.js").status_code == 404
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_nothing_is_from_elsewhere(name):
+    text = PAGE.joinpath(name).read_text().replace('"http://www.w3.org/2000/svg"', "")
+    assert re.findall(r"https?://|@import|//cdn", text) == []
+
+
+def paths(texts: dict, above: str = "") -> set[str]:
+    """Return the keys of all texts; frames may fall back to their own names."""
+    found = set()
+    for key, value in texts.items():
+        if isinstance(value, dict) and key != "frames":
+            found |= paths(value, f"{above}{key}.")
+        else:
+            found.add(f"{above}{key}")
+    return found
+
+
+def test_languages_have_the_same_texts():
+    first, *others = LANGUAGES
+    for other in others:
+        assert paths(TEXTS[other]) == paths(TEXTS[first])
+        assert len(TEXTS[other]["limits"]) == len(TEXTS[first]["limits"])
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_text_that_is_used_is_there(language):
+    html = PAGE.joinpath("index.html").read_text()
+    used = {*re.findall(r'data-t="([^"]+)"', html), *re.findall(r'\bt\("([^"]+)"', SCRIPTS)}
+    assert used - paths(TEXTS[language]) == set()
+    assert {reason.name.lower() for reason in Reason} == set(TEXTS[language]["reasons"])
