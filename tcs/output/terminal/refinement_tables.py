@@ -22,7 +22,7 @@ def report_refined(result: Mapping[str, Any]) -> None:
     gain = total - before["reachability"] - before["manipulability"]
     out.print(
         f"P_R + P_M changes by {gain:+.4f} to {total:.4f}; no set between the grid's ends exceeds "
-        f"{result['bound']:.4f}"
+        f"{result['bound']:.4f}, {result['gap']:.1%} more"
     )
     if result["success"] is not None:
         success = result["success"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.placement.refinement.dexterity_bound import dexterity_bound
 from tcs.placement.refinement.points import PointScorer
 from tcs.placement.store import ScoreFile
 
@@ -11,7 +12,8 @@ from tcs.placement.store import ScoreFile
 def upper_bound(file: ScoreFile, table: int, scorer: PointScorer) -> float:
     """Return an upper bound of P_R + P_M over every value of the axes between the grid's ends.
 
-    Every measure is at most 1. A goal at which the gripper touches the environment is never
+    A goal that some member reaches contributes its weight, and its weight times a dexterity that no
+    joint angles of an arm exceed. A goal at which the gripper touches the environment is never
     reached, whatever the base pose and torso height; this holds over the continuous space where no
     axis moves the environment.
 
@@ -21,4 +23,7 @@ def upper_bound(file: ScoreFile, table: int, scorer: PointScorer) -> float:
         scorer: The scorer of that table.
     """
     weights = file.tables[table].sets.weights
-    return float(2.0 * np.sum(weights[~scorer.never_reached()]))
+    dexterity = max(
+        dexterity_bound(arm.lowered.arrays.chain, scorer.measure) for arm in scorer.arms
+    )
+    return float((1.0 + dexterity) * np.sum(weights[~scorer.never_reached()]))

@@ -61,6 +61,16 @@ def test_a_refined_set_is_not_worse_and_below_the_bound(refined):
     np.testing.assert_allclose(table.reachability + table.manipulability, table.objective)
 
 
+def test_random_configurations_stay_below_the_bound(scored, refined, rng):
+    scorer, space = PointScorer.of(scored, 0), Space.of(scored.configurations, scored.nominal.sets)
+    values = rng.uniform(space.low, space.high, (400, space.low.size))
+    values[:, -1] = values[:4, -1].repeat(100)  # each torso height costs a call of Drake
+    found = scorer.score(Points(values, np.zeros(len(values), dtype=np.int64)))
+    # Together they are a set of 400 members.
+    together = found.reached.any(axis=0).mean() + found.dexterity.max(axis=0).mean()
+    assert 1.0 < together <= refinement_summary(refined)["bound"]
+
+
 def test_members_stay_between_the_ends_of_the_axes(refined):
     table, space = refined.nominal.refined, Space.of(refined.configurations, refined.nominal.sets)
     for k, size in enumerate(table.sizes):
