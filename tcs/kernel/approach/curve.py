@@ -9,15 +9,14 @@ import numpy as np
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.approach.grid import PIECES, LineGrid
+from tcs.kernel.approach.scene import list_groups, list_shapes
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import Workspace
-from tcs.kernel.motion.edges import curve_is_free_until
+from tcs.kernel.motion.edges import listed_are_free_until, take_middle
+from tcs.kernel.motion.pairs import take_posture
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
-    BLOCKED,
-    DONE,
-    LIMITS,
     OFF_LINE,
     StraightWorkspace,
     error_between,
@@ -27,10 +26,14 @@ from tcs.kernel.motion.straight import (
     take_piece,
 )
 from tcs.kernel.numeric.newton import factorise, step_to_goal
+from tcs.kernel.problem import Problem
 
 FEWEST, DOUBLINGS = 2, 3
 """Number of pieces of the spline tried first, and how often it is doubled until the spline is close
 enough to the line."""
+PARTS = 8
+"""Number of parts of the line for which shapes that may meet are listed: on longer ones most
+may."""
 AT_POINT = 1e-7
 """Greatest error of a point of the spline [rad and m], as for solutions."""
 
@@ -77,7 +80,7 @@ def place_line(work: Workspace, curve: CurveWorkspace) -> None:
 
 
 @inner
-def follow_path(
+def fill_spline(
     arm: ArmSolver,
     scene: MotionScene,
     motion: MotionWorkspace,
@@ -86,28 +89,28 @@ def follow_path(
     b: int,
     offset: FloatArray,
     fastest: FloatArray,
-) -> int:
-    """Follow the line from the goal along `grid.path` on branch b, and certify the motion.
+) -> bool:
+    """Follow the line from the goal along `grid.path` on branch b.
 
     Args:
         arm: The arm.
         scene: The scene.
         motion: Scratch.
         grid: `path` is the free joint at each level.
-        curve: The line is in place; the spline is filled, and `blocked` if it is BLOCKED.
+        curve: The line is in place; the spline is filled.
         b: The branch.
         offset: Motion of the tool along the line, in A [m], shape (3,).
         fastest: Greatest motion of each joint for the whole line at constant rate [rad], shape
             (7,).
 
     Returns:
-        DONE, LIMITS or BLOCKED.
+        Whether the joints keep their limits.
     """
     pieces = FEWEST
     for _ in range(DOUBLINGS + 1):
         points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
         if not _fill_points(arm, scene, grid, curve, b, offset, fastest, points, tangents):
-            return LIMITS
+            return False
         keep_within_limits(scene, points, tangents)
         worst = 0.0
         for n in range(pieces):
@@ -116,16 +119,58 @@ def follow_path(
             worst = max(worst, error)
         curve.pieces[0] = pieces
         if worst <= OFF_LINE:
-            for n in range(pieces):
-                take_piece(motion, points, tangents, n)
-                free = curve_is_free_until(scene, motion)
-                if free < 1.0:
-                    curve.blocked[0] = min(int((n + free) / pieces * PIECES) + 1, PIECES)
-                    curve.blocked[1] = motion.contact[0]
-                    return BLOCKED
-            return DONE
+            return True
         pieces *= 2
-    return LIMITS
+    return False
+
+
+@inner
+def spline_is_free(
+    problem: Problem,
+    work: Workspace,
+    scene: MotionScene,
+    motion: MotionWorkspace,
+    curve: CurveWorkspace,
+) -> bool:
+    """Return whether the spline is certified; fills `curve.blocked` if it is not.
+
+    Args:
+        problem: The scene.
+        work: Workspace with the environment in A.
+        scene: Its pairs are filled.
+        motion: The shapes around the arm are in place.
+        curve: Holds the spline.
+    """
+    pieces = curve.pieces[0]
+    points, tangents = curve.points[: pieces + 1], curve.tangents[: pieces + 1]
+    groups = list_groups(problem, work, scene, motion, points, tangents)
+    for n in range(pieces):
+        take_piece(motion, points, tangents, n)
+        free = _free_until(problem, scene, motion, groups, max(PARTS // pieces, 1))
+        if free < 1.0:
+            curve.blocked[0] = min(int((n + free) / pieces * PIECES) + 1, PIECES)
+            curve.blocked[1] = motion.contact[0]
+            return False
+    return True
+
+
+@inner
+def _free_until(
+    problem: Problem, scene: MotionScene, motion: MotionWorkspace, groups: int, parts: int
+) -> float:
+    """Return how far the current curve is certified in a number of parts; 1 for all of it.
+
+    Only the first pairs of the scene, those of `groups`, and of their shapes are checked.
+    """
+    for part in range(parts):
+        begin, end = part / parts, (part + 1) / parts
+        take_middle(motion, begin, end)
+        take_posture(scene, motion)
+        count = list_shapes(problem, scene, motion, groups)
+        free = listed_are_free_until(scene, motion, count, begin, end)
+        if free < end:
+            return free
+    return 1.0
 
 
 @inner

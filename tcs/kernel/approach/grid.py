@@ -39,6 +39,8 @@ class LineGrid(NamedTuple):
     """Scratch: position of the tool in A [m], shape (3,)."""
     is_open: BoolArray
     """Whether each node is open, shape (BRANCHES, PIECES + 1, MAX_SAMPLES)."""
+    is_free: BoolArray
+    """Whether each node is known to be free of contact, shape as `is_open`."""
     onward: IntArray
     """Column of the nearest node of the next level from which the line can be completed, or
     NOWHERE, shape (BRANCHES, PIECES + 1, MAX_SAMPLES)."""
@@ -57,6 +59,7 @@ def new_grid() -> LineGrid:
     return LineGrid(
         np.empty((PIECES + 1, 4, 3)),
         np.empty(3),
+        np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.int64),
         np.zeros(MAX_SAMPLES, np.int64),
@@ -122,9 +125,9 @@ def open_levels(
     """
     narrow = last - first + 1 < columns
     for level in range(PIECES + 1):
-        is_open = grid.is_open[b, level]
+        is_open, is_free = grid.is_open[b, level], grid.is_free[b, level]
         for i in range(columns):
-            is_open[i] = False
+            is_open[i] = is_free[i] = False
         count = last - first + 1
         start = grid.origin[0] + first * grid.origin[1]
         fill_samples(search, start, start + max(count - 1, 1) * grid.origin[1], max(count, TWO))

@@ -9,7 +9,13 @@ import numpy as np
 from tcs.kernel.analytic.ik import sample_joints
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.scratch import Search, new_search, sort_candidates
-from tcs.kernel.approach.curve import CurveWorkspace, follow_path, new_curve, place_line
+from tcs.kernel.approach.curve import (
+    CurveWorkspace,
+    fill_spline,
+    new_curve,
+    place_line,
+    spline_is_free,
+)
 from tcs.kernel.approach.grid import (
     NOWHERE,
     PIECES,
@@ -25,11 +31,16 @@ from tcs.kernel.approach.grid import (
 from tcs.kernel.approach.scene import new_scene, pair_contact_code
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
-from tcs.kernel.contacts import NO_CONTACT, Workspace, new_workspace
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    gripper_body_contact,
+    new_workspace,
+)
 from tcs.kernel.kinematics import copy_joints
-from tcs.kernel.motion.edges import posture_is_free
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, new_motion_workspace
-from tcs.kernel.motion.straight import BLOCKED, DONE
+from tcs.kernel.motion.straight import BLOCKED, DONE, LIMITS
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import APPROACH_BLOCKED, APPROACH_LIMITS, REACHED
 
@@ -65,7 +76,8 @@ class Approach(NamedTuple):
     """Motion of the tool from the goal to the begin of the approach, in A [m], shape (3,)."""
     columns: IntArray
     """Number of columns of the grid, and of those that the free joint moves from level to level;
-    column and branch of the posture that scoring found; number of motions followed; shape (5,)."""
+    column and branch of the posture that scoring found; number of motions followed; torso level;
+    shape (6,)."""
     contact: IntArray
     """First contact that blocked a motion, as a code, shape (1,)."""
 
@@ -81,7 +93,7 @@ def new_approach(problem: Problem) -> Approach:
         new_motion_workspace(scene),
         new_curve(),
         np.empty(3),
-        np.zeros(5, np.int64),
+        np.zeros(6, np.int64),
         np.zeros(1, np.int64),
     )
 
@@ -209,34 +221,73 @@ def _follow(
         DONE, LIMITS, BLOCKED or CLOSED.
     """
     grid, columns, scene = approach.grid, approach.columns, approach.scene
-    if grid.onward[b, 0, column] == NOWHERE:
-        return CLOSED
-    arm, q = problem.arm, approach.search.q
-    angle = grid.origin[0] + column * grid.origin[1]
-    sample_joints(arm, grid.goal[0], arm.branches[b], angle, q)
+    motion, curve = approach.motion, approach.curve
+    if is_free:
+        grid.is_free[b, 0, column] = True
     outcome = CLOSED
-    if is_free or posture_is_free(scene, approach.motion, q):
-        while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
+    while grid.onward[b, 0, column] != NOWHERE and columns[4] <= MOST_CURVES:
+        take_path(grid, b, column)
+        level, contact = _first_contact(problem, approach, b, column)
+        # A contact counts on lines only that limits allow.
+        if level == NOWHERE or (level > 0 and approach.contact[0] == NO_CONTACT):
             columns[4] += 1
-            take_path(grid, b, column)
-            outcome = follow_path(
-                arm, scene, approach.motion, grid, approach.curve, b, approach.offset, fastest
-            )
-            if outcome != BLOCKED:
+            if not fill_spline(
+                problem.arm, scene, motion, grid, curve, b, approach.offset, fastest
+            ):
+                outcome = LIMITS
                 break
-            level, k = approach.curve.blocked[0], approach.curve.blocked[1]
-            gripper = scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER
-            if gripper or approach.contact[0] == NO_CONTACT:
-                approach.contact[0] = pair_contact_code(problem, scene, k)
-            if gripper:
-                columns[4] = ENOUGH
+        if level == NOWHERE:
+            if spline_is_free(problem, approach.work, scene, motion, curve):
+                outcome = DONE
                 break
-            grid.is_open[b, level, column_at(grid, b, column, level)] = False
-            find_onward(grid, b, columns[0], columns[1])
+            level, k = curve.blocked[0], curve.blocked[1]
+            contact = pair_contact_code(problem, scene, k)
+            if scene.pair[k, 2] == 0 and scene.link_frame[scene.pair[k, 0]] == GRIPPER:
+                approach.contact[0], columns[4] = contact, ENOUGH
+                outcome = BLOCKED
+                break
+        if level > 0:
+            outcome = BLOCKED
+            if approach.contact[0] == NO_CONTACT:
+                approach.contact[0] = contact
+        grid.is_open[b, level, column_at(grid, b, column, level)] = False
+        find_onward(grid, b, columns[0], columns[1])
     if outcome != DONE:
         grid.is_open[b, 0, column] = False
         grid.onward[b, 0, column] = NOWHERE
     return outcome
+
+
+@inner
+def _first_contact(problem: Problem, approach: Approach, b: int, column: int) -> tuple[int, int]:
+    """Return a level at which the path from a column is in contact, or NOWHERE, and the contact."""
+    grid = approach.grid
+    for n in range(PIECES + 1):
+        # The goal, then from the begin of the approach on.
+        level = (PIECES + 1 - n) % (PIECES + 1)
+        i = column_at(grid, b, column, level)
+        if grid.is_free[b, level, i]:
+            continue
+        contact = _contact_at(problem, approach, b, i, level)
+        if contact != NO_CONTACT:
+            return level, contact
+        grid.is_free[b, level, i] = True
+    return NOWHERE, NO_CONTACT
+
+
+@inner
+def _contact_at(problem: Problem, approach: Approach, b: int, i: int, level: int) -> int:
+    """Return the contact of a node of the grid, or NO_CONTACT."""
+    work, grid, q = approach.work, approach.grid, approach.search.q
+    body_A = problem.body_A[approach.columns[5]]
+    for r in range(3):
+        work.p_AG[r] = approach.curve.line.p_AT[r] + level / PIECES * approach.offset[r]
+    contact = gripper_body_contact(problem, work, body_A)
+    if contact != NO_CONTACT:
+        return contact
+    angle = grid.origin[0] + i * grid.origin[1]
+    sample_joints(problem.arm, grid.goal[level], problem.arm.branches[b], angle, q)
+    return arm_contact(problem, work, body_A, q)
 
 
 @inner

@@ -107,9 +107,8 @@ def _follow_posture(
 def _place_surroundings(problem: Problem, approach: Approach, torso: int) -> None:
     """Place everything around the arm, the base being in place."""
     environment_in_arm_base(problem, approach.work, torso)
-    place_scene(problem, approach.work, torso, approach.scene, approach.motion)
-    # The reported contact must not depend on the configurations before.
-    approach.motion.contact[0] = -1
+    place_scene(problem, approach.work, torso, approach.motion)
+    approach.columns[5] = torso
 
 
 @inner

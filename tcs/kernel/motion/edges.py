@@ -92,25 +92,42 @@ def edge_is_free(
 @inner
 def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
     """Return how far the curve `work.control` is certified, from its begin; 1 for all of it."""
-    _take_middle(work, 0.0, 1.0)
+    take_middle(work, 0.0, 1.0)
     moved = 0.0
     for k in range(7):
         moved += work.delta[k] * scene.reach[k]
     pieces = int(np.ceil(moved / PIECE)) if moved > PIECE else 1
     for n in range(pieces):
         begin, end = n / pieces, (n + 1) / pieces
-        _take_middle(work, begin, end)
+        take_middle(work, begin, end)
         take_posture(scene, work)
         count = list_near(scene, work, ROUNDING, len(scene.pair))
-        for m in range(count):
-            if is_near(scene, work, work.pairs[m], False):
-                work.contact[0] = work.pairs[m]
-                work.hits[work.contact[0]] += 1
-                return begin
-        until = _halves_are_free_until(scene, work, count, begin, end)
+        until = listed_are_free_until(scene, work, count, begin, end)
         if until < end:
             return until
     return 1.0
+
+
+@inner
+def listed_are_free_until(
+    scene: MotionScene, work: MotionWorkspace, count: int, begin: float, end: float
+) -> float:
+    """Return how far a piece of `work.control` is certified for listed pairs; `end` for all of it.
+
+    Args:
+        scene: The scene.
+        work: Holds the curve, and as current posture the middle of the piece; the first pairs in
+            `pairs` are checked.
+        count: Number of pairs.
+        begin: Begin of the piece, in [0, 1].
+        end: End of the piece.
+    """
+    for m in range(count):
+        if is_near(scene, work, work.pairs[m], False):
+            work.contact[0] = work.pairs[m]
+            work.hits[work.contact[0]] += 1
+            return begin
+    return _halves_are_free_until(scene, work, count, begin, end)
 
 
 @inner
@@ -213,7 +230,7 @@ def _uncertified(
     Returns:
         Number of pairs not certified, or -1 where one is in contact, or moves less than RESOLUTION.
     """
-    _take_middle(work, begin, end)
+    take_middle(work, begin, end)
     take_posture(scene, work)
     left = 0
     for n in range(first, last):
@@ -230,7 +247,7 @@ def _uncertified(
 
 
 @inner
-def _take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
+def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
     """Fill the posture in the middle of a piece, and how far each joint is from it on the piece."""
     control, t, half = work.control, 0.5 * (begin + end), 0.5 * (end - begin)
     u = 1.0 - t
