@@ -104,6 +104,7 @@ COMMANDS = (
         ("scores.tcs",),
         ("--samples", "4", "--sets", "2", "--jobs", "1", "--out", "out.tcs"),
     ),
+    Command("population", ("scores.tcs",), ("--bodies", "2", "--sets", "2", "--jobs", "1")),
     Command("view", ("scores.tcs",), ("--export", "out.html")),
     Command("view", ("scores.tcs",), _WINDOW, ("--port", "--duration")),
     Command("map", ("scores.tcs",), ("--out", "out.png")),

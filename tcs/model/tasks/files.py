@@ -35,6 +35,7 @@ class GoalEntry(_Entry):
     position: list[float]
     quaternion_wxyz: list[float]
     weight: float = 1.0
+    name: str = ""
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
 
@@ -141,6 +142,7 @@ def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
         position=np.array(entry.position, dtype=np.float64),
         quaternion=np.array(entry.quaternion_wxyz, dtype=np.float64),
         weight=entry.weight,
+        name=entry.name,
         approach=approach,
         retreat=retreat,
     )

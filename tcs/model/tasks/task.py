@@ -19,6 +19,8 @@ MAX_DISTANCE = 2.0
 """Greatest distance of a goal from its body frame [m]; a larger number is not in metres."""
 
 
+LONGEST_NAME = 60
+"""Greatest length of the name of a goal [characters]: it has to fit into a table."""
 MAX_STRAIGHT = 1.0
 """Greatest length of a straight tool motion [m]: about the reach of an arm."""
 
@@ -130,6 +132,8 @@ class Goal:
     """Straight motion that ends at the goal."""
     retreat: ToolLine = DEFAULT_RETREAT
     """Straight motion that begins at the goal."""
+    name: str = ""
+    """Where the goal is, as people say it, e.g. "left cheek"; "" for no name."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -140,6 +144,11 @@ class Goal:
         """
         if not self.body_frame:
             raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
+        if len(self.name) > LONGEST_NAME or not all(c.isprintable() for c in self.name):
+            raise TaskError(
+                f"field 'name' is {self.name[:LONGEST_NAME]!r}, but must be at most {LONGEST_NAME} "
+                "printable characters, e.g. 'left cheek'."
+            )
         position = _finite("position", self.position, ("x", "y", "z"))
         # Unlike numpy's norm, this does not overflow, for which numpy would print a warning.
         distance = math.hypot(*position)
@@ -171,8 +180,8 @@ class Goal:
 
     def _key(self) -> tuple[object, ...]:
         position, quaternion = self.position.tolist(), self.quaternion.tolist()
-        lines = (self.approach, self.retreat)
-        return (self.body_frame, *position, *quaternion, self.weight, *lines)
+        others = (self.weight, self.approach, self.retreat, self.name)
+        return (self.body_frame, *position, *quaternion, *others)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

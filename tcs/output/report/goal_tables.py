@@ -13,6 +13,7 @@ from tcs.output.words import (
     axis_value,
     frame_name,
     goal_list,
+    goal_place,
     pair_text,
     percentage,
 )
@@ -45,7 +46,7 @@ def goals_table(report: ScoreReport) -> Table:
     stops = range(len(report.shown.members))
     columns = [
         Column("Goal"),
-        Column("Frame", is_number=False),
+        Column("Where", is_number=False),
         *([Column("Weight")] if is_weighted else []),
         Column("Reached from", is_number=False),
         *(Column(f"At stop {number + 1}", is_number=False) for number in stops),
@@ -61,7 +62,7 @@ def goals_table(report: ScoreReport) -> Table:
         rows.append(
             [
                 str(g),
-                frame_name(goal.body_frame),
+                goal_place(goal),
                 *([f"{weights[g]:.3f}"] if is_weighted else []),
                 stop,
                 *(_result_cell(report.results[one][g], is_used=number == one) for one in stops),

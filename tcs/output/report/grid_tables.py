@@ -6,7 +6,7 @@ from collections import Counter
 
 from tcs.output.report.blocks import Cell, Column, Table
 from tcs.output.report.score_report import ScoreReport
-from tcs.output.words import REASON_NAMES, body_name, frame_name, percent, percentage
+from tcs.output.words import REASON_NAMES, body_name, goal_place, percent, percentage
 from tcs.placement.reasons.distribution import CHECKS, checks_of
 from tcs.placement.tables import Reason
 
@@ -23,7 +23,7 @@ def reasons_table(report: ScoreReport) -> Table:
         rows.append(
             [
                 str(goal),
-                frame_name(report.job.task.goals[goal].body_frame),
+                goal_place(report.job.task.goals[goal]),
                 *(percent(fraction, 2) if fraction else "0" for fraction in fractions),
             ]
         )
@@ -33,7 +33,7 @@ def reasons_table(report: ScoreReport) -> Table:
         "the columns.",
         [
             Column("Goal"),
-            Column("Frame", is_number=False),
+            Column("Where", is_number=False),
             *(Column(REASON_NAMES[reason]) for reason in reasons),
         ],
         rows,

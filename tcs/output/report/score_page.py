@@ -16,6 +16,7 @@ from tcs.output.report.score_summary import summary_blocks, unreached_everywhere
 from tcs.output.words import (
     assigned_goals,
     frame_name,
+    goal_text,
     goals_text,
     member_text,
     scores_text,
@@ -105,7 +106,10 @@ def _goals(report: ScoreReport) -> list[Block]:
         fix = report.explanation(goal).fix
         if fix is not None:
             blocks.append(
-                Text(f"The cheapest change from stop 1 that reaches goal {goal}: {fix.sentence}")
+                Text(
+                    f"The cheapest change from stop 1 that reaches goal "
+                    f"{goal_text(goal, report.goal_names[goal])}: {fix.sentence}"
+                )
             )
     if report.shown.members:
         blocks.append(Collapsible("Arm joints", [joints_table(report)]))

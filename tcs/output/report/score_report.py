@@ -95,6 +95,11 @@ class ScoreReport:
         return str(self.file.metadata["measure"])
 
     @property
+    def goal_names(self) -> tuple[str, ...]:
+        """Where each goal is, as people say it; "" for a goal without a name."""
+        return tuple(goal.name for goal in self.job.task.goals)
+
+    @property
     def scores(self) -> tuple[float, float]:
         """P_R and P_M of the set; zeros if it has no member."""
         if not self.shown.indices:

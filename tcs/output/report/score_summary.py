@@ -39,8 +39,8 @@ def summary_blocks(report: ScoreReport) -> list[Block]:
     ]
     if report.unreached:
         items.append(
-            f"Not reached: {goals_text(report.unreached)}. The section Goals gives the reasons and "
-            "the changes that would help."
+            f"Not reached: {goals_text(report.unreached, report.goal_names)}. The section Goals "
+            "gives the reasons and the changes that would help."
         )
     if report.shown.here is not None:
         here = base_pose_text(report.shown.here.to_json())
@@ -68,8 +68,8 @@ def unreached_everywhere(report: ScoreReport) -> list[str]:
         if counts.reached == 0 and counts.farthest is not None:
             found.setdefault(REASON_TEXTS[counts.farthest.reason], []).append(goal)
     return [
-        f"No configuration reaches {goals_text(goals)}. Result of the configurations that passed "
-        f"the most checks: {reason}."
+        f"No configuration reaches {goals_text(goals, report.goal_names)}. Result of the "
+        f"configurations that passed the most checks: {reason}."
         for reason, goals in found.items()
     ]
 

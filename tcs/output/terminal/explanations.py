@@ -18,6 +18,7 @@ from tcs.output.words import (
     deviation_text,
     frame_name,
     goal_list,
+    goal_text,
     goals_text,
     pair_text,
     reason_of,
@@ -34,7 +35,8 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     """Print an explanation, given as `Explanation.to_json` returns it."""
     out = results_console()
     frame = f", on {result['body_frame']}" if result["body_frame"] else ""
-    out.print(f"Goal {result['goal']} of {result['task']} in {result['environment']}{frame}")
+    goal = goal_text(result["goal"], result["goal_name"])
+    out.print(f"Goal {goal} of {result['task']} in {result['environment']}{frame}")
     if result["observed"]:
         error = "".join(
             f"; {deviation_text(name, value)}" for name, value in result["observed_error"].items()

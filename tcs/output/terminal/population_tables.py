@@ -7,7 +7,7 @@ from typing import Any
 
 from tcs.output.terminal.console import results_console
 from tcs.output.terminal.tables import new_table
-from tcs.output.words import member_text, percentage
+from tcs.output.words import goal_text, member_text, percentage
 from tcs.output.words.population import measure_name, part_text
 
 
@@ -67,7 +67,8 @@ def _report_not_served(result: Mapping[str, Any]) -> None:
                 f"{percentage(goal['gripper_touches'])}"
             )
         out.print(
-            f"goal {goal['goal']} is not reached for {percentage(goal['not_reached'])}{touching}"
+            f"goal {goal_text(goal['goal'], goal['name'])} is not reached for "
+            f"{percentage(goal['not_reached'])}{touching}"
         )
 
 

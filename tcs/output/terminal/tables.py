@@ -20,6 +20,7 @@ from tcs.output.words import (
     body_name,
     deviation_text,
     frame_name,
+    goal_text,
     percentage,
     person_text,
     reason_of,
@@ -64,7 +65,8 @@ def report_scores(result: Mapping[str, Any]) -> None:
         out.print(f"scored for {person_text(result['person'])}")
         for goal in result["person"]["touching_goals"]:
             out.print(
-                f"goal {goal['goal']}: the gripper touches {body_name(goal['part'])} of this person"
+                f"goal {goal_text(goal['goal'], goal.get('name'))}: the gripper touches "
+                f"{body_name(goal['part'])} of this person"
             )
     out.print(
         f"{result['configurations']:,} configurations x {result['goals']} goals scored in "

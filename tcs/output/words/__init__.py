@@ -22,7 +22,7 @@ from tcs.output.words.configurations import (
     setting_text,
     settings_text,
 )
-from tcs.output.words.goals import goal_list, goals_by_reason, goals_text
+from tcs.output.words.goals import goal_list, goal_place, goal_text, goals_by_reason, goals_text
 from tcs.output.words.measures import REACHABILITY_LABEL, manipulability_label, scores_text
 from tcs.output.words.numbers import p_value, percent, percentage, signed
 from tcs.output.words.people import person_text
@@ -55,6 +55,8 @@ __all__ = [
     "deviation_text",
     "frame_name",
     "goal_list",
+    "goal_place",
+    "goal_text",
     "goals_by_reason",
     "goals_text",
     "manipulability_label",

@@ -88,6 +88,8 @@ class Population:
     blocked: BoolArray
     """Whether the gripper at a goal touches the environment, e.g. the person, in every state of the
     environment that the sets use, so that no base pose reaches it, shape (N, goals)."""
+    goal_names: tuple[str, ...]
+    """Where each goal is, as people say it; "" for a goal without a name."""
     observed: Mapping[str, float]
     """Observed state of the table; angles in degrees under `..._deg` names."""
     about: Mapping[str, str]
@@ -188,6 +190,7 @@ class Population:
             "goals": [
                 {
                     "goal": int(goal),
+                    "name": self.goal_names[goal],
                     "not_reached": float(lost[:, goal].mean()),
                     "gripper_touches": float(self.blocked[:, goal].mean()),
                 }
@@ -267,6 +270,7 @@ def population(
         people=people,
         sets=sets,
         blocked=blocked,
+        goal_names=tuple(goal.name for goal in trials.job.task.goals),
         observed=state_to_json(file.observed_axes, trials.observed),
         about={
             "task": trials.job.task.name,

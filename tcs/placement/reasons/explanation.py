@@ -46,10 +46,19 @@ class Explanation:
     @property
     def body_frame(self) -> str | None:
         """Body frame of the goal, None if the file does not state it."""
+        return self._of_goal("body_frame")
+
+    @property
+    def goal_name(self) -> str | None:
+        """Where the goal is, as people say it, None if the file does not state it."""
+        return self._of_goal("name") or None
+
+    def _of_goal(self, key: str) -> str | None:
+        """Return a text that the file holds of the goal, None if there is none."""
         goals = self.file.task.get("goals")
         goal = goals[self.goal] if isinstance(goals, list) and self.goal < len(goals) else None
-        frame = goal.get("body_frame") if isinstance(goal, dict) else None
-        return frame if isinstance(frame, str) else None
+        text = goal.get(key) if isinstance(goal, dict) else None
+        return text if isinstance(text, str) else None
 
     def to_json(self) -> dict[str, Any]:
         """Return the explanation as plain containers."""
@@ -59,6 +68,7 @@ class Explanation:
             "task": self.file.metadata["task"],
             "environment": self.file.metadata["environment"],
             "goal": self.goal,
+            "goal_name": self.goal_name,
             "body_frame": self.body_frame,
             "observed": state_to_json(axes, self.match.state),
             "observed_error": state_to_json(axes, self.match.observed_error),

@@ -153,7 +153,7 @@ class ScoringSetup:
             excluded=excluded,
             approaches=approach_lines(job) if self.approach else None,
         )
-        person = person_entry(job.spec.environment, swept.tables)
+        person = person_entry(job.spec.environment, job.task, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
         if contact is not None:
             advice = contact.advice(job.spec.robot)
@@ -309,6 +309,7 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
         "allowed_contacts": [list(pair) for pair in task.allowed_contacts],
         "goals": [
             {
+                "name": goal.name,
                 "body_frame": goal.body_frame,
                 "position": goal.position.tolist(),
                 "quaternion_wxyz": goal.quaternion.tolist(),

@@ -10,6 +10,7 @@ import numpy as np
 
 from tcs.errors import StoreError
 from tcs.model.scene import EnvironmentFile
+from tcs.model.tasks import Task
 from tcs.placement.tables import Reason, ScoreTable
 
 KEY = "person"
@@ -19,13 +20,16 @@ which the gripper touches them."""
 _log = logging.getLogger(__name__)
 
 
-def person_entry(environment: EnvironmentFile, tables: Sequence[ScoreTable]) -> dict[str, Any]:
+def person_entry(
+    environment: EnvironmentFile, task: Task, tables: Sequence[ScoreTable]
+) -> dict[str, Any]:
     """Return the entry of the metadata for a person who is not the papers' man, or {}.
 
     A goal at which the gripper touches the person is logged as a warning.
 
     Args:
         environment: The scored environment.
+        task: The scored task.
         tables: The scores of its observed states.
     """
     person = environment.person
@@ -39,7 +43,10 @@ def person_entry(environment: EnvironmentFile, tables: Sequence[ScoreTable]) -> 
             goal,
             part,
         )
-    goals = [{"goal": goal, "part": part} for goal, part in touching.items()]
+    goals = [
+        {"goal": goal, "name": task.goals[goal].name, "part": part}
+        for goal, part in touching.items()
+    ]
     return {KEY: {**person.to_json(), "touching_goals": goals}}
 
 

@@ -96,6 +96,15 @@ def test_shipped_tasks_are_sound(name):
     assert task.source
     assert task.tool
     assert task.weights.sum() == pytest.approx(1.0, abs=1e-15)  # rounding of a short sum
+    names = [goal.name for goal in task.goals]
+    assert all(names)
+    assert len(set(names)) == len(names)
+    for goal in task.goals:
+        # y of the head points to the left; the other frames are one of each side, or in the middle.
+        side = goal.body_frame.rpartition("_")[2]
+        if goal.body_frame == "head" and abs(goal.position[1]) > 0.01:
+            side = "left" if goal.position[1] > 0.0 else "right"
+        assert {"left", "right"} & set(goal.name.split()) == {"left", "right"} & {side}
     environments = data_folder() / "models" / "beds_wheelchairs"
     for environment in task.environments:
         assert (environments / f"{environment}.yaml").is_file()

@@ -69,6 +69,8 @@ def test_tasks_can_be_pickled():
     ("changes", "expected"),
     [
         ({"body_frame": ""}, "field 'body_frame' is empty"),
+        ({"name": "left\ncheek"}, "printable characters"),
+        ({"name": "c" * 61}, "at most 60"),
         ({"position": [0.1, 0.2]}, "must be 3 finite numbers (x, y, z)"),
         ({"position": [0.1, math.nan, 0.2]}, "must be 3 finite numbers"),
         ({"position": ["a", 0, 0]}, "must be 3 finite numbers"),

@@ -134,8 +134,9 @@ def test_goals_that_one_base_pose_misses_have_a_reason_and_a_change(single):
     assert single.unreached
     wording = as_markdown(make_score_page(single, command="c"))
     for goal in single.unreached:
-        assert f"The cheapest change from stop 1 that reaches goal {goal}: " in wording
-    assert f"Not reached: {goals_text(single.unreached)}." in wording
+        named = f"{goal} ({single.goal_names[goal]})"
+        assert f"The cheapest change from stop 1 that reaches goal {named}: " in wording
+    assert f"Not reached: {goals_text(single.unreached, single.goal_names)}." in wording
     assert "Nothing was re-checked" in wording
     assert "Of the sets of at most 1 in the file this one has the greatest P\\_R + P\\_M" in wording
     assert all(single.assignment[goal] is None for goal in single.unreached)

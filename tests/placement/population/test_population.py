@@ -74,8 +74,8 @@ def of(*served: list[bool]) -> Population:
     )
     blocked = np.zeros((len(served[0]), 1), dtype=np.bool_)
     return Population(
-        people=people, sets=sets, blocked=blocked, observed={}, about={}, errors=None, seed=0,
-        seconds=0.0,
+        people=people, sets=sets, blocked=blocked, goal_names=("",), observed={}, about={},
+        errors=None, seed=0, seconds=0.0,
     )  # fmt: skip
 
 
