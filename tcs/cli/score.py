@@ -99,6 +99,17 @@ def score(
     ] = None,
     at: options.At = None,
     person: options.Person = None,
+    blocks: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Keep finished blocks of the grid in this folder: after an interrupt or a crash "
+            "the same command continues there.",
+        ),
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="With --blocks: discard what was finished before.")
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to select from."""
@@ -111,6 +122,10 @@ def score(
             "is not for an observed environment. Give the robot file of one arm with --robot.",
             param_hint="--arms",
         )
+    if restart and blocks is None:
+        raise typer.BadParameter("requires --blocks.", param_hint="--restart")
+    if blocks and (observed or frames):
+        raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
     constraints = wanted.constraints()
     if at and not frames and not constraints.keep:
         raise typer.BadParameter(
@@ -119,7 +134,9 @@ def score(
         )
 
     from tcs.cli.values import person_values, settings
-    from tcs.placement.scoring import default_path, files
+    from tcs.placement.scoring import BlockFolder, default_path, files
+
+    folder = None if blocks is None else BlockFolder(blocks, restart)
 
     scoring_options: dict[str, Any] = {
         "measure": measure,
@@ -135,7 +152,13 @@ def score(
     }
     if task is None:
         rows = files.score_all_to_files(
-            environment, robot, out or Path(), arms=arms, progress=_progress, **scoring_options
+            environment,
+            robot,
+            out or Path(),
+            arms=arms,
+            progress=_progress,
+            blocks=folder,
+            **scoring_options,
         )
         terminal.print_result({"rows": rows}, tables.report_rows, as_json=as_json)
         return
@@ -148,7 +171,7 @@ def score(
         with _progress(task) as on_progress:
             result = files.score_to_file(
                 task, environment, robot, path, arms=arms, on_progress=on_progress,
-                **scoring_options,
+                blocks=folder, **scoring_options,
             )  # fmt: skip
         terminal.print_result(result, tables.report_scores, as_json=as_json)
         return

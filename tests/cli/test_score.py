@@ -54,6 +54,23 @@ def test_number_of_jobs_changes_nothing(tcs_command, corner, corner_file, tmp_pa
     np.testing.assert_array_equal(one.nominal.scores.arm_joints, two.nominal.scores.arm_joints)
 
 
+def test_blocks_are_kept_and_taken(tcs_command, corner, corner_file, tmp_path):
+    path, blocks = tmp_path / "out.tcs", tmp_path / "blocks"
+    words = ("score", "shaving", "--environment", corner, "--blocks", blocks, "--out", path)
+    for more in ((), (), ("--restart",)):
+        assert tcs_command(*words, *more).code == 0
+        table, same = tcs.load(path).nominal.scores, tcs.load(corner_file).nominal.scores
+        np.testing.assert_array_equal(table.dexterity, same.dexterity)
+        assert len(list(blocks.rglob("*.block"))) == 1
+    for words, told in [
+        (("--restart",), "requires --blocks"),
+        (("--blocks", blocks, "--observed", "person_x=0.01"), "not for an observed environment"),
+    ]:
+        ran = tcs_command("score", "shaving", *words)
+        assert ran.code == 2
+        assert told in " ".join(ran.err.replace("│", " ").split())
+
+
 def test_constraints_when_scoring(tcs_command, corner, tmp_path):
     path, told = tmp_path / "out.tcs", tmp_path / "bedroom.yaml"
     told.write_text('forbid: ["0.9 -1, 1.2 -1, 1.2 -0.5, 0.9 -0.5"]\nprefer: [left]\n')

@@ -6,6 +6,7 @@ Out: a score file, and its verification.
 
 from __future__ import annotations
 
+from tcs.placement.scoring.blocks import BlockFolder
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
 from tcs.placement.scoring.job import Job, load_job
 from tcs.placement.scoring.live import LiveScorer, score_observed
@@ -17,6 +18,7 @@ from tcs.placement.scoring.sweep import Sweep, sweep, warm_up
 from tcs.placement.scoring.verify import Verification, verify
 
 __all__ = [
+    "BlockFolder",
     "Job",
     "LiveScorer",
     "SetOptions",

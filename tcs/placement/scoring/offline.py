@@ -25,6 +25,7 @@ from tcs.placement.constraints import (
 )
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
+from tcs.placement.scoring.blocks import BlockFolder
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
@@ -66,6 +67,8 @@ class ScoringSetup:
     """Number of threads; the result does not depend on it."""
     approach: bool = False
     """Whether a goal counts as reached only by postures that can be approached."""
+    blocks: BlockFolder | None = None
+    """Where finished blocks of the grid are kept; None to keep none."""
 
     @classmethod
     def load(
@@ -82,6 +85,7 @@ class ScoringSetup:
         now: Mapping[str, float] | None = None,
         person: PersonLike | None = None,
         approach: bool = False,
+        blocks: BlockFolder | None = None,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -98,7 +102,7 @@ class ScoringSetup:
             task, environment, robot, only=only, constraints=constraints, now=now, person=person
         )
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs, approach)
+        return cls(job, job.scene(), references, options, measure, jobs, approach, blocks)
 
     def score(
         self,
@@ -152,6 +156,7 @@ class ScoringSetup:
             on_compile=on_compile,
             excluded=excluded,
             approaches=approach_lines(job) if self.approach else None,
+            blocks=self.blocks,
         )
         person = person_entry(job.spec.environment, job.task, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
@@ -237,6 +242,7 @@ def score(
     now: Mapping[str, float] | None = None,
     person: PersonLike | None = None,
     approach: bool = False,
+    blocks: BlockFolder | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -265,6 +271,8 @@ def score(
             that of the papers' average man. Goals on the person are moved to that body.
         approach: Whether a goal counts as reached only by postures that the arm can leave backwards
             along the goal's approach. The best of these gives joints and dexterity.
+        blocks: Folder in which finished blocks of the grid are kept, so that the same call
+            continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -282,13 +290,14 @@ def score(
             base pose is forbidden.
         TcsError: If an option of the sets is out of range.
         ArmClassError: If `approach` is requested of an arm without a closed form.
+        OutputError: If blocks cannot be kept in their folder, or another process is at work there.
     """
     begun = time.perf_counter()
     robots = {"": robot} if arms is None else arm_references(robot, arms)
     setups = {
         arm: ScoringSetup.load(
             task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
-            constraints=constraints, now=now, person=person, approach=approach,
+            constraints=constraints, now=now, person=person, approach=approach, blocks=blocks,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ from tcs.placement.scoring.approaches import (
     score_with_approach,
     warm_up_approaches,
 )
+from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept, key_of
 from tcs.placement.tables import Reason, ScoreTable
 
 if TYPE_CHECKING:
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
 SLICE = 1024
 """Configurations per slice: some milliseconds of work, so that threads finish together and progress
 is visible, with scratch memory that stays in the processor's cache."""
+
+JOINTS = 7
+"""Joint angles of a posture."""
 
 SHORT_GAP = 32
 """Excluded configurations in a row that are scored after all: preparing a run takes longer."""
@@ -71,6 +76,7 @@ def sweep(
     on_compile: Callable[[], None] | None = None,
     excluded: NDArray[np.bool_] | None = None,
     approaches: ApproachLines | None = None,
+    blocks: BlockFolder | None = None,
 ) -> Sweep:
     """Score every configuration of the grid against every goal.
 
@@ -86,6 +92,8 @@ def sweep(
         excluded: Configurations that are not scored, shape (configurations,); None for none.
         approaches: The approaches of the goals, to score approachable postures only; None to score
             all postures.
+        blocks: Folder to keep finished blocks of the grid in, and to take them from, without the
+            approaches; None to keep none.
 
     Returns:
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
@@ -94,6 +102,7 @@ def sweep(
         UnknownNameError: If there is no measure of that name.
         TcsError: If `jobs` is less than 1.
         ArmClassError: If there are approaches, and the arm has no closed form.
+        OutputError: If blocks cannot be kept in the folder, or another process is at work there.
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
@@ -101,25 +110,23 @@ def sweep(
     compile_seconds = warm_up(problem, on_compile, approaches)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()
-    grippers = gripper_contacts(problem)
-    starts = range(0, size, SLICE)
     reason = np.empty((size, goals), np.uint8)
     contact = np.empty((size, goals), np.int32)
     dexterity = np.empty((size, goals), np.float32)
     joints = []
     done = 0
-    for part in Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
-        delayed(_slice)(problem, grippers, start, min(start + SLICE, size), excluded)
-        for start in starts
+    with (
+        _opened(blocks, problem, lambda: key_of(lowered, measure, excluded)) as kept,
+        closing(_scored(problem, excluded, kept, jobs)) as parts,
     ):
-        rows = slice(done, done + len(part.reason))
-        reason[rows], contact[rows], dexterity[rows] = part.reason, part.contact, part.dexterity
-        # Only reached pairs, about one in ten, have joints to keep.
-        joints.append(part.joints[part.reason == 0])
-        done += len(part.reason)
-        if on_progress is not None:
-            on_progress(done, size)
-    winning = np.concatenate(joints) if joints else np.empty((0, 7), np.float32)
+        for part in parts:
+            rows = slice(done, done + len(part.reason))
+            reason[rows], contact[rows], dexterity[rows] = part[:3]
+            joints.append(part.joints)
+            done += len(part.reason)
+            if on_progress is not None:
+                on_progress(done, size)
+    winning = np.concatenate(joints) if joints else np.empty((0, JOINTS), np.float32)
     approach_begun = time.perf_counter()
     if approaches is not None:
         winning = score_with_approach(
@@ -128,7 +135,7 @@ def sweep(
     done_at = time.perf_counter()
     names = _name_contacts(contact, lowered, problem)
     winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
-    parts = tuple(
+    divided = tuple(
         ScoreTable(
             dexterity=dexterity[rows],
             reason=reason[rows],
@@ -141,7 +148,7 @@ def sweep(
         for rows in [slice(i * size // tables, (i + 1) * size // tables)]
     )
     return Sweep(
-        parts,
+        divided,
         compile_seconds,
         scoring_seconds=done_at - begun,
         ik=ik_of(problem),
@@ -182,6 +189,57 @@ def _size(problem: Problem) -> int:
     return int(problem.environment_states * base_poses * problem.torso_levels)
 
 
+def _opened(
+    blocks: BlockFolder | None, problem: Problem, key: Callable[[], str]
+) -> AbstractContextManager[Kept | None]:
+    """Return a context manager of the blocks of a problem in a folder, or of None."""
+    if blocks is None:
+        return nullcontext()
+    others = problem.environment_bodies + problem.robot_bodies
+    return blocks.opened(
+        key(),
+        goals=problem.goal_p.shape[1],
+        joints=JOINTS,
+        contacts=problem.robot_bodies * others,
+    )
+
+
+def _scored(
+    problem: Problem, excluded: NDArray[np.bool_] | None, kept: Kept | None, jobs: int
+) -> Generator[Block, None, None]:
+    """Yield the scores of the grid, in its order: in blocks where they are kept, else in slices."""
+    size, length = _size(problem), SLICE if kept is None else BLOCK
+    grippers = gripper_contacts(problem)
+    yield from Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
+        delayed(_block)(problem, grippers, start, min(start + length, size), excluded, kept)
+        for start in range(0, size, length)
+    )
+
+
+def _block(
+    problem: Problem,
+    grippers: NDArray[np.int64],
+    start: int,
+    stop: int,
+    excluded: NDArray[np.bool_] | None,
+    kept: Kept | None,
+) -> Block:
+    """Return the scores of configurations start <= h < stop: kept ones, or new ones."""
+    found = None if kept is None else kept.load(start, stop)
+    if found is not None:
+        return found
+    slices = [
+        _slice(problem, grippers, begin, min(begin + SLICE, stop), excluded)
+        for begin in range(start, stop, SLICE)
+    ]
+    reason, contact, dexterity, joints = map(np.concatenate, zip(*slices, strict=True))
+    # Only reached pairs, about one in ten, have joints to keep.
+    block = Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
+    if kept is not None:
+        kept.save(start, block)
+    return block
+
+
 def _slice(
     problem: Problem,
     grippers: NDArray[np.int64],
@@ -195,7 +253,7 @@ def _slice(
         reason=np.empty(shape, np.uint8),
         contact=np.empty(shape, np.int32),
         dexterity=np.zeros(shape, np.float32),
-        joints=np.zeros((*shape, 7), np.float32),
+        joints=np.zeros((*shape, JOINTS), np.float32),
     )
     if excluded is None:
         score_slice(problem, grippers, start, stop, scores)

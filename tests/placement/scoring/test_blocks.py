@@ -1,0 +1,166 @@
+"""Blocks: the same scores as without, whatever was finished, damaged or of other inputs before."""
+
+import importlib
+import logging
+import os
+
+import numpy as np
+import pytest
+
+from tcs.errors import OutputError
+from tcs.files.compression import compress
+from tcs.placement.scoring.blocks import FORMAT, BlockFolder
+from tcs.placement.scoring.sweep import sweep
+
+# The package has a function of the module's name.
+SWEEP = importlib.import_module("tcs.placement.scoring.sweep")
+BLOCK = 20
+
+
+@pytest.fixture(scope="module")
+def lowered(small_job):
+    return small_job.lowered(small_job.scene())
+
+
+@pytest.fixture(scope="module")
+def plain(lowered, small_job):
+    return sweep(lowered, small_job.task.weights).tables[0]
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    """Blocks so small that the grid has several; the list of the slices that were scored."""
+    scored = []
+    scores_of = SWEEP._slice
+
+    def counted(problem, grippers, start, stop, excluded=None):
+        scored.extend([start] * (stop > start))
+        return scores_of(problem, grippers, start, stop, excluded)
+
+    monkeypatch.setattr(SWEEP, "BLOCK", BLOCK)
+    monkeypatch.setattr(SWEEP, "_slice", counted)
+    return scored
+
+
+@pytest.fixture
+def run(lowered, small_job, small_blocks, tmp_path):
+    """Function that scores with blocks and returns the table, and the number of scored blocks."""
+
+    def scored(*, restart=False, **options):
+        small_blocks.clear()
+        folder = BlockFolder(tmp_path / "blocks", restart)
+        swept = sweep(lowered, small_job.task.weights, blocks=folder, **options)
+        return swept.tables[0], len(small_blocks)
+
+    return scored
+
+
+def files(folder):
+    return sorted((folder / "blocks").rglob("*.block"))
+
+
+def assert_same(first, second):
+    for name in ("reason", "dexterity", "pair", "arm_joints"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    assert first.pair_names == second.pair_names
+
+
+def test_finished_blocks_are_not_scored_again(run, plain, small_job, tmp_path):
+    table, scored = run()
+    assert_same(table, plain)
+    assert scored == len(files(tmp_path)) == -(-small_job.grid.size // BLOCK) > 2
+    table, scored = run()
+    assert_same(table, plain)
+    assert scored == 0
+    assert run(restart=True)[1] == len(files(tmp_path))
+
+
+def test_an_interrupted_run_continues(run, plain, small_job, tmp_path):
+    def interrupt(done, _total):
+        if done > small_job.grid.size / 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(on_progress=interrupt, jobs=1)
+    kept = len(files(tmp_path))
+    assert kept >= 2
+    table, scored = run()
+    assert_same(table, plain)
+    assert scored == len(files(tmp_path)) - kept
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def changed_byte(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def emptied(path):
+    path.write_bytes(b"")
+
+
+def with_codes(name, value):
+    """Return a change that writes a code which does not exist."""
+
+    def change(path):
+        content = FORMAT.load(path, dict)
+        shape = content[name]["shape"]
+        element = np.uint8 if name == "reason" else np.uint32
+        content[name] = compress(np.full(shape, value, element))
+        FORMAT.save(path, {k: v for k, v in content.items() if not k.startswith("format")})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [changed_byte, emptied, with_codes("reason", 99), with_codes("contact", 10**9),
+     with_codes("reason", 1)],
+)  # fmt: skip
+def test_a_damaged_block_is_told_and_scored_again(damage, run, plain, tmp_path, caplog):
+    run()
+    damage(files(tmp_path)[1])
+    with caplog.at_level(logging.WARNING):
+        table, scored = run()
+    assert_same(table, plain)
+    assert scored == 1
+    (record,) = caplog.records
+    assert str(files(tmp_path)[1]) in record.getMessage()
+    assert run()[1] == 0
+
+
+def test_a_block_of_another_place_is_not_taken(run, plain, tmp_path):
+    run()
+    first, second = files(tmp_path)[:2]
+    second.write_bytes(first.read_bytes())
+    table, scored = run()
+    assert_same(table, plain)
+    assert scored == 1
+
+
+def test_other_inputs_have_their_own_blocks(run, small_job, tmp_path):
+    total = run()[1]
+    excluded = np.zeros(small_job.grid.size, dtype=np.bool_)
+    excluded[:5] = True
+    assert run(excluded=excluded)[1] >= total
+    assert run(measure="inverse-condition")[1] == total
+    assert len(list((tmp_path / "blocks").iterdir())) == 3
+    assert run()[1] == 0
+
+
+def test_a_second_run_on_the_same_blocks_is_refused_with_the_process(run, tmp_path):
+    run()
+    (folder,) = (tmp_path / "blocks").iterdir()
+    with (
+        BlockFolder(tmp_path / "blocks").opened(folder.name, goals=1, joints=7, contacts=1),
+        pytest.raises(OutputError, match=f"is in use by process {os.getpid()}"),
+    ):
+        run()
+    assert run()[1] == 0
+
+
+def test_a_folder_that_cannot_be_made_is_refused(run, tmp_path):
+    (tmp_path / "blocks").write_text("a file")
+    with pytest.raises(OutputError, match="cannot be created"):
+        run()
