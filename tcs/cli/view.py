@@ -1,6 +1,9 @@
-"""The command `tcs view`: show a score file in the browser."""
+"""The command `tcs view`: show a score file or a plan in the browser."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -12,13 +15,29 @@ from tcs.output.terminal import tables
 
 @expand_options
 def view(
-    file: options.File,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A file made by `tcs score`, or a plan.json by `tcs plan --out`."
+        ),
+    ],
     chosen: options.ShownOptions,
     page: options.ExportOptions,
     window: options.WindowOptions,
+    swept: Annotated[
+        bool,
+        typer.Option("--swept", help="Of a plan: show the volume that the arm sweeps."),
+    ] = False,
 ) -> None:
-    """Show a score file in the browser: its sets, every other base pose and each goal."""
+    """Show a score file in the browser: its sets, any base pose, each goal; or play a plan."""
     page.check()
+    if file.suffix == ".json":
+        if chosen != options.ShownOptions():
+            raise typer.BadParameter("a plan has its own stops.", param_hint="--here")
+        _view_plan(file, page, window, swept)
+        return
+    if swept:
+        raise typer.BadParameter("requires a plan.json.", param_hint="--swept")
     here = chosen.state()
 
     import tcs
@@ -37,6 +56,28 @@ def view(
         terminal.print_result(result, tables.report_page, as_json=page.as_json)
         return
     show_score_view(
+        shown,
+        port=window.port,
+        browser=window.browser,
+        duration=window.duration,
+        on_line=typer.echo,
+        on_note=terminal.note,
+    )
+
+
+def _view_plan(
+    path: Path, page: options.ExportOptions, window: options.WindowOptions, swept: bool
+) -> None:
+    """Play a plan in the browser, or write it as a page."""
+    from tcs.motion import load_plan
+    from tcs.output.view import make_plan_view, show_plan_view, write_plan_view
+
+    shown = make_plan_view(load_plan(path), meshes=page.meshes or page.export is None, swept=swept)
+    if page.export is not None:
+        result = write_plan_view(shown, page.export)
+        terminal.print_result(result, tables.report_page, as_json=page.as_json)
+        return
+    show_plan_view(
         shown,
         port=window.port,
         browser=window.browser,

@@ -76,7 +76,7 @@ def check_plan(
         StoreFormatError: If it names goals, joints or axes that its scene does not have.
     """
     job, scene = rebuild_made_from(plan.made_from)
-    _check_names(plan, job)
+    check_names(plan, job)
     total, done = sum(len(stop.segments) for stop in plan.stops), 0
     edges = false = jumps = goals = 0
     error = velocity = acceleration = 0.0
@@ -106,7 +106,12 @@ def stop_of(plan: MotionPlan, planned: StopPlan, job: Job, scene: Any) -> Stop:
     return Stop.at_values(job, scene, values, plan.seed)
 
 
-def _check_names(plan: MotionPlan, job: Job) -> None:
+def check_names(plan: MotionPlan, job: Job) -> None:
+    """Check that a plan names the joints, axes and goals of its scene.
+
+    Raises:
+        StoreFormatError: If it does not.
+    """
     if plan.joints != tuple(job.spec.robot.arm_joints):
         raise StoreFormatError("The plan names other joints than the scored arm has. Plan again.")
     axes = {axis.name for axis in job.scored_grid.axes}

@@ -140,10 +140,14 @@ def member_figure(
 
 def title_of(job: Job, file: ScoreFile) -> str:
     """Return the titles of task, environment and robot, with the arms of a file of several."""
-    robot = job.spec.robot.title
     if file.arms:
-        robot = f"{file.robot['name']}, {' or '.join(file.arms)} arm"
-    return f"{job.task.title} · {job.spec.environment.title} · {robot}"
+        return job_title(job, f"{file.robot['name']}, {' or '.join(file.arms)} arm")
+    return job_title(job)
+
+
+def job_title(job: Job, robot: str | None = None) -> str:
+    """Return the titles of task, environment and robot; `robot` replaces that of its file."""
+    return f"{job.task.title} · {job.spec.environment.title} · {robot or job.spec.robot.title}"
 
 
 def _set_environment(scene: Scene, member: InitialConfiguration) -> None:

@@ -8,15 +8,7 @@ from typing import Any
 from tcs.output.terminal.console import results_console
 from tcs.output.terminal.tables import new_table
 from tcs.output.words import base_pose_text
-from tcs.output.words.bodies import pair_text
-
-_REASONS = {
-    "unreached": "no posture reaches it",
-    "rest_blocked": "something touches the robot while its arm rests",
-    "approach_limits": "joint or velocity limits prevent its approach",
-    "approach_blocked": "its approach is blocked",
-    "no_path": "no path was found",
-}
+from tcs.output.words.motions import NOT_DONE_TEXTS, not_done_text, place_text
 
 
 def report_plan(result: Mapping[str, Any]) -> None:
@@ -29,7 +21,7 @@ def report_plan(result: Mapping[str, Any]) -> None:
             continue
         table = new_table("motion", "from", "to", ">duration [s]", ">edges")
         for segment in stop["segments"]:
-            ends = [_place(segment[key]) for key in ("from", "to")]
+            ends = [place_text(segment[key]) for key in ("from", "to")]
             table.add_row(
                 segment["type"], *ends, f"{segment['duration']:.2f}", str(segment["edges"])
             )
@@ -39,7 +31,7 @@ def report_plan(result: Mapping[str, Any]) -> None:
             out.print("no path back to the rest posture was found")
     for goal in result["results"]:
         if not goal["done"]:
-            out.print(_failure(goal))
+            out.print(not_done_text(goal))
     verified = result["verified"]
     out.print(
         f"{result['goals_done']} of {result['goals']} goals done "
@@ -60,7 +52,7 @@ def report_motions(result: Mapping[str, Any]) -> None:
     out.print(table)
     for reason, count in result["not_done"].items():
         if count:
-            out.print(f"{count:,} pairs: {_REASONS[reason]}")
+            out.print(f"{count:,} pairs: {NOT_DONE_TEXTS[reason]}")
     out.print(
         f"{result['done']:,} of {result['pairs']:,} reached pairs can be done, from "
         f"{result['configurations']:,} of {result['candidates']:,} configurations. "
@@ -76,17 +68,3 @@ def report_plan_check(result: Mapping[str, Any]) -> None:
         f"{result['max_position_error']:.1e} m; at most {result['velocity']:.1%} of the velocity "
         f"limits and {result['acceleration']:.1%} of the acceleration limits"
     )
-
-
-def _place(name: str | int) -> str:
-    return name if isinstance(name, str) else f"goal {name}"
-
-
-def _failure(goal: Mapping[str, Any]) -> str:
-    """Return why a goal is not done, as one line."""
-    text = f"goal {goal['goal']}: {_REASONS[goal['reason']]}"
-    if goal["segment"]:
-        text += f" ({goal['segment']}, tried for {goal['seconds']:.2f} s)"
-    if goal["pair"] is not None:
-        text += f"; most often {pair_text(goal['pair'])}"
-    return text

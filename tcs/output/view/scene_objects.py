@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Meshcat, Sphere
 from pydrake.math import RigidTransform
 
+from tcs.model.grid import InitialConfiguration
 from tcs.model.scene import Scene, goal_poses
 from tcs.model.tasks import Task
 from tcs.output.draw import BaseFootprint, Category
@@ -54,39 +55,39 @@ class Snapshot:
     """The visible arrows, one for each goal."""
 
 
-class SceneObjects:
-    """The objects of one scene."""
+class SceneShapes:
+    """The objects of one scene, whatever is shown of it."""
 
-    def __init__(self, scene: Scene, task: Task, viewed: ViewedSet, *, meshes: bool) -> None:
+    def __init__(self, scene: Scene, task: Task, *, meshes: bool) -> None:
         """Read the objects of a scene.
 
         Args:
-            scene: The scene of the file, built with meshes if they are shown. Snapshots move it.
+            scene: The scene, built with meshes if they are shown. Poses move it.
             task: Its task.
-            viewed: The scores and the set.
             meshes: Whether the robot is shown as its meshes, or as its collision shapes.
         """
-        self._scene, self._task, self._viewed = scene, task, viewed
-        # Moves the base; every snapshot sets its pose again.
+        self.scene, self.task = scene, task
+        # Moves the base; every pose sets it again.
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
         self._environment = _environment_shapes(scene)
         self._rest = _resting_arm(scene)
 
-    def snapshot(self, index: int, goal: int) -> Snapshot:
-        """Return the poses at a configuration, with the arm at a goal if it is reached.
+    def poses(
+        self, at: InitialConfiguration, joints: ArrayLike | None, goal: int
+    ) -> dict[str, FloatArray]:
+        """Return the poses of all objects in their parents, shapes (3, 4).
 
         Args:
-            index: Flat index of the configuration.
-            goal: The goal that is shown. If it is not reached, the arm is in its rest posture.
+            at: Robot and environment.
+            joints: The arm [rad], shape (7,); None for its rest posture.
+            goal: The goal that is marked.
         """
-        result = self._viewed.result(index)
-        scene, at = self._scene, result.configuration
+        scene = self.scene
         for name, value in at.environment:
             scene.set_joint(name, value)
         scene.place_base(at.base_x, at.base_y, at.base_yaw)
         scene.set_torso(at.torso)
-        joints = self._viewed.joints(index, goal)
         scene.set_arm(self._rest if joints is None else joints)
         plant, context = scene.built.plant, scene.plant_context
         X_WB = scene.base_pose()
@@ -97,20 +98,25 @@ class SceneObjects:
         for body in {one.body for one in self._environment}:
             X_WL = plant.EvalBodyPoseInWorld(context, plant.get_body(body))
             poses[f"{ENVIRONMENT}/{int(body)}"] = X_WL
-        goals = goal_poses(scene, self._task)
+        goals = goal_poses(scene, self.task)
         poses |= {f"{GOALS}/{g}": X_WG for g, X_WG in enumerate(goals)}
         poses[SHOWN] = RigidTransform(goals[goal].translation())
-        return Snapshot(
-            {path: X.GetAsMatrix34() for path, X in poses.items()},
-            frozenset(enumerate(result.reasons)),
-        )
+        return {path: X.GetAsMatrix34() for path, X in poses.items()}
 
-    def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
+    def draw(
+        self,
+        meshcat: Meshcat,
+        arrows: Iterable[Arrow],
+        members: Iterable[InitialConfiguration],
+        *,
+        compact: bool = False,
+    ) -> None:
         """Add all objects to Meshcat, without poses.
 
         Args:
             meshcat: An empty Meshcat.
             arrows: The arrows that are shown at any time; all are hidden.
+            members: Configurations whose base is outlined on the floor.
             compact: Whether meshes are sent as bare triangles, a fifth of the size of their files,
                 which take seconds to read.
         """
@@ -123,21 +129,52 @@ class SceneObjects:
             meshcat.SetTriangleMesh(path, corners, faces, rgba(REASON_COLOURS[reason]))
             meshcat.SetProperty(path, "visible", False)
         meshcat.SetObject(SHOWN, Sphere(_MARK_RADIUS), rgba(Category.CURRENT_GOAL.colour))
-        self._draw_members(meshcat)
-        middle = np.mean([X.translation() for X in goal_poses(self._scene, self._task)], axis=0)
+        for number, at in enumerate(members):
+            self._draw_member(meshcat, number, at)
+        middle = np.mean([X.translation() for X in goal_poses(self.scene, self.task)], axis=0)
         meshcat.SetCameraPose(middle + _CAMERA, middle)
 
-    def _draw_members(self, meshcat: Meshcat) -> None:
-        """Draw the outline and the heading of the base at each member of the set."""
-        for number, index in enumerate(self._viewed.members):
-            at = self._viewed.grid.configuration(index)
-            stand = BaseFootprint(at, self._outline)
-            middle = np.array([at.base_x, at.base_y])
-            ahead = 0.45 * np.array([np.cos(at.base_yaw), np.sin(at.base_yaw)])
-            around = np.vstack([stand.polygon, stand.polygon[:1]])
-            for name, line in (("outline", around), ("ahead", np.stack([middle, middle + ahead]))):
-                points = np.column_stack([line, np.full(len(line), _LINE_HEIGHT)])
-                meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, rgba(_MEMBER))
+    def _draw_member(self, meshcat: Meshcat, number: int, at: InitialConfiguration) -> None:
+        """Draw the outline and the heading of the base."""
+        stand = BaseFootprint(at, self._outline)
+        middle = np.array([at.base_x, at.base_y])
+        ahead = 0.45 * np.array([np.cos(at.base_yaw), np.sin(at.base_yaw)])
+        around = np.vstack([stand.polygon, stand.polygon[:1]])
+        for name, line in (("outline", around), ("ahead", np.stack([middle, middle + ahead]))):
+            points = np.column_stack([line, np.full(len(line), _LINE_HEIGHT)])
+            meshcat.SetLine(f"{MEMBERS}/{number}/{name}", points.T, 4.0, rgba(_MEMBER))
+
+
+class SceneObjects(SceneShapes):
+    """The objects of the scene of a score file."""
+
+    def __init__(self, scene: Scene, task: Task, viewed: ViewedSet, *, meshes: bool) -> None:
+        """Read the objects of a scene.
+
+        Args:
+            scene: The scene of the file, built with meshes if they are shown. Snapshots move it.
+            task: Its task.
+            viewed: The scores and the set.
+            meshes: Whether the robot is shown as its meshes, or as its collision shapes.
+        """
+        super().__init__(scene, task, meshes=meshes)
+        self._viewed = viewed
+
+    def snapshot(self, index: int, goal: int) -> Snapshot:
+        """Return the poses at a configuration, with the arm at a goal if it is reached.
+
+        Args:
+            index: Flat index of the configuration.
+            goal: The goal that is shown. If it is not reached, the arm is in its rest posture.
+        """
+        result = self._viewed.result(index)
+        poses = self.poses(result.configuration, self._viewed.joints(index, goal), goal)
+        return Snapshot(poses, frozenset(enumerate(result.reasons)))
+
+    def set_up(self, meshcat: Meshcat, arrows: Iterable[Arrow], *, compact: bool = False) -> None:
+        """Add all objects to Meshcat, without poses: see `draw`."""
+        members = (self._viewed.grid.configuration(index) for index in self._viewed.members)
+        self.draw(meshcat, arrows, members, compact=compact)
 
 
 def arrow_path(arrow: Arrow) -> str:

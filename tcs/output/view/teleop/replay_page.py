@@ -10,6 +10,7 @@ from pathlib import Path
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from tcs.files.writing import whole_file
+from tcs.output.view.animation import interpolation_keys, play_visible
 from tcs.output.view.export import overlay
 from tcs.output.view.live import open_meshcat
 from tcs.output.view.teleop.panel import (
@@ -100,7 +101,7 @@ def replay_page(
     animation = MeshcatAnimation(rate)
     for path in shots[0]:
         poses = [shot[path].GetAsMatrix34() for shot in shots]
-        for at in _keys([pose.tobytes() for pose in poses]):
+        for at in interpolation_keys([pose.tobytes() for pose in poses]):
             animation.SetTransform(at, path, shots[at][path])
     _play_bars(animation, view.arm, readouts)
     _play_lines(animation, panel, readouts)
@@ -113,12 +114,12 @@ def _play_bars(animation: MeshcatAnimation, arm: Arm, readouts: list[Readout]) -
     """Animate the lengths and colours of the bars."""
     for i, bounded in enumerate(arm.bounded):
         fractions = [one.fractions[i] for one in readouts]
-        for at in _keys(fractions):
+        for at in interpolation_keys(fractions):
             for path, name, value in bar_properties(i, fractions[at], bool(bounded)):
                 animation.SetProperty(at, path, name, value)
         states = [one.states[i] for one in readouts]
         for state in COLOURS:
-            _play_visible(animation, f"{bar(i)}/{state}", [one == state for one in states])
+            play_visible(animation, f"{bar(i)}/{state}", [one == state for one in states])
 
 
 def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readout]) -> None:
@@ -128,25 +129,4 @@ def _play_lines(animation: MeshcatAnimation, panel: Panel, readouts: list[Readou
         for text in dict.fromkeys(texts):
             path = panel.text(line, text)
             if path:
-                _play_visible(animation, path, [one == text for one in texts])
-
-
-def _play_visible(animation: MeshcatAnimation, path: str, shown: list[bool]) -> None:
-    """Animate the visibility of an object; it switches without a transition."""
-    for at, visible in enumerate(shown):
-        if at in (0, len(shown) - 1) or visible != shown[at - 1]:
-            animation.SetProperty(at, path, "visible", visible)
-
-
-def _keys(values: Sequence[object]) -> list[int]:
-    """Return the indices of the keys from which linear interpolation reproduces all values.
-
-    >>> _keys([1, 1, 1, 2, 3, 3, 3])
-    [0, 2, 3, 4, 6]
-    """
-    last = len(values) - 1
-    return [
-        i
-        for i, value in enumerate(values)
-        if i in (0, last) or value != values[i - 1] or value != values[i + 1]
-    ]
+                play_visible(animation, path, [one == text for one in texts])
