@@ -79,11 +79,24 @@ def best_of_rolls(chain, q):
 
 
 # The solver has to spread the postures over the free joint's angles, and to keep the joints
-# determined (1, 12); rounding must not hide some of them (40, 53, 540), nor must intervals between
-# feasible samples in which joints run fast (18), and refinement has to go on (512, 540).
+# determined (1, 12); rounding must not hide some of them (40, 53, 143, 540), nor must intervals
+# between feasible samples in which joints run fast (18), and refinement has to go on (512, 540).
+# Between two samples the wrist may pass straight twice (188, 574).
 @pytest.mark.parametrize(
     ("seed", "offset"),
-    [(1, 0.0), (12, 0.0), (40, 0.0), (53, 0.1), (540, 0.0), (512, 0.0), (18, 0.1)],
+    [
+        (1, 0.0),
+        (12, 0.0),
+        (40, 0.0),
+        (53, 0.1),
+        (540, 0.0),
+        (512, 0.0),
+        (18, 0.1),
+        (143, 0.0),
+        (188, 0.0),
+        (188, 0.1),
+        (574, 0.0),
+    ],
     ids=str,
 )
 def test_the_best_posture_at_a_straight_wrist_is_found(seed, offset):

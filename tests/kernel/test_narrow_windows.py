@@ -12,12 +12,7 @@ from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scan
 from tcs.placement.scoring import load_job
 from tests.kernel.judge import is_true
 
-# Configuration and goal of scratching the right thigh. The PR2's shoulder lift leaves its lower
-# limit just before the wrist flex meets its own: windows of 4e-4 to 2.5e-3 rad.
-BETWEEN_LIMITS = [
-    (663388, 1), (1126360, 1), (320451, 1), (419797, 1), (621037, 1), (680582, 0),
-]  # fmt: skip
-# Of feeding. Every sample but those next to a limit touches something.
+# Configuration and goal of feeding. Every sample but those next to a limit touches something.
 NEXT_TO_A_LIMIT = [
     (86787, 3), (64777, 1), (64071, 5), (73541, 5), (80859, 5), (58945, 2), (61873, 1), (63310, 2),
     (79465, 5),
@@ -39,11 +34,6 @@ def problem_of(task, environment, robot="pr2"):
 
 
 @pytest.fixture(scope="module")
-def scratching():
-    return problem_of("scratching_thigh_right", "bed")
-
-
-@pytest.fixture(scope="module")
 def feeding():
     return problem_of("feeding", "wheelchair")
 
@@ -56,11 +46,6 @@ def shaving_with_iiwa7():
 @pytest.fixture(scope="module")
 def shaving_with_tiago():
     return problem_of("shaving", "wheelchair", "tiago")
-
-
-@pytest.mark.parametrize(("h", "g"), BETWEEN_LIMITS, ids=str)
-def test_a_window_between_two_limits_is_found(scratching, h, g):
-    check(scratching, h, g)
 
 
 @pytest.mark.parametrize(("h", "g"), NEXT_TO_A_LIMIT, ids=str)

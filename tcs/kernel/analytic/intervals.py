@@ -60,6 +60,12 @@ COS_FAST = float(np.cos(FAR_ENDS))
 SLOPE = 0.8
 """Change of isotropy over the motion of the joint that moves farthest [1/rad], from above: where
 the goal is reached already, intervals that cannot hold a better solution are left out."""
+ROLLED = 4.0
+"""Added to the bound of joints 5 and 7 [1], more than any limit takes, where the wrist may pass
+straight between two samples: each time they rotate by half a turn, and twice leaves no trace."""
+ONCE = 5e-3
+"""Spacing [rad] up to which the wrist passes straight at most once between two samples, and the
+joints at the two show it."""
 NEAR = 2e-4
 """Motion [rad] below which an interval is not divided further: narrower windows are given up."""
 PARTS = int_constant(8)
@@ -118,17 +124,20 @@ def motions(
         room = min(room, high - h3 + PATH * l3)
         high = (rows[C4 + n] + rows[C4 + m]) * mc4 + (rows[S4 + n] + rows[S4 + m]) * ms4
         room = min(room, high - h4 + PATH * l4)
-        high = (rows[C5 + n] + rows[C5 + m]) * mc5 + (rows[S5 + n] + rows[S5 + m]) * ms5
+        swept = PATH * (step + l2 + l3 + l4)
+        bend = np.sqrt(max(-2.0 * rows[WRIST + n], 0.0)) + np.sqrt(max(-2.0 * rows[WRIST + m], 0.0))
+        rolled = ROLLED if bend < (swept if step > ONCE else 0.0) else 0.0
+        high = (rows[C5 + n] + rows[C5 + m]) * mc5 + (rows[S5 + n] + rows[S5 + m]) * ms5 + rolled
         room = min(room, high - h5 + PATH * l5)
         high = (rows[C6 + n] + rows[C6 + m]) * mc6 + (rows[S6 + n] + rows[S6 + m]) * ms6
         room = min(room, high - h6 + PATH * l6)
-        high = (rows[C7 + n] + rows[C7 + m]) * mc7 + (rows[S7 + n] + rows[S7 + m]) * ms7
+        high = (rows[C7 + n] + rows[C7 + m]) * mc7 + (rows[S7 + n] + rows[S7 + m]) * ms7 + rolled
         room = min(room, high - h7 + PATH * l7) + REST * most
         # Where aim or wrist do not exist at either end, what stands in says nothing of its joint.
         missing = max(min(rows[AIM + n], rows[AIM + m]), min(rows[WRIST + n], rows[WRIST + m]))
         room = 1.0 if missing > 0.0 else room
         room = min(room, swing + forearm * l4 - (rows[AIM + n] + rows[AIM + m]))
-        room = min(room, PATH * (step + l2 + l3 + l4) - (rows[WRIST + n] + rows[WRIST + m]))
+        room = min(room, swept - (rows[WRIST + n] + rows[WRIST + m]))
         most = max(most, step)
         matters = most > FAR or max(slack[i], slack[i + 1]) < 0.0
         motion[i] = most if room >= 0.0 and matters else 0.0
