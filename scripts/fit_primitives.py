@@ -1,6 +1,7 @@
 """Fit the collision primitives of a robot, or find the pairs of bodies that need no check.
 
-    python scripts/fit_primitives.py pr2            rewrites the primitives file of its YAML file
+    python scripts/fit_primitives.py pr2            rewrites the primitives file of its YAML file,
+                                                    each body as scripts/fits.yaml says, if it does
     python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry,
                                                     and keeps groups made by hand
     python scripts/fit_primitives.py tiago base_link=6 ...     fits these bodies again, with up to
@@ -21,8 +22,11 @@ import yaml
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
 from tcs.model.robots import RobotFile, load_robot, write_primitives
-from tcs.model.robots.fitting import fit_robot, refit
+from tcs.model.robots.fitting import Target, fit_robot, refit, target_of
 from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
+
+FITS = Path(__file__).parent / "fits.yaml"
+"""Bodies of the shipped robots that are not fitted as usual."""
 
 
 def main() -> int:
@@ -54,7 +58,9 @@ def main() -> int:
 
 def rewrite_primitives(robot: RobotFile) -> None:
     """Fit and write the primitives, and print the table for docs/robots.md."""
-    fits = fit_robot(robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr))
+    fits = fit_robot(
+        robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr), chosen_fits(robot)
+    )
     write_primitives(Path(robot.primitives), [p for f in fits for p in f.fit.primitives])
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
@@ -64,6 +70,20 @@ def rewrite_primitives(robot: RobotFile) -> None:
             f"| {found.body} | {len(fit.primitives)} | {fit.hull * 1e3:.3f} "
             f"| {fit.union * 1e3:.3f} | {fit.excess:.2f} |"
         )
+
+
+def chosen_fits(robot: RobotFile) -> dict[str, Target | None]:
+    """Return how FITS says that bodies of a robot are fitted; None for those that it keeps."""
+    chosen: dict[str, Target | None] = {}
+    fits = yaml.safe_load(FITS.read_text(encoding="utf-8")).get(robot.name) or {}
+    for body, fit in fits.items():
+        if fit == "kept":
+            chosen[body] = None
+        elif isinstance(fit, int):
+            chosen[body] = target_of(robot, body, fit)
+        else:
+            chosen[body] = Target(protrusion=fit["protrusion"], max_shapes=fit["shapes"])
+    return chosen
 
 
 def rewrite_pairs(robot: RobotFile, path: Path) -> None:

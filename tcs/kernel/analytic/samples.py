@@ -42,10 +42,10 @@ ELBOW_ROUNDING = 1e-11
 """What rounding may take from 1 - cos^2 of the elbow at full stretch: twice the rounding of |SW|^2
 that counts as reached (`arcs.REACH_ROUNDING`) over twice the product of the lengths of upper arm
 and forearm, which is above 0.02 m^2."""
-LEAST_TILT = 1e-10
+LEAST_TILT = 3e-10
 """Added to the components of axis 7 across axis 5 before joint 5 is computed from them. Where the
 wrist is exactly straight, joints 5 and 7 may rotate against each other at a single angle of the
-free joint: this spreads their postures over 1e-10 rad of it, far above rounding, and changes the
+free joint: this spreads their postures over 3e-10 rad of it, far above rounding, and changes the
 pose by no more."""
 TILTED = 1e-14
 """Squared sine of joint 6 below which LEAST_TILT is added: elsewhere it would only change the

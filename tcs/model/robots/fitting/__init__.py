@@ -6,7 +6,8 @@ of them for some (`refit`), and how those of a robot file enclose its surface (`
 
 from __future__ import annotations
 
-from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit
+from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, target_of
+from tcs.model.robots.fitting.covering import Target
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
 
-__all__ = ["BodyEnclosure", "BodyFit", "enclosure", "fit_robot", "refit"]
+__all__ = ["BodyEnclosure", "BodyFit", "Target", "enclosure", "fit_robot", "refit", "target_of"]

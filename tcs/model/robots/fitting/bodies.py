@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,9 @@ class BodyFit:
 
 
 def fit_robot(
-    robot: RobotFile, on_progress: Callable[[int, int], None] | None = None
+    robot: RobotFile,
+    on_progress: Callable[[int, int], None] | None = None,
+    chosen: Mapping[str, Target | None] = MappingProxyType({}),
 ) -> tuple[BodyFit, ...]:
     """Return primitives that enclose every triangle of a robot, body by body.
 
@@ -64,20 +67,22 @@ def fit_robot(
     Args:
         robot: The robot.
         on_progress: Called with the bodies done and all bodies.
+        chosen: How closely some bodies are fitted if not as usual; None keeps the shapes that the
+            primitives file has for a body.
 
     Raises:
-        RobotError: If a mesh cannot be read.
+        UnknownNameError: If `chosen` has a body that is not fitted, or one to keep without shapes.
+        RobotError: If a mesh, or the primitives of a body to keep, cannot be read.
     """
     model = robot.model()
     triangles = body_triangles(model)
-    groups = _groups(robot, model, triangles)
-    targets: dict[object, Target] = {}
-    for body in groups:
-        key = _shape_key(model, body) if body in triangles else body
-        # The target of the scored arm holds for the other arm, which has the same shapes.
-        targets[key] = min(
-            targets.get(key, REST), _target(robot, model, body), key=lambda t: t.protrusion
-        )
+    apart = {body for body, target in chosen.items() if target is not None}
+    groups = _groups(robot, model, triangles, apart)
+    for body in chosen:
+        if body not in groups:
+            raise UnknownNameError("body", body, groups, where=f"bodies to fit of '{robot.name}'")
+    kept = _shapes_by_body(robot) if None in chosen.values() else {}
+    targets = _targets(robot, model, groups, chosen)
     fits: dict[object, tuple[Fit, FloatArray, FloatArray]] = {}
     results = []
     for done, (body, members) in enumerate(groups.items()):
@@ -86,7 +91,9 @@ def fit_robot(
         own = _in_frame_of(model, body, members, triangles)
         key = _shape_key(model, body) if len(members) == 1 else body
         R, p = _key_frame(model, body)
-        if key not in fits:
+        if body in chosen and chosen[body] is None:
+            fit = _kept(robot, kept, body, own)
+        elif key not in fits:
             target = targets.get(key, REST)
             fit = _boxes_of_urdf(model, body, members, target) or fit_triangles(body, own, target)
             fits[key] = fit, R, p
@@ -112,18 +119,59 @@ def refit(robot: RobotFile, shapes: Mapping[str, int]) -> tuple[Primitive, ...]:
         UnknownNameError: If the file has no primitive of a body.
         RobotError: If a mesh or the primitives cannot be read.
     """
+    found = _shapes_by_body(robot)
+    surfaces = surfaces_to_enclose(robot)
+    for body, most in shapes.items():
+        _check_has_shapes(robot, found, body)
+        _, _, surface = surfaces[body]
+        found[body] = fit_triangles(body, surface, target_of(robot, body, most)).primitives
+    return tuple(shape for fitted in found.values() for shape in fitted)
+
+
+def _targets(
+    robot: RobotFile,
+    model: Urdf,
+    groups: Mapping[str, list[str]],
+    chosen: Mapping[str, Target | None],
+) -> dict[object, Target]:
+    """Return how closely bodies are fitted, by the key of their shape."""
+    targets: dict[object, Target] = {}
+    for body in groups:
+        key = _shape_key(model, body)
+        # The target of the scored arm holds for the other arm, which has the same shapes.
+        targets[key] = min(
+            targets.get(key, REST), _target(robot, model, body), key=lambda t: t.protrusion
+        )
+    return targets | {_shape_key(model, body): target for body, target in chosen.items() if target}
+
+
+def target_of(robot: RobotFile, body: str, most: int) -> Target:
+    """Return how closely up to `most` shapes fit a body: the more, the less they protrude."""
+    usual = _target(robot, robot.model(), body)
+    return Target(usual.protrusion * min(1.0, usual.max_shapes / most), most)
+
+
+def _shapes_by_body(robot: RobotFile) -> dict[str, tuple[Primitive, ...]]:
+    """Return the shapes of the primitives file by body."""
     found: dict[str, tuple[Primitive, ...]] = {}
     for shape in read_primitives(Path(robot.primitives)):
         found[shape.body] = (*found.get(shape.body, ()), shape)
-    surfaces, model = surfaces_to_enclose(robot), robot.model()
-    for body, most in shapes.items():
-        if body not in found:
-            raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
-        _, _, surface = surfaces[body]
-        usual = _target(robot, model, body)
-        closer = Target(usual.protrusion * min(1.0, usual.max_shapes / most), most)
-        found[body] = fit_triangles(body, surface, closer).primitives
-    return tuple(shape for fitted in found.values() for shape in fitted)
+    return found
+
+
+def _check_has_shapes(robot: RobotFile, found: Mapping[str, object], body: str) -> None:
+    """Raise UnknownNameError if the primitives file has no shape of a body."""
+    if body not in found:
+        raise UnknownNameError("body", body, found, where=f"primitives '{robot.primitives}'")
+
+
+def _kept(
+    robot: RobotFile, found: Mapping[str, tuple[Primitive, ...]], body: str, triangles: FloatArray
+) -> Fit:
+    """Return the fit that a body has in the primitives file."""
+    _check_has_shapes(robot, found, body)
+    shapes = found[body]
+    return Fit(primitives=shapes, hull=hull_volume(triangles), union=union_volume(shapes))
 
 
 def _target(robot: RobotFile, model: Urdf, body: str) -> Target:
@@ -135,11 +183,15 @@ def _target(robot: RobotFile, model: Urdf, body: str) -> Target:
 
 
 def _groups(
-    robot: RobotFile, model: Urdf, triangles: dict[str, FloatArray]
+    robot: RobotFile, model: Urdf, triangles: dict[str, FloatArray], apart: set[str]
 ) -> dict[str, list[str]]:
-    """Return the bodies that are enclosed together, by the body that carries the primitives."""
+    """Return the bodies that are enclosed together, by the body that carries the primitives.
+
+    Bodies welded to the root are enclosed as one, but for those to keep `apart`.
+    """
     groups: dict[str, list[str]] = {}
     standing = [body for body in triangles if welded_top(model, body)[0] == robot.root_body]
+    standing = [body for body in standing if body not in apart]
     if standing:
         volume = {body: float(np.ptp(triangles[body], axis=(0, 1)).prod()) for body in standing}
         groups[max(standing, key=lambda body: volume[body])] = standing

@@ -110,6 +110,20 @@ def test_shipped_file_is_what_the_script_writes():
     np.testing.assert_allclose([s.volume for s in fitted], [s.volume for s in shipped], rtol=1e-3)
 
 
+def test_bodies_to_keep_have_the_shapes_of_the_file():
+    robot = load_robot("iiwa7")
+    shipped = robot.load_primitives()
+    fits = fit_robot(robot, chosen=dict.fromkeys({shape.body for shape in shipped}))
+    assert sorted(shape.body for found in fits for shape in found.fit.primitives) == sorted(
+        shape.body for shape in shipped
+    )
+    for found in fits:
+        assert found.fit.primitives == tuple(s for s in shipped if s.body == found.body)
+        assert found.fit.excess > 0.0
+    with pytest.raises(UnknownNameError, match="iiwa_link_8"):
+        fit_robot(robot, chosen={"iiwa_link_8": None})
+
+
 def test_fitting_one_body_again_changes_no_other(pr2):
     before = read_primitives(Path(pr2.primitives))
     name = "l_gripper_l_finger_tip_link"
