@@ -2,10 +2,10 @@
 
 Usage: python benchmarks/planning.py [--limit 100] [--compared 4] [--seeds 50] [--seed 0]
 
-The problems are MotionBenchMaker's (`planning_problems`), with the fingers as wide open as the
-robot's. A cylinder becomes the prism of twelve sides around it, of six boxes. A problem is refused
-where start or goal is beyond a joint limit, in contact with itself or an obstacle, or nearer than
-the margins of scoring; the pairs that do so are counted. Both planners use the same shapes: OMPL's
+The problems are MotionBenchMaker's (`planning_problems`), with the fingers as wide open as there.
+A cylinder becomes the prism of twelve sides around it, of six boxes. A problem is refused where
+start or goal is beyond a joint limit, in contact with itself or an obstacle, or nearer than the
+margins of scoring; the pairs that do so are counted. Both planners use the same shapes: OMPL's
 RRT-Connect calls the posture check of the kernel, at postures at most 0.02 rad apart, and its own
 simplification follows. Times are those of the processor, one core, without preparing the scene.
 """
@@ -19,13 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from planning_problems import Obstacle, Problem, planning_problems
+from planning_problems import Obstacle, Problem, planning_problems, robot_of_problems
 from scipy.spatial.transform import Rotation
 from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import BOX, SceneArrays, Shapes
 from tcs.kernel.motion.connect import connect, new_trees
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact, without_idle_pairs
+from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, motion_scene, new_motion_workspace
 from tcs.kernel.motion.shortcut import shorten
 from tcs.kernel.problem import build_problem
@@ -34,12 +35,11 @@ from tcs.motion.paths import SHORTCUTS
 from tcs.placement.scoring import load_job
 
 FloatArray = NDArray[np.float64]
-ROBOT = "panda"
 SIDES = 12
 """Sides of the prism around a cylinder, an even number."""
 AGAIN = 10.0
 """Time after which a problem counts as unsolvable [s]."""
-MOST_ITERATIONS = 10_000
+MOST_ITERATIONS = 100_000
 """Number of random postures to grow towards: scenes without a task may be narrower than those of
 `tcs plan`."""
 OMPL_SECONDS = 30.0
@@ -107,7 +107,7 @@ class Bench:
 
     def __init__(self) -> None:
         """Lower the robot in a scene of one configuration."""
-        job = load_job("feeding", "wheelchair", ROBOT)
+        job = load_job("feeding", "wheelchair", robot_of_problems())
         self.robot = job.spec.robot
         self.lowered: LoweredScene = job.lowered(job.scene())
 
@@ -117,7 +117,8 @@ class Bench:
         grid = self.lowered.grid._replace(
             environment_states=1, base_x=np.zeros(1), base_y=np.zeros(1), base_yaw=np.zeros(1)
         )
-        return Query(problem, without_idle_pairs(motion_scene(build_problem(arrays, grid), 0)))
+        scene = motion_scene(build_problem(arrays, grid), 0)
+        return Query(problem, grouped(without_idle_pairs(scene)))
 
     def _arrays(self, obstacles: tuple[Obstacle, ...]) -> SceneArrays:
         arrays = self.lowered.arrays

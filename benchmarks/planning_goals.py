@@ -7,7 +7,7 @@ Those beyond a joint limit of the URDF are left out. A goal is free if the meshe
 the self margin to one another and an environment's default margin to the obstacles of its scene,
 measured by Coal. It is refused if a range of the robot file excludes it, or the collision shapes
 touch; the pairs that do so are counted. The obstacles are boxes and cylinders as printed; the
-fingers are as wide open as the robot's.
+fingers are as wide open as in the problems.
 """
 
 from __future__ import annotations
@@ -16,14 +16,11 @@ from collections import Counter, defaultdict
 
 import coal
 import numpy as np
-from planning_problems import Obstacle, Problem, planning_problems
+from planning_problems import Obstacle, Problem, planning_problems, robot_of_problems
 from shapes import MARGIN, Bodies, Poses, _distance, _geometry, body_poses
 from table import header, parser, record, row, save
 
-from tcs.model.robots import load_robot
 from tcs.model.robots.self_collision import SelfCollision
-
-ROBOT = "panda"
 
 
 def main() -> None:
@@ -33,7 +30,7 @@ def main() -> None:
     options = command_line.parse_args()
     header("coal")
     problems = planning_problems()[: options.limit]
-    goals = Goals(Bodies(load_robot(ROBOT)), problems)
+    goals = Goals(Bodies(robot_of_problems()), problems)
     free, refused, pairs = Counter[str](), Counter[str](), Counter[str]()
     for i, problem in enumerate(problems):
         if not goals.is_free(i):

@@ -23,10 +23,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tcs.files.paths import cache_folder
+from tcs.model.robots import RobotFile, load_robot
 
 FloatArray = NDArray[np.float64]
 
 PACKAGE, VERSION = "vamp-planner", "0.6.4"
+FINGERS = {"panda_finger_joint1": 0.065}
+"""How far each finger is from the middle in the start states of all problems [m]: 25 mm beyond the
+limit of the joint."""
 _PROBLEMS = "resources/panda/problems.tar.bz2"
 _JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
 
@@ -54,6 +58,12 @@ class Problem:
     obstacles: tuple[Obstacle, ...]
     start: FloatArray
     goal: FloatArray
+
+
+def robot_of_problems() -> RobotFile:
+    """Return the Panda with the fingers of the problems."""
+    fingers = {"gripper": "problems", "grippers": {"problems": FINGERS}}
+    return load_robot("panda").model_copy(update=fingers)
 
 
 def planning_problems() -> list[Problem]:

@@ -11,6 +11,7 @@ import numpy as np
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.motion.connect import Trees, new_trees
 from tcs.kernel.motion.edges import NO_PAIR, list_needed, posture_contact
+from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
@@ -83,14 +84,16 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        motion = self._without_idle_pairs(motion_scene(self.problem, configuration), configuration)
+        every = self._without_idle_pairs(motion_scene(self.problem, configuration), configuration)
+        motion = grouped(every)
         work = new_motion_workspace(motion)
         lines, line_work = motion, work
         if self.job.task.keep_out:
             # The boxes are the last bodies of the environment.
             first = self.problem.environment_bodies - len(self.job.task.keep_out)
-            other = motion.body[motion.pair[:, 1]]
-            lines = with_pairs(motion, (other < first) | (other >= self.problem.environment_bodies))
+            other = every.body[every.pair[:, 1]]
+            outside = (other < first) | (other >= self.problem.environment_bodies)
+            lines = grouped(with_pairs(every, outside))
             line_work = new_motion_workspace(lines)
         return Stop(self, configuration, motion, work, lines, line_work, trees)
 

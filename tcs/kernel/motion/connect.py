@@ -1,5 +1,7 @@
 """A path between two sets of postures: RRT-Connect (Kuffner, LaValle 2000) with certified edges.
 
+Edges of the trees are checked at postures only, and those of a path that they make are certified:
+where one is not, what has grown beyond it is removed, and the trees grow on (Bohlin, Kavraki 2000).
 Two trees grow, from the starts and from the goals. The smaller one takes a step towards a random
 posture; the other one is then extended to the new posture until it arrives or is blocked. The
 nearest node is the one from which the arm moves least: each joint counts by how far from its axis
@@ -14,7 +16,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.edges import edge_is_free
+from tcs.kernel.motion.edges import edge_is_certified, edge_is_free, edge_seems_free
 from tcs.kernel.motion.random import RandomState, random_state, uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
@@ -48,6 +50,10 @@ class Trees(NamedTuple):
     """Node that each node was extended from, NONE for a root, shape (2, MOST_NODES)."""
     nodes: IntArray
     """Number of nodes, shape (2,)."""
+    certified: IntArray
+    """1 where the edge to a node is certified, shape (2, MOST_NODES)."""
+    renumbered: IntArray
+    """Scratch: new number of each node, NONE for those removed, shape (MOST_NODES,)."""
     target: FloatArray
     """Posture to grow towards, and next posture [rad], shape (2, 7)."""
     turned: FloatArray
@@ -68,6 +74,8 @@ def new_trees(seed: int) -> Trees:
         q=np.empty((2, MOST_NODES, 7)),
         parent=np.empty((2, MOST_NODES), np.int64),
         nodes=np.zeros(2, np.int64),
+        certified=np.empty((2, MOST_NODES), np.int64),
+        renumbered=np.empty(MOST_NODES, np.int64),
         target=np.empty((2, 7)),
         turned=np.empty(7),
         path=np.empty((MOST_POINTS, 7)),
@@ -152,10 +160,12 @@ def connect(
             if trees.nodes[other] >= MOST_NODES:
                 return 0
             met = _grow(scene, work, trees, other, met, following)
-        if met != NONE and side == 0:
-            return _path(scene, trees, new, met)
-        if met != NONE:
-            return _path(scene, trees, met, new)
+        if (
+            met != NONE
+            and _branch_is_certified(scene, work, trees, side, new)
+            and _branch_is_certified(scene, work, trees, other, met)
+        ):
+            return _path(scene, trees, new if side == 0 else met, met if side == 0 else new)
     return 0
 
 
@@ -249,11 +259,47 @@ def _grow(
         angle = difference(scene, q[n, k], target[k], k)
         reached = fraction == 1.0 and scene.period[k] == 0.0
         q[new, k] = target[k] if reached else q[n, k] + fraction * angle
-    if not edge_is_free(scene, work, q[n], q[new]):
+    if not edge_seems_free(scene, work, q[n], q[new]):
         return NONE
-    trees.parent[side, new] = n
+    trees.parent[side, new], trees.certified[side, new] = n, 0
     trees.nodes[side] += 1
     return new
+
+
+@inner
+def _branch_is_certified(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, side: int, n: int
+) -> bool:
+    """Certify the edges from a node of a tree to its root; remove what is beyond a blocked one."""
+    q, parent = trees.q[side], trees.parent[side]
+    while parent[n] != NONE:
+        before = parent[n]
+        if trees.certified[side, n] == 0:
+            if not edge_is_certified(scene, work, q[before], q[n]):
+                _remove(trees, side, n)
+                return False
+            trees.certified[side, n] = 1
+        n = before
+    return True
+
+
+@inner
+def _remove(trees: Trees, side: int, n: int) -> None:
+    """Remove a node from a tree, with all that has grown from it."""
+    q, parent, certified = trees.q[side], trees.parent[side], trees.certified[side]
+    renumbered, kept = trees.renumbered, 0
+    for m in range(trees.nodes[side]):
+        before = parent[m]
+        if m == n or (before != NONE and renumbered[before] == NONE):
+            renumbered[m] = NONE
+            continue
+        renumbered[m] = kept
+        parent[kept] = NONE if before == NONE else renumbered[before]
+        certified[kept] = certified[m]
+        for k in range(7):
+            q[kept, k] = q[m, k]
+        kept += 1
+    trees.nodes[side] = kept
 
 
 @inner

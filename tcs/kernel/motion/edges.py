@@ -13,7 +13,14 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.pairs import ROUNDING, is_near, list_near, take_posture
+from tcs.kernel.motion.pairs import (
+    ROUNDING,
+    append_below,
+    is_near,
+    is_of_groups,
+    list_near,
+    take_posture,
+)
 from tcs.kernel.motion.scene import (
     DEPTH,
     MotionScene,
@@ -29,17 +36,28 @@ much more clearance than required."""
 PIECE = 0.2
 """Motion [m] of the pieces into which a curve is divided first: on longer ones most pairs may
 meet."""
+SPACING = 0.3
+"""Bound on the motion of the arm [m] between the postures at which an edge is checked before it is
+certified: most edges that are blocked are so at one of them."""
 NO_PAIR = -1
 
 
 @inner
 def posture_is_free(scene: MotionScene, work: MotionWorkspace, q: FloatArray) -> bool:
-    """Return whether nothing touches at joint angles q; fills `contact` if something does.
+    """Return whether nothing touches at joint angles q; fills `contact` if something does."""
+    for k in range(7):
+        work.q[k] = q[k]
+    return _is_free_here(scene, work)
+
+
+@inner
+def _is_free_here(scene: MotionScene, work: MotionWorkspace) -> bool:
+    """Return whether nothing touches at `work.q`; fills `contact` if something does.
 
     The last pair in contact is checked first.
     """
     for k in range(7):
-        work.q[k], work.delta[k] = q[k], 0.0
+        work.delta[k] = 0.0
     take_posture(scene, work)
     last = work.contact[0]
     if last >= 0 and is_near(scene, work, last, False):
@@ -78,9 +96,40 @@ def edge_is_free(
     scene: MotionScene, work: MotionWorkspace, start: FloatArray, end: FloatArray
 ) -> bool:
     """Return whether the straight edge between two postures [rad] is certified, ends included."""
-    if not posture_is_free(scene, work, end):
-        work.hits[work.contact[0]] += 1
-        return False
+    return edge_seems_free(scene, work, start, end) and edge_is_certified(scene, work, start, end)
+
+
+@inner
+def edge_seems_free(
+    scene: MotionScene, work: MotionWorkspace, start: FloatArray, end: FloatArray
+) -> bool:
+    """Return whether nothing touches at postures of a straight edge [rad], from the end on.
+
+    The postures halve the edge again and again. The start is not checked.
+    """
+    moved = 0.0
+    for k in range(7):
+        moved += abs(end[k] - start[k]) * scene.reach[k]
+    parts = 1
+    while parts * SPACING < moved:
+        parts *= 2
+    first, stride = parts, parts
+    while first > 0:
+        for n in range(first, parts + 1, stride):
+            for k in range(7):
+                work.q[k] = start[k] + (end[k] - start[k]) * (n / parts)
+            if not _is_free_here(scene, work):
+                work.hits[work.contact[0]] += 1
+                return False
+        first, stride = first // 2, first
+    return True
+
+
+@inner
+def edge_is_certified(
+    scene: MotionScene, work: MotionWorkspace, start: FloatArray, end: FloatArray
+) -> bool:
+    """Return whether the straight edge between two postures [rad] is certified."""
     control = work.control
     for k in range(7):
         step = end[k] - start[k]
@@ -123,9 +172,10 @@ def listed_are_free_until(
         end: End of the piece.
     """
     for m in range(count):
-        if is_near(scene, work, work.pairs[m], False):
-            work.contact[0] = work.pairs[m]
-            work.hits[work.contact[0]] += 1
+        k = work.pairs[m]
+        if not is_of_groups(scene, k) and is_near(scene, work, k, False):
+            work.contact[0] = k
+            work.hits[k] += 1
             return begin
     return _halves_are_free_until(scene, work, count, begin, end)
 
@@ -237,12 +287,16 @@ def _uncertified(
         k = work.pairs[n]
         if not is_near(scene, work, k, True):
             continue
-        moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
-        if moved < RESOLUTION or is_near(scene, work, k, False):
-            work.contact[0] = k
-            return -1
-        work.pairs[last + left] = k
-        left += 1
+        moved, before = work.motion[scene.pair[k, 0], scene.pair[k, 2]], last + left
+        left = append_below(scene, work, k, moved, ROUNDING, before, len(work.pairs)) - last
+        for m in range(before, last + left):
+            k = work.pairs[m]
+            if is_of_groups(scene, k):
+                continue
+            moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
+            if moved < RESOLUTION or is_near(scene, work, k, False):
+                work.contact[0] = k
+                return -1
     return left
 
 

@@ -22,6 +22,8 @@ from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 COARSE = 0.02
 """Motion [m] above which bounding spheres alone decide whether a pair may meet on a piece: the
 exact distance is seldom greater, and the piece is halved anyway."""
+FAR = 0.25
+"""Motion relative to the size of a pair of groups above which the piece is halved first."""
 GROUP = 16
 """Number of pairs that one vector loop checks."""
 ROUNDING = 1e-9
@@ -122,17 +124,17 @@ def list_near(scene: MotionScene, work: MotionWorkspace, extra: float, most: int
         Number of pairs listed.
     """
     count = 0
-    for i in range(len(scene.links)):
+    for i in scene.roots:
         place_shape(scene, work, i)
-    for i in range(len(scene.links)):
+    for i in scene.roots:
         first, moving, last = scene.first_pair[i], scene.first_moving[i], scene.first_pair[i + 1]
         while first < moving and count < most:
             end = min(first + GROUP, moving)
             if _any_overlap(scene, work, i, first, end, work.motion[i, 0] + extra):
-                count = _append_near(scene, work, i, first, end, extra, count, most)
+                count = _append_near(scene, work, first, end, extra, count, most)
             first = end
         if count < most:
-            count = _append_near(scene, work, i, moving, last, extra, count, most)
+            count = _append_near(scene, work, moving, last, extra, count, most)
         if count == most:
             return count
     return count
@@ -169,19 +171,17 @@ def _any_overlap(
 def _append_near(
     scene: MotionScene,
     work: MotionWorkspace,
-    i: int,
     first: int,
     last: int,
     extra: float,
     count: int,
     most: int,
 ) -> int:
-    """Append the pairs of shape i that may touch to `work.pairs`; return how many there are.
+    """Append pairs that may touch to `work.pairs`; return how many there are.
 
     Args:
         scene: The scene.
-        work: Scratch, with the current posture.
-        i: Shape of the arm.
+        work: Scratch, with the current posture; the shapes of the pairs are placed.
         first: First pair.
         last: One after the last pair.
         extra: Added to the gap of each pair [m].
@@ -189,12 +189,70 @@ def _append_near(
         most: Number of pairs after which to stop.
     """
     for k in range(first, last):
+        i, j = scene.pair[k, 0], scene.pair[k, 1]
         moved = work.motion[i, scene.pair[k, 2]]
-        if _may_touch(work.shapes, i, scene.pair[k, 1], scene.gap[k] + moved + extra, moved):
-            work.pairs[count] = k
-            count += 1
+        if _may_touch(work.shapes, i, j, scene.gap[k] + moved + extra, moved):
+            count = append_below(scene, work, k, moved, extra, count, most)
             if count == most:
                 break
+    return count
+
+
+@inner
+def is_of_groups(scene: MotionScene, k: int) -> bool:
+    """Return whether there are pairs below pair k, so that it cannot be in contact itself."""
+    return k < len(scene.below) and scene.below[k, 0] < scene.below[k, 1]
+
+
+@inner
+def append_below(
+    scene: MotionScene,
+    work: MotionWorkspace,
+    k: int,
+    moved: float,
+    extra: float,
+    count: int,
+    most: int,
+) -> int:
+    """Append a pair that may touch to `work.pairs`, or those of the pairs below it that may.
+
+    A pair of groups that move far for their size is appended itself: nearly all pairs below it may
+    touch on the piece, and fewer of them on its halves.
+
+    Args:
+        scene: The scene.
+        work: Scratch, with the current posture.
+        k: The pair.
+        moved: Bound on the motion of its shapes relative to each other [m].
+        extra: Added to the gap of each pair [m].
+        count: Number of pairs listed already.
+        most: Number of pairs after which to stop.
+
+    Returns:
+        Number of pairs listed.
+    """
+    pairs, stack, below = work.pairs, work.stack, scene.below
+    top = 0
+    while count < most:
+        if is_of_groups(scene, k) and moved <= FAR * scene.bound[k]:
+            for n in range(below[k, 0], below[k, 1]):
+                stack[top] = n
+                top += 1
+        else:
+            pairs[count] = k
+            count += 1
+        near = False
+        while top and not near:
+            top -= 1
+            k = stack[top]
+            i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+            place_shape(scene, work, i)
+            if base > 0:
+                place_shape(scene, work, j)
+            moved = work.motion[i, base]
+            near = _may_touch(work.shapes, i, j, scene.gap[k] + moved + extra, moved)
+        if not near:
+            break
     return count
 
 

@@ -11,6 +11,8 @@ from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION
 from tcs.kernel.problem import Problem
 
 FULL_TURN = 2.0 * np.pi
+STACK = 256
+"""Capacity of a stack of pairs: two for each level of the trees of both shapes."""
 DEPTH = 40
 """Greatest number of halvings of a curve: 2^-40 of any motion is below RESOLUTION of `edges`."""
 
@@ -44,11 +46,17 @@ class MotionScene(NamedTuple):
     pair: IntArray
     """Checked pairs: shape of the arm, other shape, and link that carries the other shape, 0 if it
     is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
+    roots: IntArray
+    """Shapes of the arm in the pairs that are checked always, or all, ascending."""
     first_pair: IntArray
-    """First pair of each shape of the arm, and the number of pairs, shape (n_arm + 1,)."""
+    """First pair of each shape of the arm, and the number of pairs of all, shape (n_arm + 1,).
+    Pairs beyond these are below others."""
     first_moving: IntArray
     """First pair of each shape of the arm with another shape of the arm: pairs with fixed shapes
     come before those; shape (n_arm,)."""
+    below: IntArray
+    """First and one after the last of the pairs below each pair, equal if there are none; shape
+    (n_pairs, 2), or (0, 2) without groups. They are apart if the pair is, see `groups`."""
     centre: FloatArray
     """Centre of the fixed shape of each pair in A [m], shape (3, n_pairs); 0 where both move."""
     bound: FloatArray
@@ -85,6 +93,8 @@ class MotionWorkspace(NamedTuple):
     """Control points of the current curve [rad], shape (4, 7)."""
     pairs: IntArray
     """Stack of lists of pairs that are not certified yet, shape (DEPTH * n_pairs,)."""
+    stack: IntArray
+    """Stack of pairs whose pairs below are checked next, shape (STACK,)."""
     span: FloatArray
     """Stack of pieces of the curve: begin and end, in [0, 1], shape (2 * DEPTH, 2)."""
     stretch: IntArray
@@ -155,30 +165,49 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
         link_frame=link_frame,
         fixed=fixed,
         body=np.concatenate([problem.link_body + problem.environment_bodies, body[near]]),
-        **_pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
+        **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
     )
 
 
 def with_pairs(scene: MotionScene, kept: BoolArray) -> MotionScene:
     """Return a scene with some of its pairs only, those `kept`, shape (n_pairs,)."""
-    fields = _pair_fields(scene.links, scene.fixed, scene.pair[kept], scene.gap[kept])
+    fields = pair_fields(scene.links, scene.fixed, scene.pair[kept], scene.gap[kept])
     return scene._replace(**fields)
 
 
-def _pair_fields(
-    links: FloatArray, fixed: FloatArray, pair: IntArray, gap: FloatArray
+def pair_fields(
+    links: FloatArray,
+    fixed: FloatArray,
+    pair: IntArray,
+    gap: FloatArray,
+    below: IntArray | None = None,
+    top: int | None = None,
 ) -> dict[str, Any]:
-    """Return the fields of a scene that describe its pairs, which are sorted by their first shape.
+    """Return the fields of a scene that describe its pairs.
 
-    The pairs of a shape of the arm begin with those with fixed shapes.
+    Args:
+        links: The arm's shapes, packed, shape (n_arm, 17).
+        fixed: Fixed shapes, packed, shape (n_fixed, 17).
+        pair: Pairs, shape (n_pairs, 3). Those checked always come first, sorted by their first
+            shape; the pairs of a shape of the arm begin with those with fixed shapes.
+        gap: Distance that each pair must keep [m], shape (n_pairs,).
+        below: Pairs below each pair, shape (n_pairs, 2); None without groups.
+        top: Number of pairs that are checked always; all if None.
     """
-    first_pair = np.searchsorted(pair[:, 0], np.arange(len(links) + 1)).astype(np.int64)
+    always = pair[:top]
+    first_pair = np.searchsorted(always[:, 0], np.arange(len(links) + 1)).astype(np.int64)
+    of_two_links = always[:, 2] > 0
+    fixed_pairs = np.bincount(always[~of_two_links, 0], minlength=len(links))
+    roots = np.arange(len(links))
+    if below is not None:
+        roots = np.union1d(always[:, 0], always[of_two_links, 1])
     moving = pair[:, 2] > 0
-    fixed_pairs = np.bincount(pair[~moving, 0], minlength=len(links))
     shapes = np.concatenate([links, fixed])
     centre = np.where(moving[:, None], 0.0, shapes[pair[:, 1], CENTRE : CENTRE + 3])
     return {
         "pair": np.ascontiguousarray(pair),
+        "roots": roots.astype(np.int64),
+        "below": np.zeros((0, 2), np.int64) if below is None else below,
         "first_pair": first_pair,
         "first_moving": first_pair[:-1] + fixed_pairs,
         "gap": np.ascontiguousarray(gap),
@@ -203,6 +232,7 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         motion=np.zeros((arm, 8)),
         control=np.empty((4, 7)),
         pairs=np.empty((DEPTH + 1) * pairs, np.int64),
+        stack=np.empty(STACK, np.int64),
         span=np.empty((2 * DEPTH, 2)),
         stretch=np.empty((2 * DEPTH, 2), np.int64),
         contact=np.full(1, -1, np.int64),

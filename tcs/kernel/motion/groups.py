@@ -1,0 +1,200 @@
+"""Boxes around groups of shapes of a link, and the tree of pairs that they make.
+
+A link of many shapes gets a binary tree of boxes in its frame: the root encloses all its shapes,
+and two boxes below each box one body and the others, or one half of its shapes each. The pairs that
+are checked always are those of the roots. Below a pair are the two pairs of what is below the
+larger one of its boxes with the other one, down to the pairs of shapes: these are the pairs of the
+scene without groups, and they alone can be in contact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.kernel.arrays import BOX, CAPSULE, BoolArray, FloatArray, IntArray
+from tcs.kernel.collide import BOUND, CENTRE, COLUMNS, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.scene import MotionScene, pair_fields
+
+LEAST = 8
+"""Number of shapes of a link up to which they get no boxes: checking each pair takes no longer."""
+ENCLOSING = 1e-9
+"""Excess of the half sizes of boxes around shapes [m], above rounding errors."""
+NONE = -1
+
+
+class Groups(NamedTuple):
+    """The arm's shapes and the boxes around groups of them."""
+
+    rows: FloatArray
+    """Shapes, then boxes, packed, in link frames, shape (n, 17)."""
+    frame: IntArray
+    """Link of each, shape (n,)."""
+    parts: IntArray
+    """The two shapes or boxes in each box, NONE for shapes, shape (n, 2)."""
+    roots: IntArray
+    """Shapes and boxes that are in no other box."""
+
+
+class _Level(NamedTuple):
+    """Pairs at one depth of the tree of pairs."""
+
+    first: IntArray
+    """Shape or box of the arm, on the link that is farther from the base, shape (n,)."""
+    second: IntArray
+    """The other shape or box; those that are fixed come after all of the arm, shape (n,)."""
+    split: BoolArray
+    """Whether there are two pairs below, shape (n,): two by two, these are the next level."""
+
+
+def grouped(scene: MotionScene) -> MotionScene:
+    """Return a scene whose pairs are checked by groups; only pairs of shapes can be in contact.
+
+    Args:
+        scene: A scene without groups. It is returned unchanged if no link has many shapes.
+    """
+    groups = boxes_around(scene.links, scene.link_frame, scene.body[: len(scene.links)])
+    count, added = len(scene.links), len(groups.rows) - len(scene.links)
+    if added == 0:
+        return scene
+    levels = _levels(groups, scene.fixed)
+    pairs = scene.pair + added * np.array([0, 1, 0]) * (scene.pair[:, 1:2] >= count)
+    gaps = _gaps(levels, pairs, scene.gap, (len(groups.rows), len(groups.rows) + len(scene.fixed)))
+    kept = [gap > 0.0 for gap in gaps]
+    first = np.concatenate([level.first[keep] for level, keep in zip(levels, kept, strict=True)])
+    second = np.concatenate([level.second[keep] for level, keep in zip(levels, kept, strict=True)])
+    frame = np.concatenate([groups.frame, np.zeros(len(scene.fixed), np.int64)])
+    fields = pair_fields(
+        groups.rows,
+        scene.fixed,
+        np.stack([first, second, frame[second]], axis=1),
+        np.concatenate([gap[keep] for gap, keep in zip(gaps, kept, strict=True)]),
+        _below(levels, kept),
+        int(kept[0].sum()),
+    )
+    # The body of a box is never asked for: it is that of some shape of its link.
+    of_boxes = scene.body[[np.argmax(scene.link_frame == f) for f in groups.frame[count:]]]
+    body = np.concatenate([scene.body[:count], of_boxes, scene.body[count:]])
+    return scene._replace(links=groups.rows, link_frame=groups.frame, body=body, **fields)
+
+
+def boxes_around(links: FloatArray, link_frame: IntArray, body: IntArray) -> Groups:
+    """Return the boxes around groups of the shapes of each link that has many.
+
+    Args:
+        links: Shapes, packed, in link frames, shape (n, 17).
+        link_frame: Link of each, shape (n,).
+        body: Body of each, shape (n,): bodies that are fixed to each other are on one link.
+    """
+    half = _extents(links)
+    low, high = links[:, CENTRE : CENTRE + 3] - half, links[:, CENTRE : CENTRE + 3] + half
+    corners: list[FloatArray] = []
+    parts: list[tuple[int, ...]] = []
+    frames: list[int] = []
+
+    def halves(members: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the shapes of one body and the others, or those on either side of the middle."""
+        of_first = body[members] == body[members[0]]
+        if not np.all(of_first):
+            return members[of_first], members[~of_first]
+        centres = links[members, CENTRE : CENTRE + 3]
+        order = members[np.argsort(centres[:, np.argmax(np.ptp(centres, axis=0))], kind="stable")]
+        return order[: len(order) // 2], order[len(order) // 2 :]
+
+    def box(members: IntArray, frame: int) -> int:
+        """Return the number of a shape, or of a new box around several."""
+        if len(members) == 1:
+            return int(members[0])
+        least, most = low[members].min(axis=0), high[members].max(axis=0)
+        parts.append(tuple(box(half, frame) for half in halves(members)))
+        corners.append(np.concatenate([least, most]))
+        frames.append(frame)
+        return len(links) + len(parts) - 1
+
+    roots: list[int] = []
+    for frame in np.unique(link_frame):
+        members = np.flatnonzero(link_frame == frame)
+        roots += [box(members, int(frame))] if len(members) > LEAST else members.tolist()
+    rows = _boxes(np.array(corners).reshape(-1, 6))
+    shapes = np.full((len(links), 2), NONE)
+    return Groups(
+        rows=np.concatenate([links, rows]),
+        frame=np.concatenate([link_frame, np.array(frames, link_frame.dtype)]),
+        parts=np.concatenate([shapes, np.array(parts, np.int64).reshape(-1, 2)]),
+        roots=np.array(roots, np.int64),
+    )
+
+
+def _extents(rows: FloatArray) -> FloatArray:
+    """Return how far each shape extends from its centre along the axes of its frame, (n, 3)."""
+    size, R = rows[:, SIZE : SIZE + 3], np.abs(rows[:, ROTATION:].reshape(-1, 3, 3))
+    of_boxes = np.einsum("nij,nj->ni", R, size)
+    of_capsules = size[:, :1] + R[:, :, 2] * size[:, 1:2]
+    kind = rows[:, TYPE, None]
+    return np.where(kind == BOX, of_boxes, np.where(kind == CAPSULE, of_capsules, size[:, :1]))
+
+
+def _boxes(corners: FloatArray) -> FloatArray:
+    """Return boxes between two corners [m], shape (n, 6), as packed shapes."""
+    rows = np.zeros((len(corners), COLUMNS))
+    half = (corners[:, 3:] - corners[:, :3]) / 2.0 + ENCLOSING
+    rows[:, TYPE] = BOX
+    rows[:, BOUND] = np.linalg.norm(half, axis=1)
+    rows[:, SIZE : SIZE + 3] = half
+    rows[:, CENTRE : CENTRE + 3] = (corners[:, :3] + corners[:, 3:]) / 2.0
+    rows[:, ROTATION:] = np.eye(3).ravel()
+    return rows
+
+
+def _levels(groups: Groups, fixed: FloatArray) -> list[_Level]:
+    """Return the tree of all pairs on different links or with fixed shapes, level by level."""
+    bound = np.concatenate([groups.rows[:, BOUND], fixed[:, BOUND]])
+    parts = np.concatenate([groups.parts, np.full((len(fixed), 2), NONE)])
+    roots = np.sort(groups.roots)
+    others = np.concatenate([len(groups.rows) + np.arange(len(fixed)), roots])
+    first, second = (part.ravel() for part in np.meshgrid(roots, others, indexing="ij"))
+    frame = np.concatenate([groups.frame, np.zeros(len(fixed), groups.frame.dtype)])
+    apart = frame[first] > frame[second]
+    first, second = first[apart], second[apart]
+    levels: list[_Level] = []
+    while len(first):
+        size_first = np.where(parts[first, 0] == NONE, 0.0, bound[first])
+        size_second = np.where(parts[second, 0] == NONE, 0.0, bound[second])
+        split = np.maximum(size_first, size_second) > 0.0
+        levels.append(_Level(first, second, split))
+        of_first = (size_first >= size_second)[split, None]
+        first, second = first[split, None], second[split, None]
+        first, second = (
+            np.where(of_first, parts[first[:, 0]], first).ravel(),
+            np.where(of_first, second, parts[second[:, 0]]).ravel(),
+        )
+    return levels
+
+
+def _gaps(
+    levels: list[_Level], pair: IntArray, gap: FloatArray, shape: tuple[int, int]
+) -> list[FloatArray]:
+    """Return the greatest gap of the pairs of shapes below each pair, 0 if none is checked [m]."""
+    of_shapes = np.zeros(shape)
+    of_shapes[pair[:, 0], pair[:, 1]] = gap
+    found: list[FloatArray] = []
+    for level in reversed(levels):
+        gaps = of_shapes[level.first, level.second]
+        if found:
+            gaps[level.split] = found[-1].reshape(-1, 2).max(axis=1)
+        found.append(gaps)
+    return found[::-1]
+
+
+def _below(levels: list[_Level], kept: list[BoolArray]) -> IntArray:
+    """Return the first and one after the last of the pairs below each pair that is kept."""
+    found, begin = [], 0
+    next_levels = [*kept[1:], np.zeros(0, np.bool_)]
+    for level, keep, next_kept in zip(levels, kept, next_levels, strict=True):
+        begin += int(keep.sum())
+        ends = np.concatenate([[0], np.cumsum(next_kept)]) + begin
+        below = np.zeros((len(keep), 2), np.int64)
+        below[level.split, 0], below[level.split, 1] = ends[0:-1:2], ends[2::2]
+        found.append(below[keep])
+    return np.concatenate(found)

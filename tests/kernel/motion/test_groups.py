@@ -1,0 +1,120 @@
+"""Groups of shapes: boxes enclose them, and postures and curves are judged as without groups."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tcs.kernel.arrays import BOX, CAPSULE
+from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
+from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact, without_idle_pairs
+from tcs.kernel.motion.groups import NONE, boxes_around, grouped
+from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
+from tcs.kernel.problem import build_problem
+from tcs.kernel.verification.reference_motion import straight_curve
+from tests.kernel.arms import drake_arm
+from tests.kernel.motion.toys import HERE, within_limits
+from tests.kernel.shapes import rotation
+from tests.kernel.toy import toy_grid, toy_scene
+
+COPIES = 8
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return drake_arm("pr2 left").chain
+
+
+@pytest.fixture(scope="module")
+def plain(chain):
+    """Return a random scene whose arm has each of its shapes eight times, each time elsewhere."""
+    rng = np.random.default_rng(3)
+    scene = toy_scene(chain, 0, obstacles=12)
+    which = np.tile(np.arange(len(scene.arm.type)), COPIES)
+    arm = scene.arm._replace(
+        type=scene.arm.type[which],
+        size=0.5 * scene.arm.size[which],
+        pad=scene.arm.pad[which],
+        body=scene.arm.body[which],
+        frame=scene.arm.frame[which],
+        R=np.array([[rotation(rng) for _ in which]]),
+        p=scene.arm.p[:, which] + rng.normal(scale=0.04, size=(1, len(which), 3)),
+    )
+    many = scene._replace(
+        arm=arm,
+        arm_vs_arm=scene.arm_vs_arm[np.ix_(which, which)],
+        arm_vs_body=scene.arm_vs_body[which],
+        arm_vs_environment=scene.arm_vs_environment[which],
+    )
+    return without_idle_pairs(motion_scene(build_problem(many, toy_grid()), HERE))
+
+
+def extremes(row):
+    """Return points of a packed shape that are farthest along the axes of its frame, (n, 3)."""
+    R, size = row[ROTATION:].reshape(3, 3), row[SIZE : SIZE + 3]
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    if row[TYPE] == BOX:
+        return row[CENTRE : CENTRE + 3] + (np.sign(axes @ R) * size) @ R.T
+    half = size[1] if row[TYPE] == CAPSULE else 0.0
+    return row[CENTRE : CENTRE + 3] + size[0] * axes + np.sign(axes @ R[:, 2:]) * half * R[:, 2]
+
+
+def test_boxes_enclose_the_shapes_in_them(plain):
+    count = len(plain.links)
+    groups = boxes_around(plain.links, plain.link_frame, plain.body[:count])
+    assert len(groups.rows) > count
+    for box in range(count, len(groups.rows)):
+        members, shapes = [box], []
+        while members:
+            one = members.pop()
+            members += groups.parts[one].tolist() if groups.parts[one, 0] != NONE else []
+            shapes += [one] if one < count else []
+        assert len(shapes) > 1
+        assert set(groups.frame[shapes]) == {groups.frame[box]}
+        for shape in shapes:
+            beyond = extremes(groups.rows[shape]) - groups.rows[box, CENTRE : CENTRE + 3]
+            assert np.all(np.abs(beyond) <= groups.rows[box, SIZE : SIZE + 3])
+            assert np.max(np.linalg.norm(beyond, axis=1)) <= groups.rows[box, BOUND]
+
+
+def test_every_pair_of_shapes_is_below_a_pair_that_is_checked(plain):
+    scene = grouped(plain)
+    alone = scene.below[:, 0] == scene.below[:, 1]
+    added = len(scene.links) - len(plain.links)
+    assert added > 0
+
+    def named(pair, count, shift):
+        fixed = pair[:, 1] >= count
+        return set(zip(pair[:, 0].tolist(), (pair[:, 1] - shift * fixed).tolist(), strict=True))
+
+    found = named(scene.pair[alone], len(scene.links), added)
+    assert found == named(plain.pair, len(plain.links), 0)
+    seen = list(range(scene.first_pair[-1]))
+    for k in seen:
+        seen += range(*scene.below[k])
+    assert sorted(seen) == list(range(len(scene.pair)))
+    bodies = {(int(scene.body[i]), int(scene.body[j])) for i, j in scene.pair[alone, :2]}
+    assert bodies == {(int(plain.body[i]), int(plain.body[j])) for i, j in plain.pair[:, :2]}
+
+
+def test_postures_and_curves_are_judged_as_without_groups(plain, chain, rng):
+    scene = grouped(plain)
+    work, plain_work = new_motion_workspace(scene), new_motion_workspace(plain)
+    free, blocked = [], 0
+    while min(len(free), blocked) < 25:
+        q = within_limits(rng, chain)
+        touches = posture_contact(plain, plain_work, q) != NO_PAIR
+        assert (posture_contact(scene, work, q) != NO_PAIR) == touches
+        blocked += touches
+        free += [] if touches else [q]
+    outcomes = []
+    for q in free:
+        curve = straight_curve(q, q + rng.normal(scale=0.3, size=7))
+        outcomes.append(certified(scene, work, curve) == 1.0)
+        assert outcomes[-1] == (certified(plain, plain_work, curve) == 1.0)
+    assert 3 < sum(outcomes) < len(outcomes)
+
+
+def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
+    scene = motion_scene(build_problem(toy_scene(chain, 0), toy_grid()), HERE)
+    assert grouped(scene) is scene
