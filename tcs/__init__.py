@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tcs.placement.constraints import Constraints, Obstacle, Region
     from tcs.placement.population import Population, population
     from tcs.placement.reasons import Explanation, explain
-    from tcs.placement.refinement import refine
+    from tcs.placement.refinement import Placement, place, refine
     from tcs.placement.robustness import Evaluation, evaluate, robustify
     from tcs.placement.scoring import (
         LiveScorer,
@@ -48,6 +48,7 @@ __all__ = [
     "MotionPlan",
     "Observation",
     "Obstacle",
+    "Placement",
     "Population",
     "Region",
     "ScoreFile",
@@ -61,6 +62,7 @@ __all__ = [
     "examine",
     "explain",
     "load",
+    "place",
     "plan",
     "population",
     "refine",
@@ -95,6 +97,8 @@ _HOMES = {
     "examine": ("tcs.motion", "examine"),
     "explain": ("tcs.placement.reasons", "explain"),
     "load": ("tcs.placement.store", "load_scores"),
+    "Placement": ("tcs.placement.refinement", "Placement"),
+    "place": ("tcs.placement.refinement", "place"),
     "plan": ("tcs.motion", "plan"),
     "population": ("tcs.placement.population", "population"),
     "refine": ("tcs.placement.refinement", "refine"),

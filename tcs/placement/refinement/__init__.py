@@ -6,6 +6,7 @@ what any set could reach.
 
 from __future__ import annotations
 
+from tcs.placement.refinement.place import Placement, place
 from tcs.placement.refinement.points import Points, PointScorer, PointScores
 from tcs.placement.refinement.refined_file import (
     OBJECTIVES,
@@ -16,9 +17,11 @@ from tcs.placement.refinement.refined_file import (
 
 __all__ = [
     "OBJECTIVES",
+    "Placement",
     "PointScorer",
     "PointScores",
     "Points",
+    "place",
     "refine",
     "refined_members",
     "refinement_summary",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.model.grid import Grid
 from tcs.placement.refinement.objectives import Features, Objective, values_of
-from tcs.placement.refinement.points import Points, PointScorer
+from tcs.placement.refinement.points import Points, PointScores
 from tcs.placement.refinement.space import Space
 
 POINTS_PER_AXIS = 8
@@ -75,11 +76,22 @@ class Walk:
         return len(self.origin)
 
 
+class Scorer(Protocol):
+    """Scores configurations anywhere."""
+
+    @property
+    def grid(self) -> Grid:
+        """The grid that the search starts from."""
+
+    def score(self, points: Points) -> PointScores:
+        """Return the scores of configurations."""
+
+
 @dataclass(frozen=True, eq=False)
 class LocalSearch:
     """Refines sets together, so that a round prepares the scene once for all of them."""
 
-    scorer: PointScorer
+    scorer: Scorer
     space: Space
     objective: Objective
     rng: np.random.Generator

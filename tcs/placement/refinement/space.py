@@ -37,8 +37,8 @@ class Space:
     """Whether the members of a set share the state of the environment."""
 
     @classmethod
-    def of(cls, grid: Grid, sets: SetTable) -> Self:
-        """Return the space of a grid, with the rules of its sets."""
+    def of(cls, grid: Grid, sets: SetTable | None = None) -> Self:
+        """Return the space of a grid, with the rules of its sets if there are any."""
         values = [axis.values for axis in grid.axes]
         cell = [
             max(v[1] - v[0], LEAST_CELL[axis.held_unit]) if v.size > 1 else 0.0
@@ -54,8 +54,8 @@ class Space:
                     for axis in grid.axes
                 ]
             ),
-            min_distance=sets.min_distance,
-            same_environment=sets.same_environment,
+            min_distance=0.0 if sets is None else sets.min_distance,
+            same_environment=sets is not None and sets.same_environment,
         )
 
     @property
