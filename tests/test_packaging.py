@@ -27,7 +27,7 @@ def dependencies() -> set[str]:
 def of_extras() -> set[str]:
     """Modules of the extras that the package itself imports where they are installed."""
     extras = PROJECT["optional-dependencies"]
-    lines = [line for name in ("arplace", "bags", "service") for line in extras[name]]
+    lines = [line for name in ("arplace", "bags", "mcp", "service") for line in extras[name]]
     names = {re.split(r"[^\w-]", line)[0] for line in lines}
     return {MODULE_OF.get(name, name) for name in names}
 

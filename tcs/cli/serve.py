@@ -42,9 +42,19 @@ def serve(
             show_default=False,
         ),
     ] = None,
+    assistant: Annotated[
+        bool,
+        typer.Option(
+            "--mcp",
+            help="Answer an assistant on standard input and output, by the Model Context Protocol.",
+        ),
+    ] = False,
     jobs: options.Jobs = 2,
 ) -> None:
     """Serve the engine over HTTP: score, select, explain, evaluate and plan as requests."""
+    if assistant:
+        _serve_assistant(files, jobs)
+        return
     http = _http("serve")
     access = http.checked_access(host, token)
     with _engine(files, jobs, typer.echo) as engine:
@@ -73,6 +83,24 @@ def app(
             # Opening a browser may wait for the browser.
             threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
         server.run(window.duration)
+
+
+def _serve_assistant(files: list[Path] | None, jobs: int) -> None:
+    """Answer an assistant until it closes standard input.
+
+    Raises:
+        ServiceError: If a package that this needs is not installed.
+    """
+    from tcs.errors import ServiceError
+
+    try:
+        from tcs.service.assistant import serve_assistant
+    except ModuleNotFoundError as error:
+        raise ServiceError(
+            f"`tcs serve --mcp` needs the package {error.name}: pip install 'tcs[mcp]'."
+        ) from None
+    with _engine(files, jobs, terminal.note) as engine:
+        serve_assistant(engine)
 
 
 def _http(command: str) -> Any:

@@ -83,7 +83,7 @@ export function showLegend() {
   scale.append(`${t("legend.low")} `);
   made("span", undefined, scale, { class: "scale" });
   scale.append(t("legend.high"));
-  for (const [name, colour] of [["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"]]) {
+  for (const [name, colour] of [["blocked", "blocked"], ["person", "person"], ["furniture", "furniture"], ["goal", "goal"]]) {
     const item = made("li", undefined, list);
     made("span", undefined, item, { class: colour });
     item.append(t(`legend.${name}`));

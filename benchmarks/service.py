@@ -1,0 +1,180 @@
+"""Measure requests of the service over HTTP: select alone, 50 clients at once, malformed requests.
+
+Usage: python benchmarks/service.py FILE [--clients 50] [--requests 200] [--pause 0.0] [--save]
+
+FILE is a score file made by `tcs score`. The server is a process of its own; the clients share this
+process and write HTTP by hand, so that they take little of the processor. With `--pause`, a client
+waits between its requests on average so long [s]; without, it sends the next at once, and the
+latency is then the number of clients divided by the throughput.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from table import cell, header, parser, row, save
+
+from tcs.model.grid import Grid
+from tcs.placement.store import ScoreFile, load_scores
+
+MALFORMED = 1000
+ALONE = 300
+
+
+def main() -> int:
+    """Run every measurement and print it; return 1 if the server failed anywhere."""
+    command_line = parser(__doc__)
+    command_line.add_argument("file", type=Path, metavar="FILE")
+    command_line.add_argument("--clients", type=int, default=50)
+    command_line.add_argument("--requests", type=int, default=200)
+    command_line.add_argument("--pause", type=float, default=0.0)
+    command_line.add_argument("--seed", type=int, default=0)
+    options = command_line.parse_args()
+    header("fastapi", "uvicorn")
+    server = subprocess.Popen(
+        [sys.executable, "-m", "tcs", "serve", str(options.file), "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert server.stdout is not None
+    assert server.stderr is not None
+    try:
+        digest = server.stdout.readline().split()[0]
+        port = int(server.stderr.readline().split("127.0.0.1:")[1].split(",")[0])
+        asked = Asked(load_scores(options.file), digest, options.seed)
+        asyncio.run(measured(port, asked, options, server.pid))
+        failed = server.poll() is not None
+    finally:
+        server.terminate()
+    traces = server.stderr.read().count("Traceback")
+    row("tracebacks of the server, restarts", f"{traces}, {int(failed)}")
+    cell("service", "tracebacks of the server", "measured", str(traces))
+    save(options)
+    return 1 if traces or failed else 0
+
+
+class Asked:
+    """Requests at random states around the furniture."""
+
+    def __init__(self, file: ScoreFile, digest: str, seed: int) -> None:
+        """Send requests about a file that a server holds."""
+        self.digest, self.rng = digest, random.Random(seed)
+        grid: Grid = file.configurations
+        first = grid.configuration(0).to_json()
+        self.at = {k: v for k, v in first.items() if k != "torso" and not k.startswith("base_")}
+        self.x = [float(v) for v in grid.axis("base_x").values[[0, -1]]]
+        self.y = [float(v) for v in grid.axis("base_y").values[[0, -1]]]
+
+    def body(self) -> bytes:
+        """Return a valid request."""
+        here = [*(self.rng.uniform(*span) for span in (self.x, self.y)), self.rng.uniform(0, 360)]
+        return json.dumps({"file": self.digest, "here": here, "at": self.at}).encode()
+
+    def malformed(self) -> bytes:
+        """Return a request with some bytes replaced, cut off, or of another form."""
+        body = bytearray(self.body())
+        choice = self.rng.randrange(4)
+        if choice == 0:
+            return bytes(body[: self.rng.randrange(len(body))])
+        if choice == 1:
+            return b"[" * self.rng.randrange(1, 100_000)
+        if choice == 2:
+            odd = self.rng.choice([None, True, 1e308, "", [], {}, [[]], 2**70, "\u0000"])
+            key = self.rng.choice(["here", "at", "top", "only", "forbid", "travel", "frames", "x"])
+            return json.dumps({**json.loads(body), key: odd}).encode()
+        for _ in range(self.rng.randrange(1, 8)):
+            body[self.rng.randrange(len(body))] = self.rng.randrange(256)
+        return bytes(body)
+
+
+async def measured(port: int, asked: Asked, options: argparse.Namespace, pid: int) -> None:
+    """Run the measurements against a server."""
+    alone, _ = await client(port, [asked.body() for _ in range(ALONE)], 0.0)
+    report("select, one client", alone[20:], 0, 0.0)
+    bodies = [[asked.body() for _ in range(options.requests)] for _ in range(options.clients)]
+    before, begun = processor_time(pid), time.perf_counter()
+    found = await asyncio.gather(*(client(port, some, options.pause) for some in bodies))
+    seconds, busy = time.perf_counter() - begun, processor_time(pid) - before
+    times = [t for one, _ in found for t in one]
+    faults = sum(one for _, one in found)
+    report(f"select, {options.clients} clients at once", times, faults, len(times) / seconds)
+    each = f"{1e3 * busy / len(times):.2f} ms"
+    row("  processor time of the server, each", each)
+    cell("service", f"select, {options.clients} clients at once", "processor time each", each)
+    answered = 0
+    for _ in range(MALFORMED):
+        status = await once(port, asked.malformed())
+        answered += status in (200, 404, 413, 422)
+    row("malformed requests answered", f"{answered} of {MALFORMED}")
+    cell("service", "malformed requests", "answered", f"{answered} of {MALFORMED}")
+
+
+def report(name: str, times: list[float], faults: int, rate: float) -> None:
+    """Print and record the latencies [s]."""
+    p50, p99 = (1e3 * float(np.quantile(times, q)) for q in (0.5, 0.99))
+    more = f", {rate:.0f} requests/s" if rate else ""
+    row(name, f"p50 {p50:.2f} ms, p99 {p99:.2f} ms, {faults} errors{more}")
+    cell("service", name, "p50", f"{p50:.1f} ms")
+    cell("service", name, "p99", f"{p99:.1f} ms")
+    cell("service", name, "errors", str(faults))
+
+
+async def client(port: int, bodies: list[bytes], pause: float) -> tuple[list[float], int]:
+    """Send requests over one connection; return the latencies [s] and the number of errors."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    times, faults = [], 0
+    for body in bodies:
+        if pause:
+            await asyncio.sleep(random.expovariate(1.0 / pause))
+        begun = time.perf_counter()
+        status = await answer(reader, writer, body)
+        times.append(time.perf_counter() - begun)
+        # 422: a start that is enclosed by furniture.
+        faults += status not in (200, 422)
+    writer.close()
+    return times, faults
+
+
+async def once(port: int, body: bytes) -> int:
+    """Send one request over a connection of its own; return the status."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    try:
+        return await answer(reader, writer, body)
+    finally:
+        writer.close()
+
+
+async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, body: bytes) -> int:
+    """Send a request and read its response; return the status."""
+    writer.write(
+        b"POST /v1/select HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
+    )
+    head = await reader.readuntil(b"\r\n\r\n")
+    length = next(
+        int(line.split(b":")[1])
+        for line in head.lower().split(b"\r\n")
+        if line.startswith(b"content-length")
+    )
+    await reader.readexactly(length)
+    return int(head.split(b" ", 2)[1])
+
+
+def processor_time(pid: int) -> float:
+    """Return the processor time of a process so far [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
