@@ -6,8 +6,9 @@ import os
 import sys
 from pathlib import Path
 
-# Its models cannot be made once autodoc has loaded pydantic again, to read types for checkers.
+# Their models cannot be made once autodoc has loaded pydantic again, to read types for checkers.
 import fastapi  # noqa: F401
+import mcp  # noqa: F401
 
 HERE = Path(__file__).resolve().parent
 # The kernel's functions as plain Python: with signatures to read, and nothing to compile.

@@ -14,11 +14,11 @@
     │   └── StoreMismatchError    made from models that have changed since
     ├── PerceptionError       scans in which no table is found, or that cannot be used
     ├── SelectionError        no set to choose from, or a state that is not stored
-    ├── OutputError           a file or folder that cannot be written
-    └── ServiceError          a request that the service refuses, or a server that does not answer
-        ├── NotFoundError         a score file or job that the service does not hold
-        ├── BusyError             a full queue; the same request may succeed later
-        └── CancelledError        work that ended because it was cancelled
+    ├── ServiceError          a request that the service refuses, or a server that does not answer
+    │   ├── NotFoundError         a score file or job that the service does not hold
+    │   ├── BusyError             a full queue; the same request may succeed later
+    │   └── CancelledError        work that ended because it was cancelled
+    └── OutputError           a file or folder that cannot be written
 
 A goal that cannot be reached has a score of zero and raises no exception.
 """
