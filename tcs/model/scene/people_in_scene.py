@@ -36,9 +36,9 @@ from tcs.model.tasks import Task
 
 _LINKS = (ROOT, *PARENTS)
 """The links of a person, each after its parent."""
-_NECK = "neck_rotation"
-"""Link between head and neck of a lying person, at the origin of the neck: what it turns by does
-not move that origin."""
+_IN_PLACE = {ROOT: "head_turn_link", "neck_link": "neck_rotation"}
+"""Links at the origin of another link, between it and what carries both: what they turn by does not
+move that origin."""
 
 
 class _PartOfLink(NamedTuple):
@@ -222,8 +222,9 @@ def _carriers(scene: Scene, bodies: Mapping[str, RigidBody]) -> dict[str, RigidB
         joint.child_body().name(): joint.parent_body()
         for joint in map(plant.get_joint, plant.GetJointIndices(bodies[ROOT].model_instance()))
     }
-    if _NECK in above:
-        above["neck_link"] = above[_NECK]
+    for link, between in _IN_PLACE.items():
+        if between in above:
+            above[link] = above[between]
     return {link: above[link] for link in _LINKS}
 
 

@@ -52,7 +52,7 @@ PARENTS: Mapping[str, str] = {
     },
 }
 """The link from which each link hangs, from the head outward."""
-_SAME_FRAME = {"head_link": "head", "neck_rotation": "neck"}
+_SAME_FRAME = {"head_link": "head", "head_turn_link": "head", "neck_rotation": "neck"}
 """Links without shapes that move with a part of the person."""
 
 Poses = Mapping[str, tuple[FloatArray, FloatArray]]
@@ -174,9 +174,11 @@ def _model_file(environment: EnvironmentFile) -> tuple[ElementTree.Element, str]
 
 
 def _carrier(links: Mapping[str, ElementTree.Element], name: str) -> ElementTree.Element:
-    """Return the link that places a link: itself, or the one whose frame it shares."""
+    """Return the link that places a link: itself, or for the root the one whose frame it shares."""
     over = _pose(links[name]).get("relative_to", "")
-    return links[over] if over in _SAME_FRAME and name == ROOT else links[name]
+    if over in _SAME_FRAME and (name == ROOT or name in _SAME_FRAME):
+        return _carrier(links, over)
+    return links[name]
 
 
 def _move_joints(

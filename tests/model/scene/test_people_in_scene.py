@@ -16,12 +16,12 @@ PEOPLE = draw_bodies(2, seed=3)
 # Joints keep the positions that a state does not name.
 STATES = {
     "wheelchair": (
-        {"person_x": 0.02, "person_yaw": 0.0, "wheelchair_yaw": 0.0, "head_tilt": 0.0},
-        {"person_x": 0.01, "person_yaw": 0.2, "wheelchair_yaw": -0.3, "head_tilt": 0.2},
+        {"person_x": 0.02, "person_yaw": 0.0, "wheelchair_yaw": 0.0, "head_turn": 0.0},
+        {"person_x": 0.01, "person_yaw": 0.2, "wheelchair_yaw": -0.3, "head_turn": 0.5},
     ),
     "bed": (
-        {"head_rest": 0.0, "person_x": 0.01, "head_tilt": 0.0, "head_neck_1": 0.0},
-        {"head_rest": 1.2, "person_x": 0.02, "head_tilt": 0.2, "head_neck_1": 0.3},
+        {"head_rest": 0.0, "person_x": 0.01, "head_turn": 0.0, "head_neck_1": 0.0},
+        {"head_rest": 1.2, "person_x": 0.02, "head_turn": 0.5, "head_neck_1": 0.3},
     ),
 }
 

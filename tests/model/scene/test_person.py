@@ -175,3 +175,19 @@ def test_pictures_show_what_is_checked(environment):
             for g in environment.inspector.GetGeometries(frame, Role.kIllustration)
         }
         assert shown == checked, link
+
+
+@pytest.mark.parametrize("name", ["wheelchair", "bed"])
+def test_the_head_turns_in_place_to_the_left(name, environment):
+    scene = environment if name == "wheelchair" else EnvironmentAlone(name)
+    links = set(scene.file.body_frames.values())
+    before = {link: scene.pose(link) for link in links}
+    after = {link: scene.pose(link, head_turn=0.5) for link in links}
+    head = "person::head_center"
+    for link in links - {head}:
+        np.testing.assert_array_equal(after[link].GetAsMatrix34(), before[link].GetAsMatrix34())
+    turn = before[head].inverse() @ after[head]
+    # x of the head points out of the face, y to the left.
+    expected = RotationMatrix.MakeZRotation(0.5).matrix()
+    np.testing.assert_allclose(turn.rotation().matrix(), expected, atol=1e-12)
+    np.testing.assert_allclose(turn.translation(), np.zeros(3), atol=1e-12)
