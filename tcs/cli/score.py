@@ -110,6 +110,12 @@ def score(
     restart: Annotated[
         bool, typer.Option("--restart", help="With --blocks: discard what was finished before.")
     ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run", help="Only estimate time, memory and disk, from some slices of the grid."
+        ),
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Score every initial configuration of a grid and build the sets to select from."""
@@ -121,6 +127,10 @@ def score(
         raise typer.BadParameter(
             "is not for an observed environment. Give the robot file of one arm with --robot.",
             param_hint="--arms",
+        )
+    if dry_run and (observed or frames or arms):
+        raise typer.BadParameter(
+            "is for one arm and an environment that is not observed.", param_hint="--dry-run"
         )
     if restart and blocks is None:
         raise typer.BadParameter("requires --blocks.", param_hint="--restart")
@@ -150,6 +160,10 @@ def score(
         "jobs": jobs,
         "on_compile": terminal.note_compiling,
     }
+    if dry_run:
+        rows = files.estimate_all(task, environment, robot, **scoring_options)
+        terminal.print_result({"rows": rows}, tables.report_estimates, as_json=as_json)
+        return
     if task is None:
         rows = files.score_all_to_files(
             environment,

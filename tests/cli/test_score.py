@@ -71,6 +71,23 @@ def test_blocks_are_kept_and_taken(tcs_command, corner, corner_file, tmp_path):
         assert told in " ".join(ran.err.replace("│", " ").split())
 
 
+def test_a_dry_run_estimates_and_writes_nothing(tcs_command, corner, corner_file, tmp_path):
+    path = tmp_path / "out.tcs"
+    words = ("score", "shaving", "--environment", corner, "--dry-run", "--out", path)
+    (row,) = tcs_command(*words, "--json").json["rows"]
+    scores = tcs.load(corner_file).nominal.scores
+    assert (row["configurations"], row["goals"], row["blocks"]) == (36, 8, 1)
+    # The grid fits into one slice, so nothing is estimated but the time.
+    arrays = (scores.reason, scores.pair, scores.dexterity, scores.arm_joints)
+    assert row["memory_bytes"] == sum(array.nbytes for array in arrays)
+    assert 0 < row["disk_bytes"] < row["memory_bytes"]
+    assert row["scoring_seconds"] > 0
+    ran = tcs_command(*words)
+    assert (ran.code, "36" in ran.out) == (0, True)
+    assert not path.exists()
+    assert tcs_command(*words, "--observed", "person_x=0.01").code == 2
+
+
 def test_constraints_when_scoring(tcs_command, corner, tmp_path):
     path, told = tmp_path / "out.tcs", tmp_path / "bedroom.yaml"
     told.write_text('forbid: ["0.9 -1, 1.2 -1, 1.2 -0.5, 0.9 -0.5"]\nprefer: [left]\n')

@@ -58,6 +58,29 @@ _ON_REQUEST = ("excluded", "approach_limits", "approach_blocked")
 """Reasons of files scored under constraints or with approach, left out where there are none."""
 
 
+def report_estimates(result: Mapping[str, Any]) -> None:
+    """Print what scoring would take."""
+    rows = result["rows"]
+    table = new_table(
+        "task", "environment", ">configurations", ">goals", ">scoring", ">memory", ">disk"
+    )
+    for row in rows:
+        seconds, error = row["scoring_seconds"], row["scoring_seconds_error"]
+        table.add_row(
+            row["task"],
+            row["environment"],
+            f"{row['configurations']:,}",
+            str(row["goals"]),
+            f"{seconds:.1f} s +- {error:.1f}",
+            f"{row['memory_bytes'] / 1e6:.1f} MB",
+            f"{row['disk_bytes'] / 1e6:.1f} MB",
+        )
+    out = results_console()
+    out.print(table)
+    if len(rows) > 1:
+        out.print(f"together {sum(row['scoring_seconds'] for row in rows):.1f} s of scoring")
+
+
 def report_scores(result: Mapping[str, Any]) -> None:
     """Print the summary of a scored task."""
     out = results_console()

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 from tcs.files.writing import check_writable, make_folder
+from tcs.model.people import PersonLike
 from tcs.model.scene import Observation
+from tcs.placement.constraints import Constraints
 from tcs.placement.scoring.catalogue import default_path, task_environment_pairs
+from tcs.placement.scoring.dry_run import estimate
+from tcs.placement.scoring.job import load_job
 from tcs.placement.scoring.live import LiveScorer
 from tcs.placement.scoring.offline import score
 from tcs.placement.scoring.score_summary import summary
@@ -109,6 +113,46 @@ def score_all_to_files(
                 )
             )
     return results
+
+
+def estimate_all(
+    task: str | None,
+    environment: str | None,
+    robot: str,
+    *,
+    measure: str,
+    jobs: int,
+    constraints: Constraints,
+    now: Mapping[str, float],
+    person: PersonLike | None,
+    **_others: Any,
+) -> list[dict[str, Any]]:
+    """Estimate what scoring would take, for one task or, as `score_all_to_files`, for all.
+
+    Args:
+        task: Name or path of a task; None for all.
+        environment: Name or path of an environment; None for the default or for all.
+        robot: Name or path of a robot.
+        measure: Name of the dexterity measure.
+        jobs: Number of threads.
+        constraints: As for `tcs.score`; forbidden regions are not subtracted.
+        now: As for `tcs.score`.
+        person: As for `tcs.score`.
+        **_others: Options of `tcs.score` that change nothing in the estimate.
+
+    Raises:
+        TcsError: As `tcs.score`.
+    """
+    pairs = (
+        task_environment_pairs(environment)
+        if task is None
+        else ((task, environment or "wheelchair"),)
+    )
+    jobs_of = (
+        load_job(name, where, robot, constraints=constraints, now=now, person=person)
+        for name, where in pairs
+    )
+    return [estimate(job, measure=measure, jobs=jobs).to_json() for job in jobs_of]
 
 
 def saved_summary(path: Path, file: ScoreFile) -> dict[str, Any]:

@@ -211,18 +211,18 @@ def _scored(
     size, length = _size(problem), SLICE if kept is None else BLOCK
     grippers = gripper_contacts(problem)
     yield from Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
-        delayed(_block)(problem, grippers, start, min(start + length, size), excluded, kept)
+        delayed(score_block)(problem, grippers, start, min(start + length, size), excluded, kept)
         for start in range(0, size, length)
     )
 
 
-def _block(
+def score_block(
     problem: Problem,
     grippers: NDArray[np.int64],
     start: int,
     stop: int,
-    excluded: NDArray[np.bool_] | None,
-    kept: Kept | None,
+    excluded: NDArray[np.bool_] | None = None,
+    kept: Kept | None = None,
 ) -> Block:
     """Return the scores of configurations start <= h < stop: kept ones, or new ones."""
     found = None if kept is None else kept.load(start, stop)

@@ -1,0 +1,90 @@
+"""What scoring a grid would take: time, memory and disk, estimated from some of its slices."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tcs.files.compression import compress
+from tcs.kernel.problem import build_problem
+from tcs.kernel.sweep import gripper_contacts
+from tcs.placement.scoring.blocks import BLOCK, Block
+from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.sweep import SLICE, score_block, warm_up
+
+SAMPLES = 24
+"""Slices that are scored, spread evenly over the grid. Environment states and base positions differ
+in how many goals are near; 24 hit each part of the grids that ship."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What scoring a grid would take."""
+
+    task: str
+    environment: str
+    robot: str
+    configurations: int
+    goals: int
+    blocks: int
+    """Files of `--blocks`."""
+    scoring_seconds: float
+    """Time of the scoring alone [s], without compiling, sets and approaches."""
+    scoring_seconds_error: float
+    """Standard error of the time from the spread of the slices [s]."""
+    memory_bytes: int
+    """Memory of the scores, beside that of the program."""
+    disk_bytes: int
+    """Size of the scores in a file or in blocks, without the sets."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain containers."""
+        return asdict(self)
+
+
+def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
+    """Estimate what scoring a job would take.
+
+    Args:
+        job: The job.
+        measure: Name of the dexterity measure.
+        jobs: Number of threads; the time is that of one thread divided by it.
+    """
+    lowered = job.lowered(job.scene())
+    problem = build_problem(lowered.arrays, lowered.grid, measure)
+    warm_up(problem)
+    grippers = gripper_contacts(problem)
+    size, goals = job.scored_grid.size, len(job.task.goals)
+    starts = np.unique(np.linspace(0, max(0, size - SLICE), SAMPLES).astype(int))
+    seconds, memory, disk, scored = [], 0, 0, 0
+    for start in starts.tolist():
+        begun = time.thread_time()
+        block = score_block(problem, grippers, start, min(start + SLICE, size))
+        seconds.append(time.thread_time() - begun)
+        scored += len(block.reason)
+        memory += sum(array.nbytes for array in block)
+        disk += _stored_bytes(block)
+    slices = size / SLICE / jobs
+    spread = float(np.std(seconds, ddof=1)) if len(seconds) > 1 else 0.0
+    return Estimate(
+        task=job.task.name,
+        environment=job.spec.environment.name,
+        robot=job.spec.robot.name,
+        configurations=size,
+        goals=goals,
+        blocks=-(-size // BLOCK),
+        scoring_seconds=sum(seconds) / scored * size / jobs,
+        scoring_seconds_error=slices * spread / len(seconds) ** 0.5,
+        memory_bytes=round(memory / scored * size),
+        disk_bytes=round(disk / scored * size),
+    )
+
+
+def _stored_bytes(block: Block) -> int:
+    # Dexterity is stored where reached only.
+    stored = (*block[:2], block.dexterity[block.reason == 0], block.joints)
+    contacts = stored[1].astype(np.uint32)
+    return sum(compress(array)["bytes"].size for array in (stored[0], contacts, *stored[2:]))
