@@ -64,8 +64,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="File to write the plan to: .json, .csv, .yaml (ROS JointTrajectory) or .npz "
-            "(arrays for Drake)."
+            help="File to write the plan to: .json, .csv, .yaml (JointTrajectory of ROS 2), "
+            ".ros1.yaml (of ROS 1) or .npz (arrays for Drake)."
         ),
     ] = None,
     seed: options.Seed = 0,

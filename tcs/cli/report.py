@@ -30,6 +30,12 @@ def report(
         bool, typer.Option("--md", help="Also write text and tables as .md, under the same name.")
     ] = False,
     sizes: options.CheckOptions,
+    motions: Annotated[
+        bool,
+        typer.Option(
+            "--motions", help="Also plan the motions of the set, and show the tour of each stop."
+        ),
+    ] = False,
     as_json: options.Json = False,
 ) -> None:
     """Write a page about a score file: base poses, scores, reasons and verification.
@@ -51,6 +57,7 @@ def report(
             max_members=chosen.max_members,
             observed=found,
             sizes=CheckSizes(pairs=sizes.pairs, dense=sizes.dense, seed=sizes.seed),
+            tours=motions,
             on_progress=on_progress,
         )
     result = write_score_report(answer, paths, command=shlex.join(["tcs", *sys.argv[1:]]))

@@ -1,4 +1,4 @@
-"""Plans as files: JSON, CSV with a row for each sample, ROS messages, arrays for Drake.
+"""Plans as files: JSON, CSV with a row for each sample, ROS 1 and 2 messages, arrays for Drake.
 
 JSON is as `tcs plan --json` prints it. The others hold the trajectory of each stop as a whole.
 """
@@ -18,7 +18,7 @@ from tcs.files.writing import whole_file
 from tcs.kernel.arrays import FloatArray
 from tcs.motion.motion_plan import MotionPlan
 
-FORMATS = (".json", ".csv", ".yaml", ".npz")
+FORMATS = (".json", ".csv", ".yaml", ".ros1.yaml", ".npz")
 
 
 def check_plan_path(path: Path) -> None:
@@ -27,7 +27,7 @@ def check_plan_path(path: Path) -> None:
     Raises:
         OutputError: If its suffix is not one of `FORMATS`.
     """
-    if path.suffix not in FORMATS:
+    if _format(path) not in FORMATS:
         raise OutputError(
             f"Cannot write '{path}': a plan is written as "
             f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}."
@@ -45,11 +45,17 @@ def save_plan(path: Path, plan: MotionPlan) -> None:
         ".json": lambda: json.dumps(plan.to_json(), indent=1).encode(),
         ".csv": lambda: plan_csv(plan).encode(),
         ".yaml": lambda: plan_messages(plan).encode(),
+        ".ros1.yaml": lambda: plan_messages(plan, ros=1).encode(),
         ".npz": lambda: plan_arrays(plan),
     }
-    content = written[path.suffix]()
+    content = written[_format(path)]()
     with whole_file(path, "Plan") as stream:
         stream.write(content)
+
+
+def _format(path: Path) -> str:
+    """Return the one of FORMATS that a path ends in, else its suffix."""
+    return ".ros1.yaml" if path.name.endswith(".ros1.yaml") else path.suffix
 
 
 def plan_csv(plan: MotionPlan) -> str:
@@ -77,12 +83,17 @@ def plan_csv(plan: MotionPlan) -> str:
     return out.getvalue()
 
 
-def plan_messages(plan: MotionPlan) -> str:
-    """Return the trajectory of each stop in the layout of ROS 2 `trajectory_msgs/JointTrajectory`.
+def plan_messages(plan: MotionPlan, *, ros: int = 2) -> str:
+    """Return the trajectory of each stop in the layout of ROS `trajectory_msgs/JointTrajectory`.
 
     One YAML document for each stop with motions. Accelerations [rad/s^2] are the derivatives of the
     sampled velocities.
+
+    Args:
+        plan: The plan.
+        ros: Version of ROS, 1 or 2, which name the parts of a time differently.
     """
+    begin = {"stamp": _time(0.0, ros), "frame_id": ""}
     documents = []
     for stop in plan.stops:
         if not stop.segments:
@@ -91,24 +102,29 @@ def plan_messages(plan: MotionPlan) -> str:
         accelerations = np.gradient(found.velocities, found.times, axis=0)
         rows = zip(found.times, found.positions, found.velocities, accelerations, strict=True)
         message = {
-            "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+            "header": {"seq": 0, **begin} if ros == 1 else begin,
             "joint_names": list(plan.joints),
-            "points": [_point(*row) for row in rows],
+            "points": [
+                {**_point(q, v, a), "time_from_start": _time(t, ros)} for t, q, v, a in rows
+            ],
         }
         # JSON is YAML, and much faster to write.
         documents.append(json.dumps(message))
     return "".join(f"---\n{document}\n" for document in documents)
 
 
-def _point(time: float, q: FloatArray, v: FloatArray, a: FloatArray) -> dict[str, Any]:
-    nanoseconds = round(float(time) * 1e9)
+def _point(q: FloatArray, v: FloatArray, a: FloatArray) -> dict[str, Any]:
     return {
         "positions": (q.round(9) + 0.0).tolist(),
         "velocities": (v.round(9) + 0.0).tolist(),
         "accelerations": (a.round(9) + 0.0).tolist(),
         "effort": [],
-        "time_from_start": {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9},
     }
+
+
+def _time(seconds: float, ros: int) -> dict[str, int]:
+    names = ("secs", "nsecs") if ros == 1 else ("sec", "nanosec")
+    return dict(zip(names, divmod(round(float(seconds) * 1e9), 10**9), strict=True))
 
 
 def plan_arrays(plan: MotionPlan) -> bytes:

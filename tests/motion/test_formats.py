@@ -57,6 +57,20 @@ def test_ros_messages_have_one_point_for_each_sample(planned, tmp_path):
     assert np.max(np.abs(accelerations)) <= limit * 1.001
 
 
+def test_messages_of_ros_1_differ_in_times_and_header_alone(planned, tmp_path):
+    save_plan(tmp_path / "plan.yaml", planned)
+    save_plan(tmp_path / "plan.ros1.yaml", planned)
+    (second,) = yaml.safe_load_all((tmp_path / "plan.yaml").read_text())
+    (first,) = yaml.safe_load_all((tmp_path / "plan.ros1.yaml").read_text())
+    stamp = {"secs": 0, "nsecs": 0}
+    assert first.pop("header") == {"seq": 0, "stamp": stamp, "frame_id": ""}
+    assert second.pop("header") == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    for one, two in zip(first["points"], second["points"], strict=True):
+        at, also = one.pop("time_from_start"), two.pop("time_from_start")
+        assert at == {"secs": also["sec"], "nsecs": also["nanosec"]}
+    assert first == second
+
+
 def circle(count, rng):
     """Return goals on a circle in random order with a posture off it, and the costs."""
     angles = 2 * np.pi * rng.permutation(count) / count

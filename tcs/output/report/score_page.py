@@ -13,6 +13,7 @@ from tcs.output.report.machine import machine, today, versions
 from tcs.output.report.reproduce import commands, success_record
 from tcs.output.report.score_report import ScoreReport
 from tcs.output.report.score_summary import summary_blocks, unreached_everywhere
+from tcs.output.report.tours import tours_blocks
 from tcs.output.words import (
     assigned_goals,
     frame_name,
@@ -39,8 +40,11 @@ def make_score_page(report: ScoreReport, *, command: str) -> Page:
         sections.append(Section("Maps by environment state", _states(report)))
     if report.views:
         sections.append(Section("Robot at each stop", _views(report)))
+    sections.append(Section("Goals", _goals(report)))
+    if report.tours is not None:
+        frames = [goal.body_frame for goal in report.job.task.goals]
+        sections.append(Section("Motions", tours_blocks(report.tours, frames)))
     sections += [
-        Section("Goals", _goals(report)),
         Section("Reasons over the grid", _reasons(report)),
         Section("Verification", _verification(report)),
         Section("Success under error", _success(report)),

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from tcs.model.grid import InitialConfiguration
+from tcs.motion import plan
 from tcs.output.draw import as_png
-from tcs.output.report.pictures import map_figure, member_figure, scored_scene
+from tcs.output.report.pictures import ScoredScene, map_figure, member_figure, scored_scene
 from tcs.output.report.shown_set import ShownSet
 from tcs.output.report.states import has_states, states_figure
+from tcs.output.report.tours import Tours
 from tcs.output.words import assign_goals
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
@@ -76,6 +78,8 @@ class ScoreReport:
     """Map of each state of the environment, PNG; None if there is one state only."""
     views: tuple[bytes, ...]
     """Each member, with a close view of the tool at a goal, PNG."""
+    tours: Tours | None
+    """The motions of the set; None if none were requested."""
     seconds: float
     """Wall time to make the report."""
 
@@ -130,7 +134,11 @@ class ScoreReport:
     @property
     def is_sound(self) -> bool:
         """Whether no checked answer is false, of the file and of the postures shown."""
-        return self.verification.is_sound and all(map(self.is_confirmed, self.findings))
+        return (
+            self.verification.is_sound
+            and all(map(self.is_confirmed, self.findings))
+            and (self.tours is None or self.tours.plan.false == 0)
+        )
 
     def is_confirmed(self, goal: int) -> bool:
         """Return whether Drake confirms the posture shown at a goal, and its measure."""
@@ -165,6 +173,7 @@ class ScoreReport:
             "verification": self.verification.to_json(),
             "shown_checked": len(self.findings),
             "shown_false": [goal for goal in self.findings if not self.is_confirmed(goal)],
+            "tours": None if self.tours is None else self.tours.to_json(),
             "is_sound": self.is_sound,
             "seconds": self.seconds,
         }
@@ -183,6 +192,7 @@ def make_score_report(
     max_members: int | None = None,
     observed: Mapping[str, float] | None = None,
     sizes: CheckSizes | None = None,
+    tours: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> ScoreReport:
     """Return the report of a score file: verified with Drake and drawn.
@@ -193,11 +203,13 @@ def make_score_report(
         max_members: Most members of the set; by default as many as the file holds.
         observed: Observed values of the observed axes [m or rad].
         sizes: How many pairs to verify.
+        tours: Whether to plan the motions of the set, and re-check them.
         on_progress: Called with the numbers of pairs done and in total.
 
     Raises:
         StoreError: If the file cannot be used, or was made from other models.
         SelectionError: If there is no such set.
+        RobotError: If motions are planned and a velocity limit is unknown.
     """
     begun, sizes = time.perf_counter(), sizes or CheckSizes()
     file = load_scores(path)
@@ -221,6 +233,7 @@ def make_score_report(
         ),
         findings=dict(zip(served, findings, strict=True)),
         sizes=sizes,
+        tours=_tours(file, shown, scored) if tours else None,
         map=as_png(map_figure(file, shown, scored), _DPI, colours=None),
         states=as_png(states_figure(file, shown, scored=scored), _DPI, colours=None)
         if has_states(file)
@@ -231,3 +244,13 @@ def make_score_report(
         ),
         seconds=time.perf_counter() - begun,
     )
+
+
+def _tours(file: ScoreFile, shown: ShownSet, scored: ScoredScene) -> Tours:
+    """Plan the motions of a set, and measure their clearances."""
+    first = shown.table * scored.job.grid.size
+    planned = plan(file, [first + index for index in shown.indices])
+    before = scored.scene.positions()
+    tours = Tours.of(planned, scored.scene)
+    scored.scene.restore(before)
+    return tours

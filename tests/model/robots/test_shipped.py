@@ -34,6 +34,14 @@ def model(robot):
     return model_with_extras(robot)
 
 
+def test_the_rest_posture_is_named_and_within_the_limits(robot):
+    assert robot.rest
+    limits = robot.joint_limits()
+    for name, angle in zip(robot.arm_joints, robot.arm_rest(), strict=True):
+        assert limits[name][0] <= angle <= limits[name][1]
+        assert angle == pytest.approx(robot.rest.get(name, angle), abs=1e-9)
+
+
 def test_the_name_is_that_of_the_file(robot):
     assert load_robot(robot.name) == robot
     assert hash(load_robot(robot.name)) == hash(robot)
