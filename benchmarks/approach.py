@@ -17,21 +17,17 @@ import numpy as np
 from table import cell, header, parser, row, save
 
 import tcs
-from tcs.kernel.approach.sweep import approach_spline
-from tcs.kernel.problem import build_problem
-from tcs.model.scene import NeighbourList
-from tcs.model.tasks import TOOL_SPEED
 from tcs.motion import Stop
 from tcs.motion.approach import SAMPLES, first_accesses
-from tcs.motion.curves import Curve
-from tcs.motion.recheck import false_pieces
-from tcs.placement.scoring import Job, load_job, sweep, task_environment_pairs
+from tcs.motion.approach_check import ApproachScene
+from tcs.placement.scoring import load_job, sweep, task_environment_pairs
 from tcs.placement.scoring.approaches import approach_lines
-from tcs.placement.scoring.rebuild import rebuild_scene
 from tcs.placement.tables import Reason
 
 TIMED = ("shaving", "wheelchair")
-COMPARED = (TIMED, ("bathing", "bed"))
+COMPARED = (TIMED, ("feeding", "wheelchair"), ("bathing", "bed"))
+DRAKE = 60
+"""Greatest number of approaches re-checked with Drake, a second each."""
 APPROACH = (Reason.APPROACH_LIMITS, Reason.APPROACH_BLOCKED)
 
 
@@ -91,54 +87,38 @@ def share(file: tcs.ScoreFile) -> None:
 
 def compare(file: tcs.ScoreFile, pairs: int, seed: int) -> None:
     """Compare random pairs with the dense scan, and re-check their approaches with Drake."""
-    job, scene, lowered = rebuild_scene(file)
-    problem, lines = build_problem(lowered.arrays, lowered.grid), approach_lines(job)
-    table = file.nominal_index
-    scores = file.tables[table].scores
+    approaches = ApproachScene.of(file)
+    job, scene = approaches.job, approaches.scene
+    scores = file.nominal.scores
     drawn = np.argwhere(scores.reached | np.isin(scores.reason, APPROACH))
     rng = np.random.default_rng(seed)
     dense = both = checked = false = lost = 0
+    speed = 0.0
     for h, g in drawn[rng.permutation(len(drawn))[:pairs]].tolist():
-        number = table * job.grid.size + h
+        number = file.nominal_index * job.grid.size + h
         stop = Stop.of(job, scene, number, seed)
         is_found = any(True for n in SAMPLES for _ in first_accesses(stop, g, n))
         dense += is_found
         both += is_found and bool(scores.reached[h, g])
-        if not scores.reached[h, g]:
+        if is_found and not scores.reached[h, g]:
+            row("missed", f"configuration {h}, goal {g}: {Reason(scores.reason[h, g]).name}")
+        if not scores.reached[h, g] or checked == DRAKE:
             continue
-        spline = approach_spline(problem, lines, number, g, scores.joints_of(h, g))
-        if spline is None:
-            lost += 1
-            continue
+        found = approaches.check(number, g, np.asarray(scores.joints_of(h, g), dtype=np.float64))
         checked += 1
-        false += not is_true(job, stop, g, *spline)
+        lost += found is None
+        false += found is None or not found.is_true
+        speed = max(speed, 0.0 if found is None else found.speed)
     line = name_of(file)
     cell("recall", line, "pairs", f"{pairs:,}")
     cell("recall", line, "approachable by the dense scan", f"{dense:,}")
     cell("recall", line, "of these found", f"{both:,}")
     cell("recall", line, "false (Drake), of the approaches re-checked", f"{false:,} of {checked:,}")
-    row(line, f"{both} of {dense} found, {false} of {checked} false, {lost} not found again")
-
-
-def is_true(job: Job, stop: Stop, goal: int, points: np.ndarray, tangents: np.ndarray) -> bool:
-    """Return whether Drake confirms an approach: straight, within limits, free of contact."""
-    line = job.task.goals[goal].approach
-    knots = np.linspace(0.0, 1.0, len(points))
-    curve = Curve(knots, points, tangents, fastest=TOOL_SPEED / line.distance)
-    if false_pieces(NeighbourList(stop.scene), stop.motion, curve):
-        return False
-    stop.scene.set_arm(points[-1])
-    X_WG = stop.scene.tool_pose()
-    for piece in range(curve.pieces):
-        fractions = np.linspace(0.0, 1.0, 9)
-        for fraction, q in zip(fractions, curve.points(piece, fractions), strict=True):
-            stop.scene.set_arm(q)
-            X_GT = X_WG.inverse() @ stop.scene.tool_pose()
-            ahead = 1.0 - (piece + fraction) / curve.pieces
-            off = np.linalg.norm(X_GT.translation() + ahead * line.offset)
-            if off > 2e-3 or X_GT.rotation().ToAngleAxis().angle() > 2e-3:
-                return False
-    return True
+    row(
+        line,
+        f"{both} of {dense} found, {false} of {checked} false, {lost} of them not found again, "
+        f"speed up to {speed:.3f} of the limit",
+    )
 
 
 def name_of(file: tcs.ScoreFile) -> str:

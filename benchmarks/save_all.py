@@ -31,6 +31,10 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--places", "60", "--drake", "10"),
     ),
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
+    "approach": (
+        *("--rows", "shaving/wheelchair", "feeding/wheelchair", "bathing/bed"),
+        *("--pairs", "100"),
+    ),
     "motions": tuple(
         f"{SCORES}/{name}-pr2.tcs"
         for name in (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +13,13 @@ from tcs.cli.motion import verify_plan
 from tcs.cli.option_groups import expand_options
 from tcs.output import terminal
 from tcs.output.terminal import tables
+
+if TYPE_CHECKING:
+    from tcs.motion import ApproachCheck
+    from tcs.placement.store import ScoreFile
+
+PAIRS_PER_APPROACH = 20
+"""Pairs re-checked for each approach re-checked: Drake takes a second for the postures of one."""
 
 
 @expand_options
@@ -243,6 +250,7 @@ def verify(
         return
 
     import tcs
+    from tcs.placement.scoring.verify import FALSE_VERDICT
 
     loaded = tcs.load(file)
     with terminal.progress_bar("pairs") as on_progress:
@@ -256,10 +264,24 @@ def verify(
             seed=sizes.seed,
             on_progress=on_progress,
         )
-    terminal.print_result(found.to_json(), tables.report_verification, as_json=as_json)
-    if not found.is_sound:
+    result, is_sound = {**found.to_json(), "approaches": None}, found.is_sound
+    if "approach" in loaded.metadata:
+        approaches = _verify_approaches(loaded, sizes.pairs // PAIRS_PER_APPROACH, sizes.seed)
+        result["approaches"] = approaches.to_json()
+        if not approaches.is_sound:
+            result["verdict"], is_sound = FALSE_VERDICT, False
+    terminal.print_result(result, tables.report_verification, as_json=as_json)
+    if not is_sound:
         terminal.note(f"some answers in '{file}' are false; do not use them.")
         raise typer.Exit(1)
+
+
+def _verify_approaches(file: ScoreFile, pairs: int, seed: int) -> ApproachCheck:
+    """Re-check approaches of random reached pairs."""
+    from tcs.motion import check_approaches
+
+    with terminal.progress_bar("approaches") as on_progress:
+        return check_approaches(file, pairs=pairs, seed=seed, on_progress=on_progress)
 
 
 def export(

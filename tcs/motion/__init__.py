@@ -8,6 +8,7 @@ for all configurations worth it, which goals can be done.
 from __future__ import annotations
 
 from tcs.motion.approach import Access, Accesses, accesses
+from tcs.motion.approach_check import ApproachCheck, check_approaches
 from tcs.motion.curves import Curve
 from tcs.motion.examine import examine
 from tcs.motion.files import save_plan
@@ -21,6 +22,7 @@ from tcs.motion.timing import Timed
 __all__ = [
     "Access",
     "Accesses",
+    "ApproachCheck",
     "Curve",
     "GoalResult",
     "MotionPlan",
@@ -30,6 +32,7 @@ __all__ = [
     "StopPlan",
     "Timed",
     "accesses",
+    "check_approaches",
     "check_plan",
     "examine",
     "load_plan",

@@ -47,6 +47,7 @@ def check_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
             "greatest orientation error", greatest("max_rotation_error", " rad"), is_detail=True
         ),
         CheckLine(f"greatest error of {measure}", greatest("max_isotropy_error"), is_detail=True),
+        *_approach_lines(found),
         CheckLine(f"unreached pairs scanned densely ({scan})", f"{found['dense_checked']:,}"),
         CheckLine("reachable", f"{found['missed']:,}", is_detail=True),
         CheckLine("solutions that Drake refutes", f"{found['unconfirmed_hits']:,}", is_detail=True),
@@ -60,6 +61,26 @@ def _refined_line(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
     """Return the number of re-checked pairs of refined sets, if there are any."""
     count = found["refined_checked"]
     return (CheckLine("of refined sets", f"{count:,}", is_detail=True),) if count else ()
+
+
+def _approach_lines(found: Mapping[str, Any]) -> tuple[CheckLine, ...]:
+    """Return what the re-check of approaches shows, if the file was scored with approach."""
+    checked = found.get("approaches")
+    if checked is None:
+        return ()
+    lines = (
+        CheckLine("approaches re-checked with Drake", f"{checked['checked']:,}"),
+        CheckLine("false", f"{checked['false']:,}", is_detail=True),
+    )
+    if checked["max_line_error"] is None:
+        return lines
+    return (
+        *lines,
+        CheckLine(
+            "greatest error along the line", f"{checked['max_line_error']:.1e}", is_detail=True
+        ),
+        CheckLine("greatest speed", f"{checked['max_speed']:.2f} of the limit", is_detail=True),
+    )
 
 
 def _stratum_line(stratum: Mapping[str, Any]) -> CheckLine:

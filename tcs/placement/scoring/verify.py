@@ -32,6 +32,8 @@ from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC, ik_of
 from tcs.placement.store import ScoreFile, StateTables, files_of_arms
 from tcs.placement.tables import Reason
 
+FALSE_VERDICT = "SOME ANSWERS ARE FALSE"
+"""What a check shows that refutes an answer."""
 POSITION_BAR = 1e-6
 """Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
 the tool by up to 1.2e-7 rad x 1 m for each of seven joints, 4e-7 m in practice."""
@@ -111,7 +113,7 @@ class Verification:
     def verdict(self) -> str:
         """What the checks show, as a clause."""
         if not self.is_sound:
-            return "SOME ANSWERS ARE FALSE"
+            return FALSE_VERDICT
         if self.checked:
             return "every answer holds"
         if self.dense_checked:

@@ -1,0 +1,208 @@
+"""Re-check of the approaches of a score file: straight, within limits, free of contact by Drake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tcs.errors import TcsError
+from tcs.kernel.approach.sweep import ApproachLines, approach_spline
+from tcs.kernel.arrays import FloatArray
+from tcs.kernel.problem import Problem, build_problem
+from tcs.model.scene import NeighbourList, Scene, goal_poses
+from tcs.motion.curves import Curve
+from tcs.motion.recheck import false_pieces
+from tcs.motion.stops import Stop
+from tcs.placement.scoring.approaches import approach_lines
+from tcs.placement.scoring.job import Job
+from tcs.placement.scoring.rebuild import rebuild_scene
+from tcs.placement.store import ScoreFile, files_of_arms
+
+LINE_BAR = 1e-3
+"""Greatest error of the tool along the line [rad and m]: twice what the kernel allows in the middle
+of a piece."""
+SPEED_BAR = 1.1
+"""Greatest fraction of a velocity limit: the kernel keeps the limits at the points of a spline, and
+in the mean between them, where cubics are a little faster."""
+SAME_POSTURE = 1e-5
+"""Greatest distance of the end of an approach from the stored posture [rad]: joints are stored as
+float32, and the closed form moves others by more where the arm is nearly singular."""
+SAMPLES = 9
+"""Postures on each piece whose tool is compared with the line."""
+
+
+@dataclass(frozen=True)
+class ApproachCheck:
+    """Result of re-checking approaches; None for values that no check gave."""
+
+    checked: int
+    """Number of reached pairs whose approach was re-checked, at postures between which no point of
+    the arm moves by more than a millimetre."""
+    false: int
+    """Number of these whose approach is not found again from the stored posture, leaves the line,
+    exceeds limits or is in contact."""
+    max_line_error: float | None
+    """Greatest error of the tool along the line [rad and m]."""
+    max_speed: float | None
+    """Greatest velocity of a joint at the tool's speed, as a fraction of its limit."""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether no approach is false."""
+        return self.false == 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the findings as plain containers."""
+        return asdict(self)
+
+
+class ApproachFinding(NamedTuple):
+    """Drake's finding on one approach."""
+
+    is_true: bool
+    """Whether the approach is straight, within limits and free of contact."""
+    line_error: float
+    """Greatest error of the tool along the line [rad and m]."""
+    speed: float
+    """Greatest velocity of a joint at the tool's speed, as a fraction of its limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class ApproachScene:
+    """A job whose approaches are re-checked."""
+
+    job: Job
+    scene: Scene
+    problem: Problem
+    lines: ApproachLines
+    neighbours: NeighbourList
+
+    @classmethod
+    def of(cls, file: ScoreFile) -> ApproachScene:
+        """Rebuild the scene of a file of one arm.
+
+        Raises:
+            StoreMismatchError: If the models differ from those the file was made from.
+            RobotError: If a velocity limit is unknown.
+        """
+        job, scene, lowered = rebuild_scene(file)
+        problem = build_problem(lowered.arrays, lowered.grid)
+        return cls(job, scene, problem, approach_lines(job), NeighbourList(scene))
+
+    def check(self, number: int, goal: int, q: FloatArray) -> ApproachFinding | None:
+        """Return the finding on the approach of a posture, None if no approach is found from it.
+
+        Args:
+            number: Flat index of the initial configuration in the scored grid.
+            goal: Number of the goal.
+            q: Joint angles at the goal [rad], shape (7,).
+        """
+        spline = approach_spline(self.problem, self.lines, number, goal, q)
+        if spline is None:
+            return None
+        points, tangents = spline
+        turns = np.abs(np.angle(np.exp(1j * (points[-1] - q))))
+        curve = Curve(np.linspace(0.0, 1.0, len(points)), points, tangents)
+        stop = Stop.of(self.job, self.scene, number, 0)
+        error = self._line_error(curve, goal)
+        speed = _greatest_rate(curve, self.lines.fastest[goal])
+        is_true = (
+            bool(np.all(turns <= SAME_POSTURE))
+            and error <= LINE_BAR
+            and speed <= SPEED_BAR
+            and false_pieces(self.neighbours, stop.motion, curve) == 0
+        )
+        return ApproachFinding(is_true, error, speed)
+
+    def _line_error(self, curve: Curve, goal: int) -> float:
+        """Return the greatest error of the tool along the line to a goal [rad and m]."""
+        scene, worst = self.scene, 0.0
+        X_GW = goal_poses(scene, self.job.task)[goal].inverse()
+        offset = np.asarray(self.job.task.goals[goal].approach.offset)
+        for begin, fraction, q in _samples(curve):
+            scene.set_arm(q)
+            X_GT = X_GW @ scene.tool_pose()
+            ahead = 1.0 - (begin + fraction) / curve.pieces
+            off = float(np.linalg.norm(X_GT.translation() + ahead * offset))
+            worst = max(worst, off, float(X_GT.rotation().ToAngleAxis().angle()))
+        return worst
+
+
+def check_approaches(
+    file: ScoreFile,
+    *,
+    pairs: int = 25,
+    seed: int = 0,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> ApproachCheck:
+    """Re-check approaches of random reached pairs of a file that was scored with approach.
+
+    From the stored posture the arm is led back along the straight approach; Drake confirms the
+    line, the limits and that nothing touches.
+
+    Args:
+        file: A score file.
+        pairs: Number of reached pairs.
+        seed: Seed of the random sample.
+        on_progress: Called with the number of checked pairs and their total.
+
+    Raises:
+        TcsError: If the file was scored without approach, or `pairs` is negative.
+        StoreMismatchError: If the models differ from those the file was made from.
+    """
+    if pairs < 0:
+        raise TcsError(f"check_approaches: pairs is {pairs}; it may not be negative.")
+    if "approach" not in file.metadata:
+        raise TcsError("The file was scored without approach: it has no approaches to check.")
+    files = files_of_arms(file)
+    reached = [
+        (arm, table, int(h), int(g))
+        for arm, of_arm in enumerate(files)
+        for table, tables in enumerate(of_arm.tables)
+        for h, g in np.argwhere(tables.scores.reached)
+    ]
+    drawn = sorted(np.random.default_rng(seed).permutation(len(reached))[:pairs].tolist())
+    findings: list[ApproachFinding | None] = []
+    scenes: dict[int, ApproachScene] = {}
+    for n in drawn:
+        arm, table, h, g = reached[n]
+        if arm not in scenes:
+            scenes[arm] = ApproachScene.of(files[arm])
+        scores = files[arm].tables[table].scores
+        q = np.asarray(scores.joints_of(h, g), dtype=np.float64)
+        findings.append(scenes[arm].check(table * len(scores.reason) + h, g, q))
+        if on_progress is not None:
+            on_progress(len(findings), len(drawn))
+    found = [finding for finding in findings if finding is not None]
+    return ApproachCheck(
+        checked=len(findings),
+        false=sum(finding is None or not finding.is_true for finding in findings),
+        max_line_error=max((finding.line_error for finding in found), default=None),
+        max_speed=max((finding.speed for finding in found), default=None),
+    )
+
+
+def _samples(curve: Curve) -> Iterator[tuple[int, float, FloatArray]]:
+    """Yield the number of a piece, a fraction of it and the posture there, over the curve."""
+    fractions = np.linspace(0.0, 1.0, SAMPLES)
+    for piece in range(curve.pieces):
+        for fraction, q in zip(fractions, curve.points(piece, fractions), strict=True):
+            yield piece, float(fraction), q
+
+
+def _greatest_rate(curve: Curve, fastest: FloatArray) -> float:
+    """Return the greatest rate of a joint by the parameter, as a fraction of the fastest allowed.
+
+    Args:
+        curve: A curve whose parameter goes from 0 to 1.
+        fastest: Greatest rate of each joint [rad], shape (7,).
+    """
+    fractions = np.linspace(0.0, 1.0, SAMPLES)
+    rates = [
+        np.diff(curve.points(piece, fractions), axis=0) * (curve.pieces * (SAMPLES - 1))
+        for piece in range(curve.pieces)
+    ]
+    return float(np.max(np.abs(np.concatenate(rates)) / fastest))
