@@ -149,11 +149,12 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
     number = int(scores.pair[row, goal])
     pair = scores.pair_names[number] if number >= 0 else None
     contact = f" ({pair_text(pair)})" if pair is not None else ""
-    frame = _frame_of(file.task, goal)
+    given, frame = _text_of(file.task, goal, "name"), _frame_of(file.task, goal)
     place = sum(_frame_of(file.task, other) == frame for other in range(goal + 1))
     return {
         "goal": goal,
-        "name": f"{frame_name(frame)}, place {place}" if frame else f"goal {goal}",
+        "name": given or (f"{frame_name(frame)}, place {place}" if frame else f"goal {goal}"),
+        "given_name": given,
         "body_frame": frame,
         "place": place,
         "reached": reason == Reason.REACHED,
@@ -166,11 +167,16 @@ def _goal(file: ScoreFile, scores: ScoreTable, rows: Any, goal: int) -> dict[str
 
 def _frame_of(task: Mapping[str, Any], goal: int) -> str | None:
     """Return the body frame of a goal, None if the file does not state it."""
+    return _text_of(task, goal, "body_frame")
+
+
+def _text_of(task: Mapping[str, Any], goal: int, key: str) -> str | None:
+    """Return a text of a goal, None if the file does not state it."""
     goals = task.get("goals")
     if not isinstance(goals, Sequence) or goal >= len(goals) or not isinstance(goals[goal], dict):
         return None
-    frame = goals[goal].get("body_frame")
-    return frame if isinstance(frame, str) else None
+    text = goals[goal].get(key)
+    return text if isinstance(text, str) and text else None
 
 
 def _states(grid: Grid) -> int:

@@ -10,6 +10,7 @@ import httpx
 import pytest
 
 from tcs.app import LANGUAGES, add_page
+from tcs.model.tasks import load_task, task_names
 from tcs.placement.tables import Reason
 from tcs.service import Engine
 from tcs.service.http import Access, Server, make_application
@@ -52,10 +53,10 @@ def test_nothing_is_from_elsewhere(name):
 
 
 def paths(texts: dict, above: str = "") -> set[str]:
-    """Return the keys of all texts; frames may fall back to their own names."""
+    """Return the keys of all texts; frames and goals may fall back to their own names."""
     found = set()
     for key, value in texts.items():
-        if isinstance(value, dict) and key != "frames":
+        if isinstance(value, dict) and key not in ("frames", "goalNames"):
             found |= paths(value, f"{above}{key}.")
         else:
             found.add(f"{above}{key}")
@@ -75,3 +76,10 @@ def test_every_text_that_is_used_is_there(language):
     used = {*re.findall(r'data-t="([^"]+)"', html), *re.findall(r'\bt\("([^"]+)"', SCRIPTS)}
     assert used - paths(TEXTS[language]) == set()
     assert {reason.name.lower() for reason in Reason} == set(TEXTS[language]["reasons"])
+
+
+def test_other_languages_name_every_frame_and_goal_that_ships():
+    goals = [goal for name in task_names() for goal in load_task(name).goals]
+    for language in LANGUAGES[1:]:
+        assert {goal.name for goal in goals if goal.name} <= set(TEXTS[language]["goalNames"])
+        assert {goal.body_frame for goal in goals} <= set(TEXTS[language]["frames"])

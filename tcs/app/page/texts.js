@@ -19,6 +19,7 @@ export function named(table, name) {
 }
 
 export function goalName(goal) {
+  if (goal.given_name) return t(`goalNames.${goal.given_name}`) ?? goal.given_name;
   if (!goal.body_frame) return t("goalNumber", { place: goal.goal + 1 });
   return t("goalName", { frame: named("frames", goal.body_frame), place: goal.place });
 }
