@@ -100,6 +100,7 @@ def run(folder: Path) -> int:
         f"total {time.perf_counter() - begun:.0f} s."
     )
     print(f"Pictures: {folder / 'map.png'} and {folder / 'scene.png'}.")
+    print(f"In the browser: {Path(sys.executable).parent / 'tcs'} app {path}")
     if not found.is_sound:
         print("demo: some results are false.", file=sys.stderr)
         return 1

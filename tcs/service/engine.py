@@ -298,8 +298,9 @@ class Engine:
         def done(progress: Progress) -> dict[str, Any]:
             try:
                 return dict(without_infinities(work(progress)))
-            except UnknownNameError:
-                raise
+            except UnknownNameError as error:
+                where = self._sent.without_folder(error.where)
+                raise UnknownNameError(error.what, error.name, error.known, where=where) from None
             except TcsError as error:
                 message = self._sent.without_folder(str(error))
                 if message == str(error):

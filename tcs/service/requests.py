@@ -14,7 +14,7 @@ from pydantic import Field
 from tcs.files.documents import Document, Entries, Number
 
 FileId = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of a score file.")]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,80}$")]
+Name = Annotated[str, Field(pattern=r"^[_A-Za-z0-9-]{1,80}$")]
 """Name of a task, an environment or a robot; never a path."""
 Text = Annotated[str, Field(max_length=1000)]
 YamlText = Annotated[str, Field(max_length=1024**2)]

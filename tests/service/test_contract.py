@@ -289,7 +289,7 @@ def test_sent_documents_open_no_path(service):
             "based_on: wheelchair\nname: x\ntitle: x\nobstacles:\n"
             "  - {name: a, file: ../../../etc/hosts, xyz: [0, 0, 0]}\n",
         ),
-        "task_yaml": ("- a list\n", "name: [1\n", "name: x\n"),
+        "task_yaml": ("- a list\n", "name: [1\n", "name: x\n", "nmae: x\n"),
     }
     for key, texts in cases.items():
         for text in texts:

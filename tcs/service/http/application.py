@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import partial
 from typing import Any
 
+import anyio
 import anyio.to_thread
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
@@ -118,6 +119,8 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
 def _add_jobs(app: FastAPI, engine: Engine) -> None:
     """Add the requests about jobs."""
     streams = 0
+    # Streams wait in threads of their own, so that they keep no other request waiting.
+    threads = anyio.CapacityLimiter(engine.limits.streams)
 
     async def jobs() -> Response:
         return _json([status.model_dump() for status in engine.jobs()])
@@ -138,7 +141,7 @@ def _add_jobs(app: FastAPI, engine: Engine) -> None:
         async def closing() -> AsyncIterator[str]:
             nonlocal streams
             try:
-                async for event in _events(engine, status):
+                async for event in _events(engine, status, threads):
                     yield event
             finally:
                 streams -= 1
@@ -154,7 +157,9 @@ def _add_jobs(app: FastAPI, engine: Engine) -> None:
     )  # fmt: skip
 
 
-async def _events(engine: Engine, status: JobStatus) -> AsyncIterator[str]:
+async def _events(
+    engine: Engine, status: JobStatus, threads: anyio.CapacityLimiter
+) -> AsyncIterator[str]:
     """Yield the states of a job as events named `progress`, and the last one as `end`."""
     while True:
         name = "end" if status.has_ended else "progress"
@@ -163,7 +168,7 @@ async def _events(engine: Engine, status: JobStatus) -> AsyncIterator[str]:
             return
         wait = partial(engine.next_state, status.job, status, _BEAT)
         # A stream that is closed must not wait for the job.
-        status = await anyio.to_thread.run_sync(wait, abandon_on_cancel=True)
+        status = await anyio.to_thread.run_sync(wait, abandon_on_cancel=True, limiter=threads)
 
 
 def _add_description(app: FastAPI, engine: Engine) -> None:
