@@ -69,11 +69,13 @@ class Reach:
             head: Name or path of the head file; None is the robot's name.
 
         Raises:
-            RobotError: If the model of the robot cannot be used.
+            RobotError: If the model of the robot cannot be used, or its arm does not have seven
+                joints.
             GridError: If the torso height is out of range or not finite, or the step is not
                 positive.
             UnknownNameError: If there is no measure of that name.
         """
+        robot.require_seven_joints("a capability map")
         self.robot, self.measure = robot, measure
         self.head = head
         """Name or path of the head file; None is the robot's name."""

@@ -23,9 +23,12 @@ SPHERE, CAPSULE, BOX = 0, 1, 2
 
 
 class Chain(NamedTuple):
-    """A serial arm of seven revolute joints, each about the z axis of its own link frame.
+    """A serial arm of six or seven revolute joints, each about the z axis of its own link frame.
 
     X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1] Rz(qi), X_AT = X_AL7 F[7].
+
+    An arm of six joints has a further joint before its first one, about the same axis, which has no
+    limits and remains at 0: its own joints are q2 to q7.
     """
 
     R: FloatArray
@@ -36,6 +39,8 @@ class Chain(NamedTuple):
     """Lower joint limits [rad], shape (7,); -inf where continuous."""
     upper: FloatArray
     """Upper joint limits [rad], shape (7,); +inf where continuous."""
+    joints: int = 7
+    """Number of joints of the arm, 6 or 7."""
 
 
 class Shapes(NamedTuple):

@@ -38,11 +38,14 @@ class Problem(NamedTuple):
     """Dexterity measure to maximise."""
     arm: ArmSolver
     """Constants of the closed form, which may describe the reversed chain; without branches if
-    there is no closed form (`is_outside`). The other fields describe the arm itself."""
+    there is none (`is_outside`), or the arm has six joints, which `six_joints` solves. The other
+    fields describe the arm itself."""
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
     """Translations of the chain [m], shape (8, 3)."""
+    joints: int
+    """Number of joints of the arm, as in `Chain`."""
     links: FloatArray
     """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
     their groups, shape (n_arm + arm groups, 17)."""
@@ -137,6 +140,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         arm=any_solver(scene.chain),
         chain_R=_own(scene.chain.R),
         chain_p=_own(scene.chain.p),
+        joints=scene.chain.joints,
         links=with_boxes(links, link_first)[0],
         link_frame=np.append(frame, frame[link_first[:-1]]),
         link_body=link_body,

@@ -1,7 +1,8 @@
-"""Reach test and pair scorer of the sweep, for either solver of the inverse kinematics.
+"""Reach test and pair scorer of the sweep, for every solver of the inverse kinematics.
 
-A solver is a named tuple of constants and scratch memory: `analytic.search.Search` for an arm with
-a closed form, `numeric.search.NumericSolver` for any other. `out_of_reach` and `score_pair` select
+A solver is a named tuple of constants and scratch memory: `analytic.search.Search` for an arm of
+seven joints with a closed form, `numeric.search.NumericSolver` for one without, and
+`six_joints.pairs.SixJointSolver` for an arm of six joints. `out_of_reach` and `score_pair` select
 the implementation by the type of the solver when numba compiles their caller, so a sweep compiles
 the code of its own solver only.
 """
@@ -21,13 +22,21 @@ from tcs.kernel.contacts import Workspace
 from tcs.kernel.numeric import pairs as numeric
 from tcs.kernel.numeric.search import NumericSolver, new_numeric_solver
 from tcs.kernel.problem import Problem
+from tcs.kernel.six_joints import pairs as six_joints
+from tcs.kernel.six_joints.pairs import SixJointSolver, new_six_joint_solver
 from tcs.kernel.views import tuple_class
 
-Solver = Search | NumericSolver
+Solver = Search | NumericSolver | SixJointSolver
 
 
 def new_solver(problem: Problem) -> Solver:
-    """Return the solver of a problem's arm, with scratch memory for one worker."""
+    """Return the solver of a problem's arm, with scratch memory for one worker.
+
+    Raises:
+        ArmClassError: If the arm has six joints and no closed form.
+    """
+    if problem.joints == 6:
+        return new_six_joint_solver(problem)
     return new_numeric_solver(problem) if is_outside(problem.arm) else new_search()
 
 
@@ -41,6 +50,8 @@ def out_of_reach(problem: Problem, work: Workspace, solver: Solver) -> int:
     """
     if isinstance(solver, Search):
         return analytic.out_of_reach(problem, work, solver)
+    if isinstance(solver, SixJointSolver):
+        return six_joints.out_of_reach(problem, work, solver)
     return numeric.out_of_reach(problem, work, solver)
 
 
@@ -61,6 +72,8 @@ def score_pair(
     """
     if isinstance(solver, Search):
         return analytic.score_pair(problem, work, body_A, solver)
+    if isinstance(solver, SixJointSolver):
+        return six_joints.score_pair(problem, work, body_A, solver)
     return numeric.score_pair(problem, work, body_A, solver)
 
 
@@ -70,14 +83,14 @@ class _OfSolver(AbstractTemplate):
     As `numba.extending.overload` does, without a function in between.
     """
 
-    implementations: ClassVar[tuple[Any, Any]]
-    """For an arm with a closed form, and for any other."""
+    implementations: ClassVar[dict[type, Any]]
+    """Implementation by the class of the solver."""
     entries: ClassVar[dict[Any, Any]]
     """Compiled implementations by the types of the arguments."""
 
     def generic(self, args: Any, kws: Any) -> Any:
         """Return the signature of the implementation that fits the types of the arguments."""
-        implementation = self.implementations[tuple_class(args[-1]) is not Search]
+        implementation = self.implementations[tuple_class(args[-1])]
         dispatcher: Any = numba.typeof(implementation)
         signature: Any = dispatcher.get_call_type(self.context, args, kws)
         self.entries[signature.args] = dispatcher.get_overload(signature)
@@ -90,11 +103,19 @@ class _OfSolver(AbstractTemplate):
 
 @infer_global(out_of_reach)
 class _OutOfReach(_OfSolver):
-    implementations = analytic.out_of_reach, numeric.out_of_reach
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: analytic.out_of_reach,
+        NumericSolver: numeric.out_of_reach,
+        SixJointSolver: six_joints.out_of_reach,
+    }
     entries: ClassVar[dict[Any, Any]] = {}
 
 
 @infer_global(score_pair)
 class _ScorePair(_OfSolver):
-    implementations = analytic.score_pair, numeric.score_pair
+    implementations: ClassVar[dict[type, Any]] = {
+        Search: analytic.score_pair,
+        NumericSolver: numeric.score_pair,
+        SixJointSolver: six_joints.score_pair,
+    }
     entries: ClassVar[dict[Any, Any]] = {}

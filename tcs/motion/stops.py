@@ -61,8 +61,9 @@ class StopGrid:
             lowered: Scene and configurations as arrays, without boxes that paths keep out of.
 
         Raises:
-            RobotError: If a velocity limit is unknown.
+            RobotError: If a velocity limit is unknown, or the arm does not have seven joints.
         """
+        job.spec.robot.require_seven_joints("planning motions")
         velocity, acceleration = job.spec.robot.arm_rates()
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)

@@ -163,12 +163,14 @@ def load_arm(robot: RobotFile | str | Path, *, torso_height: float = 0.0) -> Arm
 
     Raises:
         UnknownNameError: If there is no robot of that name.
-        RobotError: If the robot file or its model cannot be used.
+        RobotError: If the robot file or its model cannot be used, or the arm does not have seven
+            joints.
         TcsError: If the torso height is not finite.
     """
     if not math.isfinite(torso_height):
         raise TcsError(f"torso height: must be a finite number [m], not {torso_height}.")
     file = robot if isinstance(robot, RobotFile) else load_robot(robot)
+    file.require_seven_joints("teleoperation")
     scene = Scene(SceneSpec(file, EMPTY_ENVIRONMENT))
     used = scene.set_torso(torso_height)
     scene.set_arm(np.zeros(JOINTS))

@@ -37,13 +37,16 @@ def gram(J: FloatArray, G: FloatArray) -> float:
 
 
 @jit
-def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
+def isotropy_at(
+    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, joints: int = JOINTS
+) -> float:
     """Return how evenly the arm can move its tool in every direction, at joint angles q.
 
     Args:
         chain_R: Rotations of the chain, shape (8, 3, 3).
         chain_p: Translations of the chain [m], shape (8, 3).
         q: Joint angles [rad], shape (7,).
+        joints: Number of joints of the arm, as in `Chain`.
 
     Returns:
         Isotropy in [0, 1]; 0 at a singularity.
@@ -54,6 +57,7 @@ def isotropy_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> floa
     """
     J, G = np.empty((6, 7)), np.empty((6, 6))
     jacobian(chain_R, chain_p, q, J)
+    clear_fixed(J, joints)
     trace = gram(J, G)
     # The determinant of the Gram matrix by Cholesky factorisation, in place.
     det = 1.0
@@ -103,16 +107,28 @@ def inverse_condition(J: FloatArray) -> float:
 
 
 @inner
-def inverse_condition_at(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray) -> float:
+def clear_fixed(J: FloatArray, joints: int) -> None:
+    """Set the columns of a Jacobian to zero that belong to no joint of the arm, in place."""
+    for k in range(JOINTS - joints):
+        for i in range(6):
+            J[i, k] = 0.0
+
+
+@inner
+def inverse_condition_at(
+    chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, joints: int
+) -> float:
     """Return `inverse_condition` of the Jacobian at joint angles q.
 
     Args:
         chain_R: Rotations of the chain, shape (8, 3, 3).
         chain_p: Translations of the chain [m], shape (8, 3).
         q: Joint angles [rad], shape (7,).
+        joints: Number of joints of the arm, as in `Chain`.
     """
     J = np.empty((6, 7))
     jacobian(chain_R, chain_p, q, J)
+    clear_fixed(J, joints)
     return inverse_condition(J)
 
 
@@ -229,9 +245,9 @@ def measure_at(problem: Problem, q: FloatArray) -> float:
         TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in thesis eq. (22).
     """
     if problem.measure.of == INVERSE_CONDITION:
-        value = inverse_condition_at(problem.chain_R, problem.chain_p, q)
+        value = inverse_condition_at(problem.chain_R, problem.chain_p, q, problem.joints)
     else:
-        value = isotropy_at(problem.chain_R, problem.chain_p, q)
+        value = isotropy_at(problem.chain_R, problem.chain_p, q, problem.joints)
     arm = problem.arm
     return value * limit_penalty(q, arm.lower, arm.upper, problem.measure.penalty)
 

@@ -55,10 +55,10 @@ def link_poses(chain: Chain, q: FloatArray) -> list[Pose]:
 
 
 def jacobian(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return the Jacobian of the tool in A, shape (6, 7), rows [angular; linear]."""
+    """Return the Jacobian of the tool in A, shape (6, joints), rows [angular; linear]."""
     *links, tool = link_poses(chain, q)
     columns = [np.concatenate([R[:, 2], np.cross(R[:, 2], tool[1] - p)]) for R, p in links]
-    return np.array(columns).T
+    return np.array(columns[7 - chain.joints :]).T
 
 
 def isotropy(J: FloatArray) -> float:

@@ -28,6 +28,7 @@ from tcs.kernel.scores import (
     REACHED,
     TOO_FAR,
 )
+from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.reference import (
     Placed,
     Pose,
@@ -199,6 +200,8 @@ def score(
     if placed.gripper_touches(with_body=False):
         return verdict(GRIPPER_BLOCKED_BY_ENVIRONMENT)
     chain = scene.chain
+    if chain.joints == 6:
+        return _six_joint_score(placed, measure)
     arcs, possible = elbow_arcs(chain, placed.X_AG)
     if not possible:
         return verdict(TOO_FAR)
@@ -223,6 +226,28 @@ def score(
         return reached
     fast = fast_candidates(chain, placed.X_AG, arcs)
     return free(fast) or verdict(ARM_BLOCKED if candidates or fast else JOINT_LIMITS)
+
+
+def _six_joint_score(placed: PlacedScene, measure: str) -> Verdict:
+    """Return the result at one goal for an arm of six joints, from Newton's method."""
+    chain = placed.scene.chain
+    solutions = newton_solutions(chain, *placed.X_AG)
+    if not len(solutions):
+        return Verdict(TOO_FAR, clearance=placed.clearance)
+    if placed.gripper_touches(with_body=True):
+        return Verdict(GRIPPER_BLOCKED_BY_ROBOT, clearance=placed.clearance)
+    postures = within(chain, solutions)
+    if not len(postures):
+        return Verdict(JOINT_LIMITS, clearance=placed.clearance)
+
+    def value(q: FloatArray) -> float:
+        return measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
+
+    best = sorted(postures, key=value, reverse=True)
+    contact_free = next((q for q in best if not placed.arm_touches(q)), None)
+    if contact_free is None:
+        return Verdict(ARM_BLOCKED, clearance=placed.clearance)
+    return Verdict(REACHED, value(contact_free), contact_free, placed.clearance)
 
 
 def confirms(scene: SceneArrays, grid: GridArrays, h: int, goal: int, q: FloatArray) -> bool:

@@ -16,6 +16,8 @@ from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.lines import axis_distance
 from tcs.kernel.numeric.solutions import numeric_solutions
+from tcs.kernel.six_joints.arm import SixJointArm, has_spherical_wrist, six_joint_arm
+from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.model.scene import Scene, arm_chain
 
 RECOVERED = 1e-4
@@ -25,6 +27,10 @@ the square root of that."""
 ON_GOAL = 1e-6
 """Largest pose error of a solution [m or rad]: a branch without a solution returns the nearest
 pose, which does not count."""
+
+ClassName = Literal[
+    "spherical-wrist", "spherical-shoulder", "six-joint spherical-wrist", "six-joint parallel-axes"
+]
 
 _MEETING = (("2-3", (2, 3)), ("5-6-7", (5, 6, 7)), ("1-2-3", (1, 2, 3)), ("5-6", (5, 6)))
 """Axes that must meet in one point: the first two entries for a spherical-wrist arm, the others for
@@ -38,17 +44,21 @@ class ArmClass:
     Attributes:
         name: "spherical-wrist": axes 2 and 3 meet in a point, and so do axes 5, 6 and 7; joint 1 is
             the free joint. "spherical-shoulder": axes 1, 2 and 3 meet, and axes 5 and 6; joint 7 is
-            the free joint. None: neither, so there is no closed form.
-        reason: Why the arm is in neither class, else empty.
+            the free joint. "six-joint spherical-wrist": of six joints, axes 1 and 2 meet, and so do
+            axes 4, 5 and 6; "six-joint parallel-axes": axes 2, 3 and 4 are parallel, and axes 5 and
+            6 meet. None: none of these, so there is no closed form.
+        reason: Why the arm is in no class, else empty.
         distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.
         solver: Constants of the closed form, None if there is none.
+        joints: Number of joints.
     """
 
-    name: Literal["spherical-wrist", "spherical-shoulder"] | None
+    name: ClassName | None
     reason: str
     distances: dict[str, float | None]
-    solver: ArmSolver | None
+    solver: ArmSolver | SixJointArm | None
+    joints: int = 7
 
     def to_json(self) -> dict[str, Any]:
         """Return the class as plain containers."""
@@ -100,18 +110,38 @@ class RoundTrip:
 
 def arm_class(chain: Chain) -> ArmClass:
     """Return the class of an arm."""
+    if chain.joints == 6:
+        return _six_joint_class(chain)
     distances = {name: _distance_from_meeting(chain, axes) for name, axes in _MEETING}
     try:
         solver = arm_solver(chain)
     except ArmClassError as error:
         return ArmClass(None, str(error), distances, None)
-    name: Literal["spherical-wrist", "spherical-shoulder"] = (
-        "spherical-wrist" if solver.free == FIRST else "spherical-shoulder"
-    )
+    name: ClassName = "spherical-wrist" if solver.free == FIRST else "spherical-shoulder"
     return ArmClass(name, "", distances, solver)
 
 
-def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) -> RoundTrip:
+def _six_joint_class(chain: Chain) -> ArmClass:
+    """Return the class of an arm of six joints."""
+    # Its axes are those of the chain from the second one on.
+    distances = {
+        "1-2": _distance_from_meeting(chain, (2, 3)),
+        "4-5-6": _distance_from_meeting(chain, (5, 6, 7)),
+        "5-6": _distance_from_meeting(chain, (6, 7)),
+    }
+    try:
+        arm = six_joint_arm(chain)
+    except ArmClassError as error:
+        return ArmClass(None, str(error), distances, None, joints=6)
+    name: ClassName = (
+        "six-joint spherical-wrist" if has_spherical_wrist(arm) else "six-joint parallel-axes"
+    )
+    return ArmClass(name, "", distances, arm, joints=6)
+
+
+def round_trip(
+    scene: Scene, solver: ArmSolver | SixJointArm | None, samples: int, seed: int
+) -> RoundTrip:
     """Return the result of an IK round trip over random postures.
 
     Drake computes the tool pose of a posture, the kernel solves for it, and Drake computes the tool
@@ -134,6 +164,7 @@ def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) 
         X_AG = _tool_in_arm_base(scene, drawn)
         closest = np.inf
         for q in _solved(chain, solver, X_AG, drawn):
+            q = q[-len(drawn) :]
             X_GT = X_AG.inverse() @ _tool_in_arm_base(scene, q)
             distance = float(np.linalg.norm(X_GT.translation()))
             angle = abs(float(X_GT.rotation().ToAngleAxis().angle()))
@@ -160,9 +191,16 @@ def round_trip(scene: Scene, solver: ArmSolver | None, samples: int, seed: int) 
 
 
 def _solved(
-    chain: Chain, solver: ArmSolver | None, X_AG: RigidTransform, drawn: FloatArray
+    chain: Chain,
+    solver: ArmSolver | SixJointArm | None,
+    X_AG: RigidTransform,
+    drawn: FloatArray,
 ) -> Iterable[FloatArray]:
     """Return the kernel's solutions for a tool pose [rad], each of shape (7,)."""
+    if isinstance(solver, SixJointArm):
+        return six_joint_solutions(solver, X_AG.rotation().matrix(), X_AG.translation())
+    if chain.joints == 6:
+        return ()
     if solver is None:
         return numeric_solutions(chain, X_AG.rotation().matrix(), X_AG.translation())
     return _branches(solver, X_AG, float(drawn[solver.free]))

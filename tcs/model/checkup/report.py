@@ -115,6 +115,8 @@ class RobotCheck:
                 f"its surface reaches {-self.lowest:.3f} m below '{self.robot.root_body}', but the "
                 "root must be on the floor: add a root link on the floor to the URDF."
             )
+        if self.arm.joints == 6 and self.arm.solver is None:
+            return (*found, self.arm.reason)
         lost = self.trip.samples - self.trip.recovered
         if lost and self.arm.solver is not None:
             found.append(
@@ -132,7 +134,7 @@ class RobotCheck:
     def notes(self) -> tuple[str, ...]:
         """Remarks on properties that are not problems, one sentence each."""
         found = []
-        if self.arm.solver is None:
+        if self.arm.solver is None and self.arm.joints == 7:
             found.append(f"{self.arm.reason} It is solved numerically, which takes longer.")
         bulky = [b for b in self.bodies if b.body in self._moved and b.excess > MOST_EXCESS]
         found += [

@@ -19,7 +19,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
 
     Raises:
         UnknownNameError: If the file names an unknown link, joint or frame.
-        RobotError: If the URDF or the primitives cannot be used, the arm is not a chain of seven
+        RobotError: If the URDF or the primitives cannot be used, the arm is not a chain of
             revolute joints from its base to the tool, a posture exceeds the hard limits, or an
             extra frame or body has the name of a link.
     """
@@ -100,7 +100,7 @@ def _primitives(robot: RobotFile, where: str) -> tuple[Primitive, ...]:
 
 
 def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Check that the arm is a chain of seven revolute joints from arm base to tool."""
+    """Check that the arm is a chain of revolute joints from arm base to tool."""
     at = f"{where}, field 'arm_joints'"
     for name in robot.arm_joints:
         joint = model.joint(name, at)

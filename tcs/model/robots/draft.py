@@ -17,7 +17,7 @@ from tcs.files.xml_documents import read_xml
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
 from tcs.model.robots.primitives import Primitive, write_primitives
-from tcs.model.robots.robot_file import RobotFile
+from tcs.model.robots.robot_file import LEAST_JOINTS, MOST_JOINTS, RobotFile
 from tcs.model.robots.self_collision import (
     DRAWS,
     blocked_at_boxes,
@@ -30,7 +30,6 @@ from tcs.model.robots.urdf.packages import resolve_uri
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
 
-ARM_JOINTS = 7
 _VERTICAL = 0.99
 """Cosine to the vertical above which a prismatic joint counts as torso joint."""
 _ON_FLOOR = 0.02
@@ -67,7 +66,8 @@ def draft_robot(
 ) -> Draft:
     """Return a robot file for a URDF.
 
-    The arm consists of the seven revolute joints nearest the tool. The torso is a vertical
+    The arm consists of the seven revolute joints nearest the tool, or of six if only six in a row
+    lead there. The torso is a vertical
     prismatic joint between root and arm. Every other joint is at 0 if its range includes values on
     both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
     `propose_disabled_pairs` the pairs that need no check.
@@ -82,7 +82,7 @@ def draft_robot(
     Raises:
         UnknownNameError: If tool or base is not a link of the URDF.
         RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or fewer
-            than seven revolute joints lead to it.
+            than six revolute joints lead to it.
     """
     path = Path(os.path.realpath(resolve_uri(str(urdf), Path())))
     model = read_urdf(path)
@@ -95,7 +95,7 @@ def draft_robot(
     address = str(urdf) if str(urdf).startswith("package://") else str(path)
     posture, gripper = _positions(model, arm, torso)
     remarks = [
-        f"arm: the seven revolute joints nearest '{tool}', from '{arm_base}' on: "
+        f"arm: the {len(arm)} revolute joints nearest '{tool}', from '{arm_base}' on: "
         f"{', '.join(joint.name for joint in arm)}",
         f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
     ]
@@ -251,13 +251,13 @@ def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Jo
         if joint.type == "prismatic" or joint.mimic is not None:
             obstacle = "mimics another" if joint.mimic else "is prismatic"
             end = f"; '{joint.name}' before them {obstacle}"
-        if end or len(arm) == ARM_JOINTS:
+        if end or len(arm) == MOST_JOINTS:
             break
         arm.insert(0, joint)
-    if len(arm) < ARM_JOINTS:
+    if len(arm) < LEAST_JOINTS:
         found = ", ".join(joint.name for joint in arm) or "none"
         raise RobotError(
-            f"{where}: an arm of seven revolute joints is needed, but from "
+            f"{where}: an arm of six or seven revolute joints is needed, but from "
             f"'{base or model.root}' to tool frame '{tool}' only {len(arm)} in a row lead there "
             f"({found}{end}). Name another tool frame or base."
         )

@@ -20,6 +20,9 @@ Name = Annotated[str, Field(min_length=1)]
 Range = tuple[JointPosition, JointPosition]
 Positions = Annotated[Mapping[Name, JointPosition], Entries]
 
+LEAST_JOINTS, MOST_JOINTS = 6, 7
+"""Number of joints that an arm may have."""
+
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
 ACCELERATION = 2.0
 """Acceleration limit of a joint unless the robot file gives one [rad/s^2]: URDFs have none, and
@@ -94,8 +97,8 @@ class RobotFile(Document):
     """B: the root link of URDF or mount, which the planar base joint carries."""
     arm_base: Name
     """A: the link that carries joint 1 of the scored arm."""
-    arm_joints: Annotated[tuple[Name, ...], Field(min_length=7, max_length=7)]
-    """The seven joints of the scored arm, from A to the tool."""
+    arm_joints: Annotated[tuple[Name, ...], Field(min_length=LEAST_JOINTS, max_length=MOST_JOINTS)]
+    """The six or seven joints of the scored arm, from A to the tool."""
     rest: Mapping[Name, JointPosition] = {}
     """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
     nearest to 0."""
@@ -157,6 +160,21 @@ class RobotFile(Document):
         """The robot with its joint limits alone, as if no disabled group narrowed them."""
         groups = tuple(g.model_copy(update={"ranges": {}}) for g in self.disabled_groups)
         return self.model_copy(update={"disabled_groups": groups})
+
+    def require_seven_joints(self, purpose: str) -> None:
+        """Refuse an arm of six joints.
+
+        Args:
+            purpose: What needs seven joints, as the subject of a sentence.
+
+        Raises:
+            RobotError: If the arm does not have seven joints.
+        """
+        if len(self.arm_joints) != MOST_JOINTS:
+            raise RobotError(
+                f"robot '{self.name}': {purpose} needs an arm of {MOST_JOINTS} joints, and this "
+                f"one has {len(self.arm_joints)}. It can be scored, selected and verified."
+            )
 
     def arm_rates(self) -> tuple[list[float], list[float]]:
         """Return velocity limits [rad/s] and acceleration limits [rad/s^2] of the scored arm.

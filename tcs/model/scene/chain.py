@@ -48,7 +48,7 @@ def link_frames(axes: tuple[JointAxis, ...]) -> tuple[FloatArray, FloatArray]:
     of axes 1, 2 and 3, and L5 and L6 at that of axes 5 and 6.
 
     Args:
-        axes: The seven joint axes, in the arm's order.
+        axes: The seven joint axes, in the order of the chain.
 
     Returns:
         Rotations (7, 3, 3) and origins (7, 3) [m].

@@ -19,6 +19,9 @@ from tcs.model.scene.lowered_scene import LoweredScene, read_only
 from tcs.model.scene.scene import Scene
 from tcs.model.tasks import Task
 
+JOINTS = 7
+"""Joints of the kernel's chain."""
+
 
 def lower(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     """Return the arrays of a scene for a task, read from its Drake plant and scene graph.
@@ -114,7 +117,9 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
     for joint in built.arm_joints:
         X_AJ = joint.frame_on_child().CalcPose(state, built.arm_base_frame)
         axes.append(JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
-    R_AL, p_AL = link_frames(tuple(axes))
+    # An arm of six joints has one more before its first, about the same axis, which remains at 0.
+    fixed = JOINTS - len(axes)
+    R_AL, p_AL = link_frames((*axes[:1] * fixed, *axes))
     X_AL = [_transform(R, p) for R, p in zip(R_AL, p_AL, strict=True)]
     X_AT = built.tool_frame.CalcPose(state, built.arm_base_frame)
     # At zero every Rz is the identity, so F[i] is the transform between consecutive frames.
@@ -123,8 +128,9 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
     chain = Chain(
         R=_rotations(_matrices([steps]))[0],
         p=_origins(_matrices([steps]))[0],
-        lower=built.arm_lower,
-        upper=built.arm_upper,
+        lower=np.concatenate([np.full(fixed, -np.inf), built.arm_lower]),
+        upper=np.concatenate([np.full(fixed, np.inf), built.arm_upper]),
+        joints=len(axes),
     )
     return chain, X_AL
 

@@ -51,7 +51,7 @@ class ScenePlant:
         plant: The plant.
         scene_graph: The scene graph.
         base_joints: base_x, base_y, base_yaw.
-        arm_joints: The scored arm's seven joints, in the robot file's order.
+        arm_joints: The scored arm's joints, in the robot file's order.
         arm_lower: Their lower limits [rad], -inf where continuous.
         arm_upper: Their upper limits [rad], +inf where continuous.
         torso_joint: The prismatic joint of the torso, None for a robot without one.
@@ -208,7 +208,8 @@ def _robot_parts(
 ) -> tuple[Part, ...]:
     """Return the robot's shapes as parts, with the arm link or the mount of each."""
     above = {joint.child_body().index(): joint for joint in _joints(plant)}
-    arm_link = {joint.index(): i + 1 for i, joint in enumerate(arm_joints)}
+    # The last joint carries link 7, whatever the number of joints.
+    arm_link = {joint.index(): 7 - i for i, joint in enumerate(reversed(arm_joints))}
     parts = []
     for geometry in geometries:
         body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))

@@ -98,14 +98,17 @@ class Scene:
         return used
 
     def set_arm(self, positions: ArrayLike) -> None:
-        """Set the seven joints of the scored arm [rad], in the robot file's order.
+        """Set the joints of the scored arm [rad], in the robot file's order.
 
-        Limits are not enforced.
+        Limits are not enforced. Seven numbers for an arm of six joints are those of the kernel's
+        chain, whose first joint remains at 0.
 
         Raises:
-            TcsError: If there are not exactly seven finite numbers.
+            TcsError: If there are not exactly as many finite numbers as joints.
         """
         values = np.asarray(positions, dtype=float)
+        if values.shape == (7,) and values[0] == 0.0:
+            values = values[-len(self._arm_positions) :]
         if values.shape != self._arm_positions.shape or not np.all(np.isfinite(values)):
             raise TcsError(
                 f"arm positions must be {len(self._arm_positions)} finite numbers [rad], "

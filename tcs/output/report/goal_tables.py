@@ -81,15 +81,15 @@ def goals_table(report: ScoreReport) -> Table:
 
 def joints_table(report: ScoreReport) -> Table:
     """Return the stored arm posture for each goal that is reached."""
-    rows = []
+    rows, arm_joints = [], report.job.spec.robot.arm_joints
     for goal, number in enumerate(report.assignment):
         if number is None:
             continue
         joints = report.scored.scores.joints_of(report.shown.indices[number], goal)
         if joints is not None:
-            angles = (f"{math.degrees(q):.2f}" for q in joints.tolist())
+            angles = (f"{math.degrees(q):.2f}" for q in joints[-len(arm_joints) :].tolist())
             rows.append([str(goal), str(number + 1), *angles])
-    names = (frame_name(name.removesuffix("_joint")) for name in report.job.spec.robot.arm_joints)
+    names = (frame_name(name.removesuffix("_joint")) for name in arm_joints)
     return Table(
         "Arm joints [deg] at each goal, rounded from those in the file.",
         [Column("Goal"), Column("Stop"), *(Column(name) for name in names)],

@@ -55,8 +55,8 @@ def check_closed_form(problem: Problem) -> None:
     """
     if is_outside(problem.arm):
         raise ArmClassError(
-            "approaches are scored for arms with a closed form, and this arm has none: score it "
-            "without approach (--no-approach). `tcs plan` finds its approaches."
+            "approaches are scored for arms of seven joints with a closed form: score this arm "
+            "without approach (--no-approach)."
         )
 
 

@@ -47,6 +47,8 @@ ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
 _ENTRIES = {ANALYTIC: "analytic.pairs.score_pair", NUMERIC: "numeric.pairs.score_pair"}
 """Pair scorers, compiled last but for the sweep: package, module and function."""
+_SIX_JOINTS = "six_joints.pairs.score_pair"
+"""The pair scorer of arms of six joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +160,7 @@ def sweep(
 
 def ik_of(problem: Problem) -> str:
     """Return the inverse kinematics of the problem's arm: ANALYTIC or NUMERIC."""
-    return NUMERIC if is_outside(problem.arm) else ANALYTIC
+    return NUMERIC if problem.joints == 7 and is_outside(problem.arm) else ANALYTIC
 
 
 def warm_up(
@@ -171,7 +173,7 @@ def warm_up(
     Raises:
         ArmClassError: If there are approaches, and the arm has no closed form.
     """
-    entries = [_ENTRIES[ik_of(problem)]]
+    entries = [_ENTRIES[ik_of(problem)] if problem.joints == 7 else _SIX_JOINTS]
     if approaches is not None:
         check_closed_form(problem)
         entries.append(ENTRY)

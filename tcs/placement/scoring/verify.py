@@ -461,6 +461,7 @@ class _DrakeChecker:
         scene.set_torso(at["torso"])
         for name in self._axes:
             scene.set_joint(name, at[name])
+        q = q[-len(self._lower) :]
         scene.set_arm(q)
         X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
         X_TG = X_WT.inverse() @ X_WG

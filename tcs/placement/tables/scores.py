@@ -55,7 +55,7 @@ class ScoreTable(ArrayTable):
     """Names of two bodies in contact."""
     arm_joints: NDArray[np.float32]
     """Arm joints [rad] of the best solution of each of the R reached pairs, row-major in (h, g),
-    shape (R, 7)."""
+    shape (R, 7). Those of an arm of six joints follow a 0."""
     weights: NDArray[np.float64]
     """Weights of the goals, sum 1, shape (G,)."""
 
@@ -153,6 +153,8 @@ class ScoreTable(ArrayTable):
 
     def joints_of(self, h: int, g: int) -> NDArray[np.float32] | None:
         """Return the arm joints of the best solution [rad], shape (7,), or None if not reached.
+
+        Those of an arm of six joints follow a 0.
 
         Args:
             h: Flat index of the initial configuration.

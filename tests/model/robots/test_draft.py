@@ -101,8 +101,8 @@ def test_pairs_that_need_no_check_cannot_meet(drafted):
 def test_arm_base_may_be_named(path):
     assert draft_robot(path, "tool", base="base").robot.arm_base == "mast"
     assert draft_robot(path, "tool", base="mast").robot.arm_base == "mast"
-    with pytest.raises(RobotError, match="only 6 in a row"):
-        draft_robot(path, "tool", base="arm1")
+    with pytest.raises(RobotError, match="only 5 in a row"):
+        draft_robot(path, "tool", base="arm2")
     with pytest.raises(RobotError, match="base 'head' does not carry"):
         draft_robot(path, "tool", base="head")
 

@@ -160,9 +160,9 @@ WRONG = {
         lambda content: content["arm_joints"].__setitem__(3, "l_elbow_flx_joint"),
         "field 'arm_joints': unknown joint.*Did you mean 'l_elbow_flex_joint'",
     ),
-    "six arm joints": (
-        lambda content: content["arm_joints"].pop(),
-        r"field 'arm_joints' is .*, but must have at least 7 items",
+    "five arm joints": (
+        lambda content: content.update(arm_joints=content["arm_joints"][:5]),
+        r"field 'arm_joints' is .*, but must have at least 6 items",
     ),
     "wrong order": (
         lambda content: content["arm_joints"].reverse(),

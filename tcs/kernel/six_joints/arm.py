@@ -1,0 +1,93 @@
+"""Constants of the closed form of an arm of six joints.
+
+Two classes have one. In numbers of the arm's own axes, 1 to 6:
+
+* spherical wrist: axes 1 and 2 meet, and axes 4, 5 and 6 meet in one point. With a further joint
+  before the first one this is an arm of `tcs.kernel.analytic`, solved with that joint at 0.
+* parallel axes: axes 2, 3 and 4 are parallel, and axes 5 and 6 meet.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tcs.errors import ArmClassError
+from tcs.kernel.analytic.solver import (
+    FIRST,
+    MEETING_TOLERANCE,
+    ArmSolver,
+    arm_solver,
+    outside_solver,
+)
+from tcs.kernel.arrays import Chain, FloatArray
+from tcs.kernel.lines import PARALLEL_TOLERANCE, axis_distance
+
+
+class SixJointArm(NamedTuple):
+    """Constants of one arm of six joints; joints and frames as in `Chain`."""
+
+    wrist: ArmSolver
+    """The closed form of a spherical-wrist arm without joint limits; without branches for one with
+    parallel axes."""
+    R: FloatArray
+    """Rotations of the chain, shape (8, 3, 3)."""
+    p: FloatArray
+    """Translations of the chain [m], L6 and L7 of an arm with parallel axes shifted to where its
+    axes 5 and 6 meet, shape (8, 3)."""
+    lower: FloatArray
+    """Joint limits [rad], shape (7,); infinite where continuous."""
+    upper: FloatArray
+
+
+def six_joint_arm(chain: Chain) -> SixJointArm:
+    """Return the constants of an arm of six joints.
+
+    Args:
+        chain: An arm of six joints.
+
+    Raises:
+        ArmClassError: If the arm has no closed form; the message says what it lacks.
+    """
+    unlimited = chain._replace(lower=np.full(7, -np.inf), upper=np.full(7, np.inf))
+    p, wrist = np.array(chain.p, order="C"), outside_solver(unlimited)
+    try:
+        solver = arm_solver(unlimited)
+        if solver.free != FIRST:
+            raise ArmClassError("joint 1 is not the free joint.")
+        wrist = solver
+    except ArmClassError:
+        p = _with_wrist_at_meeting_point(chain)
+    lower, upper = (np.array(a, dtype=np.float64) for a in (chain.lower, chain.upper))
+    return SixJointArm(wrist=wrist, R=np.array(chain.R, order="C"), p=p, lower=lower, upper=upper)
+
+
+def has_spherical_wrist(arm: SixJointArm) -> bool:
+    """Return whether an arm is in the spherical-wrist class, else its axes are parallel."""
+    return len(arm.wrist.branches) > 0
+
+
+def _with_wrist_at_meeting_point(chain: Chain) -> FloatArray:
+    """Return the translations with L6 and L7 where axes 5 and 6 of the arm meet.
+
+    Raises:
+        ArmClassError: If they do not meet, or axes 2, 3 and 4 of the arm are not parallel.
+    """
+    tilt = max(float(np.hypot(*chain.R[i][:2, 2])) for i in (3, 4))
+    passing = axis_distance(chain.R[6], chain.p[6])
+    if tilt > PARALLEL_TOLERANCE or passing is None or passing[0] > MEETING_TOLERANCE:
+        angle = np.degrees(np.arcsin(min(tilt, 1.0)))
+        apart = "are parallel" if passing is None else f"pass each other {passing[0]:.3g} m apart"
+        raise ArmClassError(
+            "the arm of six joints has no closed form, without which six joints are not supported. "
+            "It needs axes 1 and 2 to meet, and 4, 5 and 6 in one point; or axes 2, 3 and 4 to be "
+            f"parallel (they are up to {angle:.3g} degrees apart), and 5 and 6 to meet (they "
+            f"{apart})."
+        )
+    _, on_fifth, on_sixth = passing
+    p, z = np.array(chain.p, order="C"), np.array([0.0, 0.0, 1.0])
+    p[5] += chain.R[5] @ z * on_fifth
+    p[6] += chain.R[6] @ z * on_sixth - z * on_fifth
+    p[7] -= z * on_sixth
+    return p

@@ -1,0 +1,79 @@
+"""Solutions of arms of six joints by Newton's method, checked for contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.arrays import Chain, FloatArray, IntArray
+from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
+from tcs.kernel.cache import jit
+from tcs.kernel.contacts import (
+    NO_CONTACT,
+    Workspace,
+    arm_contact,
+    at_goal,
+    gripper_body_contact,
+    new_workspace,
+)
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.problem import Problem
+from tcs.kernel.verification.newton_solutions import newton_solutions, within
+from tcs.kernel.views import unowned
+
+
+def six_joint_scans(problem: Problem, pairs: IntArray, joints: FloatArray) -> NDArray[np.float64]:
+    """Return the dexterity of the best collision-free solution of each pair, -1 where none is free.
+
+    The solutions are those of `newton_solutions`. Contacts of base and gripper with the environment
+    are not checked.
+
+    Args:
+        problem: The scene, its goals and its grid, with an arm of six joints.
+        pairs: Flat indices of initial configurations whose base is free of contact, and goals at
+            which the gripper is free of contact with the environment, shape (n, 2).
+        joints: Filled with the joint angles of each solution [rad], shape (n, 7).
+    """
+    arm, work = problem.arm, new_workspace(problem)
+    chain = Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper, problem.joints)
+    values = np.full(len(pairs), -1.0)
+    for i, (configuration, goal) in enumerate(pairs):
+        if not _place(problem, work, configuration, goal):
+            continue
+        postures = within(chain, newton_solutions(chain, work.R_AG.copy(), work.p_AG.copy()))
+        torso = configuration % problem.torso_levels
+        values[i] = _best(problem, work, torso, np.ascontiguousarray(postures), joints[i])
+    return values
+
+
+@jit
+def _place(owned_problem: Problem, owned_work: Workspace, configuration: int, goal: int) -> bool:
+    """Place base, goal and environment; return whether the gripper is free of the body."""
+    problem, work = unowned(owned_problem), unowned(owned_work)
+    torso = configuration % problem.torso_levels
+    state = place_base(problem, work, configuration // problem.torso_levels)
+    goal_in_arm_base(problem, work, state, torso, goal)
+    if gripper_body_contact(problem, work, problem.body_A[torso]) != NO_CONTACT:
+        return False
+    environment_in_arm_base(problem, work, torso)
+    return True
+
+
+@jit
+def _best(
+    owned_problem: Problem,
+    owned_work: Workspace,
+    torso: int,
+    postures: FloatArray,
+    joints: FloatArray,
+) -> float:
+    """Return the greatest dexterity of the collision-free postures, -1 if none is free."""
+    problem, work = unowned(owned_problem), unowned(owned_work)
+    best = -1.0
+    for n in range(len(postures)):
+        value = measure_at(problem, postures[n])
+        contact = arm_contact(problem, work, problem.body_A[torso], postures[n])
+        if value > best and contact == NO_CONTACT and at_goal(problem, work):
+            best = value
+            joints[:] = postures[n]
+    return best

@@ -1,0 +1,156 @@
+"""Arms of six joints: all solutions against Newton's method, scores against the reference."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tcs.errors import ArmClassError
+from tcs.kernel.arrays import Chain
+from tcs.kernel.dexterity import MEASURES
+from tcs.kernel.dexterity.measures import measure_at
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
+from tcs.kernel.six_joints.arm import six_joint_arm
+from tcs.kernel.six_joints.solutions import MOST_SOLUTIONS, six_joint_solutions
+from tcs.kernel.verification.dense import dense_scan
+from tcs.kernel.verification.newton_solutions import newton_solutions, within
+from tcs.kernel.verification.reference import jacobian, link_poses, measured
+from tests.kernel.judge import compare, is_true, stratified
+from tests.kernel.shapes import around, random_arm, random_joints, rotation
+from tests.kernel.toy import scores_of, toy_grid, toy_scene
+
+CLASSES = ("spherical wrist", "parallel axes")
+SCENES = {"spherical wrist": 6, "parallel axes": 10}
+"""Seeds of toy scenes with every reason that depends on the arm."""
+FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+@cache
+def six_joint_chain(name, seed, limited=True):
+    """Return a random arm of a class: any twists, any other offsets."""
+    rng = np.random.default_rng(seed)
+    chain = random_arm(rng)
+    R, p = chain.R.copy(), chain.p.copy()
+    R[1], p[1] = np.eye(3), 0.0
+    if name == "parallel axes":
+        p = rng.uniform(-0.3, 0.3, (8, 3))
+        p[1] = 0.0
+        for i in (3, 4):
+            angle = rng.uniform(-np.pi, np.pi)
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            R[i] = turn @ FLIP if rng.random() < 0.5 else turn
+        # Axes 6 and 7 of the chain meet, but not where the origins of L6 and L7 are.
+        R[6] = rotation(rng)
+        p[6] = 0.1 * R[6][:, 2] + [0.0, 0.0, 0.05]
+    lower, upper = (np.full(7, -np.inf), np.full(7, np.inf))
+    if limited:
+        lower[1:], upper[1:] = chain.lower[1:], chain.upper[1:]
+    return Chain(R, p, lower, upper, joints=6)
+
+
+def drawn(rng, chain):
+    """Return joints within the limits and the tool pose there."""
+    q = random_joints(rng, chain)
+    q[0] = 0.0
+    return q, link_poses(chain, q)[-1]
+
+
+def is_among(q, solutions):
+    return min((np.abs(around(q - other)).max() for other in solutions), default=9.0) < 1e-6
+
+
+@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("seed", range(2))
+def test_newtons_method_finds_no_further_solution(name, seed):
+    chain = six_joint_chain(name, seed, limited=False)
+    arm, rng = six_joint_arm(chain), np.random.default_rng(seed)
+    q, (R, p) = drawn(rng, chain)
+    found = six_joint_solutions(arm, R, p)
+    assert is_among(q, found)
+    expected = newton_solutions(chain, R, p)
+    assert len(found) <= MOST_SOLUTIONS
+    assert all(is_among(other, found) for other in expected)
+    # A few starts may miss one of two solutions that nearly coincide.
+    assert sum(is_among(other, expected) for other in found) >= len(found) - 1
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_posture_is_among_the_solutions_of_its_pose(name, rng):
+    for seed in range(10):
+        chain = six_joint_chain(name, seed)
+        arm = six_joint_arm(chain)
+        for _ in range(20):
+            q, (R, p) = drawn(rng, chain)
+            found = six_joint_solutions(arm, R, p)
+            assert is_among(q, found), seed
+            for other in found:
+                assert other[0] == 0.0
+                assert np.all((other >= chain.lower) & (other <= chain.upper))
+                S, s = link_poses(chain, other)[-1]
+                np.testing.assert_allclose(S, R, atol=1e-7)
+                np.testing.assert_allclose(s, p, atol=1e-7)
+
+
+@pytest.mark.slow  # it compiles the sweep of these arms
+@pytest.mark.parametrize("name", CLASSES)
+def test_kernel_agrees_with_reference(name, rng):
+    chain = six_joint_chain(name, SCENES[name])
+    scene, grid = toy_scene(chain, SCENES[name], obstacles=3), toy_grid()
+    scores = scores_of(scene, grid)
+    assert np.sum(scores.reason == REACHED) > 5
+    compare(scene, grid, scores, stratified(rng, scores.reason, 1))
+    reached = np.argwhere(scores.reason == REACHED)
+    for h, g in reached[rng.choice(len(reached), 5, replace=False)]:
+        assert is_true(scene, grid, h, g, scores.joints[h, g])
+
+
+@pytest.mark.slow  # it compiles the sweep of these arms
+@pytest.mark.parametrize("name", CLASSES)
+def test_dense_scan_finds_what_the_sweep_finds(name, rng):
+    chain = six_joint_chain(name, SCENES[name])
+    scene, grid = toy_scene(chain, SCENES[name], obstacles=3), toy_grid()
+    problem, scores = build_problem(scene, grid), scores_of(scene, grid)
+    kept = np.isin(scores.reason, (REACHED, JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
+    for h, g in stratified(rng, np.where(kept, scores.reason, 99), 1):
+        if not kept[h, g]:
+            continue
+        q = np.full(7, np.nan)
+        value = dense_scan(problem, h, g, 0, q)
+        assert (value >= 0.0) == (scores.reason[h, g] == REACHED)
+        if value >= 0.0:
+            # The stored measure is that of joints rounded to float32.
+            assert value == pytest.approx(float(scores.dexterity[h, g]), abs=1e-6)
+
+
+def test_measures_leave_out_the_joint_that_remains_at_zero(rng):
+    chain = six_joint_chain("parallel axes", 2)
+    scene, grid = toy_scene(chain, 2, goals=1), toy_grid()
+    for measure in MEASURES:
+        problem = build_problem(scene, grid, measure)
+        q, _ = drawn(rng, chain)
+        expected = measured(jacobian(chain, q), q, chain.lower, chain.upper, measure)
+        # As for seven joints, where the eigenvalues of J J^T are good to 1e-7.
+        assert measure_at(problem, q) == pytest.approx(expected, abs=1e-7)
+
+
+def test_limits_of_more_than_a_turn_keep_one_angle_of_each_solution():
+    chain = six_joint_chain("spherical wrist", 3, limited=False)
+    lower, upper = np.full(7, -2.0 * np.pi), np.full(7, 2.0 * np.pi)
+    lower[0], upper[0] = -np.inf, np.inf
+    _, (R, p) = drawn(np.random.default_rng(3), chain)
+    wide = chain._replace(lower=lower, upper=upper)
+    free = six_joint_solutions(six_joint_arm(chain), R, p)
+    found = six_joint_solutions(six_joint_arm(wide), R, p)
+    assert len(found) == len(free) == len(within(wide, newton_solutions(wide, R, p)))
+
+
+def test_an_arm_without_a_closed_form_is_refused():
+    rng = np.random.default_rng(0)
+    chain = six_joint_chain("parallel axes", 0)
+    skew = chain._replace(R=np.array([rotation(rng) for _ in range(8)]))
+    with pytest.raises(ArmClassError, match=r"six joints.*degrees apart.*pass each other"):
+        six_joint_arm(skew)
