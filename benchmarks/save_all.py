@@ -53,6 +53,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "live": (),
     "robots": ("--limit", "2000", "--finished", "out/robots.jsonl"),
     "numeric_arms": (),
+    "six_joints": (),
     "primitives": (),
     "shapes": (),
     "null_space": (),

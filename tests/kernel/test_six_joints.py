@@ -74,8 +74,8 @@ def test_newtons_method_finds_no_further_solution(name, seed):
     expected = newton_solutions(chain, R, p)
     assert len(found) <= MOST_SOLUTIONS
     assert all(is_among(other, found) for other in expected)
-    # A few starts may miss one of two solutions that nearly coincide.
-    assert sum(is_among(other, expected) for other in found) >= len(found) - 1
+    # 400 starts may miss one elbow, with both wrists, of two that nearly coincide.
+    assert sum(is_among(other, expected) for other in found) >= len(found) - 2
 
 
 @pytest.mark.parametrize("name", CLASSES)

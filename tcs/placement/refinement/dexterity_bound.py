@@ -52,9 +52,10 @@ def dexterity_bound(chain: Chain, measure: str) -> float:
         At most 1, which bounds every measure. Less for the isotropy, in particular for an arm with
         a spherical wrist.
     """
-    if measure not in ISOTROPIES:
+    if measure not in ISOTROPIES or chain.joints != 7:
         return 1.0
-    return _isotropy_bound(*(array.tobytes() for array in chain))
+    arrays = (chain.R, chain.p, chain.lower, chain.upper)
+    return _isotropy_bound(*(array.tobytes() for array in arrays))
 
 
 @lru_cache(maxsize=16)
