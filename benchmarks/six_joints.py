@@ -24,8 +24,8 @@ from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 SAME = 1e-5
 """Greatest difference of equal joint angles [rad]; next to a singularity both are less exact."""
 ON_POSE = 1e-7
-"""Greatest error of a solution of EAIK, as of ours [entries of the rotation matrix; m]: solutions in
-the sense of least squares exceed it."""
+"""Greatest error of a solution of EAIK, as of ours [entries of the rotation matrix; m]:
+solutions in the sense of least squares exceed it."""
 
 
 def main() -> int:
