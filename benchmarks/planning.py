@@ -25,8 +25,9 @@ from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import BOX, SceneArrays, Shapes
 from tcs.kernel.motion.connect import connect, new_trees
-from tcs.kernel.motion.edges import NO_PAIR, posture_contact, without_idle_pairs
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
+from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, motion_scene, new_motion_workspace
 from tcs.kernel.motion.shortcut import shorten
 from tcs.kernel.problem import build_problem

@@ -10,8 +10,9 @@ import numpy as np
 
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.motion.connect import Trees, new_trees
-from tcs.kernel.motion.edges import NO_PAIR, list_needed, posture_contact
+from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
+from tcs.kernel.motion.idle import list_needed
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.motion.pairs import (
     ROUNDING,
@@ -21,13 +21,7 @@ from tcs.kernel.motion.pairs import (
     list_near,
     take_posture,
 )
-from tcs.kernel.motion.scene import (
-    DEPTH,
-    MotionScene,
-    MotionWorkspace,
-    new_motion_workspace,
-    with_pairs,
-)
+from tcs.kernel.motion.scene import DEPTH, MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
 
 RESOLUTION = 1e-5
@@ -225,41 +219,6 @@ def _push_halves(
     span[top + 1, 0], span[top + 1, 1] = begin, middle
     for n in range(2):
         stretch[top + n, 0], stretch[top + n, 1] = first, last
-
-
-@jit
-def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: BoolArray) -> None:
-    """Fill which pairs can touch as far as one joint decides, shape (n_pairs,).
-
-    Of links next to each other only the angle of the joint between them counts: a pair that is
-    certified over the whole range of the joint never touches.
-
-    Args:
-        owned_scene: The scene.
-        owned_work: Scratch.
-        needed: Filled.
-    """
-    scene, work = unowned(owned_scene), unowned(owned_work)
-    for n in range(len(scene.pair)):
-        joint = scene.pair[n, 2]
-        needed[n] = True
-        if scene.link_frame[scene.pair[n, 0]] != joint + 1:
-            continue
-        low, high = scene.lower[joint], scene.upper[joint]
-        if scene.period[joint] > 0.0:
-            low, high = -np.pi, np.pi
-        for m in range(4):
-            for k in range(7):
-                work.control[m, k] = low + (high - low) * m / 3.0 if k == joint else 0.0
-        work.pairs[0] = n
-        needed[n] = _halves_are_free_until(scene, work, 1, 0.0, 1.0) < 1.0
-
-
-def without_idle_pairs(scene: MotionScene) -> MotionScene:
-    """Return a scene without the pairs of neighbouring links that never touch."""
-    needed = np.ones(len(scene.pair), np.bool_)
-    list_needed(scene, new_motion_workspace(scene), needed)
-    return with_pairs(scene, needed)
 
 
 @inner

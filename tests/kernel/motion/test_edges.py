@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tcs.kernel.arrays import BOX, SPHERE
-from tcs.kernel.motion.edges import NO_PAIR, certified, list_needed, posture_contact
+from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
+from tcs.kernel.motion.idle import MOST_JOINTS, list_needed
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.clutter import arm_base
@@ -46,7 +47,7 @@ def test_postures_agree_with_the_reference(chain, rng):
     assert 3 < sum(found) < 23
 
 
-def test_pairs_that_one_joint_keeps_apart_are_left_out(chain, rng):
+def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
     scene = toy_scene(chain, 0, obstacles=30)
     # The first shape circles about the first axis, and meets a ball on its way.
     out = np.array([0.35, 0.0, 0.1])
@@ -55,16 +56,17 @@ def test_pairs_that_one_joint_keeps_apart_are_left_out(chain, rng):
     ball = placed(SPHERE, [0.05, 0, 0], p=R_WA @ (R_AL @ out + p_AL) + p_WA)
     p = scene.arm.p.copy()
     p[0, 0] = out
-    arm = scene.arm._replace(frame=np.array([1, 3, 4, 4, 7, 7], np.int8), p=p)
+    arm = scene.arm._replace(frame=np.array([1, 2, 4, 4, 7, 7], np.int8), p=p)
     scene = with_obstacle(scene._replace(arm=arm), ball)
     every = motion_scene(build_problem(scene, toy_grid()), HERE)
     work, needed = new_motion_workspace(every), np.ones(len(every.pair), np.bool_)
     list_needed(every, work, needed)
-    circling = every.link_frame[every.pair[:, 0]] == 1
-    assert np.all(needed[~circling])
-    assert 0 < needed[circling].sum() < circling.sum()
+    joints = every.link_frame[every.pair[:, 0]] - every.pair[:, 2]
+    assert np.all(needed[joints > MOST_JOINTS])
+    for few in (joints == 1, joints == 2):
+        assert 0 < needed[few].sum() < few.sum()
     postures = [within_limits(rng, chain) for _ in range(200)]
-    for kept, touches in ((~needed, False), (needed & circling, True)):
+    for kept, touches in ((~needed, False), (needed & (joints == 1), True)):
         some = with_pairs(every, kept)
         work = new_motion_workspace(some)
         assert any(posture_contact(some, work, q) != NO_PAIR for q in postures) == touches

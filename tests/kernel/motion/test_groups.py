@@ -7,8 +7,9 @@ import pytest
 
 from tcs.kernel.arrays import BOX, CAPSULE
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
-from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact, without_idle_pairs
+from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.groups import NONE, boxes_around, grouped
+from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference_motion import straight_curve

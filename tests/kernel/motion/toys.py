@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.motion.edges import without_idle_pairs
+from tcs.kernel.motion.idle import without_idle_pairs
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.reference_pairs import placed_scene
