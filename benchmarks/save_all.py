@@ -45,6 +45,8 @@ PARTS: dict[str, tuple[str, ...]] = {
             *("scratching_thigh_left-bed", "scratching_thigh_right-bed"),
         )
     ),
+    "optimum": ("--compared", "shaving/wheelchair", "feeding/wheelchair", "brushing/wheelchair"),
+    "placing": (),
     "first_run": (),
     "viewer": ("--scores", SCORES),
     "live_page": (),

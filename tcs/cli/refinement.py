@@ -20,8 +20,9 @@ def refine(
     objective: Annotated[
         str,
         typer.Option(
-            metavar="score|success",
-            help="What to maximise: P_R + P_M, or the success under the errors of the environment.",
+            metavar="score|success|margin",
+            help="What to maximise: P_R + P_M, the success under the errors of the environment, or "
+            "the success with the base displaced by up to 5 cm and 5 deg.",
         ),
     ] = "score",
     starts: Annotated[
@@ -29,7 +30,7 @@ def refine(
     ] = 6,
     rounds: Annotated[int, typer.Option(help="Greatest number of rounds of the search.")] = 40,
     samples: Annotated[
-        int, typer.Option(help="Number of samples of the success, with --objective success.")
+        int, typer.Option(help="Number of samples of the success, for the objectives with one.")
     ] = 64,
     seed: options.Seed = 0,
     observed: options.Observed = None,

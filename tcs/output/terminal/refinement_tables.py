@@ -26,8 +26,9 @@ def report_refined(result: Mapping[str, Any]) -> None:
     )
     if result["success"] is not None:
         success = result["success"]
+        cause = "under error" if result["objective"] == "success" else "with the base displaced"
         out.print(
-            f"success under error from {success['before']:.1%} to {success['after']:.1%}, in "
+            f"success {cause} from {success['before']:.1%} to {success['after']:.1%}, in "
             f"{success['samples']:,} other samples than those that chose the set"
         )
     out.print(

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.points import Points, PointScores
 
 TIE = 1e-3
@@ -74,16 +73,27 @@ class ScoreObjective:
         return Features(scores.reached, scores.dexterity)
 
 
+class Samples(Protocol):
+    """Random changes that are the same for all configurations (common random numbers)."""
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+
+    def reached(self, points: Points) -> BoolArray:
+        """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
+
+
 @dataclass(frozen=True, eq=False)
 class SuccessObjective:
-    """Success under error, the mean of P_R over samples that are the same for all configurations.
+    """Success, the mean of P_R over samples that are the same for all configurations.
 
     Each goal in each sample is a feature, and each goal without error, with a weight of TIE.
     """
 
     weights: FloatArray
     """Weights of the goals, sum 1, shape (G,)."""
-    perturbed: PerturbedPoints
+    perturbed: Samples
     """The samples."""
 
     @property

@@ -14,7 +14,13 @@ from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.model.grid import InitialConfiguration
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.bound import upper_bound
-from tcs.placement.refinement.objectives import Objective, ScoreObjective, SuccessObjective
+from tcs.placement.refinement.displaced import DisplacedBases
+from tcs.placement.refinement.objectives import (
+    Objective,
+    Samples,
+    ScoreObjective,
+    SuccessObjective,
+)
 from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.points import Points, PointScorer
 from tcs.placement.refinement.search import LocalSearch, Walk
@@ -23,11 +29,12 @@ from tcs.placement.robustness import Trials
 from tcs.placement.selection import Top, UtilityWeights, select
 from tcs.placement.selection.choice import SelectionTables
 from tcs.placement.store import ScoreFile
-from tcs.placement.tables import RefinedTable, tc_reachability
+from tcs.placement.tables import RefinedTable, SetTable, tc_reachability
 from tcs.placement.tables.success import NO_MEMBER
 
-OBJECTIVES = ("score", "success")
-"""What a refinement maximises: P_R + P_M, or the success under error."""
+OBJECTIVES = ("score", "success", "margin")
+"""What a refinement maximises: P_R + P_M, the success under the errors of the environment, or the
+success with the base displaced."""
 KEY = "refinement"
 """Entry of the metadata: for each table, None or the settings and figures of its refinement."""
 MOST_STARTS = 50
@@ -71,8 +78,9 @@ def refine(
 
     Args:
         file: A score file, which is not modified.
-        objective: "score", P_R + P_M; or "success", the mean of P_R under the errors of the
-            environment, over samples that are the same for all configurations.
+        objective: "score", P_R + P_M; "success", the mean of P_R under the errors of the
+            environment; or "margin", the mean of P_R with the base displaced by up to 5 cm and
+            5 deg. The samples of the means are the same for all configurations.
         starts: Number of sets to start from; up to three single configurations come on top.
         rounds: Greatest number of rounds of the search.
         samples: Number of samples of the success.
@@ -111,7 +119,7 @@ def refine(
     search = LocalSearch(
         scorer,
         Space.of(file.configurations, file.tables[number].sets),
-        _objective(file, number, objective, samples, seed, jobs),
+        _objective(file, number, scorer, objective, samples, seed),
         named_generator(seed, STREAM),
     )
     walks, scored = search.run(
@@ -119,15 +127,15 @@ def refine(
     )
     refined = _as_table(walks, file.tables[number].sets.weights)
     success = None
-    if objective == "success":
-        fresh = _perturbed(file, number, FRESH_SAMPLES, seed, jobs, CHECK_STREAM)
-        success = _success(search, walks[0], fresh, file.tables[number].sets.best)
+    if objective != "score":
+        fresh = _samples(file, number, scorer, objective, FRESH_SAMPLES, seed, CHECK_STREAM)
+        success = _success(search, walks[0], fresh, file.tables[number].sets)
     settings = {
         "program_version": version("tcs"),
         "objective": objective,
         "starts": starts,
         "rounds": rounds,
-        "samples": samples if objective == "success" else None,
+        "samples": None if objective == "score" else samples,
         "seed": seed,
         "scored": scored,
         "success": success,
@@ -214,32 +222,42 @@ def refined_members(
 
 
 def _objective(
-    file: ScoreFile, table: int, name: str, samples: int, seed: int, jobs: int
+    file: ScoreFile, table: int, scorer: PointScorer, name: str, samples: int, seed: int
 ) -> Objective:
     """Return the objective of a name."""
     weights = file.tables[table].sets.weights
     if name == "score":
         return ScoreObjective(weights)
-    perturbed = _perturbed(file, table, samples, seed, jobs, SAMPLES_STREAM)
-    return SuccessObjective(weights, perturbed)
+    drawn = _samples(file, table, scorer, name, samples, seed, SAMPLES_STREAM)
+    return SuccessObjective(weights, drawn)
 
 
-def _perturbed(
-    file: ScoreFile, table: int, samples: int, seed: int, jobs: int, stream: str
-) -> PerturbedPoints:
-    """Return samples of the errors of the environment, of a named stream."""
+def _samples(
+    file: ScoreFile,
+    table: int,
+    scorer: PointScorer,
+    objective: str,
+    samples: int,
+    seed: int,
+    stream: str,
+) -> Samples:
+    """Return samples of a named stream: errors of the environment, or displacements of the base."""
+    if objective == "margin":
+        return DisplacedBases.drawn(scorer, samples, named_generator(seed, stream))
     trials = Trials.of(file, table=table)
-    return PerturbedPoints(trials, trials.errors.draw(samples, seed, stream=stream), jobs)
+    offsets = trials.errors.draw(samples, seed, stream=stream)
+    return PerturbedPoints(trials, offsets, scorer.jobs)
 
 
 def _success(
-    search: LocalSearch, walk: Walk, fresh: PerturbedPoints, best: tuple[int, ...]
-) -> dict[str, Any]:
+    search: LocalSearch, walk: Walk, fresh: Samples, sets: SetTable
+) -> dict[str, float | int]:
     """Return the success of the best set of the grid and of a refined set in fresh samples."""
     of_sets = []
-    for points in (search.points_of(best), Points(walk.present.values, walk.present.arm)):
+    refined = Points(walk.present.values, walk.present.arm)
+    for points in (search.points_of(sets.best), refined):
         reached = np.logical_or.reduce(fresh.reached(points), axis=0)
-        of_sets.append(float(tc_reachability(reached, fresh.trials.weights).mean()))
+        of_sets.append(float(tc_reachability(reached, sets.weights).mean()))
     return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}
 
 

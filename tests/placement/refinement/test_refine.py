@@ -145,9 +145,10 @@ def test_constraints_hold_for_refined_sets(refined):
     assert "Refined sets are not compared: obstacles" in chosen.warnings[-1]
 
 
-def test_success_is_judged_on_other_samples(scored, monkeypatch):
+@pytest.mark.parametrize("objective", ["success", "margin"])
+def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
-    found = tcs.refine(scored, objective="success", starts=1, rounds=1, samples=2)
+    found = tcs.refine(scored, objective=objective, starts=1, rounds=1, samples=2)
     found = refinement_summary(found)
     assert found["success"]["samples"] == 30
     assert 0.0 < found["success"]["before"] < 1.0
