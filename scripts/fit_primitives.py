@@ -5,7 +5,9 @@
     python scripts/fit_primitives.py pr2 --pairs    rewrites disabled_groups, the last YAML entry,
                                                     and keeps groups made by hand
     python scripts/fit_primitives.py tiago base_link=6 ...     fits these bodies again, with up to
-                                                    so many shapes, and keeps those of the others
+                                                    so many shapes, and keeps those of the others;
+                                                    with 60+120, adds up to 120 where the first 60
+                                                    leave the surface bare
 
 The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
 The last lines say how many postures the shapes block although the surfaces are free of
@@ -14,6 +16,7 @@ self-collision, and of random boxes.
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -27,13 +30,15 @@ from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes,
 
 FITS = Path(__file__).parent / "fits.yaml"
 """Bodies of the shipped robots that are not fitted as usual."""
+_NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
+"""Number of shapes of a body, and of patches."""
 
 
 def main() -> int:
     """Rewrite primitives or pairs of the robot given on the command line."""
     names = [a for a in sys.argv[1:] if a != "--pairs" and "=" not in a]
     more = [a.split("=") for a in sys.argv[1:] if "=" in a]
-    if len(names) != 1 or not all(len(m) == 2 and m[1].isdecimal() and int(m[1]) for m in more):
+    if len(names) != 1 or not all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more):
         print(__doc__, file=sys.stderr)
         return 2
     try:
@@ -44,7 +49,7 @@ def main() -> int:
                 path = data_folder() / "models" / "robots" / f"{robot.name}.yaml"
             rewrite_pairs(robot, path)
         elif more:
-            shapes = refit(robot, {body: int(most) for body, most in more})
+            shapes = refit(robot, {body: numbers(robot, body, text) for body, text in more})
             write_primitives(Path(robot.primitives), shapes)
             print_blocked(robot)
         else:
@@ -79,11 +84,19 @@ def chosen_fits(robot: RobotFile) -> dict[str, Target | None]:
     for body, fit in fits.items():
         if fit == "kept":
             chosen[body] = None
-        elif isinstance(fit, int):
-            chosen[body] = target_of(robot, body, fit)
+        elif isinstance(fit, int | str):
+            chosen[body] = numbers(robot, body, str(fit))
         else:
             chosen[body] = Target(protrusion=fit["protrusion"], max_shapes=fit["shapes"])
     return chosen
+
+
+def numbers(robot: RobotFile, body: str, text: str) -> Target:
+    """Return how closely "60" or "60+120" shapes fit a body."""
+    found = _NUMBERS.fullmatch(text)
+    if found is None:
+        raise TcsError(f"'{text}' is no number of shapes of body '{body}', such as 60 or 60+120.")
+    return target_of(robot, body, *(int(number) for number in found.groups() if number))
 
 
 def rewrite_pairs(robot: RobotFile, path: Path) -> None:

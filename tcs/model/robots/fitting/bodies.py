@@ -105,15 +105,14 @@ def fit_robot(
     return tuple(results)
 
 
-def refit(robot: RobotFile, shapes: Mapping[str, int]) -> tuple[Primitive, ...]:
+def refit(robot: RobotFile, targets: Mapping[str, Target]) -> tuple[Primitive, ...]:
     """Return the primitives of a robot's file, those of some bodies fitted again.
 
     More shapes follow a body more closely, and block fewer postures that its surface allows.
 
     Args:
         robot: The robot.
-        shapes: Largest number of shapes of each body to fit again. Above the usual number they may
-            protrude less.
+        targets: How closely each body to fit again is fitted.
 
     Raises:
         UnknownNameError: If the file has no primitive of a body.
@@ -121,10 +120,10 @@ def refit(robot: RobotFile, shapes: Mapping[str, int]) -> tuple[Primitive, ...]:
     """
     found = _shapes_by_body(robot)
     surfaces = surfaces_to_enclose(robot)
-    for body, most in shapes.items():
+    for body, target in targets.items():
         _check_has_shapes(robot, found, body)
         _, _, surface = surfaces[body]
-        found[body] = fit_triangles(body, surface, target_of(robot, body, most)).primitives
+        found[body] = fit_triangles(body, surface, target).primitives
     return tuple(shape for fitted in found.values() for shape in fitted)
 
 
@@ -145,10 +144,13 @@ def _targets(
     return targets | {_shape_key(model, body): target for body, target in chosen.items() if target}
 
 
-def target_of(robot: RobotFile, body: str, most: int) -> Target:
-    """Return how closely up to `most` shapes fit a body: the more, the less they protrude."""
+def target_of(robot: RobotFile, body: str, most: int, patches: int = 0) -> Target:
+    """Return how closely up to `most` shapes fit a body, with so many patches.
+
+    Above the usual number, the more shapes, the less they may protrude.
+    """
     usual = _target(robot, robot.model(), body)
-    return Target(usual.protrusion * min(1.0, usual.max_shapes / most), most)
+    return Target(usual.protrusion * min(1.0, usual.max_shapes / most), most, patches)
 
 
 def _shapes_by_body(robot: RobotFile) -> dict[str, tuple[Primitive, ...]]:

@@ -46,6 +46,8 @@ _CHOOSING = 4_000
 """Most pieces by which the shapes are chosen; all are enclosed in the end."""
 _COVERED = 0.99
 """Fraction of those pieces at which no further shape is added: the nearest one grows."""
+_ROUNDS = 4
+"""Rounds of shapes that grow from what those before leave bare."""
 _DEEP = 0.012
 """Depth [m] from which on the inside has to be covered too, and least spacing of points there."""
 _SPACINGS = 20
@@ -64,10 +66,13 @@ class Target:
         protrusion: Distance by which shapes may protrude from the surface [m]. If `max_shapes` do
             not suffice, some protrude farther.
         max_shapes: Largest number of shapes on one body; a few more may fill its inside.
+        patches: Largest number of shapes added where those leave the surface bare; only what is
+            bare after that makes shapes grow.
     """
 
     protrusion: float
     max_shapes: int
+    patches: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +138,40 @@ def _covering(
     inside = _thinned(inside, max(_DEEP, size / _SPACINGS))
     sample = _sample(pieces, max(_PIECE, 2 * pitch), rng)
     candidates = _Candidates(body, solid, target.protrusion, points, sample, inside, rng)
-    return _reduced(body, candidates.chosen(target.max_shapes), pieces, inside)
+    shapes = candidates.chosen(target.max_shapes)
+    if target.patches:
+        shapes += _patches(body, solid, target, points, pieces, shapes, rng)
+    return _reduced(body, shapes, pieces, inside)
+
+
+def _patches(
+    body: str,
+    solid: Solid,
+    target: Target,
+    hull: FloatArray,
+    pieces: FloatArray,
+    shapes: list[Primitive],
+    rng: np.random.Generator,
+) -> list[Primitive]:
+    """Return shapes that grow from pieces of the surface that others do not contain."""
+    bare = pieces[~_contain(shapes, pieces)]
+    found: list[Primitive] = []
+    for _ in range(_ROUNDS):
+        if not len(bare) or len(found) == target.patches:
+            break
+        some = bare if len(bare) <= _CHOOSING else rng.choice(bare, _CHOOSING, replace=False)
+        grown = _Candidates(body, solid, target.protrusion, hull, some, np.empty((0, 3)), rng)
+        new = grown.chosen(target.patches - len(found))
+        bare, found = bare[~_contain(new, bare)], found + new
+    return found
+
+
+def _contain(shapes: list[Primitive], pieces: FloatArray) -> BoolArray:
+    """Return which pieces lie wholly in one of the shapes, shape (n,)."""
+    within = np.zeros(len(pieces), np.bool_)
+    for shape in shapes:
+        within |= shape.contains(pieces.reshape(-1, 3)).reshape(-1, 3).all(axis=1)
+    return within
 
 
 def _sample(pieces: FloatArray, length: float, rng: np.random.Generator) -> FloatArray:

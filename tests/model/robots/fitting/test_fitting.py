@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import UnknownNameError
 from tcs.model.robots import load_robot
+from tcs.model.robots.fitting import covering
 from tcs.model.robots.fitting.bodies import HAND, fit_robot, refit
 from tcs.model.robots.fitting.bounding import (
     best_candidate,
@@ -127,11 +128,24 @@ def test_bodies_to_keep_have_the_shapes_of_the_file():
 def test_fitting_one_body_again_changes_no_other(pr2):
     before = read_primitives(Path(pr2.primitives))
     name = "l_gripper_l_finger_tip_link"
-    after = refit(pr2, {name: 6})
+    after = refit(pr2, {name: Target(HAND.protrusion, 6)})
     body = [shape for shape in after if shape.body == name]
     assert 1 < len(body) <= 6
     assert [s for s in after if s not in body] == [s for s in before if s.body != name]
     assert enclosed(body, body_triangles(pr2.model())[name]).all()
     assert union_volume(body) < union_volume(s for s in before if s.body == name)
     with pytest.raises(UnknownNameError, match="Did you mean 'l_forearm_link'"):
-        refit(pr2, {"l_forearm_lin": 3})
+        refit(pr2, {"l_forearm_lin": HAND})
+
+
+def test_patches_cover_what_few_shapes_leave_bare(monkeypatch):
+    # A tenth of the usual candidates is enough for a ring.
+    monkeypatch.setattr(covering, "_SEEDS", 30)
+    monkeypatch.setattr(covering, "_CAPSULES", 60)
+    ring = np.asarray(trimesh.creation.annulus(0.09, 0.1, 0.02).triangles)
+    few, patched = (fit_triangles("b", ring, Target(0.008, 4, most)) for most in (0, 20))
+    for fit in (few, patched):
+        assert enclosed(fit.primitives, ring).all()
+    assert len(few.primitives) < len(patched.primitives) <= 24
+    # Four shapes grow to contain the rest of the ring; patches follow it.
+    assert patched.union < 0.7 * few.union
