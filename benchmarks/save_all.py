@@ -35,15 +35,18 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--rows", "shaving/wheelchair", "feeding/wheelchair", "bathing/bed"),
         *("--pairs", "100"),
     ),
-    "motions": tuple(
-        f"{SCORES}/{name}-pr2.tcs"
-        for name in (
-            *("shaving-wheelchair", "feeding-wheelchair", "brushing-wheelchair"),
-            *("shaving-bed", "shaving-bed-no-wall", "bathing-bed", "scratching_chest-bed"),
-            *("scratching_forearm_left-bed", "scratching_forearm_right-bed"),
-            *("scratching_upper_arm_left-bed", "scratching_upper_arm_right-bed"),
-            *("scratching_thigh_left-bed", "scratching_thigh_right-bed"),
-        )
+    "motions": (
+        *(
+            f"{SCORES}/{name}-pr2.tcs"
+            for name in (
+                *("shaving-wheelchair", "feeding-wheelchair", "brushing-wheelchair"),
+                *("shaving-bed", "shaving-bed-no-wall", "bathing-bed", "scratching_chest-bed"),
+                *("scratching_forearm_left-bed", "scratching_forearm_right-bed"),
+                *("scratching_upper_arm_left-bed", "scratching_upper_arm_right-bed"),
+                *("scratching_thigh_left-bed", "scratching_thigh_right-bed"),
+            )
+        ),
+        *("--sample", "300", "--jobs", "1"),
     ),
     "optimum": ("--compared", "shaving/wheelchair", "feeding/wheelchair", "brushing/wheelchair"),
     "placing": (),

@@ -30,7 +30,7 @@ END = "<!-- end of figures -->"
 UNSAVED = "\n*Not saved yet: run `make benchmark-save`.*\n\n"
 """Content of an empty block whose table has not been saved."""
 BLOCK = re.compile(rf"(<!-- figures: (\w+)/(\w+) -->\n)(.*?)({re.escape(END)})", flags=re.S)
-CELL = re.compile(r"(<!-- figure: (\w+)/(\w+) \| ([^|\n]+) \| ([^|\n]+) -->)(.*?)(<!-- -->)")
+CELL = re.compile(r"(<!-- figure: (\w+)/(\w+) \| ([^|\n]+) \| ([^|\n]+?) -->)(.*?)(<!-- -->)")
 _FENCE = re.compile(r"^ *(```+|~~~+).*?^ *\1 *$", flags=re.S | re.M)
 _CODE = re.compile(r"`[^`\n]+`|\$\$.*?\$\$|<!--.*?-->", flags=re.S)
 MEASURED = re.compile(

@@ -43,8 +43,16 @@ _CheckBase = Annotated[
 
 
 def evaluate(
-    file: options.File,
-    samples: Annotated[int, typer.Option(help="Number of samples.")] = 1000,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A file made by `tcs score`, or a plan.json by `tcs plan --out`."
+        ),
+    ],
+    samples: Annotated[
+        int | None,
+        typer.Option(help="Number of samples.", show_default="1000; of a plan 100"),
+    ] = None,
     seed: options.Seed = 0,
     errors: _Errors = None,
     select: Annotated[
@@ -66,10 +74,21 @@ def evaluate(
     observed: options.Observed = None,
     body_collisions: _BodyCollisions = "paper",
     check_base: _CheckBase = False,
+    replan: Annotated[
+        bool, typer.Option(help="Of a plan: whether motions are also planned anew in each sample.")
+    ] = True,
     jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
-    """Evaluate the success of a set in randomly perturbed environments."""
+    """Evaluate the success of a set, or of a plan, in randomly perturbed environments."""
+    if file.suffix == ".json":
+        if select != "best" or members or observed or check_base or body_collisions != "paper":
+            raise typer.BadParameter(
+                "of a plan, only --samples, --seed, --errors and --no-replan can be set.",
+                param_hint="FILE",
+            )
+        evaluate_plan_file(file, 100 if samples is None else samples, seed, errors, replan, as_json)
+        return
     if members is not None and select not in ("uniform", "equal"):
         raise typer.BadParameter("requires --select uniform or equal.", param_hint="--members")
     import tcs
@@ -79,7 +98,7 @@ def evaluate(
     with terminal.progress_bar("configurations in samples") as on_progress:
         found = tcs.evaluate(
             loaded,
-            samples=samples,
+            samples=1000 if samples is None else samples,
             seed=seed,
             errors=errors,
             select=select,
@@ -140,6 +159,25 @@ def robustify(
         tcs.save(path, done)
     result = {"file": str(path), **success_summary(done)}
     terminal.print_result(result, robustness_tables.report_robustified, as_json=as_json)
+
+
+def evaluate_plan_file(
+    path: Path, samples: int, seed: int, errors: Path | None, replan: bool, as_json: bool
+) -> None:
+    """Print whether the motions of a plan stay free in randomly perturbed environments."""
+    from tcs.motion import evaluate_plan, load_plan
+
+    plan = load_plan(path)
+    with terminal.progress_bar("samples") as on_progress:
+        found = evaluate_plan(
+            plan,
+            samples=samples,
+            seed=seed,
+            errors=errors,
+            replan=replan,
+            on_progress=on_progress,
+        )
+    terminal.print_result(found.to_json(), robustness_tables.report_plan_success, as_json=as_json)
 
 
 def table_of(loaded: ScoreFile, observed: list[str] | None) -> int | None:

@@ -14,6 +14,7 @@ from tcs.motion.examine import examine
 from tcs.motion.files import save_plan
 from tcs.motion.motion_plan import GoalResult, MotionPlan, Segment, StopPlan
 from tcs.motion.plan_check import PlanCheck, check_plan
+from tcs.motion.plan_success import PlanSuccess, evaluate_plan
 from tcs.motion.plans import plan
 from tcs.motion.stops import Stop
 from tcs.motion.stored_plan import load_plan
@@ -27,6 +28,7 @@ __all__ = [
     "GoalResult",
     "MotionPlan",
     "PlanCheck",
+    "PlanSuccess",
     "Segment",
     "Stop",
     "StopPlan",
@@ -34,6 +36,7 @@ __all__ = [
     "accesses",
     "check_approaches",
     "check_plan",
+    "evaluate_plan",
     "examine",
     "load_plan",
     "plan",

@@ -30,6 +30,20 @@ BodyPair = tuple[str, str]
 """Names of two bodies: one of the robot, then the other."""
 
 
+def single_grid(axes: Sequence[Axis], values: Sequence[float]) -> Grid:
+    """Return the grid of one configuration.
+
+    Args:
+        axes: The axes.
+        values: Value of each [m or rad].
+    """
+    single = []
+    for axis, value in zip(axes, values, strict=True):
+        start = math.degrees(value) if axis.unit == "deg" else value
+        single.append(Axis(axis.name, axis.unit, start, 0.0, 1))
+    return Grid(tuple(single))
+
+
 @dataclass(frozen=True, eq=False)
 class StopGrid:
     """Initial configurations of a job, lowered once for the stops at any of them."""
@@ -161,11 +175,7 @@ class Stop:
             RobotError: If a velocity limit is unknown.
         """
         axes = job.scored_grid.axes
-        single = []
-        for axis, value in zip(axes, values, strict=True):
-            start = math.degrees(value) if axis.unit == "deg" else value
-            single.append(Axis(axis.name, axis.unit, start, 0.0, 1))
-        grid = Grid(tuple(single))
+        grid = single_grid(axes, values)
         stops = StopGrid.of(job, scene, grid, lower(scene, job.task, grid))
         stop = stops.stop(0, new_trees(seed))
         stop.place({axis.name: value for axis, value in zip(axes, values, strict=True)})

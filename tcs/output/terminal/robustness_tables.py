@@ -44,6 +44,30 @@ def report_evaluation(result: Mapping[str, Any]) -> None:
     out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")
 
 
+def report_plan_success(result: Mapping[str, Any]) -> None:
+    """Print how often the motions of a plan stay free under error."""
+    out = results_console()
+    samples = f"{result['samples']:,} samples"
+    played = _with_interval(result["blind"])
+    out.print(f"played as planned, all motions stay free of contact in {played} of {samples}")
+    if result["replanned"] is not None:
+        again = _with_interval(result["replanned"])
+        out.print(f"planned anew, all goals of the plan can be done in {again}")
+    widths = ", ".join(f"{joint} {error_width(error)}" for joint, error in result["errors"].items())
+    out.print(f"errors  {widths}")
+    if result["clipped"]:
+        out.print(f"in {result['clipped']:,} samples an error was limited by a joint limit")
+    out.print(f"seed {result['seed']}, {result['seconds']:.1f} s")
+
+
+def _with_interval(found: Mapping[str, Any]) -> str:
+    """Return a mean with its interval, if it has one."""
+    if found["ci95"] is None:
+        return f"{found['mean']:.1%}"
+    low, high = found["ci95"]
+    return f"{found['mean']:.1%} (95 % interval {low:.1%} to {high:.1%})"
+
+
 def report_robustified(result: Mapping[str, Any]) -> None:
     """Print the most robust set of each size with its estimate."""
     out = results_console()

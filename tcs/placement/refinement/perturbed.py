@@ -13,7 +13,7 @@ from tcs.model.scene import torso_at
 from tcs.placement.refinement.points import Points
 from tcs.placement.robustness.error_model import Offsets
 from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, Run
-from tcs.placement.robustness.trials import Trials, samples_of
+from tcs.placement.robustness.trials import Trials, displaced, samples_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class PerturbedPoints:
             **trials.observed,
             **{axis.name: float(values[0, i]) for i, axis in enumerate(axes)},
         }
-        positions, _ = arm.displaced(nominal, self.offsets)
+        positions, _ = displaced(arm.job, arm.scene, nominal, self.offsets)
         x, y, yaw, torso = (np.ascontiguousarray(c) for c in values[:, -len(ROBOT_AXES) :].T)
         levels, level = np.unique(torso, return_inverse=True)
         raised = dataclasses.replace(arm.lowered, arrays=torso_at(arm.lowered, arm.scene, levels))

@@ -51,28 +51,6 @@ class ArmTrials:
     """The pairs of body and environment shapes whose collisions count, shape (n_body,
     n_environment)."""
 
-    def displaced(
-        self, nominal: Mapping[str, float], offsets: Offsets
-    ) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
-        """Return joint positions in each sample, and whether a joint was held at its limit.
-
-        Args:
-            nominal: Positions without error, by joint [m or rad]; other joints are where the
-                environment file has them.
-            offsets: Errors of the joints, shapes (samples,).
-        """
-        samples = samples_of(offsets)
-        positions = {name: np.full(samples, value) for name, value in nominal.items()}
-        limited = np.zeros(samples, dtype=np.bool_)
-        for name, error in offsets.items():
-            center = nominal.get(name, self.job.spec.environment.joints.get(name, 0.0))
-            lower, upper = self.scene.built.environment_joints.limits(name)
-            # Rounding may put the last grid value beyond the limit, where it must remain.
-            displaced = center + np.asarray(error, dtype=np.float64)
-            positions[name] = np.clip(displaced, min(lower, center), max(upper, center))
-            limited |= positions[name] != displaced
-        return positions, limited
-
     def scenes(
         self, positions: Mapping[str, FloatArray], lowered: LoweredScene, measure: str
     ) -> PerturbedScenes:
@@ -361,7 +339,8 @@ class Trials:
             state: Number of arm and environment state, as in `BasePoses`.
             offsets: Errors of the joints, shapes (samples,).
         """
-        return self.arms[0].displaced(self.nominal(state), offsets)
+        arm = self.arms[0]
+        return displaced(arm.job, arm.scene, self.nominal(state), offsets)
 
     def _scenes(
         self,
@@ -373,6 +352,31 @@ class Trials:
         positions, _ = self.positions(state, {name: v[columns] for name, v in offsets.items()})
         arm = self.arm_of(state * self.grid.state_size)
         return arm.scenes(positions, arm.lowered, str(self.file.metadata["measure"]))
+
+
+def displaced(
+    job: Job, scene: Scene, nominal: Mapping[str, float], offsets: Offsets
+) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
+    """Return joint positions in each sample, and whether a joint was held at its limit.
+
+    Args:
+        job: Robot and environment.
+        scene: Its live scene.
+        nominal: Positions without error, by joint [m or rad]; other joints are where the
+            environment file has them.
+        offsets: Errors of the joints, shapes (samples,).
+    """
+    samples = samples_of(offsets)
+    positions = {name: np.full(samples, value) for name, value in nominal.items()}
+    limited = np.zeros(samples, dtype=np.bool_)
+    for name, error in offsets.items():
+        center = nominal.get(name, job.spec.environment.joints.get(name, 0.0))
+        lower, upper = scene.built.environment_joints.limits(name)
+        # Rounding may put the last grid value beyond the limit, where it must remain.
+        moved = center + np.asarray(error, dtype=np.float64)
+        positions[name] = np.clip(moved, min(lower, center), max(upper, center))
+        limited |= positions[name] != moved
+    return positions, limited
 
 
 def samples_of(offsets: Offsets) -> int:
