@@ -53,6 +53,8 @@ NEAR = 8
 """Number of columns on either side of the posture that scoring found, whose line is tried first."""
 MOST_CURVES = 100
 """Greatest number of motions that are followed for a pair."""
+SHIFTS = 4
+"""Number of times that the columns are moved by a part of their spacing, until a line is free."""
 ENOUGH = 1_000_000
 """In place of the number of motions: no other can be free."""
 GRIPPER = 7
@@ -115,34 +117,48 @@ def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: 
     """
     _prepare(problem, approach, fastest, q)
     columns = approach.columns
-    branch = columns[3]
-    for n in range(-1, len(problem.arm.branches)):
-        # The branch of the posture that scoring found comes first.
-        b = branch if n < 0 else n
-        if n >= 0 and b == branch:
-            continue
-        if n < 0:
-            first, last = max(columns[2] - NEAR, 0), min(columns[2] + NEAR, columns[0] - 1)
-            if _open(problem, approach, b, first, last) and (
-                _follow(problem, approach, fastest, b, columns[2], True) == DONE
-            ):
-                return -1
-            if columns[4] == ENOUGH:
-                return APPROACH_BLOCKED
+    b = columns[3]
+    first, last = max(columns[2] - NEAR, 0), min(columns[2] + NEAR, columns[0] - 1)
+    if _open(problem, approach, b, first, last) and (
+        _follow(problem, approach, fastest, b, columns[2], True) == DONE
+    ):
+        return -1
+    for shift in range(SHIFTS):
+        if columns[4] == ENOUGH:
+            break
+        if shift > 0:
+            # Between the columns lie windows that are narrower than their spacing.
+            arm, step = problem.arm, approach.grid.origin[1]
+            angle = q[arm.free] + shift / SHIFTS * step
+            if angle > arm.upper[arm.free]:
+                angle -= step
+            if angle < arm.lower[arm.free]:
+                break
+            columns[0], columns[4] = place_columns(arm, approach.grid, angle), 0
+        if _search(problem, approach, fastest):
+            return REACHED
+        if approach.contact[0] == NO_CONTACT:
+            return APPROACH_LIMITS
+    return APPROACH_BLOCKED
+
+
+@inner
+def _search(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
+    """Fill `search.best` with the best approachable node; return whether there is one."""
+    columns, search = approach.columns, approach.search
+    for b in range(len(problem.arm.branches)):
         _open(problem, approach, b, 0, columns[0] - 1)
-    count = _list_candidates(problem, approach)
-    search = approach.search
-    for rank in range(count):
+    for rank in range(_list_candidates(problem, approach)):
         n = search.order[rank]
         b, i = search.found_branch[n], search.found_pair[n, 0]
         if _follow(problem, approach, fastest, b, i, False) == DONE:
             copy_joints(approach.curve.points[0], search.best)
             if rank > 0:
                 _climb(problem, approach, fastest, b, i)
-            return REACHED
+            return True
         if columns[4] > MOST_CURVES:
             break
-    return APPROACH_LIMITS if approach.contact[0] == NO_CONTACT else APPROACH_BLOCKED
+    return False
 
 
 @inner
