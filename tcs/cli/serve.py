@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -128,6 +129,8 @@ def _engine(
     """Yield an engine that holds the files, and name each with its digest."""
     from tcs.service import Engine, Limits
 
+    # Of a job that is cancelled, joblib reports the parts whose results are not used.
+    warnings.filterwarnings("ignore", category=UserWarning, module="joblib")
     with Engine(Limits(threads=jobs)) as engine:
         for path in files or ():
             on_line(f"{engine.open_file(path).file} {path}")

@@ -218,14 +218,8 @@ class Jobs:
         assert work is not None
         try:
             result = work(Progress(self, job))
-        except CancelledError as error:
-            state: JobState = "cancelled" if job.is_cancelled else "failed"
-            self._ended(job, state, problem=str(error))
-        except TcsError as error:
-            self._ended(job, "failed", problem=" ".join(str(error).splitlines()))
-        except Exception:
-            _LOG.exception("job %s failed", job.what)
-            self._ended(job, "failed", problem="a defect of the program; see the server's log.")
+        except Exception as error:
+            self._ended(job, *_outcome_of(error, job))
         else:
             self._ended(job, "done", result=result)
 
@@ -233,9 +227,9 @@ class Jobs:
         self,
         job: _Job,
         state: JobState,
+        problem: str | None = None,
         *,
         result: dict[str, Any] | None = None,
-        problem: str | None = None,
     ) -> None:
         with self._changed:
             job.result, job.problem = result, problem
@@ -245,6 +239,17 @@ class Jobs:
     def _end(self, job: _Job, state: JobState) -> None:
         job.state, job.note, job.work = state, "", None
         self._changed.notify_all()
+
+
+def _outcome_of(error: Exception, job: _Job) -> tuple[JobState, str]:
+    """Return the state of a job that an exception ended, and the exception in one line."""
+    if job.is_cancelled:
+        # Work that is cut short may end with another exception than that of its progress.
+        return "cancelled", "the job was cancelled."
+    if isinstance(error, TcsError):
+        return "failed", " ".join(str(error).splitlines())
+    _LOG.error("job %s failed", job.what, exc_info=error)
+    return "failed", "a defect of the program; see the server's log."
 
 
 def _differ(first: JobStatus, second: JobStatus) -> bool:

@@ -14,7 +14,7 @@ from pydantic import Field
 from tcs.files.documents import Document, Entries, Number
 
 FileId = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of a score file.")]
-Name = Annotated[str, Field(pattern=r"^[_A-Za-z0-9-]{1,80}$")]
+CatalogueName = Annotated[str, Field(pattern=r"^[_A-Za-z0-9-]{1,80}$")]
 """Name of a task, an environment or a robot; never a path."""
 Text = Annotated[str, Field(max_length=1000)]
 YamlText = Annotated[str, Field(max_length=1024**2)]
@@ -24,7 +24,7 @@ Settings = Annotated[dict[str, Number], Field(max_length=100)]
 """Values of axes or joints: metres, or degrees under names that end in `_deg`."""
 Frames = Annotated[dict[str, list[Number]], Field(max_length=100)]
 """Positions of body frames [m]: x, y, z, and a quaternion qw, qx, qy, qz where it is observed."""
-Region = Text | Annotated[list[tuple[Number, Number]], Entries]
+ForbiddenRegion = Text | Annotated[list[tuple[Number, Number]], Entries]
 """Polygon on the floor as "X1 Y1, X2 Y2, X3 Y3, ..." or as a list of [x, y] [m]."""
 
 
@@ -40,7 +40,7 @@ class Limited(Document):
 
     only: Annotated[list[Text], Field(max_length=100)] = Field(default_factory=list)
     keep: Annotated[list[Text], Field(max_length=100)] = Field(default_factory=list)
-    forbid: Annotated[list[Region], Field(max_length=100)] = Field(default_factory=list)
+    forbid: Annotated[list[ForbiddenRegion], Field(max_length=100)] = Field(default_factory=list)
     blocked: Annotated[list[Text], Field(max_length=100)] = Field(default_factory=list)
 
 
@@ -116,11 +116,11 @@ class SceneRequest(Document):
 class ScoreRequest(Limited):
     """Score every initial configuration of a grid, as `tcs score`; a job."""
 
-    task: Name | None = None
+    task: CatalogueName | None = None
     task_yaml: YamlText | None = None
-    environment: Name = "wheelchair"
+    environment: CatalogueName = "wheelchair"
     environment_yaml: YamlText | None = None
-    robot: Name = "pr2"
+    robot: CatalogueName = "pr2"
     arms: Text | None = None
     measure: Text = "isotropy"
     approach: Annotated[bool, Field(strict=True)] = False

@@ -64,7 +64,7 @@ class JobStatus(BaseModel):
         return self.state in ENDED
 
 
-class Problem(BaseModel):
+class ProblemDetails(BaseModel):
     """An error, as `application/problem+json` (RFC 9457)."""
 
     title: str

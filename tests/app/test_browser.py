@@ -82,9 +82,10 @@ def test_a_click_moves_the_robot_and_why_explains(page):
     script = page.driver.execute_script
     before = script(POSE)
     place = page.driver.find_element("id", "map")
+    script("arguments[0].scrollIntoView({block: 'center'})", place)
     size = place.size
     ActionChains(page.driver).move_to_element_with_offset(
-        place, -size["width"] // 3, -size["height"] // 3
+        place, -size["width"] // 8, size["height"] // 8
     ).click().perform()
     page.wait(lambda: script(POSE)[:2] != before[:2])
     why = page.driver.find_elements("css selector", "#goals button")
@@ -103,3 +104,23 @@ def test_languages_and_sizes(page):
     assert script("return document.documentElement.lang") == "de"
     script("const one = document.getElementById('language'); one.value = 'en'; one.onchange()")
     page.wait(lambda: "reached" in script(WORDS))
+
+
+def test_a_task_is_scored_and_another_is_cancelled(page):
+    script = page.driver.execute_script
+    page.wait(lambda: script("return document.getElementById('task').options.length") > 5)
+    choose = "const one = document.getElementById(arguments[0]); one.value = arguments[1];"
+    script("document.getElementById('scoring').open = true")
+    script(choose, "robot", "pr2")
+    script(choose + "one.onchange()", "task", "feeding")
+    script("document.getElementById('score').requestSubmit()")
+    page.wait(lambda: not script("return document.getElementById('job').hidden"))
+    script("document.getElementById('cancel').click()")
+    words = "return document.getElementById('jobWords').textContent"
+    page.wait(lambda: script(words) == "Cancelled.")
+    files = script("return document.getElementById('file').options.length")
+    script("document.getElementById('score').requestSubmit()")
+    page.wait(lambda: script(words) == "Scored.")
+    assert script("return document.getElementById('file').options.length") >= files
+    page.wait(lambda: "places reached" in script(WORDS))
+    assert "feeding" in script("return document.getElementById('file').selectedOptions[0].text")

@@ -12,7 +12,7 @@ from pydantic.json_schema import models_json_schema
 
 from tcs.service.http.problems import MEDIA_TYPE
 from tcs.service.operations import OPERATIONS
-from tcs.service.responses import FileEntry, JobStatus, Problem
+from tcs.service.responses import FileEntry, JobStatus, ProblemDetails
 
 _REFERENCE = "#/components/schemas/{model}"
 _STYLE = (
@@ -27,7 +27,7 @@ _STYLE = (
 def schemas() -> dict[str, Any]:
     """Return the schemas of all requests and responses, by the names of their models."""
     models: list[type[BaseModel]] = [*(one.request for one in OPERATIONS)]
-    models += [FileEntry, JobStatus, Problem]
+    models += [FileEntry, JobStatus, ProblemDetails]
     _, found = models_json_schema([(one, "validation") for one in models], ref_template=_REFERENCE)
     return dict(found["$defs"])
 
@@ -44,7 +44,7 @@ def reference(name: str) -> dict[str, str]:
 
 def problem_response(text: str) -> dict[str, Any]:
     """Return the description of an error."""
-    return {"description": text, "content": {MEDIA_TYPE: {"schema": reference("Problem")}}}
+    return {"description": text, "content": {MEDIA_TYPE: {"schema": reference("ProblemDetails")}}}
 
 
 def page(description: Mapping[str, Any]) -> str:

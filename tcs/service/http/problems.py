@@ -7,7 +7,7 @@ import json
 from fastapi import Response
 
 from tcs.errors import BusyError, NotFoundError, TcsError
-from tcs.service.responses import Problem
+from tcs.service.responses import ProblemDetails
 
 MEDIA_TYPE = "application/problem+json"
 REFUSED, ABSENT, BUSY = 422, 404, 503
@@ -22,7 +22,7 @@ def problem(status: int, title: str, detail: str) -> Response:
         title: Class of the error.
         detail: What is wrong and what to do next; line breaks become spaces.
     """
-    body = Problem(title=title, status=status, detail=" ".join(detail.splitlines()))
+    body = ProblemDetails(title=title, status=status, detail=" ".join(detail.splitlines()))
     return Response(
         json.dumps(body.model_dump()),
         status_code=status,
