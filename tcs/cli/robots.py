@@ -35,7 +35,7 @@ def new(
     from tcs.model.robots.draft import draft_to_files
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
-    with terminal.progress_bar("bodies") as on_progress:
+    with terminal.progress_bar("bodies", lines=True) as on_progress:
         result = draft_to_files(urdf, tool, path, base=base, on_progress=on_progress)
     terminal.print_result(result, robot_tables.report_draft, as_json=as_json)
 

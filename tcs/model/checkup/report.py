@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tcs.model.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
+from tcs.model.checkup.tool import fingers_off_axis
 from tcs.model.robots import RobotFile
 from tcs.model.robots.fitting import BodyEnclosure, enclosure
 from tcs.model.robots.urdf.pose import pose_in_root
@@ -71,6 +72,8 @@ class RobotCheck:
         contacts: Pairs that scoring checks and that are in contact at rest.
         trip: Result of the IK round trip.
         seed: Seed of the postures of the round trip.
+        fingers_along: Axis of the tool frame along which the fingers point, None if it is x or
+            there are none.
     """
 
     robot: RobotFile
@@ -83,6 +86,7 @@ class RobotCheck:
     contacts: tuple[Contact, ...]
     trip: RoundTrip
     seed: int
+    fingers_along: str | None = None
 
     @property
     def bodies_without_mesh(self) -> tuple[str, ...]:
@@ -114,6 +118,12 @@ class RobotCheck:
             found.append(
                 f"its surface reaches {-self.lowest:.3f} m below '{self.robot.root_body}', but the "
                 "root must be on the floor: add a root link on the floor to the URDF."
+            )
+        if self.fingers_along is not None:
+            found.append(
+                f"the fingers point along {self.fingers_along} of tool frame "
+                f"'{self.robot.tool_frame}', but goals need x forward out of the hand: add a frame "
+                "with these axes under 'frames', and name it as 'tool_frame'."
             )
         if self.arm.joints == 6 and self.arm.solver is None:
             return (*found, self.arm.reason)
@@ -186,6 +196,7 @@ class RobotCheck:
             },
             "excess_volume": {body.body: body.excess for body in self.bodies},
             "lowest_point_m": self.lowest,
+            "fingers_along": self.fingers_along,
             "self_collision": {
                 "rest_rad": dict(self.rest),
                 "margin_m": self.margin,
@@ -228,6 +239,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         contacts=contacts,
         trip=round_trip(scene, arm.solver, samples, seed),
         seed=seed,
+        fingers_along=fingers_off_axis(robot),
     )
 
 

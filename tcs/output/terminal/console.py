@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +18,10 @@ from tcs.interrupts import raise_if_interrupted, remember_interrupts, report_int
 
 _PIPE_WIDTH = 110
 """Width where stdout is not a terminal, in columns; no row of our tables is wider."""
+
+
+LINE_SECONDS = 10.0
+"""Least time between two lines of progress [s]."""
 
 
 def note(text: str) -> None:
@@ -64,17 +69,18 @@ def results_console(pipe_width: int = _PIPE_WIDTH) -> Console:
 
 
 @contextmanager
-def progress_bar(text: str) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(text: str, *, lines: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Yield a function that updates a progress bar on stderr; without a terminal there is no bar.
 
     Args:
         text: Label of the bar.
+        lines: Whether to print a line now and then where there is no terminal.
 
     Raises:
         KeyboardInterrupt: From the function, after an interrupt that compiled code dropped.
     """
     if not sys.stderr.isatty():
-        yield _no_bar
+        yield _lines(text) if lines else _no_bar
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -87,6 +93,20 @@ def progress_bar(text: str) -> Iterator[Callable[[int, int], None]]:
             progress.update(bar, completed=done, total=total)
 
         yield advance
+
+
+def _lines(text: str) -> Callable[[int, int], None]:
+    """Return a function that prints progress at most once in LINE_SECONDS."""
+    printed = time.monotonic()
+
+    def advance(done: int, total: int) -> None:
+        nonlocal printed
+        raise_if_interrupted()
+        if time.monotonic() - printed >= LINE_SECONDS:
+            printed = time.monotonic()
+            note(f"{done} of {total} {text}")
+
+    return advance
 
 
 def _no_bar(_done: int, _total: int) -> None:
