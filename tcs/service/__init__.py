@@ -1,9 +1,9 @@
-"""One engine for every program that asks: score, select, explain, evaluate and plan, as requests.
+"""One engine for all programs: score, select, explain, evaluate and plan as requests.
 
 In: requests as pydantic models, score files and task files as bytes. Out: the plain containers that
 the command line prints with `--json`, and the states of jobs. `Engine` answers in this process;
-`tcs.service.http` serves it over HTTP, and `tcs.service.client.Client` asks such a server with the
-same methods.
+`tcs.service.http` serves it over HTTP, `tcs.service.client.Client` sends requests to such a server
+by the same methods, and `tcs.service.assistant` offers them as tools of an assistant.
 """
 
 from __future__ import annotations

@@ -29,12 +29,12 @@ _ERRORS = {404: NotFoundError, 503: BusyError}
 
 
 class Client:
-    """Asks a server of `tcs serve`; a context manager that closes its connections."""
+    """Sends requests to a server of `tcs serve`; a context manager that closes its connections."""
 
     def __init__(
         self, url: str = "http://127.0.0.1:8000", token: str | None = None, seconds: float = 60.0
     ) -> None:
-        """Ask the server at an address.
+        """Send requests to the server at an address.
 
         Args:
             url: Address of the server.
@@ -70,15 +70,15 @@ class Client:
         Raises:
             ServiceError: As of every method, if the server does not answer or refuses.
         """
-        return dict(self._ask("GET", "/v1/list"))
+        return dict(self._answer("GET", "/v1/list"))
 
     def files(self) -> list[FileEntry]:
         """Return the score files that the server holds."""
-        return [FileEntry(**entry) for entry in self._ask("GET", "/v1/files")]
+        return [FileEntry(**entry) for entry in self._answer("GET", "/v1/files")]
 
     def add_file(self, content: bytes) -> FileEntry:
         """Send a score file."""
-        return FileEntry(**self._ask("POST", "/v1/files", content=content))
+        return FileEntry(**self._answer("POST", "/v1/files", content=content))
 
     def send_file(self, path: Path) -> FileEntry:
         """Send a score file of this machine.
@@ -127,7 +127,7 @@ class Client:
 
     def jobs(self) -> list[JobStatus]:
         """Return the states of all jobs without their results, the oldest first."""
-        return [JobStatus(**status) for status in self._ask("GET", "/v1/jobs")]
+        return [JobStatus(**status) for status in self._answer("GET", "/v1/jobs")]
 
     def job(self, name: str) -> JobStatus:
         """Return the state of a job, with its result if it is done.
@@ -135,7 +135,7 @@ class Client:
         Raises:
             NotFoundError: If there is no such job.
         """
-        return JobStatus(**self._ask("GET", f"/v1/jobs/{name}"))
+        return JobStatus(**self._answer("GET", f"/v1/jobs/{name}"))
 
     def cancel(self, name: str) -> JobStatus:
         """Cancel a job: a waiting one at once, a running one where it next reports its progress.
@@ -143,7 +143,7 @@ class Client:
         Raises:
             NotFoundError: If there is no such job.
         """
-        return JobStatus(**self._ask("DELETE", f"/v1/jobs/{name}"))
+        return JobStatus(**self._answer("DELETE", f"/v1/jobs/{name}"))
 
     def wait(self, name: str, on_progress: Callable[[int, int], None] | None = None) -> JobStatus:
         """Wait until a job has ended, and return its state.
@@ -178,9 +178,11 @@ class Client:
     def _post(self, request: Document) -> Any:
         content = request.model_dump_json(exclude_unset=True).encode()
         path = _PATHS[type(request)]
-        return self._ask("POST", path, content=content, type_="application/json")
+        return self._answer("POST", path, content=content, type_="application/json")
 
-    def _ask(self, verb: str, path: str, *, content: bytes | None = None, type_: str = "") -> Any:
+    def _answer(
+        self, verb: str, path: str, *, content: bytes | None = None, type_: str = ""
+    ) -> Any:
         return self._response(verb, path, content=content, type_=type_).json()
 
     def _response(

@@ -26,7 +26,7 @@ class HeldFile:
     path: Path
     """Its copy in the temporary folder."""
     is_ours: bool
-    """Whether it was made here or named by whoever started the service, rather than sent."""
+    """Whether it was made here or named when the service started, rather than sent."""
     is_pinned: bool
     """Whether it stays until the service ends."""
     number: int
@@ -56,7 +56,7 @@ class ScoreFiles:
 
         Args:
             content: The bytes of the file.
-            is_ours: Whether it was made here or named by whoever started the service.
+            is_ours: Whether it was made here or named when the service started.
             is_pinned: Whether it stays until the service ends.
 
         Raises:
@@ -94,7 +94,7 @@ class ScoreFiles:
             return held
 
     def read(self, path: Path) -> HeldFile:
-        """Hold a file that whoever starts the service names, until the service ends.
+        """Hold a file that is named when the service starts, until it ends.
 
         Raises:
             StoreError: If it cannot be read, or is not a score file.
@@ -114,7 +114,7 @@ class ScoreFiles:
         """Return a file that is held.
 
         Raises:
-            NotFoundError: If there is none of that digest.
+            NotFoundError: If no file of that digest is held.
         """
         with self._lock:
             if digest not in self._held:
@@ -129,7 +129,7 @@ class ScoreFiles:
         """Return the bytes of a file.
 
         Raises:
-            NotFoundError: If there is none of that digest.
+            NotFoundError: If no file of that digest is held.
         """
         with self._lock:
             return self.held(digest).path.read_bytes()
@@ -138,7 +138,7 @@ class ScoreFiles:
         """Return the content of a file.
 
         Raises:
-            NotFoundError: If there is none of that digest.
+            NotFoundError: If no file of that digest is held.
         """
         with self._lock:
             held = self.held(digest)
@@ -151,7 +151,7 @@ class ScoreFiles:
         """Return the content of a file whose scene may be built.
 
         Raises:
-            NotFoundError: If there is none of that digest.
+            NotFoundError: If no file of that digest is held.
             ServiceError: If it was sent, and refers to a task, environment or robot by a path.
         """
         file = self.loaded(digest)

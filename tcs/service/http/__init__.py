@@ -1,7 +1,7 @@
 """The engine over HTTP: JSON, an OpenAPI description, server-sent events; requires `tcs[service]`.
 
-In: an engine and who may ask. Out: an application for any ASGI server, and a server for it. The
-methods of `tcs.service.client.Client` are the requests that it answers.
+In: an engine and who may send requests. Out: an application for any ASGI server, and a server for
+it. The methods of `tcs.service.client.Client` are the requests that it answers.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def make_application(engine: Engine, access: Access) -> FastAPI:
 
     Args:
         engine: The engine.
-        access: Who may ask.
+        access: Who may send requests.
     """
     app = FastAPI(
         title="tcs service", description=_ABOUT, docs_url=None, redoc_url=None, openapi_url=None
@@ -72,8 +72,8 @@ def _add_operation(app: FastAPI, engine: Engine, operation: Operation) -> None:
 
     async def endpoint(request: Request) -> Response:
         content = await _json_of(request)
-        asked = checked(content, operation.request, "request", DataFileError)
-        result = await anyio.to_thread.run_sync(answer, asked)
+        checked_request = checked(content, operation.request, "request", DataFileError)
+        result = await anyio.to_thread.run_sync(answer, checked_request)
         if isinstance(result, JobStatus):
             return _json(result.model_dump(), status=202)
         return _json(result)
@@ -218,8 +218,8 @@ async def _json_of(request: Request) -> dict[str, Any]:
     Raises:
         DataFileError: If it is not one.
     """
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind != "application/json":
+    media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if media_type != "application/json":
         raise DataFileError("request: the content type must be application/json.")
     try:
         content = json.loads(await request.body())

@@ -1,4 +1,4 @@
-"""Who may ask, how much and how long: checked before a request reaches the engine."""
+"""Who may send requests, how much and how long: checked before they reach the engine."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Access:
-    """Who may ask."""
+    """Who may send requests."""
 
     token: str | None = None
     """What requests must carry as `Authorization: Bearer TOKEN`; None for no token."""
@@ -46,7 +46,7 @@ class TooSlowError(Exception):
 
 
 class Guard:
-    """Refuses requests that may not be asked, are too large or too slow, or too many at once."""
+    """Refuses requests that are not allowed, too large or too slow, or too many at once."""
 
     def __init__(self, application: Application, access: Access, limits: Limits) -> None:
         """Guard an application."""
@@ -92,7 +92,7 @@ class Guard:
             await problem(500, "InternalError", text)(scope, receive, send)
 
     def _refusal(self, scope: Message) -> Any:
-        """Return the response to a request that may not be asked, or None."""
+        """Return the response to a request that is not allowed, or None."""
         headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
         host = headers.get(b"host", "")
         if self._access.token is None and _name_of(host) not in self._access.names:

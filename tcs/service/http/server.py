@@ -22,14 +22,14 @@ _KEEP_ALIVE = 20
 
 
 def checked_access(host: str, token: str | None) -> Access:
-    """Return who may ask a server at an address.
+    """Return who may send requests to a server at an address.
 
     Args:
         host: Name or address to listen at.
         token: What requests must carry; None for no token.
 
     Raises:
-        ServiceError: If other machines could ask without a token, or the token is short.
+        ServiceError: If other machines could send requests without a token, or the token is short.
 
     >>> checked_access("127.0.0.1", None).token is None
     True
