@@ -118,6 +118,8 @@ def _place_goal(
     """Fill the pose of a goal in A, and the offset from there to the begin of its approach."""
     work = approach.work
     goal_in_arm_base(problem, work, state, torso, g)
+    # No result may depend on the pairs before, whose shapes are no longer in place.
+    work.last[0] = -1
     for r in range(3):
         approach.offset[r] = 0.0
         for c in range(3):

@@ -121,6 +121,16 @@ def test_an_obstacle_on_the_line_alone_blocks_the_approach_and_is_named(scene, s
     pytest.fail("no goal is free with the obstacle")
 
 
+def test_scores_of_a_pair_do_not_depend_on_the_pairs_before(scene, scores, found):
+    problem = build_problem(scene, GRID)
+    for n in np.flatnonzero(found.reason != APPROACH_LIMITS)[-12:]:
+        h, g = map(int, found.pair[n])
+        here = ReachedPairs(found.pair[n : n + 1], *(a[h, g : g + 1].copy() for a in scores))
+        score_approaches(problem, lines(scene), here)
+        for alone, among in zip(here, found, strict=True):
+            np.testing.assert_array_equal(alone, among[n : n + 1])
+
+
 def test_obstacles_far_away_change_nothing(scene, scores, found):
     far = with_obstacle(scene, placed(SPHERE, [0.2, 0, 0], p=[9.0, 9.0, 0.5]))
     for before, after in zip(found, approached(far, scores), strict=True):
