@@ -1,0 +1,43 @@
+"""`tcs serve` and `tcs app`: what is refused before anything is served, and how they end."""
+
+from __future__ import annotations
+
+import pytest
+
+WITHOUT = "import sys; sys.modules['{}'] = None"
+
+
+@pytest.mark.parametrize(
+    ("words", "package", "extra"),
+    [
+        (("serve",), "fastapi", "service"),
+        (("serve", "--mcp"), "mcp", "mcp"),
+        (("app", "--no-browser"), "uvicorn", "app"),
+    ],
+    ids=["serve", "mcp", "app"],
+)
+def test_without_the_extra_one_line_names_it(process, words, package, extra):
+    ran = process(*words, before=WITHOUT.format(package))
+    assert ran.code == 1
+    assert f"needs the package {package}: pip install 'tcs[{extra}]'." in ran.err
+    assert len(ran.err.splitlines()) == 1
+
+
+def test_other_machines_require_a_token(tcs_command):
+    ran = tcs_command("serve", "--host", "0.0.0.0", "--port", 0)
+    assert ran.code == 1
+    assert "can be reached from other machines" in ran.err
+
+
+def test_a_file_that_is_no_score_file_is_one_line(tcs_command, tmp_path):
+    path = tmp_path / "other.tcs"
+    path.write_bytes(b"something else")
+    ran = tcs_command("app", path, "--no-browser")
+    assert ran.code == 1
+    assert len(ran.err.splitlines()) == 1
+
+
+def test_the_page_ends_after_its_duration(tcs_command, small_file):
+    ran = tcs_command("app", small_file, "--no-browser", "--duration", 0.2)
+    assert ran.code == 0
+    assert "open http://127.0.0.1:" in ran.err
