@@ -27,7 +27,7 @@ from tcs.placement.refinement.poses import PoseScene, PoseScorer
 from tcs.placement.refinement.search import LocalSearch
 from tcs.placement.refinement.space import Space
 
-Region = tuple[tuple[float, float], tuple[float, float]]
+FloorRange = tuple[tuple[float, float], tuple[float, float]]
 """Least and greatest x, and y, of the base [m]."""
 
 STEP = 0.1
@@ -82,7 +82,7 @@ def place(
     poses: ArrayLike,
     *,
     obstacles: Sequence[Obstacle] = (),
-    region: Region | None = None,
+    region: FloorRange | None = None,
     stops: int = 1,
     torso: float = 0.0,
     measure: str = DEFAULT_MEASURE,
@@ -182,7 +182,7 @@ def _checked(poses: ArrayLike) -> FloatArray:
     return X
 
 
-def _grid(scene: PoseScene, poses: FloatArray, region: Region | None, torso: float) -> Grid:
+def _grid(scene: PoseScene, poses: FloatArray, region: FloorRange | None, torso: float) -> Grid:
     """Return the first grid of base poses."""
     if region is None:
         # The arm base is up to this far from the robot's base.
