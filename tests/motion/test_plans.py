@@ -119,7 +119,7 @@ def test_json_has_the_promised_keys(planned, tmp_path):
 
 
 def test_other_formats_and_configurations_are_refused(planned, two_goals, tcs_plan, tmp_path):
-    with pytest.raises(OutputError, match=r"\.json, \.csv, \.yaml or \.npz"):
+    with pytest.raises(OutputError, match=r"\.json, \.csv, \.yaml, \.ros1\.yaml or \.npz"):
         save_plan(tmp_path / "plan.txt", planned)
     with pytest.raises(TcsError, match="no configuration 1; the file has 1"):
         tcs.plan(tcs.load(two_goals), [1])
