@@ -105,6 +105,11 @@ COMMANDS = (
         ("--samples", "4", "--sets", "2", "--jobs", "1", "--out", "out.tcs"),
     ),
     Command("population", ("scores.tcs",), ("--bodies", "2", "--sets", "2", "--jobs", "1")),
+    Command("refine", ("scores.tcs",), ("--starts", "1", "--rounds", "1", "--out", "out.tcs")),
+    Command("check", ("scores.tcs", "map.tcm")),
+    Command("app", ("scores.tcs",), _WINDOW),
+    # Refused whatever the options are, so that none of the calls listens.
+    Command("serve", ("none.tcs",), ("--host", "0.0.0.0"), is_refused=True),
     Command("view", ("scores.tcs",), ("--export", "out.html")),
     Command("view", ("scores.tcs",), _WINDOW, ("--port", "--duration")),
     Command("map", ("scores.tcs",), ("--out", "out.png")),

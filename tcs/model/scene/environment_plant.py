@@ -24,7 +24,12 @@ from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.model_files import check_model_file
-from tcs.model.scene.resized_person import padding_of, resized_model, scales_of
+from tcs.model.scene.resized_person import (
+    padding_of,
+    person_shapes,
+    resized_model,
+    scales_of,
+)
 
 _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Size of the floor [m]: wider than any environment, so that there is a floor at every base pose,
@@ -104,11 +109,12 @@ def environment_parts(
     """Return every collision shape of the environment, in the order of the environment file."""
     parts = []
     scales = scales_of(environment)
+    shapes = person_shapes(environment) if scales else {}
     for link, body in added.links.items():
         model = link.split("::", maxsplit=1)[0]
         for geometry in plant.GetCollisionGeometriesForBody(body):
             name = link if model in added.named_by_link else inspector.GetName(geometry)
-            pad = padding_of(environment, link, scales)
+            pad = padding_of(environment, link, scales, shapes)
             parts.append(Part(geometry, body.index(), Group.ENVIRONMENT, 0, name, pad))
     if added.floor:
         world = plant.world_body()

@@ -92,6 +92,7 @@ class PeopleInScene:
         self._arrays = environment_at(lowered, scene, task, states)
         shapes = person_shapes(environment)
         self._shapes = {link: shapes[self._names[i]] for i, link in enumerate(_LINKS)}
+        self._by_name = shapes
         self._before = poses_in_file(environment)
         self._poses = self._read_poses(scene, bodies, states)
         self._parts = _parts(scene, bodies)
@@ -115,7 +116,8 @@ class PeopleInScene:
             for link, scale in zip(_LINKS, of_links, strict=True)
         }
         R, p = self._poses.R[states], self._origins(of_links, stretched, states)
-        pads = [padding_of(self._environment, name, of_names) for name in self._names]
+        pads = self._paddings(of_names)
+        before = self._paddings({})
         whole = self._arrays.environment
         sizes, paddings, centres = whole.size.copy(), whole.pad.copy(), whole.p[states]
         for part in self._parts:
@@ -125,13 +127,16 @@ class PeopleInScene:
             centres[:, part.row] = p[:, part.link] + R[:, part.link] @ shape.p_LoSo_L
         goal_p = self._arrays.goal_p[states]
         for goal, (link, anchor) in self._anchors.items():
-            padding = pads[link] - padding_of(self._environment, self._names[link], {})
-            position = anchor.position(of_links[link], padding)
+            position = anchor.position(of_links[link], pads[link] - before[link])
             goal_p[:, goal] = p[:, link] + R[:, link] @ position
         environment = whole._replace(size=sizes, pad=paddings, R=whole.R[states], p=centres)
         return self._arrays._replace(
             environment=environment, goal_R=self._arrays.goal_R[states], goal_p=goal_p
         )
+
+    def _paddings(self, scales: Mapping[str, Scale]) -> list[float]:
+        """Return the padding of each link [m]; of the papers' man without scales."""
+        return [padding_of(self._environment, name, scales, self._by_name) for name in self._names]
 
     def _origins(
         self,

@@ -39,7 +39,8 @@ def goals_on_person(task: Task, environment: EnvironmentFile) -> Task:
         if link not in scales:
             goals.append(goal)
             continue
-        padding = padding_of(environment, link, scales) - padding_of(environment, link, {})
+        padding = padding_of(environment, link, scales, shapes)
+        padding -= padding_of(environment, link, {}, shapes)
         position = Anchor.of(goal, shapes[link]).position(scales[link], padding)
         goals.append(dataclasses.replace(goal, position=position))
     return dataclasses.replace(task, goals=tuple(goals))

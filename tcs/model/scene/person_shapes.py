@@ -18,6 +18,23 @@ _THINNEST = 1e-4
 """Least length of a capsule between the centres of its caps [m]: it stays a capsule."""
 
 
+DIRECTIONS = 500
+"""Directions in which extents are compared: 9 deg apart, so that a centimetre is found to 0.1 mm,
+and along the axes, which limbs are stretched along."""
+
+
+def _spread(count: int) -> FloatArray:
+    """Return unit vectors spread evenly over the sphere, on a spiral, shape (count, 3)."""
+    i = np.arange(count)
+    z = 1.0 - (2.0 * i + 1.0) / count
+    angle = i * math.pi * (3.0 - math.sqrt(5.0))
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+_DIRECTIONS = np.concatenate([_spread(DIRECTIONS), np.eye(3)])
+
+
 @dataclass(frozen=True, eq=False)
 class LinkShape:
     """A box or a capsule on a link L, with a frame S at its centre."""
@@ -45,6 +62,25 @@ class LinkShape:
         thick = radius * math.sqrt(factors[0] * factors[1])
         long = max(factors[2] * (half + radius) - thick, _THINNEST / 2)
         return LinkShape(False, np.array([thick, long]), self.R_LS, p)
+
+    def overshoot(self, scale: Scale) -> float:
+        """Return how far the surface, mapped along the link's axes, stands out of `stretch` [m].
+
+        A capsule that is stretched unevenly becomes elliptic, and its caps longer or flatter than
+        round. Both bodies are convex: it is the greatest difference of their extents over the
+        directions, of which DIRECTIONS are taken.
+        """
+        mapped = np.array(scale)[:, None] * self.R_LS
+        stretched = self.stretch(scale)
+        beyond = self._extents(_DIRECTIONS @ mapped) - stretched._extents(_DIRECTIONS @ self.R_LS)
+        return max(0.0, float(beyond.max()))
+
+    def _extents(self, along: FloatArray) -> FloatArray:
+        """Return the extents from the centre along directions in S, shapes (n, 3) and (n,)."""
+        if self.is_box:
+            return np.asarray(np.abs(along) @ self.size)
+        radius, half = self.size
+        return np.asarray(np.abs(along[:, 2]) * half + np.linalg.norm(along, axis=1) * radius)
 
     def nearest(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return the point of the surface nearest to a point of the link.

@@ -9,7 +9,7 @@ the bed bends.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -94,15 +94,29 @@ def scales_by_link(model: str, scales: Mapping[str, Scale]) -> dict[str, Scale]:
     return {f"{model}::{link}": scales[part_of(link)] for link in (ROOT, *PARENTS)}
 
 
-def padding_of(environment: EnvironmentFile, link: str, scales: Mapping[str, Scale]) -> float:
-    """Return the padding of a link [m]: it grows with the greatest of the link's ratios.
+def padding_of(
+    environment: EnvironmentFile,
+    link: str,
+    scales: Mapping[str, Scale],
+    shapes: Mapping[str, Sequence[LinkShape]],
+) -> float:
+    """Return the padding of a link [m].
+
+    The skin of the papers' man, stretched like the link, stands out of the stretched shape by at
+    most his padding times the greatest of the link's ratios. What the mapped shape itself stands
+    out of the round one is added.
 
     Args:
         environment: The environment.
         link: Name of the link, "model::link".
-        scales: What `scales_of` returns for the environment.
+        scales: What `scales_of` returns for the environment, {} for the papers' man.
+        shapes: What `person_shapes` returns for the environment; not read for the papers' man.
     """
-    return float(environment.padding.get(link, 0.0)) * max(scales.get(link, (1.0,)))
+    padding = float(environment.padding.get(link, 0.0))
+    scale = scales.get(link)
+    if scale is None:
+        return padding
+    return padding * max(scale) + max(shape.overshoot(scale) for shape in shapes[link])
 
 
 def person_shapes(environment: EnvironmentFile) -> dict[str, list[LinkShape]]:

@@ -12,7 +12,13 @@ from tcs.errors import EnvironmentFileError
 from tcs.model.people import PAPERS_MAN, Person, papers_man
 from tcs.model.scene import goals_on_person, load_environment, with_person
 from tcs.model.scene.person_shapes import LinkShape
-from tcs.model.scene.resized_person import PARENTS, part_of, person_shapes, scales_of
+from tcs.model.scene.resized_person import (
+    PARENTS,
+    padding_of,
+    part_of,
+    person_shapes,
+    scales_of,
+)
 from tcs.model.tasks import load_task, task_names
 from tests.model.scene.environments import EnvironmentAlone
 
@@ -130,6 +136,30 @@ def test_the_person_is_on_the_seat_or_on_the_mattress(alone, who):
     assert hips[0] == pytest.approx(hips[1], abs=1e-6)
 
 
+@pytest.mark.parametrize("name", ["wheelchair", "bed"])
+@pytest.mark.parametrize("percentiles", [(5, 5), (5, 95), (95, 5), (95, 95), (20, 97)])
+def test_padded_shapes_enclose_the_skin_stretched_like_their_link(name, percentiles, rng):
+    file = load_environment(name)
+    stature, mass = percentiles
+    person = Person(sex="female", stature_percentile=stature, mass_percentile=mass)
+    scales, shapes = scales_of(with_person(file, person)), person_shapes(file)
+    directions = rng.normal(size=(400, 3))
+    for link, scale in scales.items():
+        allowed = padding_of(file, link, scales, shapes)
+        for shape in shapes[link]:
+            # Skin as far from the surface of the papers' man as his padding lets it be.
+            far = shape.p_LoSo_L + 2.0 * directions
+            found = [shape.nearest(point) for point in far]
+            skin = [
+                shape.p_LoSo_L + shape.R_LS @ (surface + file.padding[link] * normal)
+                for _, surface, normal in found
+            ]
+            stretched = shape.stretch(scale)
+            beyond = [stretched.nearest(np.array(scale) * point)[0] for point in skin]
+            # Directions between those that are compared.
+            assert max(beyond) <= allowed + 2e-4
+
+
 @pytest.mark.parametrize("name", task_names())
 def test_goals_keep_their_distance_from_the_padded_skin(name):
     task = load_task(name)
@@ -142,7 +172,7 @@ def test_goals_keep_their_distance_from_the_padded_skin(name):
         for before, after in zip(task.goals, moved.goals, strict=True):
             link = file.body_frames[before.body_frame]
             scale = scales[link]
-            grown = (max(scale) - 1.0) * file.padding[link]
+            grown = padding_of(environment, link, scales, shapes_of) - file.padding[link]
             shapes = shapes_of[link]
             d = [shape.nearest(before.position)[0] for shape in shapes]
             nearest = shapes[int(np.argmin(d))].stretch(scale)
