@@ -25,6 +25,7 @@ PRINTED = {
     "10_viewer_page": r"wrote .*feeding\.html, 3\.\d MB",
     "11_drive_an_arm": r"^4\.0 s, 1\.45 m up: joint 6 is at its limit.*the tool by 0\.0\d\d mm\n"
     r"8\.\d s, 1\.5\d m up",
+    "12_turn_the_head": r"0 deg: 75% .*60 deg: 100% .*head_turn_deg",
 }
 WRITTEN = {
     "01_score_and_select": ["feeding.tcs"],

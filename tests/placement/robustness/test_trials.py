@@ -235,13 +235,13 @@ def test_a_joint_at_its_limit_counts_regardless_of_others(bed_trials):
 
 def test_a_joint_beyond_its_limit_by_rounding_is_not_moved(bed_trials):
     """The last value of a grid may be; moving it back would add an error that was not drawn."""
-    believed = bed_trials._positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
+    believed = bed_trials.positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
     limits = (believed + 1e-12, believed + 1.0)
     joints = SimpleNamespace(limits=lambda name: limits)
     scene = SimpleNamespace(built=SimpleNamespace(environment_joints=joints))
     (arm,) = bed_trials.arms
     found = dataclasses.replace(bed_trials, arms=(dataclasses.replace(arm, scene=scene),))
-    positions, stopped = found._positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
+    positions, stopped = found.positions(0, {"head_rest": np.array([0.0, 0.5, -0.5, 2.0])})
     assert positions["head_rest"].tolist() == [believed, believed + 0.5, believed, limits[1]]
     assert stopped.tolist() == [False, False, True, True]
 
