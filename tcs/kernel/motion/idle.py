@@ -18,7 +18,7 @@ from tcs.kernel.views import unowned
 CELLS = 300
 """Greatest number of parts of the ranges of the joints that are checked for a pair: one that takes
 more is not left out."""
-MOST_JOINTS = 2
+MOST_BETWEEN = 2
 """Number of joints between two shapes up to which their pair is checked."""
 
 
@@ -44,7 +44,7 @@ def list_needed(owned_scene: MotionScene, owned_work: MotionWorkspace, needed: B
     for k in range(len(scene.pair)):
         link, base = scene.link_frame[scene.pair[k, 0]], scene.pair[k, 2]
         needed[k] = True
-        if link - base <= MOST_JOINTS:
+        if link - base <= MOST_BETWEEN:
             needed[k] = not _never_touches(scene, work, k, base, link - 1)
 
 

@@ -105,8 +105,8 @@ class PeopleInScene:
         orientations to seven digits, so that Drake's products of them are rotations to 1e-7 only.
 
         Args:
-            scales: How the parts of the person are stretched, by the keys of
-                `tcs.model.people.LINKS`.
+            scales: How the parts of the person are stretched, by the keys of `LINKS`
+                of `tcs.model.people`.
             states: Numbers of the states, shape (s,).
         """
         of_names = scales_by_link(self._environment.person_model, scales)
