@@ -7,7 +7,7 @@ import pytest
 
 from tcs.kernel.arrays import BOX, SPHERE
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
-from tcs.kernel.motion.idle import MOST_JOINTS, list_needed
+from tcs.kernel.motion.idle import MOST_BETWEEN, list_needed
 from tcs.kernel.motion.scene import motion_scene, new_motion_workspace, with_pairs
 from tcs.kernel.problem import build_problem
 from tcs.kernel.verification.clutter import arm_base
@@ -62,7 +62,7 @@ def test_pairs_that_one_or_two_joints_keep_apart_are_left_out(chain, rng):
     work, needed = new_motion_workspace(every), np.ones(len(every.pair), np.bool_)
     list_needed(every, work, needed)
     joints = every.link_frame[every.pair[:, 0]] - every.pair[:, 2]
-    assert np.all(needed[joints > MOST_JOINTS])
+    assert np.all(needed[joints > MOST_BETWEEN])
     for few in (joints == 1, joints == 2):
         assert 0 < needed[few].sum() < few.sum()
     postures = [within_limits(rng, chain) for _ in range(200)]
