@@ -31,6 +31,7 @@ PARTS: dict[str, tuple[str, ...]] = {
         *("--places", "60", "--drake", "10"),
     ),
     "planning": ("--limit", "20", "--compared", "1", "--seeds", "20"),
+    "service": (f"{SCORES}/shaving-wheelchair-pr2.tcs",),
     "approach": (
         *("--rows", "shaving/wheelchair", "feeding/wheelchair", "bathing/bed"),
         *("--pairs", "100"),
