@@ -200,7 +200,7 @@ def _person_bodies(scene: Scene) -> dict[str, RigidBody]:
     environment, plant = scene.spec.environment, scene.built.plant
     model, where = environment.person_model, f"environment '{environment.name}'"
     if not environment.is_person(model):
-        raise EnvironmentFileError(f"{where} has no person, so there is nobody to replace.")
+        raise EnvironmentFileError(f"{where} has no person to replace.")
     if environment.has_body:
         raise EnvironmentFileError(f"{where}: the person is resized already.")
     instance = plant.GetModelInstanceByName(model)

@@ -20,7 +20,8 @@ from tcs.output.report.tours import Tours
 from tcs.output.words import assign_goals
 from tcs.placement.reasons import Distribution, Explanation, explain
 from tcs.placement.scoring import Job, Verification, verify
-from tcs.placement.scoring.verify import DEXTERITY_BAR, Finding, check_pairs
+from tcs.placement.scoring.drake_check import DEXTERITY_BAR, Finding
+from tcs.placement.scoring.verify import check_pairs
 from tcs.placement.store import ScoreFile, StateTables, load_scores
 from tcs.placement.tables import Reason, SuccessTable
 

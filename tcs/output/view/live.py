@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+import webbrowser
 from collections.abc import Callable
 
 from pydrake.geometry import Meshcat, MeshcatParams
@@ -40,6 +41,38 @@ def open_meshcat(port: int | None = None) -> Meshcat:
         raise OutputError(f"the viewer cannot listen at {where}. Give a free one.") from error
     finally:
         log.setLevel(level)
+
+
+def stay_open(
+    meshcat: Meshcat,
+    run: Callable[[], None],
+    *,
+    browser: bool,
+    on_note: Callable[[str], None],
+) -> None:
+    """Tell the address of a viewer, open a browser if wanted, and run it until it ends or Ctrl-C.
+
+    Args:
+        meshcat: The viewer.
+        run: Runs it.
+        browser: Whether to open a browser.
+        on_note: Called with the address, and with a note when Ctrl-C closes the viewer.
+    """
+    begun = time.perf_counter()
+    on_note(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
+    if browser:
+        webbrowser.open(meshcat.web_url())
+    try:
+        run()
+    except KeyboardInterrupt:
+        on_note(f"closed after {time.perf_counter() - begun:.0f} s.")
+
+
+def wait(duration: float | None) -> None:
+    """Wait for a duration [s], or for ever, so that Ctrl-C is noticed."""
+    begun = time.perf_counter()
+    while duration is None or time.perf_counter() - begun < duration:
+        time.sleep(0.1)
 
 
 class Viewer:

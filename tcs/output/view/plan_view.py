@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import html
-import time
-import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +20,7 @@ from tcs.motion.plan_check import check_names
 from tcs.output.report.pictures import job_title
 from tcs.output.view.animation import play_poses, play_visible
 from tcs.output.view.export import overlay
-from tcs.output.view.live import open_meshcat
+from tcs.output.view.live import open_meshcat, stay_open, wait
 from tcs.output.view.scene_objects import SceneShapes, arrow_path
 from tcs.output.view.swept import swept_mesh
 from tcs.output.words import REASON_COLOURS, base_pose_text, goals_text
@@ -201,19 +199,11 @@ def show_plan_view(
     Raises:
         OutputError: If the viewer cannot listen at that port.
     """
-    begun = time.perf_counter()
     meshcat = open_meshcat(port)
     show_plan(view, meshcat)
     for line in (view.title, *view.lines):
         on_line(line)
-    on_note(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
-    if browser:
-        webbrowser.open(meshcat.web_url())
-    try:
-        while duration is None or time.perf_counter() - begun < duration:
-            time.sleep(0.1)
-    except KeyboardInterrupt:
-        on_note(f"closed after {time.perf_counter() - begun:.0f} s.")
+    stay_open(meshcat, lambda: wait(duration), browser=browser, on_note=on_note)
 
 
 def _goals_at(stop: StopPlan, times: FloatArray) -> list[int]:

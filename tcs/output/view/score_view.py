@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-import webbrowser
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +12,7 @@ from tcs.model.grid import InitialConfiguration
 from tcs.output.report.pictures import scored_scene, title_of
 from tcs.output.report.shown_set import ShownSet
 from tcs.output.view.export import export_page
-from tcs.output.view.live import Viewer, open_meshcat
+from tcs.output.view.live import Viewer, open_meshcat, stay_open
 from tcs.output.view.scene_objects import SceneObjects
 from tcs.output.view.viewed_set import ViewedSet
 from tcs.output.words import colour_legend
@@ -122,15 +120,8 @@ def show_score_view(
     Raises:
         OutputError: If the viewer cannot listen at that port.
     """
-    begun = time.perf_counter()
     meshcat = open_meshcat(port)
     on_line(f"{view.title}; {view.subtitle}")
     on_line(f"arrows: {colour_legend()}")
     viewer = Viewer(meshcat, view.objects, view.viewed, on_line)
-    on_note(f"open {meshcat.web_url()} in a browser; Ctrl-C ends.")
-    if browser:
-        webbrowser.open(meshcat.web_url())
-    try:
-        viewer.run(duration)
-    except KeyboardInterrupt:
-        on_note(f"closed after {time.perf_counter() - begun:.0f} s.")
+    stay_open(meshcat, lambda: viewer.run(duration), browser=browser, on_note=on_note)

@@ -29,7 +29,7 @@ from tcs.model.scene.contacts import Group
 from tcs.placement.robustness import Trials, perturbed_scenes
 from tcs.placement.robustness import trials as trials_module
 from tcs.placement.robustness.body_collisions import BODY_COLLISIONS, base_bodies, counted_pairs
-from tcs.placement.scoring.verify import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
+from tcs.placement.scoring.drake_check import CLEARANCE_ROUNDING, POSITION_BAR, ROTATION_BAR
 from tcs.placement.tables import Reason
 from tests.kernel.judge import is_true
 

@@ -1,0 +1,108 @@
+"""Check of one solution with Drake: tool at the goal, joints within limits, no contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.kernel.verification.reference import measured
+from tcs.model.scene import Scene, goal_poses
+from tcs.placement.scoring.job import Job
+
+POSITION_BAR = 1e-6
+"""Greatest distance [m] of the tool from its goal. Joints are stored as float32: rounding moves
+the tool by up to 1.2e-7 rad x 1 m for each of seven joints, 4e-7 m in practice."""
+ROTATION_BAR = 2e-6
+"""Greatest rotation [rad] of the tool from its goal: seven roundings of 1.2e-7 rad add up to
+8.4e-7, and the angle of a rotation matrix near the identity loses as much again."""
+DEXTERITY_BAR = 1e-6
+"""Greatest difference of a stored dexterity from that of Drake's Jacobian. Float32 keeps 6e-8; a
+least singular value from the eigenvalues of J J^T is good to 1e-7 next to a singularity."""
+CLEARANCE_ROUNDING = 2e-6
+"""Tolerance of a clearance measured by Drake [m]: rounding of the joints
+moves a far corner of a link by 1e-6 m, and Drake's distance between boxes is accurate to 1e-6 m."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Drake's finding on one solution."""
+
+    position_error: float
+    """Distance of the tool from its goal [m]."""
+    rotation_error: float
+    """Rotation of the tool from its goal [rad]."""
+    dexterity_error: float
+    """Absolute difference of the stored dexterity from that of Drake's Jacobian."""
+    limit_violations: int
+    """Number of joints beyond their limits."""
+    contacts: int
+    """Number of pairs of bodies closer than required."""
+
+    @property
+    def is_true(self) -> bool:
+        """Whether the solution is at its goal, within its limits and free of contact."""
+        return (
+            self.position_error <= POSITION_BAR
+            and self.rotation_error <= ROTATION_BAR
+            and self.limit_violations == 0
+            and self.contacts == 0
+        )
+
+
+class DrakeChecker:
+    """Checks solutions of one job with Drake."""
+
+    def __init__(self, job: Job, scene: Scene, measure: str) -> None:
+        """Take a job, its scene, and the name of its dexterity measure."""
+        self._job, self._scene, self._measure = job, scene, measure
+        self._lower, self._upper = scene.arm_limits
+        self._grid = job.scored_grid
+        self._axes = [axis.name for axis in self._grid.environment_axes]
+
+    def check(self, h: int, g: int, q: NDArray[np.float64], value: float) -> Finding:
+        """Return the finding for configuration h, goal g and joint angles q."""
+        return self.check_at(self.values(h), g, q, value)
+
+    def values(self, h: int, off_grid: NDArray[np.float64] | None = None) -> dict[str, float]:
+        """Return the values of all axes at configuration h [m or rad].
+
+        Args:
+            h: Index in the scored grid.
+            off_grid: Values of the axes that can be chosen, the last ones, in place of those of h.
+        """
+        at = {name: float(value) for name, value in self._grid.values(h).items()}
+        if off_grid is not None:
+            names = [axis.name for axis in self._job.grid.axes]
+            at |= dict(zip(names, map(float, off_grid), strict=True))
+        return at
+
+    def check_at(
+        self, at: Mapping[str, float], g: int, q: NDArray[np.float64], value: float
+    ) -> Finding:
+        """Return the finding at values of all axes [m or rad], for goal g and joint angles q."""
+        scene = self._scene
+        scene.place_base(at["base_x"], at["base_y"], at["base_yaw"])
+        scene.set_torso(at["torso"])
+        for name in self._axes:
+            scene.set_joint(name, at[name])
+        q = q[-len(self._lower) :]
+        scene.set_arm(q)
+        X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
+        X_TG = X_WT.inverse() @ X_WG
+        rotation = X_TG.rotation().ToAngleAxis().angle()
+        contacts = [
+            distance
+            for first, second, distance in scene.violations()
+            if distance < scene.required_clearance(first, second) - CLEARANCE_ROUNDING
+        ]
+        exact = measured(scene.tool_jacobian(), q, self._lower, self._upper, self._measure)
+        return Finding(
+            position_error=float(np.linalg.norm(X_TG.translation())),
+            rotation_error=float(rotation),
+            dexterity_error=abs(exact - float(value)),
+            limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
+            contacts=len(contacts),
+        )
