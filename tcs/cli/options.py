@@ -75,8 +75,9 @@ Person = Annotated[
     list[str] | None,
     typer.Option(
         metavar="FILE|KEY=VALUE",
-        help="Whose body the person has: sex=female or male, and any of stature, mass and other "
-        "measures of docs/people.md (m, kg), or NAME_percentile=P; or a YAML file of these.",
+        help="Whose body and posture the person has: sex=female or male, any of stature, mass and "
+        "other measures of docs/people.md (m, kg), or NAME_percentile=P; age=YEARS, posture=NAME, "
+        "JOINT_deg=ANGLE, JOINT_mobility=FRACTION; or a YAML file of these.",
         show_default="that of the environment file",
     ),
 ]

@@ -141,7 +141,7 @@ def person_values(given: Sequence[str]) -> dict[str, Any] | None:
     if not given:
         return None
 
-    from tcs.model.people import person_keys
+    from tcs.model.people import WORDS, person_keys
 
     found: dict[str, Any] = {}
     written: dict[str, Any] = {}
@@ -153,7 +153,7 @@ def person_values(given: Sequence[str]) -> dict[str, Any] | None:
         if name in written:
             raise DataFileError(f"--person sets '{name}' twice. Give it once.")
         try:
-            written[name] = value if name in ("sex", "model") else float(value)
+            written[name] = value if name in WORDS else float(value)
         except ValueError:
             raise DataFileError(
                 f"--person is '{one_line(text)}'; must be KEY=NUMBER, e.g. stature=1.62."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +23,7 @@ from tcs.files.documents import (
 )
 from tcs.files.paths import DataFiles, data_folder, expanded
 from tcs.model.grid import Axis, Grid
-from tcs.model.people import Person, PersonEntry, PersonLike, load_person
+from tcs.model.people import JOINTS, Person, PersonEntry, PersonLike, load_person
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.posture import Posture
 
@@ -242,8 +243,9 @@ def with_person(environment: EnvironmentFile, person: PersonLike) -> Environment
             f"environment '{environment.name}' has no model '{model}', so there is no person to "
             "resize. Name the model with the key 'model' of the person."
         )
-    named = Person(model=model, sex=found.sex, **found.known)
-    return environment.model_copy(update={"person": named})
+    changed = environment.model_copy(update={"person": found.model_copy(update={"model": model})})
+    _check_ranges(changed, f"environment '{environment.name}'")
+    return changed
 
 
 def _folder() -> Path:
@@ -263,10 +265,32 @@ def _read(path: Path, above: tuple[Path, ...] = ()) -> EnvironmentFile:
     )
     # Only to raise for an invalid grid here, where the message can name the file.
     Grid.from_spec(environment.grid, where=f"{where}, field 'grid'")
-    if environment.person is not None and environment.has_body:
-        environment.person.body(f"{where}, field 'person'")
+    if environment.person is not None:
+        environment.person.check_posture(f"{where}, field 'person'")
+        if environment.has_body:
+            environment.person.body(f"{where}, field 'person'")
+    _check_ranges(environment, where)
     _check_observed(environment, where=f"{where}, field 'observed'")
     return _with_files_resolved(environment, path)
+
+
+def _check_ranges(environment: EnvironmentFile, where: str) -> None:
+    """Check that the person can move their joints to all angles that the environment names.
+
+    Raises:
+        DataFileError: If one is out of the person's range of motion.
+    """
+    person = environment.person or Person()
+    for name, position in environment.joints.items():
+        if name in JOINTS:
+            person.check_angle(name, math.degrees(position), f"{where}, field 'joints': '{name}'")
+    for field in ("grid", "observed"):
+        for name, plain in getattr(environment, field).items():
+            if name in JOINTS:
+                here = f"{where}, field '{field}': '{name}'"
+                values = Axis.from_dict({**plain, "name": name}, where=here).values
+                for value in (values[0], values[-1]):
+                    person.check_angle(name, math.degrees(float(value)), here)
 
 
 def _check_observed(environment: EnvironmentFile, where: str) -> None:

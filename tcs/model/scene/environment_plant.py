@@ -24,6 +24,7 @@ from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.model_files import check_model_file
+from tcs.model.scene.person_joints import articulated_model, person_joints
 from tcs.model.scene.resized_person import (
     padding_of,
     person_shapes,
@@ -73,7 +74,7 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
             _check_free(plant, entry.name, here)
             links[entry.name] = _add_box(plant, entry.name, entry.box, X_PM)
             continue
-        instance = _add_model(plant, entry, here, resize=_resizing(environment, entry))
+        instance = _add_model(plant, entry, here, of=environment)
         _fix(plant, instance, parent, X_PM, here)
         for index in plant.GetBodyIndices(instance):
             body = plant.get_body(index)
@@ -92,9 +93,10 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
         plant.RegisterCollisionGeometry(
             plant.world_body(), top, Box(*_FLOOR_SIZE), FLOOR, ProximityProperties()
         )
-    joints = EnvironmentJoints(by_name, environment.posture)
+    positions = person_joints(environment)
+    joints = EnvironmentJoints(by_name, positions.posture)
     _check_names(environment, links, joints, where)
-    joints.set_defaults(environment.joints, where=f"{where}, field 'joints'")
+    joints.set_defaults(positions.joints, where=f"{where}, field 'joints'")
     by_link = {m.name for m in environment.models if m.named_by == "link"}
     by_link |= {o.name for o in environment.obstacles if o.box is not None}
     return EnvironmentPlant(links, joints, frozenset(by_link), environment.floor)
@@ -146,9 +148,21 @@ def _add_box(
     return body
 
 
-def _resizing(environment: EnvironmentFile, entry: ModelEntry | Obstacle) -> EnvironmentFile | None:
-    """Return the environment if the entry is its person and resized, else None."""
-    return environment if environment.has_body and environment.is_person(entry.name) else None
+def _own_model(
+    environment: EnvironmentFile, entry: ModelEntry | Obstacle, where: str
+) -> str | None:
+    """Return the model of the person as SDFormat, None if it is that of the entry's file.
+
+    It is resized to the body of the person, and has the joints that the environment names.
+    """
+    file = Path(str(entry.file))
+    if not environment.is_person(entry.name):
+        return None
+    text = resized_model(environment, file, where) if environment.has_body else None
+    if person_joints(environment).is_articulated:
+        text = text or file.read_text(encoding="utf-8")
+        text = articulated_model(environment, text, f"{where}: '{file}'")
+    return text
 
 
 def _add_model(
@@ -156,12 +170,12 @@ def _add_model(
     entry: ModelEntry | Obstacle,
     where: str,
     *,
-    resize: EnvironmentFile | None = None,
+    of: EnvironmentFile,
 ) -> ModelInstanceIndex:
-    """Parse the entry's file; the model is resized to the person of the environment `resize`."""
+    """Parse the entry's file; the model of the person is that of the environment `of`."""
     file = Path(str(entry.file))
     check_model_file(file, f"{where}: '{entry.file}'")
-    text = None if resize is None else resized_model(resize, file, where)
+    text = _own_model(of, entry, where)
     parser = Parser(plant)
     # Several entries may use one file, e.g. two shelves.
     parser.SetAutoRenaming(True)

@@ -52,6 +52,10 @@ class EnvironmentJoints:
             lower, upper = max(lower, knots[0]), min(upper, knots[-1])
         return float(lower), float(upper)
 
+    def default(self, name: str) -> float:
+        """Return the position of a joint in the state of the environment's file [m or rad]."""
+        return float(self.by_name[name].default_positions()[0])
+
     def positions(
         self, name: str, position: float, *, where: str, error: type[TcsError] = TcsError
     ) -> Iterator[tuple[Joint, float]]:

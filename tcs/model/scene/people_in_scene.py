@@ -2,7 +2,8 @@
 
 On a resized person every link keeps the orientation that it has on the papers' man; sizes of
 shapes, positions of joints, padding and goals differ. The poses of his links are read from Drake,
-and the differences are added.
+and the differences are added: what a link moves by beyond the link that carries it is constant in
+the frame of the latter.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ from pydrake.multibody.tree import RigidBody
 from tcs.errors import EnvironmentFileError
 from tcs.kernel.arrays import FloatArray, IntArray, SceneArrays
 from tcs.model.people import Scale
+from tcs.model.scene.articulated_person import links_at_joints
 from tcs.model.scene.contacts import Group
 from tcs.model.scene.lowered_scene import LoweredScene
 from tcs.model.scene.lowering import environment_at
 from tcs.model.scene.person_goals import Anchor
+from tcs.model.scene.person_joints import reference_poses
 from tcs.model.scene.person_shapes import LinkShape
 from tcs.model.scene.resized_person import (
     PARENTS,
     ROOT,
+    Poses,
     motion_to_support,
     padding_of,
     person_shapes,
@@ -36,9 +40,13 @@ from tcs.model.tasks import Task
 
 _LINKS = (ROOT, *PARENTS)
 """The links of a person, each after its parent."""
-_IN_PLACE = {ROOT: "head_turn_link", "neck_link": "neck_rotation"}
-"""Links at the origin of another link, between it and what carries both: what they turn by does not
-move that origin."""
+_SAME_ORIGIN: Mapping[str, str] = {
+    "head_link": ROOT,
+    "head_turn_link": ROOT,
+    "neck_rotation": "neck_link",
+    **links_at_joints(),
+}
+"""Links without shapes at the origin of a link that moves with the size of the person."""
 
 
 class _PartOfLink(NamedTuple):
@@ -60,8 +68,18 @@ class _LinkPoses(NamedTuple):
     p: FloatArray
     """Origins in W [m], shape (S, links, 3)."""
     turn: FloatArray
-    """Rotation from the model frame in the state of the file to W, of what carries each link,
-    shape (S, links, 3, 3)."""
+    """Rotation from the model frame with all joints at 0 to W, of what carries each node,
+    shape (S, nodes, 3, 3)."""
+
+
+class _Node(NamedTuple):
+    """A body of the person that moves with their size, or one at its origin."""
+
+    name: str
+    link: int
+    """Number in `_LINKS` of the link whose origin it shares."""
+    above: int
+    """Number of the node that carries it; -1 if what carries it does not move with the size."""
 
 
 class PeopleInScene:
@@ -94,7 +112,11 @@ class PeopleInScene:
         self._shapes = {link: shapes[self._names[i]] for i, link in enumerate(_LINKS)}
         self._by_name = shapes
         self._before = poses_in_file(environment)
-        self._poses = self._read_poses(scene, bodies, states)
+        self._at_zero, articulated = reference_poses(environment)
+        carriers = _carriers(scene, bodies)
+        self._nodes = _nodes(carriers)
+        self._base = _base(carriers)
+        self._poses = self._read_poses(scene, bodies, carriers, articulated, states)
         self._parts = _parts(scene, bodies)
         self._anchors = self._read_anchors(task)
 
@@ -145,40 +167,62 @@ class PeopleInScene:
         states: IntArray,
     ) -> FloatArray:
         """Return the origins of the links of a person in W [m], shape (s, links, 3)."""
-        steps = steps_of_joints(self._before, dict(zip(_LINKS, scales, strict=True)))
-        moved = {ROOT: np.zeros(3)}
-        for link, step in steps.items():
-            moved[link] = moved[PARENTS[link]] + step
+        by_link = dict(zip(_LINKS, scales, strict=True))
+        moved = _moved(self._before, by_link)
         after = {
             link: (R, p + moved[link]) for link, (R, p) in self._before.items() if link in moved
         }
-        steps[ROOT] = motion_to_support(self._before, self._shapes, after, stretched)
-        motions = [self._poses.turn[states, i] @ steps[link] for i, link in enumerate(_LINKS)]
-        turned = np.stack(motions, axis=1)
-        for i, link in enumerate(_LINKS[1:], 1):
-            turned[:, i] += turned[:, _LINKS.index(PARENTS[link])]
-        return np.asarray(self._poses.p[states] + turned)
+        support = motion_to_support(self._before, self._shapes, after, stretched)
+        # The support moves what carries the person.
+        R_base = self._at_zero[self._base][0] @ self._before[self._base][0].T
+        at_zero = _moved(self._at_zero, by_link)
+        by_size = np.array([at_zero[link] + R_base @ support for link in _LINKS])
+        motions: list[FloatArray] = []
+        for number, node in enumerate(self._nodes):
+            step = by_size[node.link]
+            if node.above < 0:
+                motions.append(self._poses.turn[states, number] @ step)
+                continue
+            step = step - by_size[self._nodes[node.above].link]
+            motions.append(motions[node.above] + self._poses.turn[states, number] @ step)
+        names = [node.name for node in self._nodes]
+        of_links = np.stack([motions[names.index(link)] for link in _LINKS], axis=1)
+        return np.asarray(self._poses.p[states] + of_links)
 
     def _read_poses(
-        self, scene: Scene, bodies: Mapping[str, RigidBody], states: Sequence[Mapping[str, float]]
+        self,
+        scene: Scene,
+        bodies: Mapping[str, RigidBody],
+        carriers: Mapping[str, RigidBody],
+        at_zero: Poses,
+        states: Sequence[Mapping[str, float]],
     ) -> _LinkPoses:
-        """Return the links of the papers' man in each state, read from Drake."""
-        carriers = _carriers(scene, bodies)
-        reference = np.stack([self._before[carriers[link].name()][0] for link in _LINKS])
-        bodies_read = [*(bodies[link] for link in _LINKS), *(carriers[link] for link in _LINKS)]
+        """Return the links of the papers' man in each state, read from Drake.
+
+        Args:
+            scene: The scene; its state is restored.
+            bodies: The bodies of the person by name.
+            carriers: What carries each of them.
+            at_zero: Poses of all links in the model frame with the joints at 0.
+            states: Positions of the joints, for each state.
+        """
+        links = [bodies[link] for link in _LINKS]
+        above = [carriers[node.name] for node in self._nodes]
+        reference = np.stack([at_zero[body.name()][0] for body in above])
         plant, context = scene.built.plant, scene.plant_context
         before, found = scene.positions(), []
         try:
             for state in states:
                 for name, value in state.items():
                     scene.set_joint(name, value)
-                poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies_read]
+                poses = [plant.EvalBodyPoseInWorld(context, body) for body in (*links, *above)]
                 found.append([X.GetAsMatrix34() for X in poses])
         finally:
             scene.restore(before)
-        X = np.array(found).reshape(len(states), 2, len(_LINKS), 3, 4)
-        turn = X[:, 1, ..., :3] @ np.swapaxes(reference, 1, 2)
-        return _LinkPoses(R=X[:, 0, ..., :3], p=X[:, 0, ..., 3], turn=turn)
+        X = np.array(found).reshape(len(states), -1, 3, 4)
+        of_links, of_carriers = X[:, : len(links)], X[:, len(links) :]
+        turn = of_carriers[..., :3] @ np.swapaxes(reference, 1, 2)
+        return _LinkPoses(R=of_links[..., :3], p=of_links[..., 3], turn=turn)
 
     def _read_anchors(self, task: Task) -> dict[int, tuple[int, Anchor]]:
         """Return number of the link, and anchor on it, of each goal on the person."""
@@ -221,16 +265,48 @@ def _person_bodies(scene: Scene) -> dict[str, RigidBody]:
 
 
 def _carriers(scene: Scene, bodies: Mapping[str, RigidBody]) -> dict[str, RigidBody]:
-    """Return the body that the joint of each link is fixed to."""
+    """Return the body that the joint of each body of the person is fixed to."""
     plant = scene.built.plant
-    above = {
+    return {
         joint.child_body().name(): joint.parent_body()
         for joint in map(plant.get_joint, plant.GetJointIndices(bodies[ROOT].model_instance()))
     }
-    for link, between in _IN_PLACE.items():
-        if between in above:
-            above[link] = above[between]
-    return {link: above[link] for link in _LINKS}
+
+
+def _nodes(carriers: Mapping[str, RigidBody]) -> tuple[_Node, ...]:
+    """Return the bodies that move with the size of the person, each after what carries it."""
+    found: dict[str, _Node] = {}
+
+    def add(name: str) -> None:
+        if name in found:
+            return
+        link = _SAME_ORIGIN.get(name, name)
+        above = carriers[name].name()
+        moves = above in _LINKS or above in _SAME_ORIGIN
+        if moves:
+            add(above)
+        number = list(found).index(above) if moves else -1
+        found[name] = _Node(name, _LINKS.index(link), number)
+
+    for link in _LINKS:
+        add(link)
+    return tuple(found.values())
+
+
+def _base(carriers: Mapping[str, RigidBody]) -> str:
+    """Return the name of the link that carries the person whatever their size."""
+    name = ROOT
+    while name in _LINKS or name in _SAME_ORIGIN:
+        name = carriers[name].name()
+    return name
+
+
+def _moved(before: Poses, scales: Mapping[str, Scale]) -> dict[str, FloatArray]:
+    """Return how far each link moves from the head outward, in the model frame [m]."""
+    moved = {ROOT: np.zeros(3)}
+    for link, step in steps_of_joints(before, scales).items():
+        moved[link] = moved[PARENTS[link]] + step
+    return moved
 
 
 def _parts(scene: Scene, bodies: Mapping[str, RigidBody]) -> list[_PartOfLink]:

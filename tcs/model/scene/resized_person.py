@@ -126,7 +126,7 @@ def person_shapes(environment: EnvironmentFile) -> dict[str, list[LinkShape]]:
         EnvironmentFileError: If the file cannot be read or a shape is no box or capsule.
     """
     model = environment.person_model
-    root, where = _model_file(environment)
+    root, where = model_file(environment)
     return {f"{model}::{link}": shapes for link, shapes in _shapes(root, where).items()}
 
 
@@ -138,8 +138,8 @@ def poses_in_file(environment: EnvironmentFile) -> Poses:
     Raises:
         EnvironmentFileError: If the file cannot be read.
     """
-    root, _ = _model_file(environment)
-    return _link_poses(root, _joints(environment))
+    root, _ = model_file(environment)
+    return link_poses(root, _joints(environment))
 
 
 def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
@@ -165,12 +165,12 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
     for alias, part in _SAME_FRAME.items():
         scales[alias] = next(s for name, s in scales.items() if part_of(name) == part)
     joints = _joints(environment)
-    before, shapes = _link_poses(root, joints), _shapes(root, where)
+    before, shapes = link_poses(root, joints), _shapes(root, where)
     for name in (ROOT, *PARENTS):
         for element in (*links[name].findall("collision"), *links[name].findall("visual")):
             write_shape(element, read_shape(element, where).stretch(scales[name]))
     _move_joints(links, before, scales)
-    after, resized = _link_poses(root, joints), _shapes(root, where)
+    after, resized = link_poses(root, joints), _shapes(root, where)
     shift = motion_to_support(before, shapes, after, resized)
     for name in (ROOT, *PARENTS):
         pose = _pose(_carrier(links, name))
@@ -179,7 +179,7 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _model_file(environment: EnvironmentFile) -> tuple[ElementTree.Element, str]:
+def model_file(environment: EnvironmentFile) -> tuple[ElementTree.Element, str]:
     """Return the content of the person's model file, and its name for messages."""
     model = environment.person_model
     (entry,) = (entry for entry in environment.models if entry.name == model)
@@ -284,7 +284,7 @@ def _joints(environment: EnvironmentFile) -> dict[str, float]:
     return joints
 
 
-def _link_poses(root: ElementTree.Element, joints: Mapping[str, float]) -> Poses:
+def link_poses(root: ElementTree.Element, joints: Mapping[str, float]) -> Poses:
     """Return the poses of all links in the model frame at joint positions."""
     plant = MultibodyPlant(0.0)
     (instance,) = Parser(plant).AddModelsFromString(

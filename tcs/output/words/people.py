@@ -18,11 +18,36 @@ def person_text(entry: Mapping[str, Any]) -> str:
     ...              "mass_percentile": 18.8})
     'a woman of 1.525 m (5th percentile) and 58.2 kg (19th percentile)'
     """
-    stature, mass = (_ordinal(entry[f"{key}_percentile"]) for key in ("stature", "mass"))
-    return (
-        f"{NOUNS[entry['sex']]} of {entry['stature']:.3f} m ({stature} percentile) and "
-        f"{entry['mass']:.1f} kg ({mass} percentile)"
+    who = "the average man"
+    if "sex" in entry:
+        stature, mass = (_ordinal(entry[f"{key}_percentile"]) for key in ("stature", "mass"))
+        who = (
+            f"{NOUNS[entry['sex']]} of {entry['stature']:.3f} m ({stature} percentile) and "
+            f"{entry['mass']:.1f} kg ({mass} percentile)"
+        )
+    posture = entry.get("posture")
+    return who if posture is None else f"{who}, {posture_text(posture)}"
+
+
+def posture_text(posture: Mapping[str, Any]) -> str:
+    """Return a posture in a few words.
+
+    Args:
+        posture: The entry `posture` of a person.
+
+    >>> posture_text({"name": None, "angles_deg": {"head_turn": 30.0, "head_tilt": -5.0}})
+    'head turn 30 deg, head tilt -5 deg'
+    >>> posture_text({"name": "arms_apart", "angles_deg": {}})
+    'posture arms apart'
+    """
+    name = posture["name"]
+    angles = ", ".join(
+        f"{joint.replace('_', ' ')} {angle:g} deg" for joint, angle in posture["angles_deg"].items()
     )
+    if name is None:
+        return angles
+    in_words = f"posture {name.replace('_', ' ')}"
+    return f"{in_words} ({angles})" if angles else in_words
 
 
 def _ordinal(percentile: float) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import IntArray
 from tcs.kernel.sweep import gripper_contacts
-from tcs.model.people import Person, Scale
+from tcs.model.people import Scale
 from tcs.model.scene import PeopleInScene, SceneSpec
 from tcs.model.tasks import load_task
 from tcs.placement.population.problems import PersonProblems
@@ -99,8 +99,9 @@ def _with_papers_man(arm: ArmTrials, trials: Trials) -> ArmTrials:
     spec = arm.job.spec
     if not spec.environment.has_body:
         return arm
-    man = Person(model=spec.environment.person_model)
-    environment = spec.environment.model_copy(update={"person": man})
+    person = spec.environment.person
+    assert person is not None
+    environment = spec.environment.model_copy(update={"person": person.without_body()})
     task = load_task(trials.file.metadata["task"])
     job = dataclasses.replace(arm.job, task=task, spec=SceneSpec(spec.robot, environment))
     scene = job.scene()

@@ -370,7 +370,7 @@ def displaced(
     positions = {name: np.full(samples, value) for name, value in nominal.items()}
     limited = np.zeros(samples, dtype=np.bool_)
     for name, error in offsets.items():
-        center = nominal.get(name, job.spec.environment.joints.get(name, 0.0))
+        center = nominal.get(name, scene.built.environment_joints.default(name))
         lower, upper = scene.built.environment_joints.limits(name)
         # Rounding may put the last grid value beyond the limit, where it must remain.
         moved = center + np.asarray(error, dtype=np.float64)

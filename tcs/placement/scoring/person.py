@@ -23,7 +23,9 @@ _log = logging.getLogger(__name__)
 def person_entry(
     environment: EnvironmentFile, task: Task, tables: Sequence[ScoreTable]
 ) -> dict[str, Any]:
-    """Return the entry of the metadata for a person who is not the papers' man, or {}.
+    """Return the entry of the metadata for a person who is not the papers' man as he sits or lies.
+
+    It is {} for him.
 
     A goal at which the gripper touches the person is logged as a warning.
 
@@ -33,7 +35,7 @@ def person_entry(
         tables: The scores of its observed states.
     """
     person = environment.person
-    if person is None or not person.has_body:
+    if person is None or not (person.has_body or person.has_posture):
         return {}
     touching = _touching(f"{environment.person_model}::", tables)
     for goal, part in touching.items():
