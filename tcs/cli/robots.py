@@ -29,14 +29,41 @@ def new(
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="<urdf>.yaml")
     ] = None,
+    coarse: Annotated[
+        bool,
+        typer.Option("--coarse", help="Few shapes on each link: a quick draft that blocks more."),
+    ] = False,
+    from_collision_meshes: Annotated[
+        bool,
+        typer.Option(
+            "--from-collision-meshes",
+            help="Enclose the collision meshes alone; parts of the visual ones may protrude.",
+        ),
+    ] = False,
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINKS",
+            help="Links to leave out, separated by commas: nothing is checked against them.",
+        ),
+    ] = None,
+    jobs: options.Jobs = 2,
     as_json: options.Json = False,
 ) -> None:
     """Draft a robot file from any URDF, and a CSV file with its collision primitives."""
-    from tcs.model.robots.draft import draft_to_files
+    from tcs.model.robots.draft import DraftOptions
+    from tcs.model.robots.draft_files import draft_to_files
 
     path = out or Path(f"{Path(urdf).stem}.yaml")
-    with terminal.progress_bar("bodies", lines=True) as on_progress:
-        result = draft_to_files(urdf, tool, path, base=base, on_progress=on_progress)
+    chosen = DraftOptions(
+        base=base,
+        coarse=coarse,
+        collision_meshes=from_collision_meshes,
+        ignore=tuple(link for links in ignore or () for link in links.split(",") if link),
+        jobs=jobs,
+    )
+    with terminal.progress_bar("steps", lines=True) as on_progress:
+        result = draft_to_files(urdf, tool, path, chosen, on_progress=on_progress)
     terminal.print_result(result, robot_tables.report_draft, as_json=as_json)
 
 

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from tcs.model.checkup.arm import ArmClass, RoundTrip, arm_class, round_trip
-from tcs.model.checkup.tool import fingers_off_axis
+from tcs.model.checkup.tool import fingers_off_axis, flange_note, tool_axes_problem
 from tcs.model.robots import RobotFile
 from tcs.model.robots.fitting import BodyEnclosure, enclosure
+from tcs.model.robots.hand import hand_axes
 from tcs.model.robots.urdf.pose import pose_in_root
 from tcs.model.robots.urdf.surfaces import body_triangles
 from tcs.model.scene import EMPTY_ENVIRONMENT, Contact, Scene, SceneSpec, arm_chain
@@ -74,6 +75,7 @@ class RobotCheck:
         seed: Seed of the postures of the round trip.
         fingers_along: Axis of the tool frame along which the fingers point, None if it is x or
             there are none.
+        flange: What to review in the tool frame of a hand without fingers, None if nothing.
     """
 
     robot: RobotFile
@@ -87,6 +89,7 @@ class RobotCheck:
     trip: RoundTrip
     seed: int
     fingers_along: str | None = None
+    flange: str | None = None
 
     @property
     def bodies_without_mesh(self) -> tuple[str, ...]:
@@ -120,11 +123,7 @@ class RobotCheck:
                 "root must be on the floor: add a root link on the floor to the URDF."
             )
         if self.fingers_along is not None:
-            found.append(
-                f"the fingers point along {self.fingers_along} of tool frame "
-                f"'{self.robot.tool_frame}', but goals need x forward out of the hand: add a frame "
-                "with these axes under 'frames', and name it as 'tool_frame'."
-            )
+            found.append(tool_axes_problem(self.robot, self.fingers_along))
         if self.arm.joints == 6 and self.arm.solver is None:
             return (*found, self.arm.reason)
         lost = self.trip.samples - self.trip.recovered
@@ -156,6 +155,18 @@ class RobotCheck:
             found.append(
                 f"no mesh to compare the primitives with: {', '.join(self.bodies_without_mesh)} "
                 "(bodies of the robot file)."
+            )
+        if self.flange is not None:
+            found.append(self.flange)
+        if self.robot.ignored_links:
+            found.append(
+                f"nothing is checked against {', '.join(self.robot.ignored_links)} "
+                "('ignored_links' of the robot file)."
+            )
+        if self.robot.surfaces == "collision":
+            found.append(
+                "surfaces: collision, so parts of the visual meshes may protrude from the "
+                "primitives unchecked."
             )
         if self.robot.limits == "soft" and all(j.soft == j.hard for j in self.limits):
             found.append(
@@ -240,6 +251,7 @@ def check_up(robot: RobotFile, *, samples: int = 1000, seed: int = 0) -> RobotCh
         trip=round_trip(scene, arm.solver, samples, seed),
         seed=seed,
         fingers_along=fingers_off_axis(robot),
+        flange=flange_note(robot, hand_axes(robot)),
     )
 
 

@@ -1,23 +1,13 @@
-"""The axes of the tool frame against the fingers of the hand."""
+"""The axes of the tool frame against the hand."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from tcs.model.robots import RobotFile
-from tcs.model.robots.extras import model_with_extras
-from tcs.model.robots.urdf import Urdf
-from tcs.model.robots.urdf.pose import pose_in_root
-
-AHEAD = 0.7
-"""Least cosine between x of the tool frame and the direction of the fingers: 45 degrees."""
+from tcs.model.robots.hand import HandAxes, hand_axes
 
 
 def fingers_off_axis(robot: RobotFile) -> str | None:
     """Return the tool axis along which the fingers point, None if it is x or there are no fingers.
-
-    Fingers are what joints beyond the arm move. Their direction is that of the centre of their
-    primitives, seen from the last joint of the arm.
 
     Args:
         robot: The robot.
@@ -28,28 +18,26 @@ def fingers_off_axis(robot: RobotFile) -> str | None:
     Raises:
         RobotError: If a model or the primitives cannot be used.
     """
-    model = model_with_extras(robot)
-    fingers = _fingers(model, robot.arm_joints[-1])
-    positions = robot.with_mimics({**robot.joint_positions(), **robot.rest})
-    centres = []
-    for shape in robot.load_primitives():
-        if shape.body in fingers:
-            R, p = pose_in_root(model, shape.body, positions)
-            centres.append(p + R @ np.array(shape.xyz))
-    if not centres:
-        return None
-    last = model.joints[robot.arm_joints[-1]].child
-    R_T, _ = pose_in_root(model, robot.tool_frame, positions)
-    _, p_last = pose_in_root(model, last, positions)
-    ahead = R_T.T @ (np.mean(centres, axis=0) - p_last)
-    if ahead[0] >= AHEAD * np.linalg.norm(ahead):
-        return None
-    largest = int(np.argmax(np.abs(ahead)))
-    return f"{'+' if ahead[largest] > 0 else '-'}{'xyz'[largest]}"
+    hand = hand_axes(robot)
+    return (
+        hand.forward_axis if hand is not None and hand.fingers and not hand.is_forward_x else None
+    )
 
 
-def _fingers(model: Urdf, last: str) -> frozenset[str]:
-    """Return the links that movable joints beyond the last joint of the arm move."""
-    hand = model.links_moved_by(last)
-    moving = [j.name for j in model.joints.values() if j.is_movable and j.parent in hand]
-    return frozenset[str]().union(*map(model.links_moved_by, moving))
+def tool_axes_problem(robot: RobotFile, axis: str) -> str:
+    """Return the sentence that says which axis of the tool frame is not as goals need it."""
+    return (
+        f"the fingers point along {axis} of tool frame '{robot.tool_frame}', but goals need x "
+        "forward out of the hand: add a frame with these axes under 'frames', and name it as "
+        "'tool_frame'."
+    )
+
+
+def flange_note(robot: RobotFile, hand: HandAxes | None) -> str | None:
+    """Return what to review in the tool frame of a hand without fingers, None if nothing."""
+    if hand is None or hand.fingers or hand.is_forward_x:
+        return None
+    return (
+        f"the last link points along {hand.forward_axis} of tool frame '{robot.tool_frame}'; goals "
+        "need x forward out of the hand."
+    )

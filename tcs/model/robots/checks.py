@@ -78,6 +78,7 @@ def _check_links(robot: RobotFile, links: Mapping[str, str], model: Urdf, where:
         ("arm_base", robot.arm_base),
         ("tool_frame", robot.tool_frame),
         *(("standing_bodies", body) for body in robot.standing_bodies),
+        *(("ignored_links", body) for body in robot.ignored_links),
         *(("disabled_groups", body) for pair in robot.disabled_pairs for body in pair),
         *(("primitives", shape.body) for shape in _primitives(robot, where)),
     ):

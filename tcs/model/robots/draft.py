@@ -6,18 +6,17 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
-from tcs.errors import OutputError, RobotError, UnknownNameError
-from tcs.files.writing import check_writable, scratch_folder, whole_file
+from tcs.errors import RobotError, UnknownNameError
+from tcs.files.writing import scratch_folder
 from tcs.files.xml_documents import read_xml
 from tcs.model.robots.checks import check_robot
 from tcs.model.robots.fitting import fit_robot
+from tcs.model.robots.hand import hand_axes
 from tcs.model.robots.primitives import Primitive, write_primitives
-from tcs.model.robots.robot_file import LEAST_JOINTS, MOST_JOINTS, RobotFile
+from tcs.model.robots.robot_file import LEAST_JOINTS, MOST_JOINTS, ExtraFrame, RobotFile
 from tcs.model.robots.self_collision import (
     DRAWS,
     blocked_at_boxes,
@@ -35,11 +34,6 @@ _VERTICAL = 0.99
 _ON_FLOOR = 0.02
 """Bodies that reach down to this height [m] stand on the floor."""
 
-_HEADER = """\
-# Drafted by `tcs robot new`; review these choices:
-{remarks}
-"""
-
 
 @dataclass(frozen=True, slots=True)
 class Draft:
@@ -56,11 +50,35 @@ class Draft:
     remarks: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DraftOptions:
+    """How a robot file is drafted.
+
+    Attributes:
+        base: Link at or beyond which the arm starts; None is the root.
+        coarse: Whether a few shapes on each link do, which protrude farther.
+        collision_meshes: Whether the collision geometry of a link, if there is any, is its whole
+            surface.
+        ignore: Links that nothing is checked against.
+        jobs: Number of processes that fit shapes; does not change the results.
+    """
+
+    base: str | None = None
+    coarse: bool = False
+    collision_meshes: bool = False
+    ignore: tuple[str, ...] = ()
+    jobs: int = 1
+
+
+USUAL = DraftOptions()
+"""The arm nearest the tool, its visual and collision geometry enclosed closely."""
+
+
 def draft_robot(
     urdf: str | Path,
     tool: str,
+    options: DraftOptions = USUAL,
     *,
-    base: str | None = None,
     name: str | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Draft:
@@ -70,23 +88,29 @@ def draft_robot(
     lead there. The torso is a vertical
     prismatic joint between root and arm. Every other joint is at 0 if its range includes values on
     both sides of 0, else in the middle of its range. `fit_robot` gives the primitives and
-    `propose_disabled_pairs` the pairs that need no check.
+    `propose_disabled_pairs` the pairs that need no check. If the hand does not point along x of the
+    tool, a frame with the axes that goals need is added.
 
     Args:
         urdf: Path of the URDF, or its `package://` address.
         tool: T, the link that moves to the goals.
-        base: Link at or beyond which the arm starts; None is the root.
+        options: Arm, and closeness of the primitives.
         name: Name of the robot; None is the file name of the URDF.
-        on_progress: Called with the number of bodies fitted and of all bodies.
+        on_progress: Called with the number of steps done and of all: bodies to fit, and tests.
 
     Raises:
-        UnknownNameError: If tool or base is not a link of the URDF.
+        UnknownNameError: If tool, base or a link to ignore is not a link of the URDF.
         RobotError: If the URDF or a mesh cannot be used, the base does not carry the tool, or fewer
             than six revolute joints lead to it.
     """
     path = Path(os.path.realpath(resolve_uri(str(urdf), Path())))
     model = read_urdf(path)
-    arm, arm_base, torso = _arm(model, tool, base)
+    arm, arm_base, torso = _arm(model, tool, options.base)
+    for link in options.ignore:
+        if link not in model.links:
+            where = f"URDF '{path}', links to ignore"
+            raise UnknownNameError("link", link, model.links, where=where)
+    model = model.with_surfaces(collision_only=options.collision_meshes, ignored=options.ignore)
     if not body_triangles(model):
         raise RobotError(
             f"URDF '{path}': no link has a visual or collision geometry, so there is nothing to "
@@ -94,11 +118,6 @@ def draft_robot(
         )
     address = str(urdf) if str(urdf).startswith("package://") else str(path)
     posture, gripper = _positions(model, arm, torso)
-    remarks = [
-        f"arm: the {len(arm)} revolute joints nearest '{tool}', from '{arm_base}' on: "
-        f"{', '.join(joint.name for joint in arm)}",
-        f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
-    ]
     # The search for disabled pairs reads the primitives from their file.
     with scratch_folder() as folder:
         shapes = folder / "primitives.csv"
@@ -107,6 +126,8 @@ def draft_robot(
             name=name or path.stem,
             title=f"{path.stem}, tool {tool}",
             urdf=address,
+            surfaces="collision" if options.collision_meshes else "all",
+            ignored_links=options.ignore,
             root_body=model.root,
             arm_base=arm_base,
             arm_joints=tuple(joint.name for joint in arm),
@@ -122,21 +143,35 @@ def draft_robot(
             source=_source(path, address),
         )
         check_robot(robot, where=f"robot drafted from '{path}'")
-        fits = fit_robot(robot, on_progress)
+        steps = _Steps(on_progress)
+        fits = fit_robot(robot, steps.bodies, coarse=options.coarse, jobs=options.jobs)
         primitives = tuple(shape for found in fits for shape in found.fit.primitives)
         write_primitives(shapes, primitives)
         robot = robot.model_copy(update={"disabled_groups": propose_disabled_pairs(robot)})
+        steps.test_done()
         rest = free_posture(robot)
-        if rest is None:
-            remarks.append(f"rest: all of {DRAWS} postures of the arm are in self-collision")
         robot = robot.model_copy(update={"rest": rest or {}})
-        blocked, at_boxes = blocked_by_shapes(robot), blocked_at_boxes(robot)
+        robot, axes = _with_goal_axes(robot)
+        blocked = blocked_by_shapes(robot)
+        steps.test_done()
+        at_boxes = blocked_at_boxes(robot)
+        steps.test_done()
     worst = max(fits, key=lambda found: found.fit.excess)
-    remarks += [
+    remarks = [
+        f"arm: the {len(arm)} revolute joints nearest '{tool}', from '{arm_base}' on: "
+        f"{', '.join(joint.name for joint in arm)}",
+        f"torso: {f'{torso.name!r}' if torso else 'no vertical prismatic joint below the arm'}",
+        f"tool: {axes}",
+        *(
+            []
+            if rest is not None
+            else [f"rest: all of {DRAWS} postures of the arm are in self-collision"]
+        ),
         f"primitives: {len(primitives)}; those of '{worst.body}' exceed its hull most, "
         f"{worst.fit.excess:.2f} times",
         f"self-collision: {blocked.text()}",
         f"obstacles: {at_boxes.text()}",
+        *_left_out(options),
         "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
         "check that the gripper is open and a second arm out of the way",
         f"root: '{model.root}' must be on the floor, z up, x forward",
@@ -144,95 +179,61 @@ def draft_robot(
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
 
 
-def write_draft(draft: Draft, path: Path) -> Path:
-    """Write a draft as a YAML file with its primitives in a CSV file beside it; both or neither.
+class _Steps:
+    """Progress over bodies to fit and the tests that follow."""
 
-    Args:
-        draft: The draft.
-        path: The YAML file; it must not exist yet.
+    TESTS = 3
 
-    Returns:
-        Path of the CSV file.
+    def __init__(self, on_progress: Callable[[int, int], None] | None) -> None:
+        self._report = on_progress
+        self._done = self._total = 0
 
-    Raises:
-        OutputError: If one of the files exists or cannot be written.
-    """
-    shapes = check_free(path)
-    content = draft.robot.model_dump(mode="json", exclude_defaults=True)
-    content["primitives"] = shapes.name
-    if not draft.robot.urdf.startswith("package://"):
-        # Relative, so that the folder of both files can be moved.
-        content["urdf"] = Path(
-            os.path.relpath(draft.robot.urdf, os.path.dirname(os.path.realpath(path)))
-        ).as_posix()
-    text = _HEADER.format(remarks="\n".join(f"# - {remark}" for remark in draft.remarks))
-    text += yaml.safe_dump(
-        content, sort_keys=False, width=95, default_flow_style=None, allow_unicode=True
+    def bodies(self, done: int, total: int) -> None:
+        """Report bodies fitted."""
+        self._done, self._total = done, total + self.TESTS
+        self._tell()
+
+    def test_done(self) -> None:
+        """Report one more test."""
+        self._done += 1
+        self._tell()
+
+    def _tell(self) -> None:
+        if self._report is not None:
+            self._report(self._done, self._total)
+
+
+def _with_goal_axes(robot: RobotFile) -> tuple[RobotFile, str]:
+    """Return a robot whose tool frame points along its hand, and what was chosen."""
+    hand, tool = hand_axes(robot), robot.tool_frame
+    if hand is None:
+        return robot, f"the shapes of the hand do not show where it points; x of '{tool}' must"
+    part = "the fingers point" if hand.fingers else "the last link points"
+    if hand.is_forward_x:
+        return robot, f"{part} along +x of '{tool}', as goals need"
+    taken = {*robot.model().links}
+    name = next(
+        n for n in (f"{tool}_goal{i or ''}" for i in range(len(taken) + 1)) if n not in taken
     )
-    write_primitives(shapes, draft.primitives)
-    try:
-        with whole_file(path, "Robot file") as stream:
-            stream.write(text.encode())
-    except BaseException:
-        shapes.unlink()
-        raise
-    return shapes
+    frame = ExtraFrame(name=name, parent=tool, rpy_deg=hand.goal_axes())
+    opening = "" if hand.opening is None else " and y in the direction in which they open"
+    return (
+        robot.model_copy(update={"frames": (frame,), "tool_frame": name}),
+        f"{part} along {hand.forward_axis} of '{tool}', and goals need +x: frame '{name}' was "
+        f"added with x forward{opening}",
+    )
 
 
-def draft_to_files(
-    urdf: str | Path,
-    tool: str,
-    path: Path,
-    *,
-    base: str | None = None,
-    on_progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """Draft a robot file, write it with its primitives, and return a summary as plain containers.
-
-    Args:
-        urdf: Path of the URDF, or its `package://` address.
-        tool: T, the link that moves to the goals.
-        path: The YAML file; it must not exist yet. Its stem is the name of the robot.
-        base: Link at or beyond which the arm starts; None is the root.
-        on_progress: Called with the number of bodies fitted and of all bodies.
-
-    Raises:
-        OutputError: If one of the files exists or cannot be written.
-        UnknownNameError: As `draft_robot`.
-        RobotError: As `draft_robot`.
-    """
-    check_writable(check_free(path))
-    draft = draft_robot(urdf, tool, base=base, name=path.stem, on_progress=on_progress)
-    shapes = write_draft(draft, path)
-    robot = draft.robot
-    return {
-        "file": str(path),
-        "primitives": str(shapes),
-        "arm_base": robot.arm_base,
-        "arm_joints": list(robot.arm_joints),
-        "torso_joint": robot.torso_joint,
-        "tool_frame": robot.tool_frame,
-        "disabled_pairs": len(robot.disabled_pairs),
-        "remarks": list(draft.remarks),
-    }
-
-
-def check_free(path: Path) -> Path:
-    """Return the path of the CSV file for a YAML file, if neither of them exists.
-
-    Raises:
-        OutputError: If one exists, or the name of the YAML file does not end in `.yaml`.
-    """
-    if path.suffix != ".yaml":
-        raise OutputError(
-            f"robot file '{path}': its name must end in .yaml, which distinguishes a path from the "
-            "name of a robot."
+def _left_out(options: DraftOptions) -> list[str]:
+    """Return remarks on surfaces that the primitives need not enclose."""
+    remarks = []
+    if options.collision_meshes:
+        remarks.append(
+            "surfaces: the collision meshes; parts of the visual meshes may protrude unchecked"
         )
-    shapes = path.with_name(f"{path.stem}_primitives.csv")
-    for file in (path, shapes):
-        if os.path.lexists(file):
-            raise OutputError(f"'{file}' already exists. Remove it, or name another file.")
-    return shapes
+    if options.ignore:
+        remarks.append(f"ignored: nothing is checked against {', '.join(options.ignore)}")
+    return remarks
 
 
 def _arm(model: Urdf, tool: str, base: str | None) -> tuple[list[Joint], str, Joint | None]:

@@ -93,6 +93,11 @@ class RobotFile(Document):
     mount: Mount | None = None
     """The link that carries the root link of a URDF that starts above the floor; None if it is on
     the floor."""
+    surfaces: Literal["all", "collision"] = "all"
+    """What the primitives of a link enclose: its visual and its collision geometry, or the latter
+    alone if the URDF has any for it."""
+    ignored_links: tuple[Name, ...] = ()
+    """Links that nothing is checked against: they have no primitives."""
     root_body: Name
     """B: the root link of URDF or mount, which the planar base joint carries."""
     arm_base: Name
@@ -211,13 +216,13 @@ class RobotFile(Document):
         return resolve_uri(self.urdf, Path())
 
     def model(self) -> Urdf:
-        """Return the content of the URDF, on its mount.
+        """Return the content of the URDF, on its mount, with the surfaces that count.
 
         Raises:
             RobotError: If the URDF cannot be used.
         """
-        path = self.urdf_path()
-        return read_urdf(path) if self.mount is None else _mounted(path, self.mount)
+        collision_only = self.surfaces == "collision"
+        return _model(self.urdf_path(), self.mount, collision_only, self.ignored_links)
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
@@ -322,13 +327,17 @@ class RobotFile(Document):
 
 
 @cache
-def _mounted(path: Path, mount: Mount) -> Urdf:
-    """Return a URDF on a mount.
+def _model(path: Path, mount: Mount | None, collision_only: bool, ignored: tuple[str, ...]) -> Urdf:
+    """Return a URDF on a mount, with the surfaces that count.
 
     Raises:
         RobotError: If the URDF cannot be used, or the name of the mount is taken.
     """
     model = read_urdf(path)
+    if collision_only or ignored:
+        model = model.with_surfaces(collision_only=collision_only, ignored=ignored)
+    if mount is None:
+        return model
     if mount.link in (*model.links, WORLD):
         raise RobotError(f"link '{mount.link}' of the mount: the name is taken. Choose another.")
     return model.mounted_on(mount.link, mount.xyz, mount.rpy)

@@ -1,12 +1,19 @@
 """Drafting robot files: what is found in a URDF, and one-line errors if it cannot be used."""
 
 import pytest
+import trimesh
 
 from tcs.errors import OutputError, RobotError, UnknownNameError
+from tcs.model.checkup.tool import fingers_off_axis
 from tcs.model.robots import load_robot
-from tcs.model.robots.draft import draft_robot, write_draft
+from tcs.model.robots.draft import DraftOptions, draft_robot
+from tcs.model.robots.draft_files import write_draft
+from tcs.model.robots.fitting import covering, fit_robot
+from tcs.model.robots.fitting.bodies import ARM, COARSE
 from tcs.model.robots.fitting.enclosure import enclosure
+from tcs.model.robots.primitives import enclosed
 from tcs.model.robots.self_collision import SelfCollision, sample_positions
+from tcs.model.robots.urdf.surfaces import body_triangles
 from tests.model.robots.made_up import urdf
 
 
@@ -99,12 +106,12 @@ def test_pairs_that_need_no_check_cannot_meet(drafted):
 
 
 def test_arm_base_may_be_named(path):
-    assert draft_robot(path, "tool", base="base").robot.arm_base == "mast"
-    assert draft_robot(path, "tool", base="mast").robot.arm_base == "mast"
+    assert draft_robot(path, "tool", DraftOptions(base="base")).robot.arm_base == "mast"
+    assert draft_robot(path, "tool", DraftOptions(base="mast")).robot.arm_base == "mast"
     with pytest.raises(RobotError, match="only 5 in a row"):
-        draft_robot(path, "tool", base="arm2")
+        draft_robot(path, "tool", DraftOptions(base="arm2"))
     with pytest.raises(RobotError, match="base 'head' does not carry"):
-        draft_robot(path, "tool", base="head")
+        draft_robot(path, "tool", DraftOptions(base="head"))
 
 
 def test_too_few_joints_are_one_clear_line(tmp_path):
@@ -120,7 +127,7 @@ def test_unknown_tool_names_the_nearest(path):
     with pytest.raises(UnknownNameError, match="Did you mean 'tool'"):
         draft_robot(path, "toool")
     with pytest.raises(UnknownNameError, match="Did you mean 'mast'"):
-        draft_robot(path, "tool", base="maast")
+        draft_robot(path, "tool", DraftOptions(base="maast"))
 
 
 @pytest.mark.parametrize(
@@ -142,6 +149,76 @@ def test_a_joint_that_ends_the_arm_too_soon_is_named(tmp_path, old, new, message
     file.write_text(urdf().replace(joint.format(old), joint.format(new) + mimic))
     with pytest.raises(RobotError, match=message):
         draft_robot(file, "tool")
+
+
+def test_a_tool_with_z_forward_gets_a_frame_with_x_forward(tmp_path):
+    file = tmp_path / "z_forward.urdf"
+    file.write_text(urdf().replace('rpy="0 -1.5707963267948966 0"', 'rpy="0 0 0"'))
+    draft = draft_robot(file, "tool")
+    write_draft(draft, tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    assert robot.tool_frame == "tool_goal"
+    assert any("point along +z of 'tool'" in remark for remark in draft.remarks)
+    assert fingers_off_axis(robot.model_copy(update={"tool_frame": "tool"})) == "+z"
+    assert fingers_off_axis(robot) is None
+
+
+COLLISION = """<collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision>"""
+
+
+def test_links_may_be_ignored_and_collision_meshes_be_used(tmp_path):
+    """Only what is enclosed has shapes, and the file says what is not."""
+    file = tmp_path / "partly.urdf"
+    whole = '<link name="arm2"><visual>'
+    assert whole in urdf()
+    file.write_text(urdf().replace(whole, whole.replace("<visual>", COLLISION + "<visual>")))
+    options = DraftOptions(collision_meshes=True, ignore=("head", "arm1"))
+    steps = []
+    draft = draft_robot(file, "tool", options, on_progress=lambda *step: steps.append(step))
+    write_draft(draft, tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    bodies = [shape.body for shape in robot.load_primitives()]
+    assert not {"head", "arm1"} & set(bodies)
+    (shape,) = [s for s in robot.load_primitives() if s.body == "arm2"]
+    assert shape.size == pytest.approx((0.05, 0.05, 0.05), abs=1e-4)
+    assert [found.body for found in enclosure(robot) if found.outside] == []
+    assert (robot.surfaces, robot.ignored_links) == ("collision", ("head", "arm1"))
+    notes = " ".join(draft.remarks)
+    assert "visual meshes may protrude" in notes
+    assert "nothing is checked against head, arm1" in notes
+    # Taking either choice back shows what is not enclosed.
+    for change in ({"surfaces": "all"}, {"ignored_links": ()}):
+        assert any(found.outside for found in enclosure(robot.model_copy(update=change)))
+    done, totals = zip(*steps, strict=True)
+    assert list(done) == sorted(done)
+    assert done[-1] == totals[-1]
+    with pytest.raises(UnknownNameError, match=r"links to ignore.*Did you mean 'head'"):
+        draft_robot(file, "tool", DraftOptions(ignore=("hed",)))
+
+
+def test_a_coarse_fit_has_fewer_shapes_that_enclose(drafted, tmp_path, monkeypatch):
+    # A tenth of the usual candidates is enough for a ring.
+    monkeypatch.setattr(covering, "_SEEDS", 30)
+    monkeypatch.setattr(covering, "_CAPSULES", 60)
+    ring = trimesh.creation.annulus(0.05, 0.06, 0.1, sections=16)
+    ring.export(tmp_path / "ring.stl")
+    file = tmp_path / "ring.urdf"
+    box = '<box size="0.08 0.08 0.12"/>'
+    file.write_text(urdf().replace(box, '<mesh filename="ring.stl"/>', 1))
+    robot = drafted[0].robot.model_copy(update={"urdf": str(file)})
+    surface = body_triangles(robot.model())["arm2"]
+    counts = []
+    for coarse in (True, False):
+        (shapes,) = (f.fit.primitives for f in fit_robot(robot, coarse=coarse) if f.body == "arm2")
+        assert enclosed(shapes, surface).all()
+        counts.append(len(shapes))
+    assert 1 < counts[0] <= COARSE[ARM].max_shapes < counts[1]
+
+
+@pytest.mark.slow  # starts processes
+def test_processes_do_not_change_the_fit():
+    robot = load_robot("ur5")
+    assert fit_robot(robot, coarse=True, jobs=2) == fit_robot(robot, coarse=True)
 
 
 def test_missing_meshes_are_named(tmp_path):
@@ -190,7 +267,7 @@ def test_both_files_or_neither(drafted, tmp_path, monkeypatch):
     def refuse(path, *arguments, **options):
         raise OutputError("disk full")
 
-    monkeypatch.setattr("tcs.model.robots.draft.whole_file", refuse)
+    monkeypatch.setattr("tcs.model.robots.draft_files.whole_file", refuse)
     with pytest.raises(OutputError, match="disk full"):
         write_draft(drafted[0], tmp_path / "mine.yaml")
     assert list(tmp_path.iterdir()) == []

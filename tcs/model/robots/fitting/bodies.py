@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -36,6 +37,12 @@ ARM = Target(protrusion=0.005, max_shapes=40)
 """Links that the arm joints move."""
 REST = Target(protrusion=0.008, max_shapes=40)
 """Base, torso and head: large and not convex."""
+COARSE = {
+    HAND: Target(protrusion=0.008, max_shapes=16),
+    ARM: Target(protrusion=0.012, max_shapes=12),
+    REST: Target(protrusion=0.02, max_shapes=12),
+}
+"""What replaces each of these for a quick draft."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +64,9 @@ def fit_robot(
     robot: RobotFile,
     on_progress: Callable[[int, int], None] | None = None,
     chosen: Mapping[str, Target | None] = MappingProxyType({}),
+    *,
+    coarse: bool = False,
+    jobs: int = 1,
 ) -> tuple[BodyFit, ...]:
     """Return primitives that enclose every triangle of a robot, body by body.
 
@@ -69,6 +79,8 @@ def fit_robot(
         on_progress: Called with the bodies done and all bodies.
         chosen: How closely some bodies are fitted if not as usual; None keeps the shapes that the
             primitives file has for a body.
+        coarse: Whether a few shapes that protrude farther do for all other bodies.
+        jobs: Number of processes; does not change the results.
 
     Raises:
         UnknownNameError: If `chosen` has a body that is not fitted, or one to keep without shapes.
@@ -82,27 +94,65 @@ def fit_robot(
         if body not in groups:
             raise UnknownNameError("body", body, groups, where=f"bodies to fit of '{robot.name}'")
     kept = _shapes_by_body(robot) if None in chosen.values() else {}
-    targets = _targets(robot, model, groups, chosen)
-    fits: dict[object, tuple[Fit, FloatArray, FloatArray]] = {}
-    results = []
-    for done, (body, members) in enumerate(groups.items()):
-        if on_progress is not None:
-            on_progress(done, len(groups))
-        own = _in_frame_of(model, body, members, triangles)
-        key = _shape_key(model, body) if len(members) == 1 else body
-        R, p = _key_frame(model, body)
-        if body in chosen and chosen[body] is None:
-            fit = _kept(robot, kept, body, own)
-        elif key not in fits:
-            target = targets.get(key, REST)
-            fit = _boxes_of_urdf(model, body, members, target) or fit_triangles(body, own, target)
-            fits[key] = fit, R, p
+    targets = _targets(robot, model, groups, chosen, coarse=coarse)
+    own = {body: _in_frame_of(model, body, m, triangles) for body, m in groups.items()}
+    keys = {
+        body: _shape_key(model, body) if len(members) == 1 else body
+        for body, members in groups.items()
+    }
+    first: dict[object, str] = {}
+    for body, key in keys.items():
+        if not (body in chosen and chosen[body] is None):
+            first.setdefault(key, body)
+    fits: dict[str, Fit] = {}
+    tasks: list[tuple[str, FloatArray, Target]] = []
+    for key, body in first.items():
+        target = targets.get(key, COARSE[REST] if coarse else REST)
+        boxes = _boxes_of_urdf(model, body, groups[body], target)
+        if boxes is None:
+            tasks.append((body, own[body], target))
         else:
-            fit = _transferred(fits[key], body, R, p)
+            fits[body] = boxes
+    fits |= _fitted(tasks, len(groups), on_progress, jobs)
+    results = []
+    for body, members in groups.items():
+        source = first.get(keys[body])
+        if body in chosen and chosen[body] is None:
+            fit = _kept(robot, kept, body, own[body])
+        elif source == body:
+            fit = fits[body]
+        else:
+            assert source is not None
+            known = (fits[source], *_key_frame(model, source))
+            fit = _transferred(known, body, *_key_frame(model, body))
         results.append(BodyFit(body=body, enclosed=tuple(members), fit=fit))
     if on_progress is not None:
         on_progress(len(groups), len(groups))
     return tuple(results)
+
+
+def _fitted(
+    tasks: list[tuple[str, FloatArray, Target]],
+    total: int,
+    on_progress: Callable[[int, int], None] | None,
+    jobs: int,
+) -> dict[str, Fit]:
+    """Return fits to triangles by body, the largest surfaces first."""
+    tasks = sorted(tasks, key=lambda task: -len(task[1]))
+    fits: dict[str, Fit] = {}
+    done = total - len(tasks)
+    if on_progress is not None:
+        on_progress(done, total)
+    calls = (delayed(_named_fit)(*task) for task in tasks)
+    for body, fit in Parallel(jobs, return_as="generator_unordered")(calls):
+        fits[body] = fit
+        if on_progress is not None:
+            on_progress(done + len(fits), total)
+    return fits
+
+
+def _named_fit(body: str, triangles: FloatArray, target: Target) -> tuple[str, Fit]:
+    return body, fit_triangles(body, triangles, target)
 
 
 def refit(robot: RobotFile, targets: Mapping[str, Target]) -> tuple[Primitive, ...]:
@@ -132,6 +182,8 @@ def _targets(
     model: Urdf,
     groups: Mapping[str, list[str]],
     chosen: Mapping[str, Target | None],
+    *,
+    coarse: bool,
 ) -> dict[object, Target]:
     """Return how closely bodies are fitted, by the key of their shape."""
     targets: dict[object, Target] = {}
@@ -141,6 +193,8 @@ def _targets(
         targets[key] = min(
             targets.get(key, REST), _target(robot, model, body), key=lambda t: t.protrusion
         )
+    if coarse:
+        targets = {key: COARSE[target] for key, target in targets.items()}
     return targets | {_shape_key(model, body): target for body, target in chosen.items() if target}
 
 

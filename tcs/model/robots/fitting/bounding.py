@@ -88,7 +88,7 @@ def tightest_orientation(points: FloatArray) -> FloatArray:
         return np.eye(3)
     best, best_volume = np.eye(3), math.inf
     normals = np.unique(np.round(hull.equations[:, :3], 6), axis=0)
-    frames = np.stack([_frame_with_z(normal / np.linalg.norm(normal)) for normal in normals])
+    frames = _frames_with_z(normals / np.linalg.norm(normals, axis=1, keepdims=True))
     for frame in _promising(points[hull.vertices], frames):
         seen = points @ frame
         angle, area = _tightest_rectangle(seen[:, :2])
@@ -172,7 +172,7 @@ def enclose_axis(body: str, first: FloatArray, last: FloatArray, radius: float) 
     """
     length = float(np.linalg.norm(last - first))
     along = (last - first) / length if length else np.eye(3)[2]
-    w, x, y, z = _rounded_quaternion(_frame_with_z(along))
+    w, x, y, z = _rounded_quaternion(_frames_with_z(along[None])[0])
     centre = np.round((first + last) / 2, _DECIMALS) + 0.0
     return Primitive(
         body=body,
@@ -222,11 +222,11 @@ def _capsule_volume(radius: float, length: float) -> float:
     return math.pi * radius**2 * (length + 4 / 3 * radius)
 
 
-def _frame_with_z(z: FloatArray) -> FloatArray:
-    """Return a right-handed frame with a given z axis, shape (3, 3)."""
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)
+def _frames_with_z(z: FloatArray) -> FloatArray:
+    """Return right-handed frames with given z axes, shape (n, 3, 3), for axes of shape (n, 3)."""
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z), axis=1)], z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
 
 
 def _promising(points: FloatArray, frames: FloatArray) -> FloatArray:

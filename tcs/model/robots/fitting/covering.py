@@ -220,8 +220,11 @@ class _Candidates:
 
     def chosen(self, most: int) -> list[Primitive]:
         """Return the shapes that cover most, each what those before it leave."""
-        left = np.ones(self._covered.shape[1], np.bool_)
-        gain = self._covered.astype(np.float32) @ self._weights.astype(np.float32)
+        items, weights = self._covered.shape[1], self._weights.astype(np.float32)
+        left = np.ones(items, np.bool_)
+        gain = self._covered.astype(np.float32) @ weights
+        # Rows of items: what a shape covers is subtracted from the others' gain.
+        by_item = self._covered.T.copy()
         shapes: list[Primitive] = []
         while len(shapes) < most and left[: self._pieces].mean() > 1 - _COVERED:
             best = int(np.argmax(gain))
@@ -230,7 +233,7 @@ class _Candidates:
                 break
             shapes.append(self._shape(best))
             left &= ~new
-            gain -= self._covered[:, new] @ self._weights[new].astype(np.float32)
+            gain -= weights[new] @ by_item[new].astype(np.float32)
         return shapes
 
     def _shape(self, index: int) -> Primitive:
@@ -244,11 +247,17 @@ class _Candidates:
     def _in_boxes(self, R: FloatArray, ends: FloatArray) -> BoolArray:
         """Return what boxes with given axes and ends contain, shape (boxes, items)."""
         seen, ends = (self._points @ R).astype(np.float32), ends.astype(np.float32)
-        found = [
-            self._items(((seen >= low) & (seen <= high)).all(axis=1))
-            for low, high in zip(ends[:, 0], ends[:, 1], strict=True)
-        ]
-        return np.array(found).reshape(-1, len(self._weights))
+        corners = 3 * self._pieces
+        a, b, c = (seen[k:corners:3] for k in range(3))
+        # By coordinate: NumPy is slow along an axis of three.
+        low = np.concatenate([np.minimum(np.minimum(a, b), c), seen[corners:]]).T.copy()
+        high = np.concatenate([np.maximum(np.maximum(a, b), c), seen[corners:]]).T.copy()
+        found = np.ones((len(ends), len(self._weights)), np.bool_)
+        for within, (least, greatest) in zip(found, ends, strict=True):
+            for k in range(3):
+                within &= low[k] >= least[k]
+                within &= high[k] <= greatest[k]
+        return found
 
     def _in_capsules(self) -> BoolArray:
         found = []

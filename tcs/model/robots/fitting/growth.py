@@ -49,16 +49,10 @@ def boxes_in(
     seen, border = hull_corners(points) @ R, _BORDER * solid.pitch
     low, high = seen.min(axis=0) - border, seen.max(axis=0) + border
     count = np.ceil((high - low) / solid.pitch).astype(np.int64) + 1
-    ticks = [
-        (low[k] + solid.pitch * np.arange(count[k]))[:, None] * R[:, k] / solid.pitch
-        for k in range(3)
-    ]
-    start = -solid.origin / solid.pitch
-    index = (
-        ticks[0][:, None, None] + ticks[1][None, :, None] + (ticks[2] + start)[None, None]
-    ).astype(np.float32)
-    outside = ndimage.map_coordinates(
-        solid.outside, np.moveaxis(index, 3, 0), order=1, mode="nearest"
+    # Sampling point k of the new grid is low @ R.T + pitch * R @ k, in cells of the solid's grid.
+    start = (R @ low - solid.origin) / solid.pitch
+    outside = ndimage.affine_transform(
+        solid.outside, R, start, tuple(count), order=1, mode="nearest"
     )
     free = outside <= protrusion
     cells = np.clip(np.rint((seeds @ R - low) / solid.pitch).astype(np.int64), 0, count - 1)

@@ -52,12 +52,12 @@ def solid_of(triangles: FloatArray, pitch: float, reach: float) -> Solid:
         pitch: Distance of the points of the grid [m].
         reach: Distance from the surface that the grid must cover [m].
     """
-    points = np.unique(np.round(cut(triangles, pitch).reshape(-1, 3) / pitch), axis=0)
+    points = np.rint(cut(triangles, pitch).reshape(-1, 3) / pitch).astype(np.int64)
     border = int(np.ceil((CLOSING + reach) / pitch)) + _BORDER
     first = points.min(axis=0) - border
-    size = (points.max(axis=0) - first).astype(np.int64) + border + 1
+    size = points.max(axis=0) - first + border + 1
     surface = np.zeros(size, np.bool_)
-    surface[tuple((points - first).astype(np.int64).T)] = True
+    surface[tuple((points - first).T)] = True
     fits = ndimage.distance_transform_edt(~surface) * pitch > CLOSING
     parts, _ = ndimage.label(fits)
     reached = ndimage.distance_transform_edt(parts != parts[0, 0, 0]) * pitch <= CLOSING

@@ -72,20 +72,17 @@ def blocked_by_shapes(robot: RobotFile, *, postures: int = 300, seed: int = 0) -
     model = model_with_extras(robot)
     triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
-    moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
     limits, off = robot.joint_limits(), {frozenset(pair) for pair in robot.disabled_pairs}
     narrowed = {frozenset(p) for g in robot.disabled_groups if g.ranges for p in g.pairs}
     plant = SelfCollision(robot)
+    plant.ignore_unscored(model, robot.arm_joints)
+    plant.ignore(pair for pair in robot.disabled_pairs if frozenset(pair) not in narrowed)
     free = blocked = 0
     pairs = Counter[BodyPair]()
     for positions in drawn_positions(robot, postures, seed):
         is_within = all(limits[n][0] <= positions[n] <= limits[n][1] for n in robot.arm_joints)
         exempt = off if is_within else off - narrowed
-        touching = [
-            pair
-            for pair in plant.touching(positions)
-            if moved & set(pair) and not set(pair) <= hand and frozenset(pair) not in exempt
-        ]
+        touching = [p for p in plant.touching(positions) if frozenset(p) not in exempt]
         if any(surfaces.distance(pair, positions) < SPACING for pair in touching):
             continue
         free += 1

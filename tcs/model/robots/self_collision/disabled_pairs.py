@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,35 +58,67 @@ def propose_disabled_pairs(
     robot = robot.without_ranges
     hard, soft = robot.with_choices(limits="hard"), robot.with_choices(limits="soft")
     model = model_with_extras(robot)
-    built = robot.model().links.keys()
-    plant = SelfCollision(robot)
-    sampled = sample_positions(hard, postures, seed)
-    counts = Counter(pair for posture in sampled for pair in plant.touching(posture))
     moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
+    neighbours = neighbouring_pairs(robot)
+    touched, always = touching_pairs(
+        robot, moved, neighbours, sample_positions(hard, postures, seed)
+    )
     triangles = carried_triangles(robot, model)
     surfaces = SurfaceDistance(model, triangles)
     fine = SurfaceDistance(model, triangles, scale=FINER, rough=surfaces)
     found = _Found()
-    for pair, count in sorted(counts.items()):
-        if not moved & set(pair) or not all(surfaces.has(body) for body in pair):
+    for pair in sorted(touched):
+        if not all(surfaces.has(body) for body in pair):
             continue
-        joints = joints_between(model, *pair)
-        few = len(free_joints(model, joints)) <= _MOST_JOINTS
-        if len(joints) == 1 and built >= set(pair):
+        if pair in neighbours:
             found.neighbours.append(pair)
             continue
         if set(pair) <= hand:
             # Scoring does not check pairs within the hand.
             continue
+        few = len(free_joints(model, joints_between(model, *pair))) <= _MOST_JOINTS
         for limits, apart in ((hard, found.apart_hard), (soft, found.apart_soft)):
             gap = _closest_approach((surfaces, fine), pair, limits, seed) if few else 0.0
             if gap >= MEETING:
                 apart[pair] = gap
                 break
         else:
-            if count == postures:
+            if pair in always:
                 found.always.append(pair)
     return found.groups(postures)
+
+
+def neighbouring_pairs(robot: RobotFile) -> set[BodyPair]:
+    """Return the pairs of links of the URDF that one joint connects, each sorted by name."""
+    model = robot.model()
+    bodies = sorted({shape.body for shape in robot.load_primitives()} & model.links.keys())
+    pairs = itertools.combinations(bodies, 2)
+    return {pair for pair in pairs if len(joints_between(model, *pair)) == 1}
+
+
+def touching_pairs(
+    robot: RobotFile,
+    moved: frozenset[str],
+    neighbours: set[BodyPair],
+    postures: list[dict[str, float]],
+) -> tuple[set[BodyPair], set[BodyPair]]:
+    """Return the pairs with a moved body that touch in any posture, and those that do in all.
+
+    The latter lack neighbours.
+    """
+    plant = SelfCollision(robot)
+    plant.ignore_within(plant.bodies - moved)
+    touched: set[BodyPair] = set()
+    always: set[BodyPair] | None = None
+    for posture in postures:
+        now = plant.touching(posture)
+        still = (now if always is None else always & now) - neighbours
+        # Nothing more is to be learned of neighbours, and of a pair that touches only here or
+        # only before. Their contacts would take most of the time.
+        plant.ignore((now | (always or set())) - still)
+        touched |= now
+        always = set(still)
+    return touched, always or set()
 
 
 def renewed_groups(robot: RobotFile) -> tuple[DisabledGroup, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +74,9 @@ class SelfCollision:
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._state = plant.GetMyMutableContextFromRoot(self._context)
+        self._filter = scene_graph.collision_filter_manager(
+            scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
         self._query_port = scene_graph.get_query_output_port()
         self._query_context = scene_graph.GetMyContextFromRoot(self._context)
 
@@ -92,6 +95,37 @@ class SelfCollision:
         self._plant.SetPositions(self._state, q)
         contacts = self._query_port.Eval(self._query_context).ComputePointPairPenetration()
         return frozenset(_pair(self._bodies[c.id_A], self._bodies[c.id_B]) for c in contacts)
+
+    def ignore(self, pairs: Iterable[BodyPair]) -> None:
+        """Leave out pairs of bodies from now on: those that always touch take most time."""
+        declaration = CollisionFilterDeclaration()
+        for first, second in pairs:
+            declaration.ExcludeBetween(self._geometries(first), self._geometries(second))
+        self._filter.Apply(declaration)
+
+    def ignore_within(self, bodies: Iterable[str]) -> None:
+        """Leave out all pairs of given bodies from now on."""
+        within = CollisionFilterDeclaration().ExcludeWithin(self._geometries(*bodies))
+        self._filter.Apply(within)
+
+    def ignore_unscored(self, model: Urdf, arm_joints: tuple[str, ...]) -> None:
+        """Leave out the pairs that scoring does not check: without the arm, and within the hand.
+
+        Args:
+            model: The robot with its extra bodies.
+            arm_joints: The scored arm, from base to tool.
+        """
+        moved, hand = (model.links_moved_by(arm_joints[i]) for i in (0, -1))
+        self.ignore_within(self.bodies - moved)
+        self.ignore_within(hand)
+
+    @property
+    def bodies(self) -> frozenset[str]:
+        """Names of the bodies that have shapes."""
+        return frozenset(self._bodies.values())
+
+    def _geometries(self, *bodies: str) -> GeometrySet:
+        return GeometrySet([g for g, body in self._bodies.items() if body in bodies])
 
 
 class _Adder:

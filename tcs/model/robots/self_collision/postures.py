@@ -25,10 +25,10 @@ def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
     Returns:
         Positions by joint, empty if all joints may be at 0; None if every candidate collides.
     """
-    model, limits = model_with_extras(robot), robot.joint_limits()
-    moved, hand = (model.links_moved_by(robot.arm_joints[i]) for i in (0, -1))
-    off = {frozenset(pair) for pair in robot.disabled_pairs}
+    limits = robot.joint_limits()
     plant, others = SelfCollision(robot), robot.joint_positions()
+    plant.ignore_unscored(model_with_extras(robot), robot.arm_joints)
+    plant.ignore(robot.disabled_pairs)
     bounded = {name: tuple(np.clip(limits[name], -np.pi, np.pi)) for name in robot.arm_joints}
     middle = {name: float(np.mean(pair)) for name, pair in bounded.items()}
     draws = (
@@ -38,9 +38,7 @@ def free_posture(robot: RobotFile, seed: int = 0) -> dict[str, float] | None:
     for drawn in ({}, middle, *draws):
         # Rounded for the file, and still within the limits.
         arm = {name: float(np.clip(round(q, 4), *limits[name])) for name, q in drawn.items()}
-        touching = plant.touching(robot.with_mimics({**others, **arm}))
-        checked = (pair for pair in touching if moved & set(pair) and not set(pair) <= hand)
-        if not any(frozenset(pair) not in off for pair in checked):
+        if not plant.touching(robot.with_mimics({**others, **arm})):
             return arm
     return None
 

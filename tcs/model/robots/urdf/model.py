@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -83,6 +83,8 @@ class Geometry:
     rpy: Vector
     """Roll, pitch, yaw about the link's fixed axes [rad]."""
     rgba: tuple[float, float, float, float] | None
+    is_surface: bool = True
+    """Whether it is part of the surface that may touch; if not, it is only drawn."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,25 @@ class Urdf:
         joint = replace(fixed_joint(link, self.root, xyz, rpy), name=f"{link}_mount")
         links = {link: (), **self.links}
         return Urdf(path=self.path, links=links, joints={joint.name: joint, **self.joints})
+
+    def with_surfaces(self, *, collision_only: bool, ignored: Collection[str]) -> Urdf:
+        """Return the tree with fewer surfaces; what is left out is still drawn.
+
+        Args:
+            collision_only: Whether the collision geometry of a link, if there is any, is its whole
+                surface.
+            ignored: Links without a surface.
+        """
+
+        def kept(link: str, geometry: Geometry) -> bool:
+            replaced = collision_only and any(g.role == "collision" for g in self.links[link])
+            return link not in ignored and not (replaced and geometry.role == "visual")
+
+        links = {
+            link: tuple(replace(g, is_surface=g.is_surface and kept(link, g)) for g in geometries)
+            for link, geometries in self.links.items()
+        }
+        return Urdf(path=self.path, links=links, joints=self.joints)
 
     def joint(self, name: str, where: str) -> Joint:
         """Return a joint by name.

@@ -52,8 +52,8 @@ def body_triangles(model: Urdf) -> dict[str, FloatArray]:
 
 
 def surface_geometries(model: Urdf, body: str) -> tuple[Geometry, ...]:
-    """Return the geometries of a body that are part of the robot: those that mark no frame."""
-    return tuple(geometry for geometry in model.links[body] if not _is_marker(geometry))
+    """Return the geometries of a body that are its surface: those that mark no frame."""
+    return tuple(g for g in model.links[body] if g.is_surface and not _is_marker(g))
 
 
 def geometry_triangles(geometry: Geometry) -> FloatArray:

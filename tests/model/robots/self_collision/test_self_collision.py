@@ -5,6 +5,7 @@ import pytest
 
 from tcs.model.robots import load_robot
 from tcs.model.robots.draft import draft_robot
+from tcs.model.robots.draft_files import write_draft
 from tcs.model.robots.robot_file import DisabledGroup, RobotFile
 from tcs.model.robots.self_collision import (
     SelfCollision,
@@ -20,6 +21,7 @@ from tcs.model.robots.self_collision.clearance import (
     free_joints,
     joints_between,
 )
+from tcs.model.robots.self_collision.disabled_pairs import neighbouring_pairs, touching_pairs
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 from tests.model.robots.made_up import urdf
 
@@ -34,6 +36,30 @@ def arm_bodies(pr2):
     model = pr2.model()
     first = model.joints[pr2.arm_joints[0]].child
     return {body for body in model.links if model.chain(first, body) is not None}
+
+
+def test_leaving_out_settled_pairs_changes_no_verdict(tmp_path):
+    """What the search for pairs sees is what all pairs at all postures show."""
+    file = tmp_path / "made_up.urdf"
+    file.write_text(urdf())
+    draft = draft_robot(file, "tool")
+    write_draft(draft, tmp_path / "mine.yaml")
+    robot = load_robot(tmp_path / "mine.yaml")
+    moved = robot.model().links_moved_by(robot.arm_joints[0])
+    neighbours = neighbouring_pairs(robot)
+    drawn = sample_positions(robot, 200, seed=5)
+    touched, always = touching_pairs(robot, moved, neighbours, drawn)
+    plant = SelfCollision(robot)
+    found = [{p for p in plant.touching(q) if moved & set(p)} for q in drawn]
+    assert touched == set.union(*found)
+    assert always == set.intersection(*found) - neighbours
+    assert len(touched - neighbours) >= 3
+    assert ("arm1", "arm2") in neighbours
+    assert ("arm1", "arm3") not in neighbours
+    plant.ignore_unscored(robot.model(), robot.arm_joints)
+    hand = robot.model().links_moved_by(robot.arm_joints[-1])
+    scored = [{p for p in pairs if not set(p) <= hand} for pairs in found]
+    assert [set(plant.touching(q)) for q in drawn] == scored
 
 
 def postures(pr2, torso, count, seed):
