@@ -97,6 +97,9 @@ class SceneArrays(NamedTuple):
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray
     """Goal positions in W [m], shape (environment states, goals, 3)."""
+    freedom: FloatArray = np.empty((0, 9))
+    """What is free about each goal, in the columns of `tcs.kernel.freedom.forms`, shape
+    (goals, 9); no rows if every goal is a single pose."""
 
 
 class GridArrays(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, move
 from tcs.kernel.contacts import Workspace
@@ -39,9 +40,16 @@ def place_base(problem: Problem, work: Workspace, place: int) -> int:
 
 @inner
 def goal_in_arm_base(problem: Problem, work: Workspace, state: int, torso: int, g: int) -> None:
-    """Fill the pose of a goal in the arm base A, `work.R_AG` and `work.p_AG`."""
+    """Fill the nominal pose of a goal in the arm base A, `work.R_AG` and `work.p_AG`."""
+    pose_in_arm_base(problem, work, torso, problem.goal_R[state, g], problem.goal_p[state, g])
+
+
+@inner
+def pose_in_arm_base(
+    problem: Problem, work: Workspace, torso: int, R_WG: FloatArray, p_WG: FloatArray
+) -> None:
+    """Fill the pose in the arm base A of a pose in W, `work.R_AG` and `work.p_AG`."""
     A, a = problem.base_R[torso], problem.base_p[torso]
-    R_WG, p_WG = problem.goal_R[state, g], problem.goal_p[state, g]
     R_BW, p_BW, R_AG, p_AG = work.R_BW, work.p_BW, work.R_AG, work.p_AG
     for r in range(3):
         p_AG[r] = 0.0

@@ -123,7 +123,16 @@ def base_contact(problem: Problem, work: Workspace, torso: int, mount: int) -> i
 @inner
 def gripper_environment_contact(problem: Problem, work: Workspace, state: int, goal: int) -> int:
     """Return the first contact of the gripper with the environment, the tool being at a goal."""
-    _place_gripper(problem, work, problem.goal_R[state, goal], problem.goal_p[state, goal])
+    R, p = problem.goal_R[state, goal], problem.goal_p[state, goal]
+    return gripper_contact_at(problem, work, state, R, p)
+
+
+@inner
+def gripper_contact_at(
+    problem: Problem, work: Workspace, state: int, R: FloatArray, p: FloatArray
+) -> int:
+    """Return the first contact of the gripper with the environment, the tool at a pose in W."""
+    _place_gripper(problem, work, R, p)
     arm, environment, gaps = work.arm, problem.environment[state], problem.gap_environment
     box = len(problem.link_body)
     for g in range(problem.gripper_groups):

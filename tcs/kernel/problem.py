@@ -19,6 +19,7 @@ from tcs.kernel.arrays import (
 )
 from tcs.kernel.collide import BOUND, CENTRE, pack
 from tcs.kernel.dexterity import DEFAULT_MEASURE, Dexterity, dexterity
+from tcs.kernel.freedom.forms import FreeGoals, free_goals
 from tcs.kernel.groups import first_rows, with_boxes, with_group_rows
 
 UNCHECKED = -1.0
@@ -102,6 +103,8 @@ class Problem(NamedTuple):
     """Goal orientations in W, shape (environment states, goals, 3, 3)."""
     goal_p: FloatArray
     """Goal positions in W [m], shape (environment states, goals, 3)."""
+    freedom: FreeGoals
+    """What is free about the goals, which are their nominal poses."""
     base_x: FloatArray
     """As in `GridArrays`, also the fields below."""
     base_y: FloatArray
@@ -176,6 +179,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         arm_radius=_arm_radius(scene.chain, links[0], frame) + widest,
         goal_R=_own(scene.goal_R),
         goal_p=_own(scene.goal_p),
+        freedom=free_goals(scene.freedom, scene.chain),
         base_x=_own(grid.base_x),
         base_y=_own(grid.base_y),
         base_yaw=_own(grid.base_yaw),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.arrays import BoolArray, FloatArray, IntArray
 from tcs.kernel.base_pose import environment_in_arm_base, goal_in_arm_base, place_base
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.contacts import (
@@ -14,10 +14,13 @@ from tcs.kernel.contacts import (
     Workspace,
     base_contact,
     gripper_body_contact,
+    gripper_contact_at,
     gripper_environment_contact,
     new_workspace,
 )
 from tcs.kernel.dexterity.measures import measure_at, rounded_inward
+from tcs.kernel.freedom.forms import pose_of
+from tcs.kernel.freedom.search import score_free
 from tcs.kernel.problem import Problem
 from tcs.kernel.scores import (
     BODY_BLOCKED,
@@ -34,9 +37,11 @@ from tcs.kernel.views import unowned
 def gripper_contacts(problem: Problem) -> IntArray:
     """Return the contact codes of the gripper with the environment, shape (states, goals).
 
-    With the tool at a goal they are independent of the base pose.
+    With the tool at a goal they are independent of the base pose. If goals are free, there is one
+    code for each of their poses, in the order of `Problem.freedom`: shape (states, poses).
     """
-    codes = np.empty(problem.goal_p.shape[:2], np.int64)
+    states, poses = len(problem.goal_p), len(problem.freedom.u) or problem.goal_p.shape[1]
+    codes = np.empty((states, poses), np.int64)
     _gripper_contacts(problem, new_workspace(problem), codes)
     return codes
 
@@ -44,9 +49,21 @@ def gripper_contacts(problem: Problem) -> IntArray:
 @jit
 def _gripper_contacts(owned_problem: Problem, owned_work: Workspace, codes: IntArray) -> None:
     problem, work = unowned(owned_problem), unowned(owned_work)
+    free, R, p = problem.freedom, np.empty((3, 3)), np.empty(3)
     for s in range(codes.shape[0]):
-        for g in range(codes.shape[1]):
-            codes[s, g] = gripper_environment_contact(problem, work, s, g)
+        for g in range(problem.goal_p.shape[1]):
+            if not len(free.first):
+                codes[s, g] = gripper_environment_contact(problem, work, s, g)
+                continue
+            for n in range(free.first[g], free.first[g + 1]):
+                pose_of(free.form[g], free.u[n], problem.goal_R[s, g], problem.goal_p[s, g], R, p)
+                codes[s, n] = gripper_contact_at(problem, work, s, R, p)
+
+
+def blocked_grippers(problem: Problem) -> BoolArray:
+    """Return whether the gripper is in contact at every pose of a goal, shape (states, goals)."""
+    blocked, first = gripper_contacts(problem) != NO_CONTACT, problem.freedom.first
+    return np.logical_and.reduceat(blocked, first[:-1], axis=1) if first.size else blocked
 
 
 def score_slice(
@@ -101,6 +118,15 @@ def _score_slice(
         environment_placed = False
         for g in range(problem.goal_p.shape[1]):
             scores.contact[row, g] = NO_CONTACT
+            if len(problem.freedom.first):
+                if not environment_placed:
+                    environment_in_arm_base(problem, work, torso)
+                    environment_placed = True
+                reason, code = score_free(problem, work, solver, grippers, state, torso, g)
+                scores.reason[row, g], scores.contact[row, g] = reason, code
+                if reason == REACHED:
+                    write_winner(problem, solver.best, rounded, scores, row, g)
+                continue
             if grippers[state, g] != NO_CONTACT:
                 scores.reason[row, g] = GRIPPER_BLOCKED_BY_ENVIRONMENT
                 scores.contact[row, g] = grippers[state, g]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tcs.errors import TaskError
 from tcs.kernel.arrays import BoolArray, FloatArray
 from tcs.kernel.motion.connect import Trees, new_trees
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
@@ -77,8 +78,14 @@ class StopGrid:
 
         Raises:
             RobotError: If a velocity limit is unknown, or the arm does not have seven joints.
+            TaskError: If a goal is free.
         """
         job.spec.robot.require_seven_joints("planning motions")
+        if job.task.has_freedom:
+            raise TaskError(
+                f"task '{job.task.name}' has goals with freedom, but motions lead to goals of a "
+                "single pose. Leave 'free' out of the task to plan."
+            )
         velocity, acceleration = job.spec.robot.arm_rates()
         if job.task.keep_out:
             lowered = with_keep_out(lowered, job.task)

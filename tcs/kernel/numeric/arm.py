@@ -20,6 +20,7 @@ from tcs.kernel.arrays import Chain, FloatArray, IntArray
 from tcs.kernel.cache import jit
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.lines import axis_distance
+from tcs.kernel.low_discrepancy import spread
 from tcs.kernel.problem import Problem
 
 SAMPLES = 1 << 18
@@ -118,19 +119,6 @@ def joint_ranges(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, Floa
     """Return the limits [rad], -pi and pi for a joint whose range is a full turn or more."""
     limited = upper - lower < 2.0 * np.pi
     return np.where(limited, lower, -np.pi), np.where(limited, upper, np.pi)
-
-
-def spread(count: int, dimensions: int) -> FloatArray:
-    """Return a low-discrepancy sequence in the unit cube, shape (count, dimensions).
-
-    The sequence is deterministic: multiples, modulo 1, of powers of the root of x^(d+1) = x + 1,
-    Roberts' generalised golden ratio.
-    """
-    root = 2.0
-    for _ in range(64):
-        root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    steps = root ** -np.arange(1.0, dimensions + 1)
-    return np.remainder(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
 
 
 def _slides(R: FloatArray, p: FloatArray) -> FloatArray:

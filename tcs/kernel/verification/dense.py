@@ -23,6 +23,7 @@ from tcs.kernel.contacts import (
 )
 from tcs.kernel.dexterity.measures import measure_at
 from tcs.kernel.problem import Problem
+from tcs.kernel.verification.free_scans import free_scans
 from tcs.kernel.verification.numeric_dense import STARTS, numeric_dense_scans
 from tcs.kernel.verification.six_joint_scans import six_joint_scans
 from tcs.kernel.views import unowned
@@ -65,7 +66,8 @@ def dense_scans(
     With a closed form, every sample of the free joint is solved on every branch, and more are added
     where a joint moves farther than COARSE from one to the next. Solutions within the joint limits
     are checked for contacts in descending order of their measure; the best one is not refined.
-    Without a closed form, `numeric_dense_scans` is used; for six joints, `six_joint_scans`.
+    Without a closed form, `numeric_dense_scans` is used; for six joints, `six_joint_scans`. A goal
+    with freedom is scanned at many of its poses (`free_scans`).
     Contacts of base and gripper with the environment are not checked. The GIL is released.
 
     Args:
@@ -76,6 +78,8 @@ def dense_scans(
             a closed form.
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
+    if problem.freedom.first.size:
+        return free_scans(problem, pairs, samples, joints)
     if problem.joints == 6:
         return six_joint_scans(problem, pairs, joints)
     if is_outside(problem.arm):

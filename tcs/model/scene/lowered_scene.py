@@ -61,6 +61,8 @@ def _flat(item: object) -> Iterator[object]:
     if isinstance(item, Chain) and item.joints == 7:
         # Scenes of seven joints keep the digests that files were written with.
         item = item[:-1]
+    if isinstance(item, SceneArrays) and not len(item.freedom):
+        item = item[:-1]
     if isinstance(item, tuple):
         for member in item:
             yield from _flat(member)

@@ -12,6 +12,7 @@ from pydrake.multibody.tree import Frame
 
 from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays, Shapes
+from tcs.kernel.freedom.forms import COLUMNS
 from tcs.model.grid import Grid
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
@@ -88,6 +89,7 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         self_margin=scene.spec.robot.self_margin,
         goal_R=_rotations(goal_matrices),
         goal_p=_origins(goal_matrices),
+        freedom=_freedom(task),
     )
     return LoweredScene(
         arrays=read_only(arrays),
@@ -104,6 +106,14 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         environment_bodies=environment_bodies,
         goals=() if task is None else tuple(f"{task.name} {i}" for i in range(len(task.goals))),
     )
+
+
+def _freedom(task: Task | None) -> FloatArray:
+    """Return what is free about each goal of a task, without rows if nothing is."""
+    if task is None or not task.has_freedom:
+        return np.empty((0, COLUMNS))
+    none = np.zeros(COLUMNS)
+    return np.array([none if goal.free is None else goal.free.row() for goal in task.goals])
 
 
 def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:

@@ -6,6 +6,16 @@ In: task files. Out: checked goals with weights, allowed contacts, and changes t
 from __future__ import annotations
 
 from tcs.model.tasks.files import load_task, task_names
+from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task, ToolLine
 
-__all__ = ["TOOL_SPEED", "Goal", "KeepOut", "Task", "ToolLine", "load_task", "task_names"]
+__all__ = [
+    "TOOL_SPEED",
+    "Freedom",
+    "Goal",
+    "KeepOut",
+    "Task",
+    "ToolLine",
+    "load_task",
+    "task_names",
+]

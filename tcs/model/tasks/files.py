@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -10,6 +12,7 @@ from pydantic import ConfigDict, Field
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles
+from tcs.model.tasks.freedom import Freedom
 from tcs.model.tasks.task import DEFAULT_APPROACH, Goal, KeepOut, Task, ToolLine
 
 TASKS = DataFiles("task", "tasks/*/*.yaml")
@@ -28,6 +31,30 @@ class LineEntry(_Entry):
     distance: float
 
 
+class ConeEntry(_Entry):
+    """An axis that may tilt by an angle in any direction."""
+
+    axis: list[float]
+    half_angle_deg: float
+
+
+class SymmetryEntry(_Entry):
+    """An axis about which several angles are equivalent."""
+
+    axis: list[float]
+    fold: int
+
+
+class FreeEntry(_Entry):
+    """What is free about a goal; the axes are those of the tool frame at the goal."""
+
+    rotation_about: list[float] | None = None
+    cone: ConeEntry | None = None
+    symmetry: SymmetryEntry | None = None
+    orientation: bool = False
+    position: list[float] | None = None
+
+
 class GoalEntry(_Entry):
     """One goal of a task file."""
 
@@ -36,6 +63,7 @@ class GoalEntry(_Entry):
     quaternion_wxyz: list[float]
     weight: float = 1.0
     name: str = ""
+    free: Literal["orientation", "nothing"] | FreeEntry | None = None
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
 
@@ -65,6 +93,7 @@ class TaskFile(_Entry):
     environments: list[str]
     goals: list[GoalEntry]
     tool: str = ""
+    free: Literal["orientation", "nothing"] | FreeEntry | None = None
     approach: LineEntry | None = None
     retreat: LineEntry | None = None
     keep_out: list[KeepOutEntry] = Field(default_factory=list)
@@ -143,9 +172,63 @@ def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
         quaternion=np.array(entry.quaternion_wxyz, dtype=np.float64),
         weight=entry.weight,
         name=entry.name,
+        free=_freedom(entry.free if entry.free is not None else task.free),
         approach=approach,
         retreat=retreat,
     )
+
+
+def _freedom(entry: str | FreeEntry | None) -> Freedom | None:
+    """Return what is free about a goal, None for nothing.
+
+    Raises:
+        TaskError: If a value is invalid, or two of them contradict each other.
+    """
+    if entry is None or entry == "nothing":
+        return None
+    try:
+        if not isinstance(entry, FreeEntry):
+            return Freedom.of_orientation()
+        box = _three(entry.position or [0.0, 0.0, 0.0], "position")
+        turning = [entry.rotation_about, entry.cone, entry.symmetry]
+        if entry.orientation:
+            if any(part is not None for part in turning):
+                raise TaskError(
+                    "'orientation' frees every rotation. Leave the other rotations out."
+                )
+            return Freedom.of_orientation(box)
+        if entry.rotation_about is not None and entry.symmetry is not None:
+            raise TaskError("'rotation_about' and 'symmetry' exclude each other. Keep one of them.")
+        axes = [part if isinstance(part, list) else part.axis for part in turning if part]
+        named = [_three(axis, "axis") for axis in axes]
+        if any(axis != named[0] for axis in named[1:]):
+            raise TaskError("the axes of 'cone', 'rotation_about' and 'symmetry' must be the same.")
+        if entry.cone is not None and not 0.0 < entry.cone.half_angle_deg < 180.0:
+            raise TaskError(
+                f"field 'cone.half_angle_deg' is {entry.cone.half_angle_deg:g}, but must be above "
+                "0 and below 180."
+            )
+        if entry.symmetry is not None and entry.symmetry.fold < 2:
+            raise TaskError(
+                f"field 'symmetry.fold' is {entry.symmetry.fold}, but must be 2 or more."
+            )
+        return Freedom(
+            axis=named[0] if named else (1.0, 0.0, 0.0),
+            rotates=entry.rotation_about is not None,
+            fold=1 if entry.symmetry is None else entry.symmetry.fold,
+            tilt=0.0 if entry.cone is None else math.radians(entry.cone.half_angle_deg),
+            box=box,
+        )
+    except TaskError as error:
+        raise TaskError(f"field 'free': {error}") from None
+
+
+def _three(numbers: list[float], field: str) -> tuple[float, float, float]:
+    """Return three numbers."""
+    if len(numbers) != 3:
+        raise TaskError(f"'{field}' is {numbers}, but must be [x, y, z].")
+    x, y, z = numbers
+    return x, y, z
 
 
 def _keep_out(number: int, entry: KeepOutEntry) -> KeepOut:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS, SIZE, WEIGHT
+from tcs.model.tasks.freedom import Freedom
 
 UNIT_TOLERANCE = 1e-5
 """Tolerance of a quaternion's length: six printed digits round by less than this."""
@@ -134,6 +135,8 @@ class Goal:
     """Straight motion that begins at the goal."""
     name: str = ""
     """Where the goal is, as people say it, e.g. "left cheek"; "" for no name."""
+    free: Freedom | None = None
+    """Tool poses that serve as well as the nominal one, None for none."""
 
     def __post_init__(self) -> None:
         """Check each value, normalise the quaternion, and make the arrays read-only.
@@ -180,7 +183,7 @@ class Goal:
 
     def _key(self) -> tuple[object, ...]:
         position, quaternion = self.position.tolist(), self.quaternion.tolist()
-        others = (self.weight, self.approach, self.retreat, self.name)
+        others = (self.weight, self.approach, self.retreat, self.name, self.free)
         return (self.body_frame, *position, *quaternion, *others)
 
 
@@ -243,6 +246,11 @@ class Task:
         """Weight of each goal, summing to 1, shape (goals,)."""
         raw = np.array([goal.weight for goal in self.goals], dtype=np.float64)
         return np.asarray(raw / raw.sum(), dtype=np.float64)
+
+    @property
+    def has_freedom(self) -> bool:
+        """Whether a goal is free."""
+        return any(goal.free is not None for goal in self.goals)
 
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""

@@ -36,7 +36,8 @@ def report_explanation(result: Mapping[str, Any]) -> None:
     out = results_console()
     frame = f", on {result['body_frame']}" if result["body_frame"] else ""
     goal = goal_text(result["goal"], result["goal_name"])
-    out.print(f"Goal {goal} of {result['task']} in {result['environment']}{frame}")
+    free = f" ({result['goal_free']})" if "goal_free" in result else ""
+    out.print(f"Goal {goal} of {result['task']} in {result['environment']}{frame}{free}")
     if result["observed"]:
         error = "".join(
             f"; {deviation_text(name, value)}" for name, value in result["observed_error"].items()

@@ -48,8 +48,9 @@ def goals_text(goals: Sequence[int], names: Sequence[str] = ()) -> str:
 
 
 def goal_place(goal: Goal) -> str:
-    """Return where a goal is: its name, or its body frame in words."""
-    return goal.name or frame_name(goal.body_frame)
+    """Return where a goal is: its name, or its body frame in words; and what is free about it."""
+    place = goal.name or frame_name(goal.body_frame)
+    return place if goal.free is None else f"{place} ({goal.free})"
 
 
 def goals_by_reason(reasons: Iterable[Reason]) -> Mapping[Reason, tuple[int, ...]]:

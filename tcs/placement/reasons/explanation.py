@@ -53,6 +53,11 @@ class Explanation:
         """Where the goal is, as people say it, None if the file does not state it."""
         return self._of_goal("name") or None
 
+    @property
+    def goal_freedom(self) -> str | None:
+        """What is free about the goal, in words; None for nothing."""
+        return self._of_goal("free")
+
     def _of_goal(self, key: str) -> str | None:
         """Return a text that the file holds of the goal, None if there is none."""
         goals = self.file.task.get("goals")
@@ -69,6 +74,7 @@ class Explanation:
             "environment": self.file.metadata["environment"],
             "goal": self.goal,
             "goal_name": self.goal_name,
+            **({} if self.goal_freedom is None else {"goal_free": self.goal_freedom}),
             "body_frame": self.body_frame,
             "observed": state_to_json(axes, self.match.state),
             "observed_error": state_to_json(axes, self.match.observed_error),

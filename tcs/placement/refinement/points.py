@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from tcs.errors import SelectionError
 from tcs.kernel.arrays import BoolArray, FloatArray, GridArrays, IntArray
-from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.sweep import blocked_grippers, gripper_contacts, score_slice
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.model.scene import LoweredScene, Scene, environment_at, torso_at
 from tcs.placement.constraints import Footprint
@@ -146,7 +145,7 @@ class PointScorer:
         blocked = np.ones(self.goals, dtype=np.bool_)
         for arm in self.arms:
             problem = self._problem(arm, np.empty((1, 0)), np.zeros(1))
-            blocked &= gripper_contacts(problem)[0] != NO_CONTACT
+            blocked &= blocked_grippers(problem)[0]
         return blocked
 
     def _forbidden(self, points: Points) -> BoolArray:

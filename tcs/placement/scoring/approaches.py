@@ -48,11 +48,16 @@ def approach_entry() -> dict[str, Any]:
 
 
 def check_closed_form(problem: Problem) -> None:
-    """Check that the arm has a closed form.
+    """Check that the arm has a closed form, and that every goal is a single pose.
 
     Raises:
-        ArmClassError: If it has none.
+        ArmClassError: If it has none, or a goal is free.
     """
+    if problem.freedom.first.size:
+        raise ArmClassError(
+            "approaches are scored for goals of a single pose, but goals of this task are free: "
+            "score it without approach (--no-approach)."
+        )
     if is_outside(problem.arm):
         raise ArmClassError(
             "approaches are scored for arms of seven joints with a closed form: score this arm "

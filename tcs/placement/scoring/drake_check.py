@@ -31,7 +31,7 @@ class Finding:
     """Drake's finding on one solution."""
 
     position_error: float
-    """Distance of the tool from its goal [m]."""
+    """Distance of the tool from its goal, or from the nearest pose that serves as well [m]."""
     rotation_error: float
     """Rotation of the tool from its goal [rad]."""
     dexterity_error: float
@@ -92,7 +92,12 @@ class DrakeChecker:
         scene.set_arm(q)
         X_WT, X_WG = scene.tool_pose(), goal_poses(scene, self._job.task)[g]
         X_TG = X_WT.inverse() @ X_WG
-        rotation = X_TG.rotation().ToAngleAxis().angle()
+        position = float(np.linalg.norm(X_TG.translation()))
+        rotation = float(X_TG.rotation().ToAngleAxis().angle())
+        free = self._job.task.goals[g].free
+        if free is not None:
+            X_GT = X_TG.inverse()
+            position, rotation = free.errors(X_GT.rotation().matrix(), X_GT.translation())
         contacts = [
             distance
             for first, second, distance in scene.violations()
@@ -100,8 +105,8 @@ class DrakeChecker:
         ]
         exact = measured(scene.tool_jacobian(), q, self._lower, self._upper, self._measure)
         return Finding(
-            position_error=float(np.linalg.norm(X_TG.translation())),
-            rotation_error=float(rotation),
+            position_error=position,
+            rotation_error=rotation,
             dexterity_error=abs(exact - float(value)),
             limit_violations=int(np.sum((q < self._lower) | (q > self._upper))),
             contacts=len(contacts),

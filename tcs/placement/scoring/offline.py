@@ -325,6 +325,7 @@ def _task_as_dict(task: Task) -> dict[str, Any]:
                 "weight": goal.weight,
                 "approach": _line_as_dict(goal.approach),
                 "retreat": _line_as_dict(goal.retreat),
+                **({} if goal.free is None else {"free": str(goal.free)}),
             }
             for goal in task.goals
         ],

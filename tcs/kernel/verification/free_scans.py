@@ -1,0 +1,119 @@
+"""Dense scans of goals with freedom: their poses are drawn anew, far more densely."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.freedom.forms import AXIS, FOLD, HALF, ROTATES, TILT, no_freedom
+from tcs.kernel.problem import Problem
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import gripper_contacts, score_slice
+
+ANGLES = 360
+"""Poses of a goal that is free to rotate about an axis: one every degree."""
+POSES = 1000
+"""Poses of any other freedom."""
+
+
+def drawn_poses(form: FloatArray, seed: int = 0) -> tuple[FloatArray, FloatArray]:
+    """Return tool poses X_GT within a freedom, the nominal one first.
+
+    They are random, and share nothing with those of the search but the meaning of the freedom. A
+    single free angle is divided evenly, from a random angle on.
+
+    Args:
+        form: The freedom, in the columns of `tcs.kernel.freedom.forms`.
+        seed: Seed of the poses.
+
+    Returns:
+        Orientations (n, 3, 3) and positions (n, 3) [m].
+    """
+    rng = np.random.default_rng(seed)
+    axis, half = form[AXIS : AXIS + 3], form[HALF : HALF + 3]
+    only_angle = bool(form[ROTATES]) and not form[TILT] and not np.any(half)
+    varies = form[TILT] > 0 or bool(np.any(half))
+    count = ANGLES if only_angle else POSES if varies else max(int(form[FOLD]), 1)
+    if form[ROTATES]:
+        angle = rng.uniform(0.0, 2.0 * np.pi, count)
+        if only_angle:
+            angle = angle[0] + np.arange(count) * 2.0 * np.pi / count
+    else:
+        fold = max(int(form[FOLD]), 1)
+        angle = (np.arange(count) % fold) * 2.0 * np.pi / fold
+    about = Rotation.from_rotvec(angle[:, None] * axis)
+    # Uniform on the cap of directions within the tilt.
+    tilt = np.arccos(1.0 - rng.uniform(size=count) * (1.0 - np.cos(form[TILT])))
+    across = np.cross(axis, rng.normal(size=(count, 3)))
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    across = across / np.where(length > 0.0, length, 1.0)
+    R = (Rotation.from_rotvec(tilt[:, None] * across) * about).as_matrix()
+    p = rng.uniform(-1.0, 1.0, (count, 3)) * half
+    R[0], p[0] = np.eye(3), 0.0
+    return R, p
+
+
+def at_poses(problem: Problem, state: int, goal: int) -> Problem:
+    """Return a problem whose goals are the drawn poses of one goal, alike in every state.
+
+    Args:
+        problem: The problem.
+        state: The environment state from which the goal is taken.
+        goal: The goal.
+    """
+    R_GT, p_GT = drawn_poses(problem.freedom.form[goal])
+    R_WG, p_WG = problem.goal_R[state, goal], problem.goal_p[state, goal]
+    states = len(problem.goal_R)
+    R, p = R_WG @ R_GT, p_WG + p_GT @ R_WG.T
+    return problem._replace(
+        goal_R=np.ascontiguousarray(np.repeat(R[None], states, axis=0)),
+        goal_p=np.ascontiguousarray(np.repeat(p[None], states, axis=0)),
+        freedom=no_freedom(),
+    )
+
+
+def free_scans(
+    problem: Problem, pairs: IntArray, samples: int, joints: FloatArray
+) -> NDArray[np.float64]:
+    """Return the dexterity of the best collision-free sample over the freedom of each goal.
+
+    The arguments are those of `dense_scans`; `samples` is divided by 8, because neighbouring poses
+    have neighbouring solutions. An arm of six joints has all its solutions at each pose, those of
+    the closed form, which `six_joint_scans` checks without freedom.
+    """
+    from tcs.kernel.verification.dense import dense_scans
+
+    values = np.full(len(pairs), -1.0)
+    places = problem.base_x.size * problem.base_y.size * problem.base_yaw.size
+    for i, (configuration, goal) in enumerate(pairs):
+        state = int(configuration) // (places * problem.torso_levels)
+        posed = at_poses(problem, state, int(goal))
+        if problem.joints == 6:
+            values[i], joints[i] = _best_score(posed, int(configuration))
+            continue
+        clear = np.flatnonzero(gripper_contacts(posed)[state] == NO_CONTACT)
+        if not clear.size:
+            continue
+        tried = np.stack([np.full(clear.size, configuration), clear], axis=1)
+        found = np.empty((clear.size, 7))
+        of_poses = dense_scans(posed, tried, samples // 8, found)
+        best = int(np.argmax(of_poses))
+        values[i], joints[i] = of_poses[best], found[best]
+    return values
+
+
+def _best_score(posed: Problem, configuration: int) -> tuple[float, FloatArray]:
+    """Return the greatest score over the goals of a problem, and its joints; -1 for none."""
+    count = posed.goal_p.shape[1]
+    scores = Scores(
+        np.empty((1, count), np.uint8),
+        np.empty((1, count), np.int32),
+        np.full((1, count), -1.0, np.float32),
+        np.zeros((1, count, 7), np.float32),
+    )
+    score_slice(posed, gripper_contacts(posed), configuration, configuration + 1, scores)
+    best = int(np.argmax(scores.dexterity[0]))
+    return float(scores.dexterity[0, best]), scores.joints[0, best].astype(np.float64)

@@ -1,0 +1,166 @@
+"""Goals with freedom: their poses, and scores against other scenes, reference and dense scan."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.freedom.forms import COLUMNS, free_goals
+from tcs.kernel.problem import build_problem
+from tcs.kernel.scores import ARM_BLOCKED, JOINT_LIMITS, REACHED, TOO_FAR
+from tcs.kernel.sweep import blocked_grippers, gripper_contacts
+from tcs.kernel.verification import free_scans
+from tcs.kernel.verification.dense import dense_scans
+from tcs.kernel.verification.free_scans import drawn_poses
+from tcs.kernel.verification.reference_freedom import at_offset, free_score, is_served, offset
+from tcs.model.tasks import Freedom
+from tests.kernel.shapes import about, random_arm
+from tests.kernel.toy import scores_of, toy_grid, toy_scene
+
+X = (1.0, 0.0, 0.0)
+FREEDOMS = {
+    "rotation": Freedom(axis=(0.6, 0.0, 0.8), rotates=True),
+    "symmetry": Freedom(axis=X, fold=3),
+    "cone": Freedom(axis=X, tilt=0.4),
+    "cone, rotation": Freedom(axis=X, tilt=0.4, rotates=True),
+    "box": Freedom(box=(0.01, 0.0, 0.03)),
+    "orientation": Freedom.of_orientation(),
+}
+SEED = 4
+CHAIN = random_arm(np.random.default_rng(SEED))
+
+
+def scene_with(free, goals=2, seed=SEED, chain=CHAIN):
+    """Return a toy scene whose goals are all free."""
+    scene = toy_scene(chain, seed, goals=goals, states=1)
+    rows = np.repeat(free.row()[None], goals, axis=0)
+    return scene._replace(freedom=rows)
+
+
+@pytest.mark.parametrize("name", FREEDOMS)
+def test_sampled_and_drawn_poses_are_within_the_freedom(name):
+    free = FREEDOMS[name]
+    goals = free_goals(free.row()[None], CHAIN)
+    assert np.all(goals.u[0] == 0.0)
+    tools = [offset(goals.form[0], u) for u in goals.u]
+    tools += list(zip(*drawn_poses(goals.form[0]), strict=True))
+    for R, p in tools:
+        assert max(free.errors(R, p)) < 1e-9
+    apart = {tuple(np.round(np.append(R, p), 6)) for R, p in tools[: goals.samples[0]]}
+    assert len(apart) == goals.samples[0]
+
+
+def test_a_scene_without_freedom_is_scored_as_before():
+    scene = toy_scene(CHAIN, SEED, goals=2, states=1)
+    none = scene._replace(freedom=np.zeros((2, COLUMNS)))
+    for one, other in zip(
+        scores_of(scene, toy_grid(states=1)), scores_of(none, toy_grid(states=1)), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_symmetric_tool_scores_the_better_of_its_poses():
+    scene, grid = scene_with(Freedom(axis=X, fold=2)), toy_grid(states=1)
+    both = scores_of(scene, grid)
+    turned = scene._replace(
+        goal_R=scene.goal_R @ about(np.array(X), math.pi), freedom=scene.freedom[:0]
+    )
+    parts = [scores_of(scene._replace(freedom=scene.freedom[:0]), grid), scores_of(turned, grid)]
+    reached = [part.reason == REACHED for part in parts]
+    assert np.any(reached[0] & ~reached[1])
+    assert np.any(reached[1] & ~reached[0])
+    np.testing.assert_array_equal(both.reason == REACHED, reached[0] | reached[1])
+    better = np.maximum(
+        *(np.where(r, p.dexterity, 0.0) for r, p in zip(reached, parts, strict=True))
+    )
+    # A rotation by pi is rounded.
+    np.testing.assert_allclose(
+        np.where(both.reason == REACHED, both.dexterity, 0), better, atol=1e-6
+    )
+
+
+def test_a_rotation_that_the_last_joint_makes_frees_nothing():
+    chain = CHAIN._replace(
+        R=CHAIN.R.copy(),
+        p=CHAIN.p.copy(),
+        lower=np.append(CHAIN.lower[:6], -np.inf),
+        upper=np.append(CHAIN.upper[:6], np.inf),
+    )
+    chain.p[7] = [0.0, 0.0, 0.2]
+    axis = tuple(chain.R[7].T @ [0.0, 0.0, 1.0])
+    scene = scene_with(Freedom(axis=axis, rotates=True), chain=chain)
+    # Only the gripper, which the last joint carries, tells one angle from another.
+    bare = np.zeros_like(scene.arm_vs_environment), np.zeros_like(scene.arm_vs_body)
+    scene = scene._replace(
+        arm_vs_environment=bare[0], arm_vs_body=bare[1], arm_vs_arm=np.zeros_like(scene.arm_vs_arm)
+    )
+    grid = toy_grid(states=1)
+    free, nominal = (
+        scores_of(scene, grid),
+        scores_of(scene._replace(freedom=scene.freedom[:0]), grid),
+    )
+    reached = nominal.reason == REACHED
+    assert 5 < np.sum(reached) < reached.size
+    np.testing.assert_array_equal(free.reason, nominal.reason)
+    # The search of the free joint samples other angles at each pose.
+    np.testing.assert_allclose(free.dexterity[reached], nominal.dexterity[reached], rtol=2e-3)
+
+
+def test_kernel_agrees_with_reference():
+    scene, grid = scene_with(FREEDOMS["rotation"], goals=1), toy_grid(states=1)
+    scores, free = scores_of(scene, grid), free_goals(scene.freedom, CHAIN)
+    nominal = scores_of(scene._replace(freedom=scene.freedom[:0]), grid)
+    reached = scores.reason == REACHED
+    assert np.all(reached | (nominal.reason != REACHED))
+    assert np.any(reached & (nominal.reason != REACHED))
+    gained = np.argwhere(reached & (nominal.reason != REACHED))
+    for h, g in gained:
+        assert is_served(scene, grid, h, g, scores.joints[h, g].astype(float))
+        bent = scores.joints[h, g].astype(float)
+        bent[3] += 1e-3
+        assert not is_served(scene, grid, h, g, bent)
+    h, g = gained[0]
+    expected = free_score(scene, grid, h, g, free)
+    # Refinement, and poses between the samples, only add to what the reference finds.
+    assert scores.dexterity[h, g] >= expected.dexterity - 1e-6
+
+
+@pytest.mark.parametrize("name", FREEDOMS)
+def test_dense_scan_finds_no_further_solution(name, rng, monkeypatch):
+    monkeypatch.setattr(free_scans, "ANGLES", 72)
+    monkeypatch.setattr(free_scans, "POSES", 100)
+    scene, grid = scene_with(FREEDOMS[name]), toy_grid(states=1)
+    scores, problem = scores_of(scene, grid), build_problem(scene, grid)
+    never = np.isin(scores.reason, (JOINT_LIMITS, ARM_BLOCKED, TOO_FAR))
+    pairs = np.argwhere(never)
+    pairs = pairs[rng.choice(len(pairs), min(4, len(pairs)), replace=False)]
+    assert np.all(dense_scans(problem, pairs, 800, np.empty((len(pairs), 7))) < 0.0)
+    found = np.argwhere(scores.reason == REACHED)[:2]
+    values = dense_scans(problem, found, 800, np.empty((len(found), 7)))
+    assert np.all(values > 0.0)
+
+
+def test_a_gripper_is_blocked_where_all_its_poses_are():
+    scene = scene_with(FREEDOMS["rotation"])
+    problem = build_problem(scene, toy_grid(states=1))
+    codes = gripper_contacts(problem)
+    first = problem.freedom.first
+    expected = [np.all(codes[0, a:b] != NO_CONTACT) for a, b in itertools.pairwise(first)]
+    np.testing.assert_array_equal(blocked_grippers(problem)[0], expected)
+
+
+def test_a_nominal_goal_beside_a_free_one_keeps_its_score():
+    scene, grid = scene_with(FREEDOMS["orientation"]), toy_grid(states=1)
+    mixed = scene._replace(freedom=scene.freedom * [[0.0], [1.0]])
+    nominal = scores_of(scene._replace(freedom=scene.freedom[:0]), grid)
+    scores = scores_of(mixed, grid)
+    np.testing.assert_array_equal(scores.reason[:, 0] == REACHED, nominal.reason[:, 0] == REACHED)
+    np.testing.assert_array_equal(scores.joints[:, 0], nominal.joints[:, 0])
+    moved = at_offset(
+        mixed, 1, offset(free_goals(mixed.freedom, CHAIN).form[1], np.array([1.0, 0.2, 0, 0, 0, 0]))
+    )
+    assert np.abs(moved.goal_R[:, 1] - scene.goal_R[:, 1]).max() > 0.1

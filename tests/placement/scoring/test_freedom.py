@@ -1,0 +1,83 @@
+"""Tasks whose goals are free, from the file to Drake's re-check."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tcs.errors import ArmClassError, TaskError
+from tcs.files.paths import data_folder
+from tcs.kernel.verification import free_scans
+from tcs.model.tasks import Freedom
+from tcs.motion.stops import StopGrid
+from tcs.placement.scoring import load_job, score, verify
+from tcs.placement.scoring.drake_check import ROTATION_BAR, DrakeChecker
+from tcs.placement.tables import Reason
+from tests.environments import CORNER, write_environment
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory):
+    """Return shaving with goals that may rotate about y, and an environment."""
+    folder = tmp_path_factory.mktemp("free")
+    text = (data_folder() / "tasks/adl/shaving.yaml").read_text()
+    task = folder / "shaving_free.yaml"
+    task.write_text(
+        text.replace(
+            "name: shaving\n", "name: shaving_free\nfree: {rotation_about: [0, 1, 0]}\n", 1
+        )
+    )
+    return task, write_environment(folder, "free-corner", CORNER)
+
+
+@pytest.fixture(scope="module")
+def file(paths):
+    return score(*paths)
+
+
+def test_freedom_only_adds_to_what_is_reached(file, paths):
+    fixed = score("shaving", paths[1])
+    free, nominal = (f.nominal.scores.reason == Reason.REACHED for f in (file, fixed))
+    assert np.all(free | ~nominal)
+    assert np.sum(free) > np.sum(nominal) > 0
+
+
+def test_drake_confirms_poses_within_the_freedom(file, monkeypatch):
+    monkeypatch.setattr(free_scans, "ANGLES", 72)
+    found = verify(file, pairs=60, dense=3)
+    assert found.is_sound
+    assert (found.checked, found.missed) == (60, 0)
+    assert found.dense_checked > 0
+
+
+def test_drake_refutes_the_same_solutions_without_the_freedom(file, paths):
+    job = load_job(*paths, "pr2")
+    scores, h, g = file.nominal.scores, *np.argwhere(file.nominal.scores.reason == 0)[0]
+    q = np.asarray(scores.joints_of(h, g), dtype=np.float64)
+
+    def finding(free):
+        goals = tuple(dataclasses.replace(goal, free=free) for goal in job.task.goals)
+        task = dataclasses.replace(job.task, goals=goals)
+        changed = dataclasses.replace(job, task=task)
+        return DrakeChecker(changed, changed.scene(), "isotropy").check(
+            h, g, q, scores.dexterity[h, g]
+        )
+
+    assert finding(job.task.goals[g].free).is_true
+    assert finding(Freedom.of_orientation()).is_true
+    assert finding(None).rotation_error > ROTATION_BAR
+    assert not finding(Freedom(axis=(1.0, 0.0, 0.0), rotates=True)).is_true
+
+
+def test_the_file_says_what_is_free(file):
+    assert file.task["goals"][0]["free"] == "any rotation about y"
+
+
+def test_approaches_and_motions_refuse_free_goals_in_a_line(paths):
+    with pytest.raises(ArmClassError, match="goals of this task are free"):
+        score(*paths, approach=True)
+    job = load_job(*paths, "pr2")
+    with pytest.raises(TaskError, match="goals with freedom"):
+        StopGrid.of(job, None, job.grid, None)
