@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -32,6 +32,13 @@ def refine(
     samples: Annotated[
         int, typer.Option(help="Number of samples of the success, for the objectives with one.")
     ] = 64,
+    keep_success: Annotated[
+        bool,
+        typer.Option(
+            help="With the objective score, whether a set must be as sure under the errors of the "
+            "environment as the best set of the grid."
+        ),
+    ] = True,
     seed: options.Seed = 0,
     observed: options.Observed = None,
     jobs: options.Jobs = 2,
@@ -57,6 +64,7 @@ def refine(
             starts=starts,
             rounds=rounds,
             samples=samples,
+            keep_success=keep_success,
             seed=seed,
             table=table,
             jobs=jobs,
@@ -66,3 +74,14 @@ def refine(
         tcs.save(path, done)
     result = {"file": str(path), **refinement_summary(done, table)}
     terminal.print_result(result, report_refined, as_json=as_json)
+
+
+def refined_in_place(path: Path, jobs: int) -> dict[str, Any]:
+    """Refine the sets of a score file with the default options; return what that gained."""
+    import tcs
+    from tcs.placement.refinement import refinement_summary
+
+    with terminal.progress_bar("rounds") as on_progress:
+        file = tcs.refine(tcs.load(path), jobs=jobs, on_progress=on_progress)
+    tcs.save(path, file)
+    return refinement_summary(file)

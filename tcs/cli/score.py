@@ -11,8 +11,10 @@ import typer
 from tcs.cli import options
 from tcs.cli.motion import verify_plan
 from tcs.cli.option_groups import expand_options
+from tcs.cli.refinement import refined_in_place
 from tcs.output import terminal
 from tcs.output.terminal import tables
+from tcs.output.terminal.refinement_tables import report_refined
 
 if TYPE_CHECKING:
     from tcs.motion import ApproachCheck
@@ -52,7 +54,8 @@ def score(
         str,
         typer.Option(
             help="Dexterity measure to maximise: isotropy or inverse-condition; -limited lowers it "
-            "near joint limits, -limited-thesis with the penalty printed in the ITCM thesis."
+            "near joint limits, -limited-thesis with the penalty printed in the ITCM thesis; or "
+            "jlwki, the isotropy with the joints weighted by their distance to their limits."
         ),
     ] = "isotropy",
     approach: Annotated[
@@ -62,6 +65,10 @@ def score(
             help="Count a goal as reached only if a posture there can be approached: backwards "
             "along the goal's straight line, within the limits, touching nothing.",
         ),
+    ] = False,
+    refine: Annotated[
+        bool,
+        typer.Option("--refine", help="Then refine the best sets between the grid points."),
     ] = False,
     jobs: options.Jobs = 2,
     out: Annotated[
@@ -143,6 +150,11 @@ def score(
         raise typer.BadParameter("requires --blocks.", param_hint="--restart")
     if blocks and (observed or frames):
         raise typer.BadParameter("is not for an observed environment.", param_hint="--blocks")
+    if refine and (approach or dry_run or observed or frames):
+        raise typer.BadParameter(
+            "is for scores without approach, of an environment that is not observed.",
+            param_hint="--refine",
+        )
     constraints = wanted.constraints()
     if at and not frames and not constraints.keep:
         raise typer.BadParameter(
@@ -181,6 +193,10 @@ def score(
             blocks=folder,
             **scoring_options,
         )
+        if refine:
+            for row in rows:
+                if row["best"]:
+                    row["refinement"] = refined_in_place(Path(row["file"]), jobs)
         terminal.print_result({"rows": rows}, tables.report_rows, as_json=as_json)
         return
     environment = environment or "wheelchair"
@@ -194,7 +210,11 @@ def score(
                 task, environment, robot, path, arms=arms, on_progress=on_progress,
                 blocks=folder, **scoring_options,
             )  # fmt: skip
+        if refine:
+            result["refinement"] = refined_in_place(path, jobs)
         terminal.print_result(result, tables.report_scores, as_json=as_json)
+        if refine and not as_json:
+            report_refined({**result["refinement"], "file": path})
         return
 
     import tcs

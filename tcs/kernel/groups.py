@@ -78,20 +78,18 @@ def _box_around(rows: FloatArray) -> FloatArray:
     p = rows[..., CENTRE : CENTRE + 3]
     half = _core(rows[0])
     radius = np.where(rows[0, :, TYPE] == BOX, 0.0, rows[0, :, SIZE])
+    # Of the boxes with the orientation of each shape k around all shapes n.
+    along = np.abs(np.einsum("kri,nrj->knij", R[0], R[0]))
+    spread = np.einsum("knij,nj->kni", along, half) + radius[:, None]
+    middle = np.einsum("knr,kri->kni", p[0] - p[0][:, None], R[0])
+    low, high = (middle - spread).min(axis=1), (middle + spread).max(axis=1)
+    sizes = (high - low) / 2 + ROUNDING
+    k = int(np.argmin(sizes.prod(axis=1)))
     best = np.empty((len(rows), COLUMNS))
-    least = np.inf
-    for k in range(rows.shape[1]):
-        along = np.abs(np.einsum("ri,nrj->nij", R[0, k], R[0]))
-        spread = np.einsum("nij,nj->ni", along, half) + radius[:, None]
-        middle = (p[0] - p[0, k]) @ R[0, k]
-        low, high = (middle - spread).min(axis=0), (middle + spread).max(axis=0)
-        size = (high - low) / 2 + ROUNDING
-        if size.prod() < least:
-            least = float(size.prod())
-            best[:, TYPE], best[:, SIZE : SIZE + 3] = BOX, size
-            best[:, BOUND] = np.linalg.norm(size)
-            best[:, CENTRE : CENTRE + 3] = p[:, k] + R[:, k] @ ((low + high) / 2)
-            best[:, ROTATION:] = R[:, k].reshape(-1, 9)
+    best[:, TYPE], best[:, SIZE : SIZE + 3] = BOX, sizes[k]
+    best[:, BOUND] = np.linalg.norm(sizes[k])
+    best[:, CENTRE : CENTRE + 3] = p[:, k] + R[:, k] @ ((low[k] + high[k]) / 2)
+    best[:, ROTATION:] = R[:, k].reshape(-1, 9)
     return best
 
 

@@ -188,6 +188,21 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     )
 
 
+def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
+    """Return a problem with its environment in other states, without arranging the robot again.
+
+    Args:
+        problem: A problem of the same scene.
+        scene: The scene with these states of its environment.
+    """
+    return problem._replace(
+        environment=pack(scene.environment),
+        goal_R=_own(scene.goal_R),
+        goal_p=_own(scene.goal_p),
+        environment_states=len(scene.goal_p),
+    )
+
+
 def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
     """Return an upper bound of the distance of the arm's shapes from the origin of A [m]."""
     reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain.p[:7], axis=1))])

@@ -8,7 +8,8 @@ from tcs.placement.refinement import refinement_summary
 from tests.placement.refinement.test_refine import BESIDE
 
 
-def test_json_and_text(tcs_command, tmp_path, capsys):
+def test_json_and_text(tcs_command, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 20)
     environment, path, out = (tmp_path / name for name in ("beside.yaml", "a.tcs", "b.tcs"))
     environment.write_text(BESIDE)
     tcs.save(path, tcs.score("shaving", environment))
@@ -17,5 +18,23 @@ def test_json_and_text(tcs_command, tmp_path, capsys):
     assert ran.json == {"file": str(out), **refinement_summary(tcs.load(out))}
     assert {"before", "after", "bound", "seconds"} <= set(ran.json)
     report_refined(ran.json)
-    assert "no set between the grid's ends exceeds" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "no set between the grid's ends exceeds" in printed
+    assert "success under error from" in printed
     assert tcs_command("select", out, "--here", 1.4, -1.2, 180, "--gamma", 0).code == 0
+
+
+def test_scoring_with_refinement(tcs_command, tmp_path, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 20)
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.starting_sets", one_start)
+    environment, path = tmp_path / "beside.yaml", tmp_path / "a.tcs"
+    environment.write_text(BESIDE)
+    words = ("score", "shaving", "--environment", environment, "--out", path, "--refine")
+    ran = tcs_command(*words, "--json")
+    assert ran.code == 0
+    assert ran.json["refinement"] == refinement_summary(tcs.load(path))
+    assert tcs_command(*words, "--approach").code == 2
+
+
+def one_start(file, table, count):
+    return [file.tables[table].sets.best]

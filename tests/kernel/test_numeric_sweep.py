@@ -180,7 +180,7 @@ def test_slices_do_not_matter():
         np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name), err_msg=name)
 
 
-@pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited"])
+@pytest.mark.parametrize("measure", ["inverse-condition", "isotropy-limited", "jlwki"])
 def test_other_measures_choose_other_winners(measure):
     scene, grid, plain = offset_scene(0)
     other = scores_of(scene, grid, measure=measure)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from tcs.errors import UnknownNameError
 
-ISOTROPY, INVERSE_CONDITION = 0, 1
-"""Function of the Jacobian."""
+ISOTROPY, INVERSE_CONDITION, LIMIT_WEIGHTED = 0, 1, 2
+"""Function of the Jacobian; LIMIT_WEIGHTED is the isotropy with the joints weighted by their
+distance to their limits."""
 UNLIMITED, NORMALISED, THESIS = 0, 1, 2
 """Joint-limit penalty: none, normalised, or as in the ITCM thesis."""
 
@@ -20,7 +21,7 @@ class Dexterity(NamedTuple):
     """A dexterity measure, as the codes that the compiled functions use."""
 
     of: int
-    """ISOTROPY or INVERSE_CONDITION."""
+    """ISOTROPY, INVERSE_CONDITION or LIMIT_WEIGHTED."""
     penalty: int
     """UNLIMITED, NORMALISED or THESIS."""
 
@@ -33,6 +34,7 @@ MEASURES = {
     "inverse-condition-limited": Dexterity(INVERSE_CONDITION, NORMALISED),
     "isotropy-limited-thesis": Dexterity(ISOTROPY, THESIS),
     "inverse-condition-limited-thesis": Dexterity(INVERSE_CONDITION, THESIS),
+    "jlwki": Dexterity(LIMIT_WEIGHTED, UNLIMITED),
 }
 """Every measure; docs/method.md has the equations."""
 

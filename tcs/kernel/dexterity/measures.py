@@ -6,7 +6,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.dexterity import INVERSE_CONDITION, THESIS, UNLIMITED
+from tcs.kernel.dexterity import INVERSE_CONDITION, LIMIT_WEIGHTED, THESIS, UNLIMITED
 from tcs.kernel.kinematics import jacobian
 from tcs.kernel.problem import Problem
 
@@ -14,6 +14,9 @@ THESIS_SCALE = 1e6
 """k of the ITCM thesis, eq. (21), chosen there for seven limited joints."""
 MIDDLE = 0.25
 """Greatest factor of a joint in eq. (21), attained in the middle of its limits."""
+LEAST_WEIGHT, LIMIT_SCALE = 1e-3, 0.05
+"""Least weight of a joint in JLWKI, and the fraction of half the range over which what the weight
+lacks to 1 halves."""
 JOINTS = 7
 NEWTON_STEPS = 200
 """Greatest number of Newton steps to an eigenvalue. It takes 4 to 8; where all six eigenvalues
@@ -55,9 +58,16 @@ def isotropy_at(
         TCS eq. (2), det(J J^T)^(1/6) / (trace(J J^T)/6). The print shows a square root; only the
         sixth root keeps the measure below 1. Rows mix units: compare within one robot only.
     """
-    J, G = np.empty((6, 7)), np.empty((6, 6))
+    J = np.empty((6, 7))
     jacobian(chain_R, chain_p, q, J)
     clear_fixed(J, joints)
+    return isotropy(J)
+
+
+@inner
+def isotropy(J: FloatArray) -> float:
+    """Return the kinematic isotropy of a Jacobian of shape (6, 7), see `isotropy_at`."""
+    G = np.empty((6, 6))
     trace = gram(J, G)
     # The determinant of the Gram matrix by Cholesky factorisation, in place.
     det = 1.0
@@ -237,13 +247,55 @@ def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: 
     return -np.expm1(-product)
 
 
+@inner
+def limit_weight(q: float, lower: float, upper: float) -> float:
+    """Return the weight of a joint by its distance to its limits: 1/2 at a limit, 1 far from both.
+
+    Args:
+        q: Joint angle [rad].
+        lower: Lower limit [rad]; infinite where continuous, which weighs 1.
+        upper: Upper limit [rad].
+
+    Source:
+        TOC (Kapusta and Kemp 2019), as published in its authors' later program, assistive_gym:
+        w = max(0.001, 1 - 0.5^((R - |R - q + lower|) / (0.05 R) + 1)), R half the range.
+    """
+    if not (np.isfinite(lower) and np.isfinite(upper)):
+        return 1.0
+    half = 0.5 * (upper - lower)
+    if half <= 0.0:
+        return LEAST_WEIGHT
+    margin = (half - abs(half - q + lower)) / (LIMIT_SCALE * half)
+    return max(LEAST_WEIGHT, 1.0 - 0.5 ** (margin + 1.0))
+
+
+@inner
+def limit_weighted_isotropy_at(problem: Problem, q: FloatArray) -> float:
+    """Return JLWKI at joint angles q [rad], shape (7,): the isotropy with weighted joints.
+
+    Source:
+        TOC, det(J W J^T)^(1/6) / (trace(J W J^T) / 6), W = diag of `limit_weight`.
+    """
+    J = np.empty((6, 7))
+    jacobian(problem.chain_R, problem.chain_p, q, J)
+    clear_fixed(J, problem.joints)
+    for k in range(JOINTS):
+        root = np.sqrt(limit_weight(q[k], problem.arm.lower[k], problem.arm.upper[k]))
+        for i in range(6):
+            J[i, k] *= root
+    return isotropy(J)
+
+
 @jit
 def measure_at(problem: Problem, q: FloatArray) -> float:
     """Return the problem's dexterity measure at joint angles q [rad], shape (7,).
 
     Source:
-        TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in thesis eq. (22).
+        TCS eq. (2) or ITCM thesis eq. (20), multiplied by the penalty as in thesis eq. (22); or
+        JLWKI of TOC.
     """
+    if problem.measure.of == LIMIT_WEIGHTED:
+        return limit_weighted_isotropy_at(problem, q)
     if problem.measure.of == INVERSE_CONDITION:
         value = inverse_condition_at(problem.chain_R, problem.chain_p, q, problem.joints)
     else:

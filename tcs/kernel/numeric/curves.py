@@ -12,7 +12,7 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.dexterity import ISOTROPY
+from tcs.kernel.dexterity import INVERSE_CONDITION
 from tcs.kernel.dexterity.measures import inverse_condition
 from tcs.kernel.kinematics import copy_joints
 from tcs.kernel.numeric.arm import NumericArm
@@ -158,7 +158,7 @@ def trace(
         count: Number of curves.
         beyond: How far beyond its limits a joint is followed [rad].
         stride: Longest stride [rad, norm of the joints].
-        of: Function to evaluate at each point, ISOTROPY or INVERSE_CONDITION.
+        of: Function to evaluate at each point, as in `Dexterity`; the isotropy for LIMIT_WEIGHTED.
 
     Returns:
         Updated number of curves.
@@ -184,7 +184,7 @@ def _append_point(
 ) -> float:
     """Store the current joints and tangent as point n of a curve; return its slack [rad]."""
     J = curves.newton.J
-    if of == ISOTROPY:
+    if of != INVERSE_CONDITION:
         total = 0.0
         for i in range(6):
             for k in range(7):

@@ -14,8 +14,8 @@ import numpy as np
 from tcs.kernel.analytic.ik import within
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner, int_constant, jit
-from tcs.kernel.dexterity import UNLIMITED
-from tcs.kernel.dexterity.measures import limit_penalty
+from tcs.kernel.dexterity import LIMIT_WEIGHTED, UNLIMITED
+from tcs.kernel.dexterity.measures import limit_penalty, measure_at
 from tcs.kernel.kinematics import link_poses
 from tcs.kernel.numeric.arm import ACROSS, TILTS, TURNS, UP, NumericArm, figures_at, numeric_arm_of
 from tcs.kernel.numeric.curves import (
@@ -143,7 +143,7 @@ def find_curves(
         R_AG: Goal orientation in A, shape (3, 3).
         p_AG: Goal position in A [m], shape (3,).
         search: `curves` is filled.
-        of: Function to evaluate along the curves, ISOTROPY or INVERSE_CONDITION.
+        of: Function to evaluate along the curves, as in `Dexterity`.
 
     Returns:
         Number of curves.
@@ -249,7 +249,7 @@ def trace_from(
         beyond: How far beyond its limits a joint is followed [rad].
         stride: Longest stride along a curve [rad, norm of the joints].
         iterations: Greatest number of Newton iterations.
-        of: Function to evaluate along the curve, ISOTROPY or INVERSE_CONDITION.
+        of: Function to evaluate along the curve, as in `Dexterity`.
 
     Returns:
         Updated number of curves.
@@ -389,6 +389,11 @@ def _add(problem: Problem, search: CurveSearch, n: int, fraction: float, found: 
         turn_into_limits(problem, search.best)
         lower, upper = problem.arm.lower, problem.arm.upper
         value *= limit_penalty(search.best, lower, upper, problem.measure.penalty)
+    elif problem.measure.of == LIMIT_WEIGHTED:
+        # Between two points a joint may reach and leave its limit: no interpolation.
+        point_between(curves, n, fraction, search.best)
+        turn_into_limits(problem, search.best)
+        value = measure_at(problem, search.best)
     search.measure[found] = value
     return found + 1
 

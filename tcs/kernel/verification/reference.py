@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, Chain, FloatArray, Shapes
-from tcs.kernel.dexterity import ISOTROPY, NORMALISED, UNLIMITED, dexterity
+from tcs.kernel.dexterity import ISOTROPY, LIMIT_WEIGHTED, NORMALISED, UNLIMITED, dexterity
 
 LEAST_ELBOW = 1e-6
 """Least angle of the elbow from stretched and from folded [rad]."""
@@ -88,11 +88,29 @@ def limit_penalty(q: FloatArray, lower: FloatArray, upper: FloatArray, penalty: 
     return 1.0 - math.exp(-1e6 * float(np.prod(factors)))
 
 
+def limit_weight(q: float, lower: float, upper: float) -> float:
+    """Return the weight of a joint in JLWKI: 1 for a joint without limits.
+
+    Source:
+        TOC, max(0.001, 1 - 0.5^((R - |R - q + lower|) / (0.05 R) + 1)), R half the range.
+    """
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        return 1.0
+    R = (upper - lower) / 2
+    return max(0.001, 1 - 0.5 ** ((R - abs(R - q + lower)) / (0.05 * R) + 1))
+
+
 def measured(
     J: FloatArray, q: FloatArray, lower: FloatArray, upper: FloatArray, measure: str
 ) -> float:
-    """Return the dexterity measure of that name, ITCM thesis eq. (22) where it has a penalty."""
+    """Return the dexterity measure of that name, ITCM thesis eq. (22) where it has a penalty.
+
+    JLWKI is the isotropy of J with the column of each joint multiplied by the root of its weight.
+    """
     of, penalty = dexterity(measure)
+    if of == LIMIT_WEIGHTED:
+        weights = np.array([limit_weight(*joint) for joint in zip(q, lower, upper, strict=True)])
+        return isotropy(J * np.sqrt(weights[-J.shape[1] :]))
     value = isotropy(J) if of == ISOTROPY else inverse_condition(J)
     return value * limit_penalty(q, lower, upper, penalty)
 

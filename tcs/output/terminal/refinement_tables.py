@@ -26,7 +26,7 @@ def report_refined(result: Mapping[str, Any]) -> None:
     )
     if result["success"] is not None:
         success = result["success"]
-        cause = "under error" if result["objective"] == "success" else "with the base displaced"
+        cause = "with the base displaced" if result["displaced"] else "under error"
         out.print(
             f"success {cause} from {success['before']:.1%} to {success['after']:.1%}, in "
             f"{success['samples']:,} other samples than those that chose the set"

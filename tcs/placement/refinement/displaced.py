@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Self
@@ -39,6 +40,12 @@ class DisplacedBases:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.offsets)
+
+    def hardest(self, count: int) -> Self:
+        """Return the samples with the largest displacements."""
+        size = np.sum((self.offsets / [RADIUS, RADIUS, ANGLE]) ** 2, axis=1)
+        rows = np.sort(np.argsort(-size, kind="stable")[:count])
+        return dataclasses.replace(self, offsets=self.offsets[rows])
 
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""

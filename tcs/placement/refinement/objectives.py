@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,9 @@ class Samples(Protocol):
     @property
     def samples(self) -> int:
         """Number of samples."""
+
+    def hardest(self, count: int) -> Self:
+        """Return the samples with the largest changes."""
 
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
 
-from tcs.kernel.arrays import BoolArray
+from tcs.kernel.arrays import BoolArray, GridArrays
+from tcs.kernel.problem import Problem, build_problem, with_environment
+from tcs.kernel.sweep import gripper_contacts
 from tcs.model.grid import ROBOT_AXES
-from tcs.model.scene import torso_at
+from tcs.model.scene import environment_at, torso_at
 from tcs.placement.refinement.points import Points
 from tcs.placement.robustness.error_model import Offsets
-from tcs.placement.robustness.perturbed_scenes import BATCH, BasePoses, Run
-from tcs.placement.robustness.trials import Trials, displaced, samples_of
+from tcs.placement.robustness.perturbed_scenes import BasePoses, PerturbedScenes, Run
+from tcs.placement.robustness.trials import ArmTrials, Trials, displaced, samples_of
+from tcs.placement.tables import Reason
+
+BATCH = 50
+"""Samples of a configuration that a thread evaluates at a time: some ten milliseconds of work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,37 +42,73 @@ class PerturbedPoints:
         """Number of samples."""
         return samples_of(self.offsets)
 
+    def hardest(self, count: int) -> Self:
+        """Return the samples with the largest errors, each in units of its joint's spread."""
+        spread = {name: values.std() or 1.0 for name, values in self.offsets.items()}
+        size = np.sum([(v / spread[name]) ** 2 for name, v in self.offsets.items()], axis=0)
+        rows = np.sort(np.argsort(-size, kind="stable")[:count])
+        of_rows = {name: values[rows] for name, values in self.offsets.items()}
+        return dataclasses.replace(self, offsets=of_rows)
+
     def reached(self, points: Points) -> BoolArray:
         """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
-        fixed = points.values.shape[1] - len(ROBOT_AXES)
         out = np.zeros((len(points.values), self.samples, self.trials.weights.size), dtype=np.bool_)
-        states = np.column_stack([points.arm, points.values[:, :fixed]])
-        for state in np.unique(states, axis=0):
-            self._fill(points, np.flatnonzero(np.all(states == state, axis=1)), out)
+        parts = [
+            part
+            for arm in np.unique(points.arm)
+            for part in self._parts(points, np.flatnonzero(points.arm == arm))
+        ]
+
+        def fill(part: _Part) -> None:
+            found = part.scenes.scores(part.poses, part.run)
+            out[part.row, part.run.start : part.run.stop] = found.reason == Reason.REACHED
+
+        Parallel(n_jobs=self.jobs, prefer="threads")(delayed(fill)(part) for part in parts)
         return out
 
-    def _fill(
-        self, points: Points, rows: np.ndarray[tuple[int], np.dtype[np.intp]], out: BoolArray
-    ) -> None:
-        """Fill the rows of configurations with one arm and one state of the environment."""
+    def _parts(self, points: Points, rows: NDArray[np.intp]) -> Iterator[_Part]:
+        """Yield the work for configurations with one arm."""
         trials = self.trials
         arm = trials.arms[int(points.arm[rows[0]])]
         values = points.values[rows]
-        axes = trials.grid.environment_axes
-        nominal = {
-            **trials.observed,
-            **{axis.name: float(values[0, i]) for i, axis in enumerate(axes)},
-        }
-        positions, _ = displaced(arm.job, arm.scene, nominal, self.offsets)
         x, y, yaw, torso = (np.ascontiguousarray(c) for c in values[:, -len(ROBOT_AXES) :].T)
         levels, level = np.unique(torso, return_inverse=True)
-        raised = dataclasses.replace(arm.lowered, arrays=torso_at(arm.lowered, arm.scene, levels))
-        scenes = arm.scenes(positions, raised, str(trials.file.metadata["measure"]))
+        arrays = torso_at(arm.lowered, arm.scene, levels)
+        arrays = arrays._replace(body_vs_environment=arm.body_pairs)
+        origin = np.zeros(1)
+        grid = GridArrays(len(arrays.goal_p), origin, origin, origin, levels.size)
+        robot = build_problem(arrays, grid, str(trials.file.metadata["measure"]))
         poses = BasePoses(np.zeros(rows.size, dtype=np.int64), x, y, yaw, level)
-        runs = [
-            Run(row, start, min(start + BATCH, self.samples))
-            for row in range(rows.size)
-            for start in range(0, self.samples, BATCH)
-        ]
-        for run, found in scenes.reached(poses, runs, self.jobs):
-            out[rows[run.row], run.start : run.stop] = found
+        axes = trials.grid.environment_axes
+        states, state = np.unique(values[:, : len(axes)], axis=0, return_inverse=True)
+        for number, at in enumerate(states):
+            scenes = self._scenes(
+                arm, robot, {axis.name: v for axis, v in zip(axes, at.tolist(), strict=True)}
+            )
+            for i in np.flatnonzero(state.ravel() == number):
+                for start in range(0, self.samples, BATCH):
+                    run = Run(int(i), start, min(start + BATCH, self.samples))
+                    yield _Part(scenes, poses, run, int(rows[i]))
+
+    def _scenes(self, arm: ArmTrials, robot: Problem, state: dict[str, float]) -> PerturbedScenes:
+        """Return one state of the environment in all samples."""
+        nominal = {**self.trials.observed, **state}
+        positions, _ = displaced(arm.job, arm.scene, nominal, self.offsets)
+        samples = (
+            {name: float(values[i]) for name, values in positions.items()}
+            for i in range(self.samples)
+        )
+        problem = with_environment(
+            robot, environment_at(arm.lowered, arm.scene, arm.job.task, samples)
+        )
+        return PerturbedScenes(problem, gripper_contacts(problem))
+
+
+class _Part(NamedTuple):
+    """One configuration in some of the samples."""
+
+    scenes: PerturbedScenes
+    poses: BasePoses
+    run: Run
+    row: int
+    """Number of the configuration."""

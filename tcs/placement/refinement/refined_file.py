@@ -15,8 +15,8 @@ from tcs.model.grid import InitialConfiguration
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.bound import upper_bound
 from tcs.placement.refinement.displaced import DisplacedBases
+from tcs.placement.refinement.floor import HARDEST, SuccessFloor, settled
 from tcs.placement.refinement.objectives import (
-    Objective,
     Samples,
     ScoreObjective,
     SuccessObjective,
@@ -49,7 +49,7 @@ STREAM = "refinement"
 """Name of the random stream of the search."""
 SAMPLES_STREAM = "refinement samples"
 """Name of the random stream of the samples of the success."""
-FRESH_SAMPLES = 1000
+FRESH_SAMPLES = 500
 """Samples on which the refined set is judged."""
 CHECK_STREAM = "refinement check"
 """Name of their random stream."""
@@ -63,6 +63,7 @@ def refine(
     starts: int = 6,
     rounds: int = 40,
     samples: int = 64,
+    keep_success: bool = True,
     seed: int = 0,
     table: int | None = None,
     jobs: int = 2,
@@ -84,6 +85,9 @@ def refine(
         starts: Number of sets to start from; up to three single configurations come on top.
         rounds: Greatest number of rounds of the search.
         samples: Number of samples of the success.
+        keep_success: Whether, with the objective "score", a set must be at least as sure under
+            the errors of the environment (of the base, if it has none) as the best set of the
+            grid, in the hardest of the samples and in others that judge the result.
         seed: Seed of the search and of the samples; the result is the same for any number of
             jobs.
         table: Number of the table; by default the nominal one. The others keep what they have.
@@ -116,26 +120,36 @@ def refine(
     begun = time.perf_counter()
     scorer = PointScorer.of(file, number, jobs)
     scorer.warm_up(on_compile)
+    sets = file.tables[number].sets
+    is_scored = objective == "score"
+    draw = _samples(file, number, scorer, objective, seed)
+    drawn = draw(samples, SAMPLES_STREAM)
     search = LocalSearch(
         scorer,
-        Space.of(file.configurations, file.tables[number].sets),
-        _objective(file, number, scorer, objective, samples, seed),
+        Space.of(file.configurations, sets),
+        ScoreObjective(sets.weights) if is_scored else SuccessObjective(sets.weights, drawn),
         named_generator(seed, STREAM),
     )
-    walks, scored = search.run(
-        starting_sets(file, number, starts), rounds, on_progress or (lambda done, total: None)
-    )
-    refined = _as_table(walks, file.tables[number].sets.weights)
-    success = None
-    if objective != "score":
-        fresh = _samples(file, number, scorer, objective, FRESH_SAMPLES, seed, CHECK_STREAM)
-        success = _success(search, walks[0], fresh, file.tables[number].sets)
+    starts_at = starting_sets(file, number, starts)
+    keep = is_scored and keep_success
+    if keep:
+        hardest = _floor(search, drawn.hardest(-(-samples // HARDEST)), sets)
+        search = dataclasses.replace(search, keeps=hardest.keeps)
+    walks, scored = search.run(starts_at, rounds, on_progress or (lambda done, total: None))
+    fresh = draw(FRESH_SAMPLES, CHECK_STREAM)
+    if keep:
+        screen = _floor(search, fresh.hardest(FRESH_SAMPLES // HARDEST), sets)
+        walks = settled(walks, screen, _floor(search, fresh, sets))
+    refined = _as_table(walks, sets.weights)
+    success = None if is_scored and not keep else _success(search, walks[0], fresh, sets)
     settings = {
         "program_version": version("tcs"),
         "objective": objective,
         "starts": starts,
         "rounds": rounds,
-        "samples": None if objective == "score" else samples,
+        "samples": None if success is None else samples,
+        "keep_success": keep,
+        "displaced": success is not None and isinstance(fresh, DisplacedBases),
         "seed": seed,
         "scored": scored,
         "success": success,
@@ -221,32 +235,30 @@ def refined_members(
     )
 
 
-def _objective(
-    file: ScoreFile, table: int, scorer: PointScorer, name: str, samples: int, seed: int
-) -> Objective:
-    """Return the objective of a name."""
-    weights = file.tables[table].sets.weights
-    if name == "score":
-        return ScoreObjective(weights)
-    drawn = _samples(file, table, scorer, name, samples, seed, SAMPLES_STREAM)
-    return SuccessObjective(weights, drawn)
-
-
 def _samples(
-    file: ScoreFile,
-    table: int,
-    scorer: PointScorer,
-    objective: str,
-    samples: int,
-    seed: int,
-    stream: str,
-) -> Samples:
-    """Return samples of a named stream: errors of the environment, or displacements of the base."""
-    if objective == "margin":
-        return DisplacedBases.drawn(scorer, samples, named_generator(seed, stream))
-    trials = Trials.of(file, table=table)
-    offsets = trials.errors.draw(samples, seed, stream=stream)
-    return PerturbedPoints(trials, offsets, scorer.jobs)
+    file: ScoreFile, table: int, scorer: PointScorer, objective: str, seed: int
+) -> Callable[[int, str], Samples]:
+    """Return a function that draws samples, given their number and the name of the stream.
+
+    They are errors of the environment; displacements of the base for the objective "margin", and
+    where no joint of the environment has an error.
+    """
+    built = [(arm.job, arm.scene, arm.lowered) for arm in scorer.arms]
+    trials = Trials.built(file, table, built)
+
+    def drawn(samples: int, stream: str) -> Samples:
+        if objective == "margin" or (objective == "score" and not trials.errors.errors):
+            return DisplacedBases.drawn(scorer, samples, named_generator(seed, stream))
+        offsets = trials.errors.draw(samples, seed, stream=stream)
+        return PerturbedPoints(trials, offsets, scorer.jobs)
+
+    return drawn
+
+
+def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloor:
+    """Return the success of the best sets of the grid in some samples."""
+    single, best = search.points_of(sets.best_single), search.points_of(sets.best)
+    return SuccessFloor.of(samples, sets.weights, single, best)
 
 
 def _success(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.kernel.arrays import BoolArray
 from tcs.model.grid import Grid
 from tcs.placement.refinement.objectives import Features, Objective, values_of
 from tcs.placement.refinement.points import Points, PointScores
@@ -28,6 +29,8 @@ GAIN = 1e-9
 """Least gain of the objective that counts: above the rounding of its sum."""
 CHUNK = 4096
 """Combinations of members whose objective is computed at a time."""
+TRIED = (0, 4, 32)
+"""Ranks, by the objective, of the better combinations that are tried against a condition."""
 
 
 class Evaluated(NamedTuple):
@@ -56,6 +59,11 @@ class Evaluated(NamedTuple):
         """What the configurations contribute to the objective."""
         return Features(self.feature_reached, self.feature_dexterity)
 
+    @property
+    def points(self) -> Points:
+        """The configurations alone."""
+        return Points(self.values, self.arm)
+
 
 @dataclass(eq=False)
 class Walk:
@@ -69,11 +77,26 @@ class Walk:
     """The objective of the set."""
     width: float = 1.0
     """Half width of the cells around the members, as a fraction of the first ones."""
+    passed: list[tuple[Evaluated, float]] = field(default_factory=list)
+    """The members and objectives before each move, the start first."""
+
+    def move(self, members: Evaluated, value: float) -> None:
+        """Move to a better set."""
+        self.passed.append((self.present, self.value))
+        self.present, self.value = members, value
+
+    def move_back(self) -> None:
+        """Return to where the walk was before the last move."""
+        self.present, self.value = self.passed.pop()
 
     @property
     def members(self) -> int:
         """Number of members."""
         return len(self.origin)
+
+
+Condition = Callable[[Sequence[Points]], BoolArray]
+"""Returns which of several sets satisfy a condition."""
 
 
 class Scorer(Protocol):
@@ -95,6 +118,8 @@ class LocalSearch:
     space: Space
     objective: Objective
     rng: np.random.Generator
+    keeps: Condition | None = None
+    """Condition of the sets that walks move to, checked for few of them; None for none."""
 
     def run(
         self,
@@ -164,9 +189,11 @@ class LocalSearch:
             found.rows(slice(end - len(part.values), end))
             for part, end in zip(proposed, ends, strict=True)
         ]
+        offered = []
         for walk in walks:
-            self._move(walk, parts[: walk.members])
+            offered.append(self._better(walk, parts[: walk.members]))
             parts = parts[walk.members :]
+        self._move(walks, offered)
         return int(ends[-1])
 
     def _around(self, walk: Walk) -> list[Points]:
@@ -187,8 +214,35 @@ class LocalSearch:
             found.append(Points(around, np.full(len(around), arm)))
         return found
 
-    def _move(self, walk: Walk, around: Sequence[Evaluated]) -> None:
-        """Move a walk to the best combination, or halve the cells if there is none.
+    def _move(
+        self, walks: Sequence[Walk], offered: Sequence[Sequence[tuple[Evaluated, float]]]
+    ) -> None:
+        """Move each walk to the first set offered that is allowed, or halve its cells if none is.
+
+        Args:
+            walks: The walks.
+            offered: Better sets and their objectives, for each walk.
+        """
+        still = list(range(len(walks)))
+        for rank in range(len(TRIED)):
+            tried = [k for k in still if rank < len(offered[k])]
+            if not tried:
+                break
+            sets = [offered[k][rank] for k in tried]
+            keeps = (
+                np.ones(len(sets), dtype=np.bool_)
+                if self.keeps is None
+                else self.keeps([members.points for members, _ in sets])
+            )
+            for k, (members, value), kept in zip(tried, sets, keeps, strict=True):
+                if kept:
+                    walks[k].move(members, value)
+                    still.remove(k)
+        for k in still:
+            walks[k].width /= 2.0
+
+    def _better(self, walk: Walk, around: Sequence[Evaluated]) -> list[tuple[Evaluated, float]]:
+        """Return better combinations than a walk's present set, the best first: those to try.
 
         Args:
             walk: The walk.
@@ -199,21 +253,28 @@ class LocalSearch:
             Evaluated.joined([walk.present.rows(slice(i, i + 1)), part])
             for i, part in enumerate(around)
         ]
-        best, value = self._best_combination(choices)
-        if value <= walk.value + GAIN:
-            walk.width /= 2.0
-            return
-        chosen = [part.rows(slice(k, k + 1)) for part, k in zip(choices, best, strict=True)]
-        walk.present, walk.value = Evaluated.joined(chosen), value
-
-    def _best_combination(self, choices: Sequence[Evaluated]) -> tuple[tuple[int, ...], float]:
-        """Return the best allowed combination of one configuration per member, and its value."""
         shape = tuple(len(part.values) for part in choices)
-        best, most = (0,) * len(shape), -np.inf
-        for start in range(0, int(np.prod(shape)), CHUNK):
-            flat = np.arange(start, min(start + CHUNK, int(np.prod(shape))))
+        found = self._values(choices)
+        better = np.flatnonzero(found > walk.value + GAIN)
+        better = better[np.argsort(-found[better], kind="stable")]
+        ranks = TRIED[:1] if self.keeps is None else TRIED
+        sets = []
+        for flat in better[[rank for rank in ranks if rank < better.size]]:
             which = np.unravel_index(flat, shape)
-            pairs = list(zip(choices, which, strict=True))
+            chosen = [part.rows(slice(k, k + 1)) for part, k in zip(choices, which, strict=True)]
+            sets.append((Evaluated.joined(chosen), float(found[flat])))
+        return sets
+
+    def _values(self, choices: Sequence[Evaluated]) -> NDArray[np.float64]:
+        """Return the objective of each combination of one configuration per member, flat.
+
+        Those that are not allowed have -inf.
+        """
+        shape = tuple(len(part.values) for part in choices)
+        values = np.empty(int(np.prod(shape)))
+        for start in range(0, values.size, CHUNK):
+            flat = np.arange(start, min(start + CHUNK, values.size))
+            pairs = list(zip(choices, np.unravel_index(flat, shape), strict=True))
             found = values_of(
                 self.objective,
                 Features(
@@ -223,11 +284,8 @@ class LocalSearch:
             )
             members = np.stack([part.values[i] for part, i in pairs], axis=1)
             found[~self.space.allowed(members)] = -np.inf
-            first = int(np.argmax(found))
-            if found[first] > most:
-                most = float(found[first])
-                best = tuple(int(i[first]) for i in which)
-        return best, most
+            values[flat] = found
+        return values
 
 
 def _best_of(walks: Sequence[Walk]) -> list[Walk]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -126,17 +126,37 @@ class Trials:
             raise SelectionError(
                 f"There is no table {table}; the file has {len(file.tables)}, counted from 0."
             )
-        model = ErrorModel.of(built[0][1], errors)
         measure = str(file.metadata["measure"])
         seconds = sum(
             warm_up(build_problem(lowered.arrays, lowered.grid, measure), on_compile)
             for *_, lowered in built
         )
+        trials = cls.built(file, chosen, built, errors, body_collisions)
+        return dataclasses.replace(trials, compile_seconds=seconds)
+
+    @classmethod
+    def built(
+        cls,
+        file: ScoreFile,
+        table: int,
+        built: Sequence[tuple[Job, Scene, LoweredScene]],
+        errors: Errors = None,
+        body_collisions: str = "paper",
+    ) -> Trials:
+        """Return the trials of a table whose scene is built, once for each arm, and kernel warm.
+
+        Args:
+            file: A score file.
+            table: Number of its table.
+            built: Job, scene and arrays of each arm.
+            errors: As for `of`.
+            body_collisions: As for `of`.
+        """
         arms = tuple(
             ArmTrials(job, scene, lowered, counted_pairs(scene, lowered, body_collisions))
             for job, scene, lowered in built
         )
-        return cls(file, chosen, model, body_collisions, arms, seconds)
+        return cls(file, table, ErrorModel.of(built[0][1], errors), body_collisions, arms, 0.0)
 
     def at_table(self, table: int) -> Trials:
         """Return the trials of another table of the same file."""

@@ -12,7 +12,13 @@ import tcs
 from tcs.errors import SelectionError, StoreError, TcsError, UnknownNameError
 from tcs.model.grid import Grid
 from tcs.placement.refinement import Points, PointScorer, refinement_summary
+from tcs.placement.refinement.displaced import ANGLE, RADIUS, DisplacedBases
+from tcs.placement.refinement.floor import SLACK, settled
+from tcs.placement.refinement.objectives import ScoreObjective
+from tcs.placement.refinement.perturbed import PerturbedPoints
+from tcs.placement.refinement.search import Evaluated, LocalSearch, Walk
 from tcs.placement.refinement.space import Space
+from tcs.placement.robustness import Trials
 from tcs.placement.store.encoding import decode, encode
 
 BESIDE = """
@@ -37,7 +43,7 @@ def scored(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def refined(scored):
-    return tcs.refine(scored, starts=2, rounds=3)
+    return tcs.refine(scored, starts=2, rounds=3, keep_success=False)
 
 
 def test_scores_at_grid_points_are_those_of_the_grid(scored):
@@ -80,7 +86,7 @@ def test_members_stay_between_the_ends_of_the_axes(refined):
 
 
 def test_the_result_does_not_depend_on_the_number_of_threads(scored, refined):
-    again = tcs.refine(scored, starts=2, rounds=3, jobs=1).nominal.refined
+    again = tcs.refine(scored, starts=2, rounds=3, keep_success=False, jobs=1).nominal.refined
     np.testing.assert_array_equal(again.values, refined.nominal.refined.values)
 
 
@@ -143,6 +149,83 @@ def test_constraints_hold_for_refined_sets(refined):
     chosen = tcs.select(refined, HERE, constraints=tcs.Constraints(blocked=(box,)))
     assert chosen.refined is None
     assert "Refined sets are not compared: obstacles" in chosen.warnings[-1]
+
+
+def test_a_set_keeps_the_success_of_the_grid(scored, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 100)
+    options = {"starts": 1, "rounds": 4, "samples": 32}
+    kept = tcs.refine(scored, **options)
+    free = tcs.refine(scored, **options, keep_success=False)
+    found = refinement_summary(kept)
+    assert found["keep_success"]
+    assert found["success"]["after"] >= found["success"]["before"] - SLACK
+    assert kept.nominal.refined.objective[0] <= free.nominal.refined.objective[0]
+
+
+def test_walks_move_to_sets_that_satisfy_the_condition(scored, rng):
+    scorer, sets = PointScorer.of(scored, 0), scored.nominal.sets
+    tried = []
+
+    def keeps(offered):
+        tried.extend(points.values for points in offered)
+        return np.array([np.all(points.values[:, 1] < -0.95) for points in offered])
+
+    search = LocalSearch(
+        scorer, Space.of(scored.configurations, sets), ScoreObjective(sets.weights), rng
+    )
+    (free,), _ = search.run([sets.best_single], 3, lambda done, total: None)
+    nowhere = dataclasses.replace(search, keeps=keeps)
+    (still,), _ = nowhere.run([sets.best_single], 3, lambda done, total: None)
+    assert free.passed
+    assert not still.passed
+    assert tried
+
+
+def test_walks_move_back_until_they_keep_the_floor():
+    def stand(x):
+        rows = np.zeros((1, 2))
+        return Evaluated(np.array([[x]]), np.zeros(1, dtype=np.int64), *[rows] * 5)
+
+    class Floor:
+        def keeps(self, sets):
+            return np.array([points.values[0, 0] <= self.most for points in sets])
+
+    screen, judge = Floor(), Floor()
+    screen.most, judge.most = 2.5, 1.5
+    walks = [Walk((0,), stand(0.0), 0.0), Walk((1,), stand(9.0), 9.0), Walk((2,), stand(1.0), 1.2)]
+    for x in (1.0, 2.0, 3.0):
+        walks[0].move(stand(x), x)
+    kept = settled(walks, screen, judge)
+    # The second never keeps the floor; the first moves back past the third.
+    assert [(walk.origin, walk.value) for walk in kept] == [((2,), 1.2), ((0,), 1.0)]
+
+
+@pytest.mark.parametrize("samples", ["errors", "displaced bases"])
+def test_the_hardest_samples_have_the_largest_changes(scored, rng, samples):
+    if samples == "errors":
+        trials = Trials.of(scored)
+        drawn = PerturbedPoints(trials, trials.errors.draw(50, 0), 1)
+        size = sum((v / v.std()) ** 2 for v in drawn.offsets.values())
+        kept = drawn.hardest(5).offsets
+        name = next(iter(kept))
+        rows = np.flatnonzero(np.isin(drawn.offsets[name], kept[name]))
+    else:
+        drawn = DisplacedBases.drawn(None, 50, rng)
+        size = (drawn.offsets[:, :2] ** 2).sum(axis=1) / RADIUS**2
+        size += (drawn.offsets[:, 2] / ANGLE) ** 2
+        rows = np.flatnonzero(np.isin(drawn.offsets[:, 0], drawn.hardest(5).offsets[:, 0]))
+    assert set(rows) == set(np.argsort(-size)[:5])
+
+
+def test_perturbed_points_on_the_grid_are_those_of_trials(scored):
+    trials = Trials.of(scored)
+    offsets = trials.errors.draw(12, 3)
+    members = np.array(scored.nominal.sets.best)
+    at = np.stack([*scored.configurations.values(members).values()], axis=1)
+    points = Points(at, np.zeros(len(at), dtype=np.int64))
+    found = PerturbedPoints(trials, offsets, 2).reached(points)
+    np.testing.assert_array_equal(found, trials.reached(members, offsets))
+    assert found.any()
 
 
 @pytest.mark.parametrize("objective", ["success", "margin"])
