@@ -10,6 +10,7 @@ from tcs.cli import (
     arplace,
     capability,
     check,
+    environments,
     locate,
     motion,
     options,
@@ -37,6 +38,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(robots.app, name="robot")
+app.add_typer(environments.app, name="environment")
 app.add_typer(capability.app, name="capability")
 app.add_typer(arplace.app, name="arplace")
 app.add_typer(teleop.app, name="teleop")

@@ -54,18 +54,58 @@ class ModelEntry(_NamedEntry):
 
 
 class Obstacle(_NamedEntry):
-    """An obstacle of the user's own: a box, or any SDFormat model, fixed to the world."""
+    """An obstacle of the user's own, fixed to the world: a shape, a file of one, or a model."""
 
     box: tuple[Size, Size, Size] | None = None
     """Full sizes along its own x, y, z [m]."""
+    sphere: Size | None = None
+    """Radius [m]."""
+    cylinder: tuple[Size, Size] | None = None
+    """Radius, and length along its own z [m]."""
+    capsule: tuple[Size, Size] | None = None
+    """Radius, and length between the centres of its caps along its own z [m]."""
     file: str | None = None
+    """An SDFormat model, a closed mesh, or a point cloud."""
+    scale: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """Metres per unit of a mesh or a point cloud; None is 1."""
+    protrusion: Annotated[float, Field(ge=0.002, le=0.2)] | None = None
+    """Distance by which the shapes around a mesh may protrude from it [m]; None is 0.01."""
+    cell: Annotated[float, Field(ge=0.005, le=1.0)] | None = None
+    """Edge of the cells of a point cloud [m]; a cell with a point is solid. None is 0.03."""
 
     @model_validator(mode="after")
-    def _is_box_or_file(self) -> Self:
-        if (self.box is None) == (self.file is None):
-            raise ValueError("give either 'box: [x, y, z]' or 'file: some.sdf'")
+    def _is_one_thing(self) -> Self:
+        given = [key for key in SHAPES if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"give one of {', '.join(SHAPES)}, not {' and '.join(given) or 'none'}"
+            )
+        allowed = _OPTIONS.get(self.type, ())
+        for key in ("scale", "protrusion", "cell"):
+            if getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"{key} is for {_OPTION_OF[key]}")
         return self
 
+    @property
+    def type(self) -> str:
+        """What it is: the name of a shape, or "model", "mesh" or "cloud" for a file."""
+        if self.file is None:
+            return next(key for key in SHAPES if getattr(self, key) is not None)
+        suffix = Path(self.file).suffix.lower()
+        if suffix in MESHES:
+            return "mesh"
+        return "cloud" if suffix in CLOUDS else "model"
+
+
+SHAPES = ("box", "sphere", "cylinder", "capsule", "file")
+MESHES = (".obj", ".stl", ".glb", ".gltf")
+CLOUDS = (".ply", ".npy")
+_OPTIONS = {"mesh": ("scale", "protrusion"), "cloud": ("scale", "cell")}
+_OPTION_OF = {
+    "scale": f"meshes ({', '.join(MESHES)}) and point clouds ({', '.join(CLOUDS)})",
+    "protrusion": f"meshes ({', '.join(MESHES)})",
+    "cell": f"point clouds ({', '.join(CLOUDS)})",
+}
 
 E = TypeVar("E", ModelEntry, Obstacle)
 
@@ -90,7 +130,8 @@ class EnvironmentFile(Document):
     posture: Annotated[Mapping[str, Posture], Entries] = {}
     """For each leading joint, e.g. a head rest, the positions of the joints that follow it."""
     body_frames: Annotated[Mapping[str, str], Entries] = {}
-    """Frames that goals may be fixed to, e.g. parts of the person: name and "model::link"."""
+    """Frames that goals may be fixed to, e.g. parts of the person: name and "model::link", the name
+    of an obstacle, or "world"."""
     padding: Annotated[Mapping[str, Clearance], Entries] = {}
     """Greatest distance by which the true surface may exceed the shapes of a link, by "model::link"
     [m]."""

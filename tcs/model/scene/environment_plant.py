@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Box, ProximityProperties, SceneGraphInspector
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.geometry import Box, Capsule, ProximityProperties, SceneGraphInspector, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -20,10 +20,12 @@ from pydrake.multibody.tree import (
 )
 
 from tcs.errors import EnvironmentFileError, UnknownNameError
+from tcs.model.robots.primitives import Primitive
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.model_files import check_model_file
+from tcs.model.scene.obstacle_shapes import obstacle_shapes
 from tcs.model.scene.person_joints import articulated_model, person_joints
 from tcs.model.scene.resized_person import (
     padding_of,
@@ -36,6 +38,11 @@ _FLOOR_SIZE = (100.0, 100.0, 1.0)
 """Size of the floor [m]: wider than any environment, so that there is a floor at every base pose,
 and so thick that nothing lies below it."""
 _OBSTACLE_COLOUR = np.array([0.70, 0.66, 0.58, 1.0])
+_CLASSES: dict[str, type[Sphere] | type[Capsule] | type[Box]] = {
+    "sphere": Sphere,
+    "capsule": Capsule,
+    "box": Box,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +50,7 @@ class EnvironmentPlant:
     """The elements of an environment in a plant.
 
     Attributes:
-        links: Every link by "model::link", every box obstacle by its name.
+        links: Every link by "model::link", every obstacle of shapes by its name.
         joints: Every movable joint.
         named_by_link: Names of the models whose contacts are reported by link.
         floor: Whether there is a floor.
@@ -70,9 +77,10 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
         parent = _parent_frame(plant, entry, links, where)
         X_PM = RigidTransform(RollPitchYaw(entry.rpy), entry.xyz)
         here = f"{where}, '{entry.name}'"
-        if isinstance(entry, Obstacle) and entry.box is not None:
+        shapes = obstacle_shapes(entry, here) if isinstance(entry, Obstacle) else ()
+        if shapes:
             _check_free(plant, entry.name, here)
-            links[entry.name] = _add_box(plant, entry.name, entry.box, X_PM)
+            links[entry.name] = _add_shapes(plant, entry.name, shapes, X_PM)
             continue
         instance = _add_model(plant, entry, here, of=environment)
         _fix(plant, instance, parent, X_PM, here)
@@ -98,7 +106,7 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
     _check_names(environment, links, joints, where)
     joints.set_defaults(positions.joints, where=f"{where}, field 'joints'")
     by_link = {m.name for m in environment.models if m.named_by == "link"}
-    by_link |= {o.name for o in environment.obstacles if o.box is not None}
+    by_link |= {o.name for o in environment.obstacles if o.type != "model"}
     return EnvironmentPlant(links, joints, frozenset(by_link), environment.floor)
 
 
@@ -136,15 +144,19 @@ def _parent_frame(
     return links[entry.parent].body_frame()
 
 
-def _add_box(
-    plant: MultibodyPlant, name: str, size: tuple[float, float, float], X_WO: RigidTransform
+def _add_shapes(
+    plant: MultibodyPlant, name: str, shapes: tuple[Primitive, ...], X_WO: RigidTransform
 ) -> RigidBody:
     # A separate body, not a shape of the world, so that it is named like other obstacles.
     body = plant.AddRigidBody(name, plant.AddModelInstance(name))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WO)
-    at_body = RigidTransform()
-    plant.RegisterCollisionGeometry(body, at_body, Box(*size), "box", ProximityProperties())
-    plant.RegisterVisualGeometry(body, at_body, Box(*size), "box", _OBSTACLE_COLOUR)
+    for i, shape in enumerate(shapes):
+        X_OS = RigidTransform(RotationMatrix(shape.rotation), shape.xyz)
+        solid = _CLASSES[shape.kind](*shape.size)
+        # The first has the name of its type, as it would in a file.
+        label = shape.kind if i == 0 else f"{shape.kind} {i}"
+        plant.RegisterCollisionGeometry(body, X_OS, solid, label, ProximityProperties())
+        plant.RegisterVisualGeometry(body, X_OS, solid, label, _OBSTACLE_COLOUR)
     return body
 
 
@@ -255,8 +267,9 @@ def _check_names(
         if link not in links:
             raise UnknownNameError("link", link, links, where=f"{where}, field 'padding'")
     for frame, link in environment.body_frames.items():
-        if link not in links:
-            raise UnknownNameError("link", link, links, where=f"{where}, body frame '{frame}'")
+        if link not in (*links, WORLD):
+            known = (*links, WORLD)
+            raise UnknownNameError("link", link, known, where=f"{where}, body frame '{frame}'")
     for joint in environment.joints:
         if joint not in joints.by_name:
             raise UnknownNameError("joint", joint, joints.by_name, where=f"{where}, field 'joints'")

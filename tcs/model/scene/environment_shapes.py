@@ -13,13 +13,19 @@ from tcs.model.scene.environment_plant import add_environment, environment_parts
 
 
 def environment_shapes(environment: EnvironmentFile) -> Shapes:
+    """Return the collision shapes of an environment; see `named_shapes`."""
+    return named_shapes(environment)[1]
+
+
+def named_shapes(environment: EnvironmentFile) -> tuple[tuple[str, ...], Shapes]:
     """Return the collision shapes of an environment in the state of its file, in W.
 
     Args:
         environment: The environment.
 
     Returns:
-        Shapes in one state; the bodies are numbered in the order of the shapes.
+        The name of each under which its contacts are reported, and the shapes in one state; the
+        bodies are numbered in the order of the shapes.
 
     Raises:
         EnvironmentFileError: If a model cannot be used, or a shape is not supported.
@@ -37,7 +43,8 @@ def environment_shapes(environment: EnvironmentFile) -> Shapes:
     found = [shape_of(inspector, part) for part in parts]
     poses = np.array([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
     poses = poses.reshape(1, len(parts), 3, 4)
-    return Shapes(
+    names = tuple(part.name for part in parts)
+    return names, Shapes(
         type=np.array([code for code, _ in found], dtype=np.int8),
         size=np.array([size for _, size in found], dtype=np.float64).reshape(-1, 3),
         pad=np.array([part.pad for part in parts], dtype=np.float64),

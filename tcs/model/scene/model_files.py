@@ -53,7 +53,8 @@ def check_model_file(path: Path, where: str, *, above: tuple[str, ...] = ()) -> 
     """
     if path.suffix.lower() not in SUFFIXES:
         raise EnvironmentFileError(
-            f"{where} must be an SDFormat or URDF file, with a name in {' or '.join(SUFFIXES)}."
+            f"{where} must be an SDFormat or URDF file, with a name in {' or '.join(SUFFIXES)}; an "
+            "obstacle may also be a mesh or a point cloud."
         )
     root = read_xml(path, where, EnvironmentFileError)
     _check_counts(root, where)

@@ -34,6 +34,7 @@ from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
+from tcs.model.scene.environment import WORLD
 from tcs.model.scene.environment_plant import add_environment, environment_parts
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.spec import SceneSpec
@@ -131,7 +132,8 @@ def build_plant(
         tool_frame=plant.GetFrameByName(robot.tool_frame, instance),
         environment_joints=added.joints,
         body_frames={
-            name: added.links[link].body_frame() for name, link in environment.body_frames.items()
+            name: plant.world_frame() if link == WORLD else added.links[link].body_frame()
+            for name, link in environment.body_frames.items()
         },
         parts=parts,
         rule=rule,

@@ -93,12 +93,12 @@ def test_unknown_name_gets_the_nearest():
         ),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1], "size": 1}]},
-            r"field 'obstacles\[0\]': unknown key 'size'\. Known: box, file",
+            r"field 'obstacles\[0\]': unknown key 'size'\. Known: box, capsule, ",
         ),
-        ({"obstacles": [{"name": "a"}]}, r"obstacles\[0\]'.*either 'box"),
+        ({"obstacles": [{"name": "a"}]}, r"obstacles\[0\]'.*give one of box.*not none"),
         (
             {"obstacles": [{"name": "a", "box": [1, 1, 1], "file": "x.sdf"}]},
-            r"obstacles\[0\]'.*either 'box",
+            r"obstacles\[0\]'.*not box and file",
         ),
         (
             {"obstacles": [{"name": "a", "box": [1, 0, 1]}]},
