@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from table import cell, header, parser, row, save
 
 from tcs.kernel.arrays import BOX, SceneArrays, Shapes
-from tcs.kernel.motion.connect import connect, new_trees
+from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import list_needed
@@ -35,7 +35,7 @@ from tcs.kernel.motion.scene import (
     new_motion_workspace,
     with_pairs,
 )
-from tcs.kernel.motion.shortcut import shorten
+from tcs.kernel.motion.trees import new_trees
 from tcs.kernel.problem import build_problem
 from tcs.model.scene import LoweredScene
 from tcs.motion.paths import SHORTCUTS
@@ -224,11 +224,8 @@ class Query:
         """Return the length of a path [rad], inf if none was found."""
         trees = new_trees(seed)
         ends = self.problem.start[None], self.problem.goal[None]
-        count = connect(self.scene, self.work, trees, *ends, MOST_ITERATIONS)
-        if count == 0:
-            return np.inf
-        count = shorten(self.scene, self.work, trees, count, SHORTCUTS)
-        return _length(trees.path[:count])
+        count = connect(self.scene, self.work, trees, *ends, MOST_ITERATIONS, SHORTCUTS)
+        return _length(trees.path[:count]) if count else np.inf
 
     def ompl_planned(self, seed: int) -> tuple[float, float]:
         """Return time [ms] and length [rad] of OMPL's RRT-Connect, inf if it finds no path."""

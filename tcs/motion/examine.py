@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import is_compiled
-from tcs.kernel.motion.connect import Trees, connect, new_trees
+from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.random import random_state
+from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.motion.approach import Access, accesses, first_accesses
 from tcs.motion.plans import ENTRY
 from tcs.motion.stops import BodyPair, Stop, StopGrid
@@ -294,7 +295,7 @@ class _Reachable:
     def _connected(self, ends: Sequence[FloatArray], iterations: int) -> int | None:
         """Return the number of the posture to which a path was found, None if there is none."""
         stop, starts = self.stop, np.array(self.postures)
-        count = connect(stop.motion, stop.work, stop.trees, starts, np.array(ends), iterations)
+        count = connect(stop.motion, stop.work, stop.trees, starts, np.array(ends), iterations, 0)
         return int(stop.trees.ends[1]) if count else None
 
 

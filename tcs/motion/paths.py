@@ -7,7 +7,6 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import certified
-from tcs.kernel.motion.shortcut import shorten
 from tcs.motion.curves import Curve
 from tcs.motion.stops import Stop
 
@@ -37,12 +36,8 @@ def find_path(
         Postures of the path [rad], shape (k, 7), with certified straight edges, and the number of
         the goal. Joints without limits may end full turns away from it.
     """
-    count = connect(stop.motion, stop.work, stop.trees, starts, goals, iterations)
-    if count == 0:
-        return None
-    goal = int(stop.trees.ends[1])
-    count = shorten(stop.motion, stop.work, stop.trees, count, SHORTCUTS)
-    return stop.trees.path[:count].copy(), goal
+    count = connect(stop.motion, stop.work, stop.trees, starts, goals, iterations, SHORTCUTS)
+    return (stop.trees.path[:count].copy(), int(stop.trees.ends[1])) if count else None
 
 
 def rounded(stop: Stop, path: FloatArray) -> list[Curve]:

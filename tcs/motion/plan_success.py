@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
-from tcs.kernel.motion.connect import new_trees
 from tcs.kernel.motion.edges import certified
+from tcs.kernel.motion.trees import new_trees
 from tcs.model.grid import Grid
 from tcs.model.scene import LoweredScene, Scene, lower
 from tcs.model.scene.lowering import environment_at

@@ -10,7 +10,6 @@ import numpy as np
 
 from tcs.errors import TaskError
 from tcs.kernel.arrays import BoolArray, FloatArray
-from tcs.kernel.motion.connect import Trees, new_trees
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import list_needed
@@ -21,6 +20,7 @@ from tcs.kernel.motion.scene import (
     new_motion_workspace,
     with_pairs,
 )
+from tcs.kernel.motion.trees import Trees, new_trees
 from tcs.kernel.problem import Problem, build_problem
 from tcs.model.grid import Axis, Grid, InitialConfiguration
 from tcs.model.scene import LoweredScene, Scene, lower

@@ -10,18 +10,27 @@ the arm reaches.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from tcs.kernel.arrays import FloatArray, IntArray
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
 from tcs.kernel.motion.edges import edge_is_certified, edge_is_free, edge_seems_free
-from tcs.kernel.motion.random import RandomState, random_state, uniform
+from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.shortcut import cut_corners, drop_postures, path_is_certified
+from tcs.kernel.motion.trees import (
+    MOST_NODES,
+    MOST_POINTS,
+    NONE,
+    SAME,
+    Trees,
+    difference,
+    distance,
+    unwound,
+)
 from tcs.kernel.views import unowned
 
-STEP = 2.0
+STEP = 0.5
 """Longest edge of a tree [rad, norm of the joints]."""
 LOCAL = 0.3
 """Fraction of the random postures that are drawn around a node of the tree that grows: next to a
@@ -30,86 +39,8 @@ SPREAD = 3.0
 """Greatest scale of these: the standard deviation of each joint is half of it [rad]. The scale is
 this times the square of a random number, so that some targets are near enough for a trapped tree.
 """
-MOST_NODES = 20_000
-"""Capacity of each tree."""
-MOST_POINTS = 1024
-"""Capacity of a path."""
 DIRECT = 4
 """Pairs of start and goal, the nearest ones, that are connected directly if possible."""
-NONE = -1
-SAME = 1e-12
-"""Greatest distance of two postures that are the same up to rounding of full turns [rad]."""
-
-
-class Trees(NamedTuple):
-    """The two trees of a query, from the starts (0) and from the goals (1), and its path."""
-
-    q: FloatArray
-    """Postures [rad], shape (2, MOST_NODES, 7)."""
-    parent: IntArray
-    """Node that each node was extended from, NONE for a root, shape (2, MOST_NODES)."""
-    nodes: IntArray
-    """Number of nodes, shape (2,)."""
-    certified: IntArray
-    """1 where the edge to a node is certified, shape (2, MOST_NODES)."""
-    renumbered: IntArray
-    """Scratch: new number of each node, NONE for those removed, shape (MOST_NODES,)."""
-    target: FloatArray
-    """Posture to grow towards, and next posture [rad], shape (2, 7)."""
-    turned: FloatArray
-    """End of a shortcut, full turns taken off [rad], shape (7,)."""
-    path: FloatArray
-    """Postures of the path, from a start to a goal [rad], shape (MOST_POINTS, 7)."""
-    spare: FloatArray
-    """Scratch to rebuild the path [rad], shape (MOST_POINTS, 7)."""
-    ends: IntArray
-    """Start and goal that the path connects, shape (2,)."""
-    random: RandomState
-    """State of the random numbers."""
-
-
-def new_trees(seed: int) -> Trees:
-    """Return memory for a query."""
-    return Trees(
-        q=np.empty((2, MOST_NODES, 7)),
-        parent=np.empty((2, MOST_NODES), np.int64),
-        nodes=np.zeros(2, np.int64),
-        certified=np.empty((2, MOST_NODES), np.int64),
-        renumbered=np.empty(MOST_NODES, np.int64),
-        target=np.empty((2, 7)),
-        turned=np.empty(7),
-        path=np.empty((MOST_POINTS, 7)),
-        spare=np.empty((MOST_POINTS, 7)),
-        ends=np.zeros(2, np.int64),
-        random=random_state(seed),
-    )
-
-
-@inner
-def difference(scene: MotionScene, start: float, end: float, k: int) -> float:
-    """Return the angle of joint k from one position to another, the short way round [rad]."""
-    period = scene.period[k]
-    angle = end - start
-    if period > 0.0:
-        angle -= period * np.floor(angle / period + 0.5)
-    return angle
-
-
-@inner
-def unwound(scene: MotionScene, start: float, end: float, k: int) -> float:
-    """Return the position of joint k nearest to `start` that equals `end` up to full turns."""
-    period = scene.period[k]
-    return end - period * np.floor((end - start) / period + 0.5) if period > 0.0 else end
-
-
-@inner
-def distance(scene: MotionScene, a: FloatArray, b: FloatArray) -> float:
-    """Return the distance of two postures [rad, norm of the joints]."""
-    square = 0.0
-    for k in range(7):
-        angle = difference(scene, a[k], b[k], k)
-        square += angle * angle
-    return np.sqrt(square)
 
 
 @jit
@@ -120,6 +51,7 @@ def connect(
     starts: FloatArray,
     goals: FloatArray,
     iterations: int,
+    shortcuts: int,
 ) -> int:
     """Find a path of certified edges from one of the starts to one of the goals.
 
@@ -131,6 +63,7 @@ def connect(
         starts: Postures at which nothing touches [rad], shape (n, 7).
         goals: Postures at which nothing touches [rad], shape (m, 7).
         iterations: Greatest number of random postures to grow towards.
+        shortcuts: Number of random shortcuts to try; with 0 the path is not shortened.
 
     Returns:
         Number of postures of the path, 0 if none was found.
@@ -142,13 +75,53 @@ def connect(
         return 0
     if _connect_directly(scene, work, trees, len(starts), len(goals)):
         return _path(scene, trees, trees.ends[0], trees.ends[1])
+    left = iterations
+    while left > 0:
+        left = _grow_until_met(scene, work, trees, left)
+        if left >= 0:
+            count = _certified_path(scene, work, trees, shortcuts)
+            if count > 0:
+                return count
+    return 0
+
+
+@inner
+def _certified_path(scene: MotionScene, work: MotionWorkspace, trees: Trees, shortcuts: int) -> int:
+    """Fill the path over the nodes that have met, `trees.met`, with certified edges.
+
+    With shortcuts, only the edges are certified that stay when postures have been dropped.
+
+    Returns:
+        Number of postures of the path; 0 if an edge is blocked, which is then removed.
+    """
+    if shortcuts > 0:
+        count = _path(scene, trees, trees.met[0], trees.met[1])
+        count = drop_postures(scene, work, trees, count)
+        if path_is_certified(scene, work, trees, count):
+            return cut_corners(scene, work, trees, count, shortcuts)
+    for side in range(2):
+        if not _branch_is_certified(scene, work, trees, side, trees.met[side]):
+            return 0
+    count = _path(scene, trees, trees.met[0], trees.met[1])
+    return cut_corners(scene, work, trees, count, shortcuts)
+
+
+@inner
+def _grow_until_met(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, iterations: int
+) -> int:
+    """Grow both trees until they meet, at the nodes `trees.met`.
+
+    Returns:
+        Number of iterations left, -1 if they have not met.
+    """
     target, following = trees.target[0], trees.target[1]
-    for _ in range(iterations):
-        grown = trees.nodes[0] - len(starts), trees.nodes[1] - len(goals)
+    for n in range(iterations):
+        grown = trees.nodes[0] - trees.roots[0], trees.nodes[1] - trees.roots[1]
         side = 0 if grown[0] <= grown[1] else 1
         _draw_target(scene, trees, side)
         if max(trees.nodes[0], trees.nodes[1]) >= MOST_NODES:
-            return 0
+            return -1
         new = _grow(scene, work, trees, side, _nearest(scene, trees, side, target), target)
         if new == NONE:
             continue
@@ -158,15 +131,12 @@ def connect(
         met = _nearest(scene, trees, other, following)
         while met != NONE and distance(scene, trees.q[other, met], following) > SAME:
             if trees.nodes[other] >= MOST_NODES:
-                return 0
+                return -1
             met = _grow(scene, work, trees, other, met, following)
-        if (
-            met != NONE
-            and _branch_is_certified(scene, work, trees, side, new)
-            and _branch_is_certified(scene, work, trees, other, met)
-        ):
-            return _path(scene, trees, new if side == 0 else met, met if side == 0 else new)
-    return 0
+        if met != NONE:
+            trees.met[side], trees.met[other] = new, met
+            return iterations - n - 1
+    return -1
 
 
 @inner
@@ -199,7 +169,7 @@ def _plant(trees: Trees, side: int, roots: FloatArray) -> None:
         trees.parent[side, n] = NONE
         for k in range(7):
             trees.q[side, n, k] = roots[n, k]
-    trees.nodes[side] = count
+    trees.nodes[side], trees.roots[side] = count, count
 
 
 @inner

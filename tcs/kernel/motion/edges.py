@@ -17,10 +17,12 @@ from tcs.kernel.motion.pairs import (
     ROUNDING,
     append_below,
     is_near,
+    is_near_on_piece,
     is_of_groups,
     list_near,
     take_posture,
 )
+from tcs.kernel.motion.planes import take_twists
 from tcs.kernel.motion.scene import DEPTH, MotionScene, MotionWorkspace
 from tcs.kernel.views import unowned
 
@@ -142,8 +144,7 @@ def curve_is_free_until(scene: MotionScene, work: MotionWorkspace) -> float:
     pieces = int(np.ceil(moved / PIECE)) if moved > PIECE else 1
     for n in range(pieces):
         begin, end = n / pieces, (n + 1) / pieces
-        take_middle(work, begin, end)
-        take_posture(scene, work)
+        _take_piece(scene, work, begin, end)
         count = list_near(scene, work, ROUNDING, len(scene.pair))
         until = listed_are_free_until(scene, work, count, begin, end)
         if until < end:
@@ -239,12 +240,11 @@ def _uncertified(
     Returns:
         Number of pairs not certified, or -1 where one is in contact, or moves less than RESOLUTION.
     """
-    take_middle(work, begin, end)
-    take_posture(scene, work)
+    _take_piece(scene, work, begin, end)
     left = 0
     for n in range(first, last):
         k = work.pairs[n]
-        if not is_near(scene, work, k, True):
+        if not is_near_on_piece(scene, work, k):
             continue
         moved, before = work.motion[scene.pair[k, 0], scene.pair[k, 2]], last + left
         left = append_below(scene, work, k, moved, ROUNDING, before, len(work.pairs)) - last
@@ -260,6 +260,14 @@ def _uncertified(
 
 
 @inner
+def _take_piece(scene: MotionScene, work: MotionWorkspace, begin: float, end: float) -> None:
+    """Make the middle of a piece the current posture, with the motion of the links on the piece."""
+    take_middle(work, begin, end)
+    take_posture(scene, work)
+    take_twists(work)
+
+
+@inner
 def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
     """Fill the posture in the middle of a piece, and how far each joint is from it on the piece."""
     control, t, half = work.control, 0.5 * (begin + end), 0.5 * (end - begin)
@@ -267,5 +275,7 @@ def take_middle(work: MotionWorkspace, begin: float, end: float) -> None:
     for k in range(7):
         a, b, c, d = control[0, k], control[1, k], control[2, k], control[3, k]
         work.q[k] = u * u * (u * a + 3.0 * t * b) + t * t * (3.0 * u * c + t * d)
-        # The derivative of the curve lies between three times the differences of its points.
+        # The derivatives of the curve lie between multiples of the differences of its points.
         work.delta[k] = 3.0 * half * max(abs(b - a), abs(c - b), abs(d - c))
+        work.rate[k] = 3.0 * half * (u * u * (b - a) + 2.0 * u * t * (c - b) + t * t * (d - c))
+        work.bend[k] = 6.0 * half * half * max(abs(a - 2.0 * b + c), abs(b - 2.0 * c + d))

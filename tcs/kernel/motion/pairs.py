@@ -17,6 +17,7 @@ from tcs.kernel.arrays import BOX, CAPSULE, FloatArray
 from tcs.kernel.cache import inner
 from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE, closer, move, spheres_overlap
 from tcs.kernel.kinematics import link_poses
+from tcs.kernel.motion.planes import plane_between
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 
 COARSE = 0.02
@@ -28,6 +29,7 @@ GROUP = 16
 """Number of pairs that one vector loop checks."""
 ROUNDING = 1e-9
 """Excess of the bounds [relative, and m], far above rounding errors of positions."""
+GROWN = 1.0 + ROUNDING
 
 
 @inner
@@ -48,8 +50,8 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
         half * shapes[i, ROTATION + 5],
         half * shapes[i, ROTATION + 8],
     )
-    total = 0.0
-    work.motion[i, frame] = 0.0
+    total = second = 0.0
+    work.motion[i, frame] = work.rest[i, frame] = 0.0
     for k in range(frame, 0, -1):
         angle = work.delta[k - 1]
         if angle > 0.0:
@@ -60,8 +62,11 @@ def place_shape(scene: MotionScene, work: MotionWorkspace, i: int) -> None:
                 square = max(square, _from_axis(R, dx - ax, dy - ay, dz - az))
             if shapes[i, TYPE] == BOX:
                 radius = _radius_about(shapes, i, R)
-            total += angle * (np.sqrt(square) + radius + total) * (1.0 + ROUNDING)
-        work.motion[i, k - 1] = total
+            away = np.sqrt(square) + radius + total
+            # Of the second derivative of a point: the terms of two joints, of one, of its own.
+            second += (angle * (2.0 * total + angle * away) + work.bend[k - 1] * away) * GROWN
+            total += angle * away * GROWN
+        work.motion[i, k - 1], work.rest[i, k - 1] = total, 0.5 * second
 
 
 @inner
@@ -101,7 +106,10 @@ def take_posture(scene: MotionScene, work: MotionWorkspace) -> None:
 
 @inner
 def is_near(scene: MotionScene, work: MotionWorkspace, k: int, grown: bool) -> bool:
-    """Return whether pair k may touch: at the current posture, or `grown`, on the current piece."""
+    """Return whether pair k may touch: at the current posture, or `grown`, near it.
+
+    Near it is wherever no joint is farther from the posture than `delta`.
+    """
     i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
     place_shape(scene, work, i)
     if base > 0:
@@ -189,9 +197,8 @@ def _append_near(
         most: Number of pairs after which to stop.
     """
     for k in range(first, last):
-        i, j = scene.pair[k, 0], scene.pair[k, 1]
-        moved = work.motion[i, scene.pair[k, 2]]
-        if _may_touch(work.shapes, i, j, scene.gap[k] + moved + extra, moved):
+        moved = work.motion[scene.pair[k, 0], scene.pair[k, 2]]
+        if _may_touch_on_piece(scene, work, k, moved, extra):
             count = append_below(scene, work, k, moved, extra, count, most)
             if count == most:
                 break
@@ -250,10 +257,76 @@ def append_below(
             if base > 0:
                 place_shape(scene, work, j)
             moved = work.motion[i, base]
-            near = _may_touch(work.shapes, i, j, scene.gap[k] + moved + extra, moved)
+            near = _may_touch_on_piece(scene, work, k, moved, extra)
         if not near:
             break
     return count
+
+
+@inner
+def _may_touch_on_piece(
+    scene: MotionScene, work: MotionWorkspace, k: int, moved: float, extra: float
+) -> bool:
+    """Return whether pair k may be closer than its gap, and `extra` [m], on the current piece.
+
+    Its shapes are placed; they move by at most `moved` [m] relative to each other.
+    """
+    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+    within = scene.gap[k] + extra
+    if is_of_groups(scene, k):
+        near = _groups_may_touch(work.shapes, i, j, within + moved)
+    else:
+        near = _may_touch(work.shapes, i, j, within + moved, moved)
+    return near and not (moved > 0.0 and plane_between(scene, work, i, j, base, within))
+
+
+@inner
+def is_near_on_piece(scene: MotionScene, work: MotionWorkspace, k: int) -> bool:
+    """Return whether pair k may touch on the current piece of a curve."""
+    i, j, base = scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2]
+    place_shape(scene, work, i)
+    if base > 0:
+        place_shape(scene, work, j)
+    return _may_touch_on_piece(scene, work, k, work.motion[i, base], ROUNDING)
+
+
+@inner
+def _groups_may_touch(shapes: FloatArray, i: int, j: int, within: float) -> bool:
+    """Return whether two shapes or boxes around groups may be closer than a distance [m].
+
+    Two boxes may be unless a face of one separates them: what is in them is checked next anyway.
+    """
+    if not spheres_overlap(shapes, i, shapes, j, within) or not _sphere_near(shapes, i, j, within):
+        return False
+    if shapes[i, TYPE] != BOX or shapes[j, TYPE] != BOX:
+        return closer(shapes, i, shapes, j, within)
+    return not _face_separates(shapes, i, j, within) and not _face_separates(shapes, j, i, within)
+
+
+@inner
+def _face_separates(shapes: FloatArray, i: int, j: int, within: float) -> bool:
+    """Return whether box i is at least a distance [m] beyond a face of box j."""
+    x, y, z = (
+        shapes[i, CENTRE] - shapes[j, CENTRE],
+        shapes[i, CENTRE + 1] - shapes[j, CENTRE + 1],
+        shapes[i, CENTRE + 2] - shapes[j, CENTRE + 2],
+    )
+    for m in range(3):
+        nx, ny, nz = (
+            shapes[j, ROTATION + m],
+            shapes[j, ROTATION + 3 + m],
+            shapes[j, ROTATION + 6 + m],
+        )
+        extent = shapes[j, SIZE + m] + within
+        for n in range(3):
+            extent += shapes[i, SIZE + n] * abs(
+                nx * shapes[i, ROTATION + n]
+                + ny * shapes[i, ROTATION + 3 + n]
+                + nz * shapes[i, ROTATION + 6 + n]
+            )
+        if abs(nx * x + ny * y + nz * z) >= extent:
+            return True
+    return False
 
 
 @inner

@@ -89,6 +89,15 @@ class MotionWorkspace(NamedTuple):
     motion: FloatArray
     """Bound on how far any point of a shape moves on the current piece, relative to each link
     0 .. 7 before its own [m], shape (n_arm, 8)."""
+    rest: FloatArray
+    """Bound on how far any point of a shape is on the current piece from where its twist at the
+    middle posture leads to, relative to each link 0 .. 7 before its own [m], shape (n_arm, 8)."""
+    rate: FloatArray
+    """Motion of each joint on half of the current piece, to first order [rad], shape (7,)."""
+    bend: FloatArray
+    """Bound on twice the motion of each joint beyond the first order [rad], shape (7,)."""
+    twist: FloatArray
+    """Motion of the links 0 .. 7 on half of the current piece, see `planes`, shape (8, 6)."""
     control: FloatArray
     """Control points of the current curve [rad], shape (4, 7)."""
     pairs: IntArray
@@ -230,6 +239,10 @@ def new_motion_workspace(scene: MotionScene) -> MotionWorkspace:
         posture=np.zeros(1, np.int64),
         delta=np.zeros(7),
         motion=np.zeros((arm, 8)),
+        rest=np.zeros((arm, 8)),
+        rate=np.zeros(7),
+        bend=np.zeros(7),
+        twist=np.zeros((8, 6)),
         control=np.empty((4, 7)),
         pairs=np.empty((DEPTH + 1) * pairs, np.int64),
         stack=np.empty(STACK, np.int64),

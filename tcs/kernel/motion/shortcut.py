@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tcs.kernel.arrays import FloatArray
 from tcs.kernel.cache import inner, jit
-from tcs.kernel.motion.connect import MOST_POINTS, Trees, distance, unwound
-from tcs.kernel.motion.edges import edge_is_free
+from tcs.kernel.motion.edges import edge_is_certified, edge_is_free
 from tcs.kernel.motion.random import uniform
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
+from tcs.kernel.motion.trees import MOST_POINTS, Trees, distance, edge_length, unwound
 from tcs.kernel.views import unowned
 
 LEAST_GAIN = 0.01
@@ -24,39 +22,52 @@ def shorten(
     count: int,
     attempts: int,
 ) -> int:
-    """Shorten `path` in place; its ends stay up to full turns, and all edges remain certified.
+    """Shorten `path` in place, see `cut_corners`; returns the number of its postures."""
+    scene, work, trees = unowned(owned_scene), unowned(owned_work), unowned(owned_trees)
+    count = drop_postures(scene, work, trees, count)
+    return cut_corners(scene, work, trees, count, attempts)
+
+
+@inner
+def cut_corners(
+    scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int, attempts: int
+) -> int:
+    """Shorten `path` in place; its ends stay up to full turns, and new edges are certified.
 
     Args:
-        owned_scene: The scene.
-        owned_work: Scratch.
-        owned_trees: Holds path and random state.
+        scene: The scene.
+        work: Scratch.
+        trees: Holds path and random state.
         count: Number of postures of the path.
-        attempts: Number of random shortcuts to try.
+        attempts: Number of random shortcuts to try; postures are dropped after them.
 
     Returns:
         Number of postures of the shorter path.
     """
-    scene, work, trees = unowned(owned_scene), unowned(owned_work), unowned(owned_trees)
-    count = _drop_postures(scene, work, trees, count)
     for _ in range(attempts):
         if count < 3 or count + 2 > MOST_POINTS:
             break
         count = _cut(scene, work, trees, count)
-    return _drop_postures(scene, work, trees, count)
+    return drop_postures(scene, work, trees, count) if attempts > 0 else count
 
 
 @inner
-def _length(a: FloatArray, b: FloatArray) -> float:
-    """Return the length of a straight edge [rad, norm of the joints]."""
-    square = 0.0
-    for k in range(7):
-        square += (b[k] - a[k]) ** 2
-    return np.sqrt(square)
+def path_is_certified(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> bool:
+    """Return whether all edges of `path` are certified; `count` is the number of its postures."""
+    path = trees.path
+    for n in range(count - 1):
+        if not edge_is_certified(scene, work, path[n], path[n + 1]):
+            return False
+    return True
 
 
 @inner
 def _edge_is_free(
-    scene: MotionScene, work: MotionWorkspace, trees: Trees, start: FloatArray, end: FloatArray
+    scene: MotionScene,
+    work: MotionWorkspace,
+    trees: Trees,
+    start: FloatArray,
+    end: FloatArray,
 ) -> bool:
     """Return whether the edge to a posture, the short way round, is free; fills `trees.turned`."""
     for k in range(7):
@@ -75,7 +86,7 @@ def _turn(path: FloatArray, first: int, count: int, before: FloatArray, after: F
 
 
 @inner
-def _drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
+def drop_postures(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) -> int:
     """Drop postures between which an edge is free, the longest runs first; return how many stay."""
     path, begin = trees.path, 0
     while begin < count - 2:
@@ -101,7 +112,7 @@ def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) ->
     path, ends, spare = trees.path, trees.target, trees.spare
     total = 0.0
     for n in range(count - 1):
-        total += _length(path[n], path[n + 1])
+        total += edge_length(path[n], path[n + 1])
     first, second = uniform(trees.random) * total, uniform(trees.random) * total
     early, late = min(first, second), max(first, second)
     m, n = _take_point(path, count, early, ends[0]), _take_point(path, count, late, ends[1])
@@ -126,11 +137,11 @@ def _cut(scene: MotionScene, work: MotionWorkspace, trees: Trees, count: int) ->
 def _take_point(path: FloatArray, count: int, along: float, point: FloatArray) -> int:
     """Fill the point at a distance along the path [rad]; return the number of its edge."""
     n = 0
-    length = _length(path[0], path[1])
+    length = edge_length(path[0], path[1])
     while along > length and n < count - 2:
         along -= length
         n += 1
-        length = _length(path[n], path[n + 1])
+        length = edge_length(path[n], path[n + 1])
     fraction = min(along / length, 1.0) if length > 0.0 else 0.0
     for k in range(7):
         point[k] = path[n, k] + fraction * (path[n + 1, k] - path[n, k])

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from tcs.kernel.arrays import BOX
-from tcs.kernel.motion.connect import connect, new_trees
+from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.shortcut import shorten
+from tcs.kernel.motion.trees import new_trees
 from tcs.kernel.verification.clutter import arm_base
 from tcs.kernel.verification.reference_motion import straight_curve
 from tests.kernel.arms import drake_arm
@@ -41,11 +42,8 @@ def plan(scene, seed=0, attempts=40, iterations=3000):
     """Return a path from the first posture of SWING to the second, None if there is none."""
     ready, work, plain = prepared(scene)
     trees = new_trees(seed)
-    count = connect(ready, work, trees, SWING[:1], SWING[1:], iterations)
-    if count == 0:
-        return None, ready, work, plain
-    count = shorten(ready, work, trees, count, attempts)
-    return trees.path[:count].copy(), ready, work, plain
+    count = connect(ready, work, trees, SWING[:1], SWING[1:], iterations, attempts)
+    return (trees.path[:count].copy() if count else None), ready, work, plain
 
 
 def length(path):
@@ -104,7 +102,7 @@ def test_shortcuts_do_not_lengthen_a_path(chain):
     scene = walled(chain)
     ready, work, _ = prepared(scene)
     trees = new_trees(1)
-    count = connect(ready, work, trees, SWING[:1], SWING[1:], 3000)
+    count = connect(ready, work, trees, SWING[:1], SWING[1:], 3000, 0)
     found = trees.path[:count].copy()
     shorter = plan(scene, 1)[0]
     assert length(SWING) < length(shorter) < length(found)
@@ -116,7 +114,7 @@ def test_a_path_starts_and_ends_at_the_nearest_of_several_postures(chain):
     starts = np.array([SWING[0] + 0.3, SWING[0]])
     # Full turns of the continuous joints 5 and 7 are the same posture.
     goals = np.array([SWING[1] - 0.4, SWING[1] + [0, 0, 0, 0, 2 * np.pi, 0, -2 * np.pi]])
-    assert connect(ready, work, trees, starts, goals, 10) == 2
+    assert connect(ready, work, trees, starts, goals, 10, 0) == 2
     assert trees.ends.tolist() == [1, 1]
     np.testing.assert_allclose(trees.path[1], SWING[1], atol=1e-12)
 
@@ -128,7 +126,7 @@ def test_an_arm_without_a_closed_form_plans_too(rng):
     free = (q for q in drawn if posture_contact(ready, work, q) == NO_PAIR)
     ends = np.array([next(free), next(free)])
     trees = new_trees(0)
-    count = connect(ready, work, trees, ends[:1], ends[1:], 3000)
+    count = connect(ready, work, trees, ends[:1], ends[1:], 3000, 0)
     assert count >= 2
     np.testing.assert_allclose(trees.path[[0, count - 1]], ends, atol=1e-12)
     for a, b in itertools.pairwise(trees.path[:count]):
@@ -137,4 +135,4 @@ def test_an_arm_without_a_closed_form_plans_too(rng):
 
 def test_without_postures_there_is_no_path(chain):
     ready, work, _ = prepared(bare(chain))
-    assert connect(ready, work, new_trees(0), SWING[:1], np.empty((0, 7)), 10) == 0
+    assert connect(ready, work, new_trees(0), SWING[:1], np.empty((0, 7)), 10, 0) == 0

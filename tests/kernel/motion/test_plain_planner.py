@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from tcs.kernel.motion.connect import connect, new_trees
+from tcs.kernel.motion.connect import connect
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
-from tcs.kernel.motion.shortcut import shorten
+from tcs.kernel.motion.trees import new_trees
 from tcs.kernel.verification.reference_motion import is_free_along, least_excess, straight_curve
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.plain_planner import plain_path
@@ -38,10 +38,10 @@ def test_where_the_plain_planner_finds_a_path_the_compiled_one_does(chain, seed)
     high = np.where(np.isfinite(scene.upper), scene.upper, np.pi)
     simple = plain_path(touches, low, high, start, goal, seed)
     trees = new_trees(seed)
-    count = connect(scene, work, trees, start[None], goal[None], 5000)
+    count = connect(scene, work, trees, start[None], goal[None], 5000, 20)
     assert count > 0 or simple is None
     if count == 0:
         return
-    path = trees.path[: shorten(scene, work, trees, count, 20)]
+    path = trees.path[:count]
     for a, b in itertools.pairwise(path):
         assert is_free_along(straight_curve(a, b), 25, touches)
