@@ -131,31 +131,6 @@ def test_a_thin_plate_between_two_postures_is_never_crossed(chain, rng):
         assert certified(blocked, scratch, control) < t
 
 
-def test_a_plate_along_the_motion_blocks_it_where_the_arc_bends_into_it(chain, rng):
-    scene = bare(chain)
-    control = straight_curve(*SWING)
-    R_WA, p_WA = arm_base(scene, toy_grid(), HERE)
-    blocked = 0
-    for t in rng.uniform(0.1, 0.9, 30):
-        q, q_next = (point_on_curve(control, u) for u in (t, t + 1e-4))
-        p, p_next = (R_WA @ link_poses(chain, joints)[-1][1] + p_WA for joints in (q, q_next))
-        # A plate that contains the tangent of the tool's path, on a random side of the tool.
-        normal = np.cross(p_next - p, rng.normal(size=3))
-        normal /= np.linalg.norm(normal)
-        plate = placed(BOX, [0.1, 0.1, 0.0005], along(normal), p + rng.uniform(0.0, 0.1) * normal)
-        ready, work, _ = prepared(with_obstacle(scene, plate))
-        until = certified(ready, work, control)
-        touching = [
-            u
-            for u in np.linspace(0.0, 1.0, 400)
-            if posture_contact(ready, work, point_on_curve(control, u)) != NO_PAIR
-        ]
-        assert not touching or until <= touching[0]
-        assert touching or until == 1.0
-        blocked += len(touching) > 0
-    assert 5 < blocked < 30
-
-
 def test_a_curve_of_length_0_is_a_posture(chain, rng):
     scene, work, _ = toy(chain)
     for _ in range(50):
