@@ -60,6 +60,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "robots": ("--limit", "2000", "--finished", "out/robots.jsonl"),
     "numeric_arms": (),
     "six_joints": (),
+    "drafting": ("--coarse",),
     "primitives": (),
     "shapes": (),
     "null_space": (),

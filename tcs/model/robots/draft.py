@@ -13,10 +13,14 @@ from tcs.errors import RobotError, UnknownNameError
 from tcs.files.writing import scratch_folder
 from tcs.files.xml_documents import read_xml
 from tcs.model.robots.checks import check_robot
+from tcs.model.robots.draft_frames import on_floor, standing_bodies, with_goal_axes
 from tcs.model.robots.fitting import fit_robot
-from tcs.model.robots.hand import hand_axes
 from tcs.model.robots.primitives import Primitive, write_primitives
-from tcs.model.robots.robot_file import LEAST_JOINTS, MOST_JOINTS, ExtraFrame, RobotFile
+from tcs.model.robots.robot_file import (
+    LEAST_JOINTS,
+    MOST_JOINTS,
+    RobotFile,
+)
 from tcs.model.robots.self_collision import (
     DRAWS,
     blocked_at_boxes,
@@ -31,8 +35,6 @@ from tcs.model.robots.urdf.surfaces import body_triangles
 
 _VERTICAL = 0.99
 """Cosine to the vertical above which a prismatic joint counts as torso joint."""
-_ON_FLOOR = 0.02
-"""Bodies that reach down to this height [m] stand on the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,11 +140,12 @@ def draft_robot(
             postures={"drafted": posture} if posture else {},
             gripper="drafted" if gripper else None,
             grippers={"drafted": gripper} if gripper else {},
-            standing_bodies=_standing(model, posture, arm, torso),
             primitives=str(shapes),
             source=_source(path, address),
         )
+        robot = robot.model_copy(update={"standing_bodies": standing_bodies(robot)})
         check_robot(robot, where=f"robot drafted from '{path}'")
+        robot, floor = on_floor(robot)
         steps = _Steps(on_progress)
         fits = fit_robot(robot, steps.bodies, coarse=options.coarse, jobs=options.jobs)
         primitives = tuple(shape for found in fits for shape in found.fit.primitives)
@@ -151,7 +154,7 @@ def draft_robot(
         steps.test_done()
         rest = free_posture(robot)
         robot = robot.model_copy(update={"rest": rest or {}})
-        robot, axes = _with_goal_axes(robot)
+        robot, axes = with_goal_axes(robot)
         blocked = blocked_by_shapes(robot)
         steps.test_done()
         at_boxes = blocked_at_boxes(robot)
@@ -174,7 +177,7 @@ def draft_robot(
         *_left_out(options),
         "posture: 0 if the range of a joint includes both signs, else the middle of its range; "
         "check that the gripper is open and a second arm out of the way",
-        f"root: '{model.root}' must be on the floor, z up, x forward",
+        f"root: {floor}",
     ]
     return Draft(robot=robot, primitives=primitives, remarks=tuple(remarks))
 
@@ -201,27 +204,6 @@ class _Steps:
     def _tell(self) -> None:
         if self._report is not None:
             self._report(self._done, self._total)
-
-
-def _with_goal_axes(robot: RobotFile) -> tuple[RobotFile, str]:
-    """Return a robot whose tool frame points along its hand, and what was chosen."""
-    hand, tool = hand_axes(robot), robot.tool_frame
-    if hand is None:
-        return robot, f"the shapes of the hand do not show where it points; x of '{tool}' must"
-    part = "the fingers point" if hand.fingers else "the last link points"
-    if hand.is_forward_x:
-        return robot, f"{part} along +x of '{tool}', as goals need"
-    taken = {*robot.model().links}
-    name = next(
-        n for n in (f"{tool}_goal{i or ''}" for i in range(len(taken) + 1)) if n not in taken
-    )
-    frame = ExtraFrame(name=name, parent=tool, rpy_deg=hand.goal_axes())
-    opening = "" if hand.opening is None else " and y in the direction in which they open"
-    return (
-        robot.model_copy(update={"frames": (frame,), "tool_frame": name}),
-        f"{part} along {hand.forward_axis} of '{tool}', and goals need +x: frame '{name}' was "
-        f"added with x forward{opening}",
-    )
 
 
 def _left_out(options: DraftOptions) -> list[str]:
@@ -295,20 +277,6 @@ def _positions(
         value = 0.0 if lower < 0.0 < upper else round((lower + upper) / 2, 6)
         (gripper if joint.child in held else posture)[joint.name] = value
     return posture, gripper
-
-
-def _standing(
-    model: Urdf, posture: dict[str, float], arm: list[Joint], torso: Joint | None
-) -> tuple[str, ...]:
-    """Return the bodies that reach down to the floor and that neither arm nor torso moves."""
-    first = [joint.name for joint in (arm[0], torso) if joint is not None]
-    moved = frozenset[str]().union(*map(model.links_moved_by, first))
-    found = []
-    for body, triangles in body_triangles(model).items():
-        R, p = pose_in_root(model, body, posture)
-        if body not in moved and (triangles @ R.T + p)[..., 2].min() <= _ON_FLOOR:
-            found.append(body)
-    return tuple(found)
 
 
 def _source(path: Path, address: str) -> str:

@@ -8,6 +8,7 @@ from tcs.model.checkup.tool import fingers_off_axis
 from tcs.model.robots import load_robot
 from tcs.model.robots.draft import DraftOptions, draft_robot
 from tcs.model.robots.draft_files import write_draft
+from tcs.model.robots.draft_frames import on_floor
 from tcs.model.robots.fitting import covering, fit_robot
 from tcs.model.robots.fitting.bodies import ARM, COARSE
 from tcs.model.robots.fitting.enclosure import enclosure
@@ -161,6 +162,22 @@ def test_a_tool_with_z_forward_gets_a_frame_with_x_forward(tmp_path):
     assert any("point along +z of 'tool'" in remark for remark in draft.remarks)
     assert fingers_off_axis(robot.model_copy(update={"tool_frame": "tool"})) == "+z"
     assert fingers_off_axis(robot) is None
+
+
+def test_a_root_above_the_floor_is_mounted(drafted, tmp_path):
+    """As the pelvis of a humanoid: the lowest surface stands on the floor."""
+    file = tmp_path / "raised.urdf"
+    pose = '<origin xyz="0 0 0.15"/><geometry><box size="0.5 0.5 0.3"/>'
+    assert pose in urdf()
+    file.write_text(urdf().replace(pose, pose.replace("0 0 0.15", "0 0 -0.65")))
+    robot = drafted[0].robot.model_copy(update={"urdf": str(file), "standing_bodies": ()})
+    mounted, remark = on_floor(robot)
+    assert mounted.mount.xyz == (0.0, 0.0, 0.8)
+    assert mounted.root_body == mounted.model().root == "floor_link"
+    assert mounted.standing_bodies == ("base",)
+    assert "0.8 m above the lowest surface" in remark
+    assert on_floor(mounted)[0] == mounted
+    assert on_floor(drafted[0].robot)[0] == drafted[0].robot
 
 
 COLLISION = """<collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision>"""
