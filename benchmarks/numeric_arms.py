@@ -21,7 +21,7 @@ from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.scores import REACHED, Scores
 from tcs.kernel.sweep import gripper_contacts, score_slice
 from tcs.placement.scoring import load_job
-from tcs.placement.scoring.sweep import SLICE
+from tcs.placement.scoring.engines import SLICE
 
 ENVIRONMENT = "wheelchair"
 ROWS = "pr2:shaving,tiago:shaving,iiwa7:feeding,panda:feeding"

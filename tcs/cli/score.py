@@ -124,6 +124,16 @@ def score(
     restart: Annotated[
         bool, typer.Option("--restart", help="With --blocks: discard what was finished before.")
     ] = False,
+    engine: Annotated[
+        str,
+        typer.Option(help="Who scores: threads, processes, or dask for the workers of a cluster."),
+    ] = "threads",
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="With --engine dask: what `dask scheduler` prints, tcp://..."
+        ),
+    ] = None,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -155,6 +165,10 @@ def score(
             "is for scores without approach, of an environment that is not observed.",
             param_hint="--refine",
         )
+    if engine != "threads" and (observed or frames or dry_run):
+        raise typer.BadParameter(
+            "other than threads is for scoring a whole grid.", param_hint="--engine"
+        )
     constraints = wanted.constraints()
     if at and not frames and not constraints.keep:
         raise typer.BadParameter(
@@ -164,9 +178,13 @@ def score(
 
     from tcs.cli.values import person_values, settings
     from tcs.placement.scoring import BlockFolder, default_path, files
+    from tcs.placement.scoring.engines import engine_named
 
-    folder = None if blocks is None else BlockFolder(blocks, restart)
-
+    offline: dict[str, Any] = {
+        "arms": arms,
+        "blocks": None if blocks is None else BlockFolder(blocks, restart),
+        "engine": engine_named(engine, jobs=jobs, scheduler=scheduler),
+    }
     scoring_options: dict[str, Any] = {
         "measure": measure,
         "approach": approach,
@@ -188,9 +206,8 @@ def score(
             environment,
             robot,
             out or Path(),
-            arms=arms,
             progress=_progress,
-            blocks=folder,
+            **offline,
             **scoring_options,
         )
         if refine:
@@ -207,9 +224,14 @@ def score(
     if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(
-                task, environment, robot, path, arms=arms, on_progress=on_progress,
-                blocks=folder, **scoring_options,
-            )  # fmt: skip
+                task,
+                environment,
+                robot,
+                path,
+                on_progress=on_progress,
+                **offline,
+                **scoring_options,
+            )
         if refine:
             result["refinement"] = refined_in_place(path, jobs)
         terminal.print_result(result, tables.report_scores, as_json=as_json)

@@ -12,8 +12,9 @@ from tcs.files.compression import compress
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.blocks import BLOCK, Block
+from tcs.placement.scoring.engines import SLICE, Part, Work
 from tcs.placement.scoring.job import Job
-from tcs.placement.scoring.sweep import SLICE, score_block, warm_up
+from tcs.placement.scoring.sweep import warm_up
 
 SAMPLES = 24
 """Slices that are scored, spread evenly over the grid. Environment states and base positions differ
@@ -56,13 +57,13 @@ def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
     lowered = job.lowered(job.scene())
     problem = build_problem(lowered.arrays, lowered.grid, measure)
     warm_up(problem)
-    grippers = gripper_contacts(problem)
+    work = Work(problem, gripper_contacts(problem))
     size, goals = job.scored_grid.size, len(job.task.goals)
     starts = np.unique(np.linspace(0, max(0, size - SLICE), SAMPLES).astype(int))
     seconds, memory, disk, scored = [], 0, 0, 0
     for start in starts.tolist():
         begun = time.thread_time()
-        block = score_block(problem, grippers, start, min(start + SLICE, size))
+        block = work.score(Part(start, min(start + SLICE, size)))
         seconds.append(time.thread_time() - begun)
         scored += len(block.reason)
         memory += sum(array.nbytes for array in block)

@@ -26,6 +26,7 @@ from tcs.placement.constraints import (
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.blocks import BlockFolder
+from tcs.placement.scoring.engines import Engine
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
@@ -69,6 +70,8 @@ class ScoringSetup:
     """Whether a goal counts as reached only by postures that can be approached."""
     blocks: BlockFolder | None = None
     """Where finished blocks of the grid are kept; None to keep none."""
+    engine: Engine | None = None
+    """Who scores; None for `jobs` threads of this process."""
 
     @classmethod
     def load(
@@ -86,6 +89,7 @@ class ScoringSetup:
         person: PersonLike | None = None,
         approach: bool = False,
         blocks: BlockFolder | None = None,
+        engine: Engine | None = None,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -102,7 +106,7 @@ class ScoringSetup:
             task, environment, robot, only=only, constraints=constraints, now=now, person=person
         )
         references = data_references(job, task, environment, robot)
-        return cls(job, job.scene(), references, options, measure, jobs, approach, blocks)
+        return cls(job, job.scene(), references, options, measure, jobs, approach, blocks, engine)
 
     def score(
         self,
@@ -157,6 +161,7 @@ class ScoringSetup:
             excluded=excluded,
             approaches=approach_lines(job) if self.approach else None,
             blocks=self.blocks,
+            engine=self.engine,
         )
         person = person_entry(job.spec.environment, job.task, swept.tables)
         contact = prevailing_self_contact(swept.tables, lowered.robot_bodies)
@@ -243,6 +248,7 @@ def score(
     person: PersonLike | None = None,
     approach: bool = False,
     blocks: BlockFolder | None = None,
+    engine: Engine | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.
@@ -273,6 +279,8 @@ def score(
             along the goal's approach. The best of these gives joints and dexterity.
         blocks: Folder in which finished blocks of the grid are kept, so that the same call
             continues after the process was killed; see `tcs.placement.scoring.BlockFolder`.
+        engine: Who scores: `Threads`, `Processes` or `Dask` of `tcs.placement.scoring.engines`; by
+            default `jobs` threads. The scores are the same.
         **sets: Options of the kept sets: `rule`, `same_environment`, `max_members`,
             `min_distance`; see `tcs.placement.scoring.SetOptions`.
 
@@ -288,7 +296,7 @@ def score(
         GridError: If the grid is empty or enormous, or a condition is invalid.
         SelectionError: If the present value of an axis to keep is missing or not scored, or every
             base pose is forbidden.
-        TcsError: If an option of the sets is out of range.
+        TcsError: If an option of the sets is out of range, or the workers of the engine are lost.
         ArmClassError: If `approach` is requested of an arm without a closed form.
         OutputError: If blocks cannot be kept in their folder, or another process is at work there.
     """
@@ -298,6 +306,7 @@ def score(
         arm: ScoringSetup.load(
             task, environment, of_arm, measure=measure, jobs=jobs, sets=sets, only=only,
             constraints=constraints, now=now, person=person, approach=approach, blocks=blocks,
+            engine=engine,
         )
         for arm, of_arm in robots.items()
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Scoring of a lowered scene: the kernel runs over slices of the grid in several threads."""
+"""Scoring of a lowered scene: an engine scores the parts of its grid."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
-from tcs.kernel.contacts import NO_CONTACT
 from tcs.kernel.dexterity import DEFAULT_MEASURE
 from tcs.kernel.problem import Problem, build_problem
-from tcs.kernel.scores import Scores
-from tcs.kernel.sweep import gripper_contacts, score_slice
+from tcs.kernel.sweep import gripper_contacts
 from tcs.model.scene import LoweredScene
 from tcs.placement.scoring.approaches import (
     ENTRY,
@@ -28,20 +26,15 @@ from tcs.placement.scoring.approaches import (
     warm_up_approaches,
 )
 from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept, key_of
-from tcs.placement.tables import Reason, ScoreTable
+from tcs.placement.scoring.engines import Engine, Part, Threads, Work
+from tcs.placement.scoring.engines.work import JOINTS
+from tcs.placement.tables import ScoreTable
 
 if TYPE_CHECKING:
     from tcs.kernel.approach.sweep import ApproachLines
 
-SLICE = 1024
-"""Configurations per slice: some milliseconds of work, so that threads finish together and progress
-is visible, with scratch memory that stays in the processor's cache."""
-
-JOINTS = 7
-"""Joint angles of a posture."""
-
-SHORT_GAP = 32
-"""Excluded configurations in a row that are scored after all: preparing a run takes longer."""
+READERS = 2
+"""Threads that read kept blocks."""
 
 ANALYTIC, NUMERIC = "analytic", "numeric"
 """Solution of the inverse kinematics: in closed form, or by Newton's method from many starts."""
@@ -79,6 +72,7 @@ def sweep(
     excluded: NDArray[np.bool_] | None = None,
     approaches: ApproachLines | None = None,
     blocks: BlockFolder | None = None,
+    engine: Engine | None = None,
 ) -> Sweep:
     """Score every configuration of the grid against every goal.
 
@@ -96,13 +90,14 @@ def sweep(
             all postures.
         blocks: Folder to keep finished blocks of the grid in, and to take them from, without the
             approaches; None to keep none.
+        engine: Who scores, without the approaches; None for `jobs` threads of this process.
 
     Returns:
         Scores, TCS eq. (1) to (4) per configuration, with a reason for every pair.
 
     Raises:
         UnknownNameError: If there is no measure of that name.
-        TcsError: If `jobs` is less than 1.
+        TcsError: If `jobs` is less than 1, or the workers of the engine are lost.
         ArmClassError: If there are approaches, and the arm has no closed form.
         OutputError: If blocks cannot be kept in the folder, or another process is at work there.
     """
@@ -115,20 +110,24 @@ def sweep(
     reason = np.empty((size, goals), np.uint8)
     contact = np.empty((size, goals), np.int32)
     dexterity = np.empty((size, goals), np.float32)
-    joints = []
+    joints = {}
     done = 0
+    work = Work(problem, gripper_contacts(problem), excluded)
     with (
         _opened(blocks, problem, lambda: key_of(lowered, measure, excluded)) as kept,
-        closing(_scored(problem, excluded, kept, jobs)) as parts,
+        closing(_scored(work, engine or Threads(jobs), kept)) as parts,
     ):
-        for part in parts:
-            rows = slice(done, done + len(part.reason))
-            reason[rows], contact[rows], dexterity[rows] = part[:3]
-            joints.append(part.joints)
-            done += len(part.reason)
+        for part, block in parts:
+            rows = slice(part.start, part.stop)
+            reason[rows], contact[rows], dexterity[rows] = block[:3]
+            joints[part] = block.joints
+            done += part.stop - part.start
             if on_progress is not None:
                 on_progress(done, size)
-    winning = np.concatenate(joints) if joints else np.empty((0, JOINTS), np.float32)
+    # Parts are finished in any order.
+    winning = np.concatenate(
+        [np.empty((0, JOINTS), np.float32), *(joints[part] for part in sorted(joints))]
+    )
     approach_begun = time.perf_counter()
     if approaches is not None:
         winning = score_with_approach(
@@ -180,7 +179,7 @@ def warm_up(
     if on_compile is not None and not all(map(is_compiled, entries)):
         on_compile()
     begun = time.perf_counter()
-    _slice(problem, gripper_contacts(problem), 0, 0)
+    Work(problem, gripper_contacts(problem)).warm_up()
     seconds = time.perf_counter() - begun
     return seconds + (0.0 if approaches is None else warm_up_approaches(problem, approaches))
 
@@ -207,80 +206,27 @@ def _opened(
 
 
 def _scored(
-    problem: Problem, excluded: NDArray[np.bool_] | None, kept: Kept | None, jobs: int
-) -> Generator[Block, None, None]:
-    """Yield the scores of the grid, in its order: in blocks where they are kept, else in slices."""
-    size, length = _size(problem), SLICE if kept is None else BLOCK
-    grippers = gripper_contacts(problem)
-    yield from Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(
-        delayed(score_block)(problem, grippers, start, min(start + length, size), excluded, kept)
-        for start in range(0, size, length)
+    work: Work, engine: Engine, kept: Kept | None
+) -> Generator[tuple[Part, Block], None, None]:
+    """Yield the scores of all parts of the grid, kept ones first, and keep the new ones."""
+    size, length = _size(work.problem), engine.length if kept is None else BLOCK
+    parts = [Part(start, min(start + length, size)) for start in range(0, size, length)]
+    if kept is None:
+        yield from engine.scored(work, parts)
+        return
+    missing = []
+    # Threads, because most of the time goes into decompressing.
+    found = Parallel(n_jobs=READERS, prefer="threads", return_as="generator")(
+        delayed(kept.load)(*part) for part in parts
     )
-
-
-def score_block(
-    problem: Problem,
-    grippers: NDArray[np.int64],
-    start: int,
-    stop: int,
-    excluded: NDArray[np.bool_] | None = None,
-    kept: Kept | None = None,
-) -> Block:
-    """Return the scores of configurations start <= h < stop: kept ones, or new ones."""
-    found = None if kept is None else kept.load(start, stop)
-    if found is not None:
-        return found
-    slices = [
-        _slice(problem, grippers, begin, min(begin + SLICE, stop), excluded)
-        for begin in range(start, stop, SLICE)
-    ]
-    reason, contact, dexterity, joints = map(np.concatenate, zip(*slices, strict=True))
-    # Only reached pairs, about one in ten, have joints to keep.
-    block = Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
-    if kept is not None:
-        kept.save(start, block)
-    return block
-
-
-def _slice(
-    problem: Problem,
-    grippers: NDArray[np.int64],
-    start: int,
-    stop: int,
-    excluded: NDArray[np.bool_] | None = None,
-) -> Scores:
-    """Return the scores of configurations start <= h < stop."""
-    shape = (stop - start, problem.goal_p.shape[1])
-    scores = Scores(
-        reason=np.empty(shape, np.uint8),
-        contact=np.empty(shape, np.int32),
-        dexterity=np.zeros(shape, np.float32),
-        joints=np.zeros((*shape, JOINTS), np.float32),
-    )
-    if excluded is None:
-        score_slice(problem, grippers, start, stop, scores)
-        return scores
-    out = excluded[start:stop]
-    for begin, end in _scored_runs(out):
-        rows = slice(begin, end)
-        part = Scores(
-            scores.reason[rows], scores.contact[rows], scores.dexterity[rows], scores.joints[rows]
-        )
-        score_slice(problem, grippers, start + begin, start + end, part)
-    scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
-    scores.dexterity[out] = 0.0
-    return scores
-
-
-def _scored_runs(excluded: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return begin and end of the runs to score: all that is not excluded, and short gaps.
-
-    >>> _scored_runs(np.array([True, False, False, True, False]))
-    [(1, 5)]
-    """
-    rows = np.flatnonzero(~excluded)
-    parts = np.split(rows, np.flatnonzero(np.diff(rows) > SHORT_GAP) + 1)
-    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size]
+    for part, block in zip(parts, found, strict=True):
+        if block is None:
+            missing.append(part)
+        else:
+            yield part, block
+    for part, block in engine.scored(work, missing):
+        kept.save(part.start, block)
+        yield part, block
 
 
 def _name_contacts(

@@ -10,6 +10,7 @@ import pytest
 from tcs.errors import OutputError
 from tcs.files.compression import compress
 from tcs.placement.scoring.blocks import FORMAT, BlockFolder
+from tcs.placement.scoring.engines import Work
 from tcs.placement.scoring.sweep import sweep
 
 # The package has a function of the module's name.
@@ -29,16 +30,16 @@ def plain(lowered, small_job):
 
 @pytest.fixture
 def small_blocks(monkeypatch):
-    """Blocks so small that the grid has several; the list of the slices that were scored."""
+    """Blocks so small that the grid has several; the list of the parts that were scored."""
     scored = []
-    scores_of = SWEEP._slice
+    scores_of = Work.score
 
-    def counted(problem, grippers, start, stop, excluded=None):
-        scored.extend([start] * (stop > start))
-        return scores_of(problem, grippers, start, stop, excluded)
+    def counted(work, part):
+        scored.append(part)
+        return scores_of(work, part)
 
     monkeypatch.setattr(SWEEP, "BLOCK", BLOCK)
-    monkeypatch.setattr(SWEEP, "_slice", counted)
+    monkeypatch.setattr(Work, "score", counted)
     return scored
 
 

@@ -1,0 +1,170 @@
+"""Scores of a part of the grid, wherever they are computed."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Generator, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tcs.errors import TcsError
+from tcs.kernel import cache
+from tcs.kernel.contacts import NO_CONTACT
+from tcs.kernel.problem import Problem
+from tcs.kernel.scores import Scores
+from tcs.kernel.sweep import score_slice
+from tcs.placement.scoring.blocks import Block
+from tcs.placement.tables import Reason
+
+SLICE = 1024
+"""Configurations per call of the kernel: some milliseconds of work, with scratch memory that stays
+in the processor's cache."""
+
+JOINTS = 7
+"""Joint angles of a posture."""
+
+SHORT_GAP = 32
+"""Excluded configurations in a row that are scored after all: preparing a run takes longer."""
+
+
+class Part(NamedTuple):
+    """Configurations start <= h < stop, in the flat order of the grid."""
+
+    start: int
+    stop: int
+
+
+class Work(NamedTuple):
+    """A grid to score."""
+
+    problem: Problem
+    """The scene, its goals and its grid."""
+    grippers: NDArray[np.int64]
+    """Contacts of the gripper at the goals, from `tcs.kernel.sweep.gripper_contacts`."""
+    excluded: NDArray[np.bool_] | None = None
+    """Configurations that are not scored, shape (configurations,); None for none."""
+
+    def score(self, part: Part) -> Block:
+        """Return the scores of a part."""
+        slices = [
+            self._score_slice(begin, min(begin + SLICE, part.stop))
+            for begin in range(part.start, part.stop, SLICE)
+        ]
+        reason, contact, dexterity, joints = map(np.concatenate, zip(*slices, strict=True))
+        # Only reached pairs, about one in ten, have joints to keep.
+        return Block(reason, contact, dexterity, joints[reason == Reason.REACHED])
+
+    def warm_up(self) -> None:
+        """Compile the kernel, or load its machine code."""
+        self._score_slice(0, 0)
+
+    def _score_slice(self, start: int, stop: int) -> Scores:
+        """Return the scores of configurations start <= h < stop."""
+        shape = (stop - start, self.problem.goal_p.shape[1])
+        scores = Scores(
+            reason=np.empty(shape, np.uint8),
+            contact=np.empty(shape, np.int32),
+            dexterity=np.zeros(shape, np.float32),
+            joints=np.zeros((*shape, JOINTS), np.float32),
+        )
+        if self.excluded is None:
+            score_slice(self.problem, self.grippers, start, stop, scores)
+            return scores
+        out = self.excluded[start:stop]
+        for begin, end in _scored_runs(out):
+            rows = slice(begin, end)
+            score_slice(
+                self.problem,
+                self.grippers,
+                start + begin,
+                start + end,
+                Scores(
+                    scores.reason[rows],
+                    scores.contact[rows],
+                    scores.dexterity[rows],
+                    scores.joints[rows],
+                ),
+            )
+        scores.reason[out], scores.contact[out] = Reason.EXCLUDED, NO_CONTACT
+        scores.dexterity[out] = 0.0
+        return scores
+
+
+class Engine(Protocol):
+    """Scores the parts of a grid. The scores are the same with every engine."""
+
+    @property
+    def length(self) -> int:
+        """Configurations per part that keep its workers busy, if nothing else decides."""
+
+    def scored(
+        self, work: Work, parts: Sequence[Part]
+    ) -> Generator[tuple[Part, Block], None, None]:
+        """Yield the scores of parts as they are finished.
+
+        Args:
+            work: The grid.
+            parts: What to score of it.
+
+        Raises:
+            TcsError: If the workers cannot be reached, or are lost with no part finished meanwhile.
+        """
+
+
+class PackedWork(NamedTuple):
+    """A grid to score, as it is sent to other processes."""
+
+    content: bytes
+    digest: str
+    """SHA-256 of the content, as 64 hex digits."""
+    kernel: str
+    """Digest of the kernel's sources, of what compiles them, and of the processor."""
+
+    @classmethod
+    def of(cls, work: Work) -> PackedWork:
+        """Pack a grid."""
+        content = pickle.dumps(work, protocol=5)
+        return cls(content, hashlib.sha256(content).hexdigest(), _kernel_digest())
+
+    def unpacked(self) -> Work:
+        """Return the grid; the last one is kept.
+
+        Raises:
+            TcsError: If it was changed on its way, or another kernel would score it.
+        """
+        if self.kernel != _kernel_digest():
+            raise TcsError(
+                "A worker has another kernel than the computer that asks: another version of tcs, "
+                "numba or Python, or another processor, which may round differently. Use workers "
+                "with the same."
+            )
+        return _unpacked(self)
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: PackedWork) -> Work:
+    if hashlib.sha256(packed.content).hexdigest() != packed.digest:
+        raise TcsError("A worker was sent a damaged grid. Try again.")
+    work: Work = pickle.loads(packed.content)
+    return work
+
+
+@lru_cache(maxsize=1)
+def _kernel_digest() -> str:
+    return cache.kernel_digest(Path(cache.__file__).parent)
+
+
+def _scored_runs(excluded: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return begin and end of the runs to score: all that is not excluded, and short gaps.
+
+    >>> _scored_runs(np.array([True, False, False, True, False]))
+    [(1, 5)]
+    """
+    rows = np.flatnonzero(~excluded)
+    parts = np.split(rows, np.flatnonzero(np.diff(rows) > SHORT_GAP) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size]
