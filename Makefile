@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT := out
+LOCK := requirements.lock
 # Temporary files of the tests stay in the checkout too.
 PYTEST := $(BIN)/python -m pytest --basetemp=$(OUT)/tests
 # Processes that share the tests, a file at a time: what a file sets up is made once. The order is
@@ -15,7 +16,7 @@ CHOSEN := -m "not slow"
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all run-tests lint wheel docs format figures benchmark benchmark-robots benchmark-peers \
+.PHONY: help demo test test-all run-tests lint lock wheel docs format figures benchmark benchmark-robots benchmark-peers \
   benchmark-save clean
 
 help:  ## List the targets
@@ -84,11 +85,18 @@ clean:  ## Remove everything the other targets made
 	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find tcs tests scripts benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
-# Installed again only when pyproject.toml changes; the checkout itself is what gets imported.
-$(STAMP): pyproject.toml
+lock: $(STAMP)  ## Renew requirements.lock: the newest versions that pyproject.toml allows
+	@$(BIN)/python -m pip install --disable-pip-version-check --quiet uv
+	$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade \
+	  --quiet --no-annotate --custom-compile-command 'make lock' --output-file $(LOCK)
+
+# Installed again only when these files change; the checkout itself is what gets imported. With the
+# versions of the lock file, so that a release of a dependency changes nothing.
+$(STAMP): pyproject.toml $(LOCK)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
 	  echo "tcs needs Python 3.11 or newer, but '$(PYTHON)' is not. Try: make PYTHON=python3.11 $(MAKECMDGOALS)" >&2; \
 	  exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet \
+	  --constraint $(LOCK) --editable '.[dev]'
 	@touch $@

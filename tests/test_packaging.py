@@ -1,5 +1,6 @@
 import ast
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -7,6 +8,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from tcs.model.tasks import task_names
 
@@ -27,7 +30,9 @@ def dependencies() -> set[str]:
 def of_extras() -> set[str]:
     """Modules of the extras that the package itself imports where they are installed."""
     extras = PROJECT["optional-dependencies"]
-    lines = [line for name in ("arplace", "bags", "mcp", "service") for line in extras[name]]
+    lines = [
+        line for name in ("arplace", "bags", "dask", "mcp", "service") for line in extras[name]
+    ]
     names = {re.split(r"[^\w-]", line)[0] for line in lines}
     return {MODULE_OF.get(name, name) for name in names}
 
@@ -49,6 +54,33 @@ def test_what_is_imported_is_what_is_depended_on():
     modules = {MODULE_OF.get(name, name) for name in dependencies() - WITHOUT_MODULE}
     # These come with pydantic, numba and fastapi, in the versions those need.
     assert foreign - {"anyio", "llvmlite", "pydantic_core"} == modules | of_extras()
+
+
+def test_lock_file_has_an_allowed_version_of_every_dependency():
+    lines = (CHECKOUT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    locked = [Requirement(line) for line in lines if not line.startswith("#")]
+    versions = {
+        canonicalize_name(one.name): str(one.specifier).removeprefix("==")
+        for one in locked
+        if one.marker is None or one.marker.evaluate()
+    }
+    extras = PROJECT["optional-dependencies"]
+    for wanted in map(Requirement, [*PROJECT["dependencies"], *extras["dev"]]):
+        name = canonicalize_name(wanted.name)
+        assert name in versions, f"{name}: run `make lock`"
+        assert versions[name] in wanted.specifier, f"{name}: run `make lock`"
+
+
+def test_every_package_has_its_licence_told():
+    page = (CHECKOUT / "THIRD_PARTY.md").read_text(encoding="utf-8").split("## Packages")[1]
+    told = dict(re.findall(r"^\| ([\w-]+) \| (.+) \|$", page, flags=re.MULTILINE))
+    del told["package"]
+    script = runpy.run_path(str(CHECKOUT / "scripts" / "licences.py"))
+    assert told == script["licences"](), "run `python scripts/licences.py`"
+    assert all(
+        f"| {file} | {source} |" in script["PAGE"].read_text(encoding="utf-8")
+        for file, source in script["sources_of_data"]()
+    )
 
 
 def test_readme_gives_a_reason_for_each_dependency():

@@ -18,7 +18,7 @@ from tcs.placement.constraints import (
     scored_constraints,
 )
 from tcs.placement.scoring import rebuild_scene, sweep
-from tcs.placement.scoring.sweep import SHORT_GAP, _scored_runs
+from tcs.placement.scoring.engines.work import SHORT_GAP, _scored_runs
 from tcs.placement.tables import Reason
 from tcs.placement.tables.place_map import PlaceMap
 from tests.placement.tables.small import small_grid
