@@ -88,7 +88,7 @@ def test_explanation_names_the_constraint(forbidden):
 
 def test_the_kernel_scores_no_more_than_needed(forbidden, small_job, monkeypatch):
     calls = []
-    module = __import__("tcs.placement.scoring.sweep", fromlist=["score_slice"])
+    module = __import__("tcs.placement.scoring.engines.work", fromlist=["score_slice"])
     real = module.score_slice
 
     def counted(problem, grippers, start, stop, scores):
