@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,7 +33,8 @@ class LiveScorer:
     """Scores one task in one environment with one robot, once for each observation.
 
     Building the scene and compiling are done once; each observation then takes the time of the
-    scoring alone. Not thread-safe: all observations share one scene.
+    scoring alone. Several threads may ask at once: their observations are scored one after the
+    other, each with `jobs` threads, for all share one scene.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class LiveScorer:
             constraints=constraints, now=now, person=person, approach=approach,
         )  # fmt: skip
         lowered = self._job_at({}).lowered(self._setup.scene)
+        self._scene_in_use = threading.Lock()
         problem = build_problem(lowered.arrays, lowered.grid, measure)
         warm_up(problem, on_compile, approach_lines(self.job) if approach else None)
 
@@ -104,6 +107,11 @@ class LiveScorer:
         begun = time.perf_counter()
         if not isinstance(observation, Observation):
             observation = Observation(joints=dict(observation or {}))
+        with self._scene_in_use:
+            return self._score(observation, begun)
+
+    def _score(self, observation: Observation, begun: float) -> ScoreFile:
+        """Score the scene as it is observed, as its only user."""
         grid_axes = [axis.name for axis in self.job.grid.environment_axes]
         found = estimate_joints(self._setup.scene, observation, grid_axes)
         entry = {
