@@ -17,7 +17,8 @@ from tcs.output.terminal import console
 class Commands(TyperGroup):
     """A command group that ends a failed command with one line and an exit code.
 
-    Exit codes: 0 done, 1 a `TcsError`, 2 misuse (reported by typer), 130 interrupted by Ctrl-C, 143
+    Exit codes: 0 done, 1 a `TcsError` or too little memory, 2 misuse (reported by typer), 130
+    interrupted by Ctrl-C, 143
     terminated by SIGTERM. Any other exception is a defect of the program and keeps its traceback.
     """
 
@@ -33,6 +34,13 @@ class Commands(TyperGroup):
         """Run the command."""
         with _ended_in_one_line():
             return super().invoke(ctx)
+
+
+def is_for_want_of_memory(error: BaseException) -> bool:
+    """Return whether an exception says that memory, or the space of addresses, is used up."""
+    return isinstance(error, MemoryError) or (
+        isinstance(error, RuntimeError) and str(error) == "can't start new thread"
+    )
 
 
 def _refuse_empty(words: list[str]) -> None:
@@ -63,6 +71,12 @@ def _ended_in_one_line() -> Iterator[None]:
         except typer.Exit:
             raise
         except (Exception, KeyboardInterrupt) as error:
+            if is_for_want_of_memory(error):
+                console.note(
+                    "the memory does not suffice. Score a coarser grid or fewer axes, or use a "
+                    "machine with more; `tcs score --dry-run` tells how much scores need."
+                )
+                raise typer.Exit(1) from None
             if not isinstance(error, KeyboardInterrupt) and not was_interrupted():
                 raise
             raise typer.Exit(report_interrupt()) from None

@@ -260,3 +260,17 @@ def test_interrupt_while_writing_keeps_the_old_file(tcs_command, small_file, sta
     assert ran.code == 130
     assert small_file.read_bytes() == before
     assert list(small_file.parent.iterdir()) == [small_file]
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError("std::bad_alloc"), RuntimeError("can't start new thread")]
+)
+def test_too_little_memory_is_told_in_one_line(error, tcs_command, tmp_path, monkeypatch):
+    def score(*_arguments, **_options):
+        raise error
+
+    monkeypatch.setattr("tcs.placement.scoring.files.score", score)
+    ran = tcs_command("score", "shaving", "--out", tmp_path / "o.tcs")
+    assert ran.code == 1
+    assert ran.err.startswith("tcs: the memory does not suffice.")
+    assert ran.err.count("\n") == 1

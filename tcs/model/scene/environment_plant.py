@@ -196,6 +196,8 @@ def _add_model(
             instances = parser.AddModels(str(file))
         else:
             instances = parser.AddModelsFromString(text, "sdf")
+    except MemoryError:
+        raise
     except Exception as error:
         # Drake raises errors of several classes, e.g. ValueError for a number it cannot convert.
         reason = " ".join(str(error).split())

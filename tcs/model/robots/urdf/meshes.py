@@ -90,6 +90,8 @@ def _load(mesh: Path) -> trimesh.Trimesh:
     _content(mesh)
     try:
         loaded = trimesh.load(mesh, force="mesh", process=False)
+    except MemoryError:
+        raise
     except Exception as error:  # its readers raise errors of many classes
         text = " ".join(str(error).split()) or type(error).__name__
         raise RobotError(f"mesh '{mesh}' cannot be used: {text}.") from error
