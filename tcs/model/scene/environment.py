@@ -25,6 +25,7 @@ from tcs.files.paths import DataFiles, data_folder, expanded
 from tcs.model.grid import Axis, Grid
 from tcs.model.people import JOINTS, Person, PersonEntry, PersonLike, load_person
 from tcs.model.scene.error_distribution import ErrorDistribution
+from tcs.model.scene.furniture import BedEntry, WheelchairEntry
 from tcs.model.scene.posture import Posture
 
 FLOOR = "floor"
@@ -122,6 +123,10 @@ class EnvironmentFile(Document):
     person: PersonEntry | None = None
     """Name of the model that is the person, or whose body they have; without a name it is the model
     named "person", if there is one. All other models are furniture, also those with body frames."""
+    wheelchair: WheelchairEntry | None = None
+    """Sizes of the model named "wheelchair", or the name of a preset."""
+    bed: BedEntry | None = None
+    """Sizes of the model named "bed", or the name of a preset."""
     obstacles: Annotated[tuple[Obstacle, ...], Entries] = ()
     floor: bool = True
     """Whether there is a floor at z = 0; the arm must not touch it, the rest of the robot may."""
@@ -163,6 +168,16 @@ class EnvironmentFile(Document):
                 f"person: no model is named '{self.person_model}'; there are "
                 f"{', '.join(known) or 'none'}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _sizes_are_of_models(self) -> Self:
+        known = [model.name for model in self.models]
+        for name in ("wheelchair", "bed"):
+            if getattr(self, name) is not None and name not in known:
+                raise ValueError(
+                    f"{name}: no model is named '{name}'; there are {', '.join(known) or 'none'}"
+                )
         return self
 
     @model_validator(mode="after")
@@ -322,6 +337,9 @@ def _check_ranges(environment: EnvironmentFile, where: str) -> None:
         DataFileError: If one is out of the person's range of motion.
     """
     person = environment.person or Person()
+    if environment.wheelchair is not None:
+        here = f"{where}, field 'wheelchair.back_angle_deg': 'trunk_flexion'"
+        person.check_angle("trunk_flexion", -environment.wheelchair.back_angle_deg, here)
     for name, position in environment.joints.items():
         if name in JOINTS:
             person.check_angle(name, math.degrees(position), f"{where}, field 'joints': '{name}'")

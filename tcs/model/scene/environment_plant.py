@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +21,11 @@ from pydrake.multibody.tree import (
 )
 
 from tcs.errors import EnvironmentFileError, UnknownNameError
+from tcs.files.xml_documents import read_xml
 from tcs.model.robots.primitives import Primitive
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.environment import FLOOR, WORLD, EnvironmentFile, ModelEntry, Obstacle
+from tcs.model.scene.furniture import changed_bed, changed_wheelchair, seat_motion
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.model_files import check_model_file
 from tcs.model.scene.obstacle_shapes import obstacle_shapes
@@ -75,7 +78,7 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
     where = f"environment '{environment.name}'"
     for entry in environment.placed:
         parent = _parent_frame(plant, entry, links, where)
-        X_PM = RigidTransform(RollPitchYaw(entry.rpy), entry.xyz)
+        X_PM = _seated(environment, entry) @ RigidTransform(RollPitchYaw(entry.rpy), entry.xyz)
         here = f"{where}, '{entry.name}'"
         shapes = obstacle_shapes(entry, here) if isinstance(entry, Obstacle) else ()
         if shapes:
@@ -160,20 +163,41 @@ def _add_shapes(
     return body
 
 
+def _seated(environment: EnvironmentFile, entry: ModelEntry | Obstacle) -> RigidTransform:
+    """Return how an entry moves with the seat of a wheelchair of other sizes than the papers'."""
+    chair = environment.wheelchair
+    if chair is None or not environment.is_person(entry.name):
+        return RigidTransform()
+    if not isinstance(entry, ModelEntry) or not entry.parent.startswith("wheelchair::"):
+        return RigidTransform()
+    R, p = seat_motion(chair)
+    return RigidTransform(RotationMatrix(R), p)
+
+
 def _own_model(
     environment: EnvironmentFile, entry: ModelEntry | Obstacle, where: str
 ) -> str | None:
-    """Return the model of the person as SDFormat, None if it is that of the entry's file.
+    """Return the model of the entry as SDFormat, None if it is that of its file.
 
-    It is resized to the body of the person, and has the joints that the environment names.
+    The person is resized to their body, and has the joints that the environment names; wheelchair
+    and bed have the sizes of the environment.
     """
     file = Path(str(entry.file))
+    here = f"{where}: '{file}'"
+    if entry.name == "wheelchair" and environment.wheelchair is not None:
+        root = read_xml(file, here, EnvironmentFileError)
+        changed_wheelchair(environment.wheelchair, root, here)
+        return ElementTree.tostring(root, encoding="unicode")
+    if entry.name == "bed" and environment.bed is not None:
+        root = read_xml(file, here, EnvironmentFileError)
+        changed_bed(environment.bed, root, here)
+        return ElementTree.tostring(root, encoding="unicode")
     if not environment.is_person(entry.name):
         return None
     text = resized_model(environment, file, where) if environment.has_body else None
     if person_joints(environment).is_articulated:
         text = text or file.read_text(encoding="utf-8")
-        text = articulated_model(environment, text, f"{where}: '{file}'")
+        text = articulated_model(environment, text, here)
     return text
 
 

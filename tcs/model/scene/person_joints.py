@@ -56,7 +56,7 @@ def person_joints(environment: EnvironmentFile) -> PersonJoints:
         UnknownNameError: If there is no posture of a name.
     """
     person = environment.person
-    angles = {} if person is None else {k: math.radians(v) for k, v in person.angles.items()}
+    angles = {name: math.radians(angle) for name, angle in _angles(environment).items()}
     stated = named_joints(environment)
     if stated <= set(OF_EVERY_MODEL):
         return PersonJoints({}, {**environment.joints, **angles}, environment.posture)
@@ -88,9 +88,16 @@ def named_joints(environment: EnvironmentFile) -> set[str]:
     """Return the joints of the person that the environment names, in any of its fields."""
     fields = (environment.joints, environment.grid, environment.observed, environment.errors)
     found = {name for field in fields for name in field}
-    if environment.person is not None:
-        found |= set(environment.person.angles)
-    return found & set(JOINTS)
+    return (found | set(_angles(environment))) & set(JOINTS)
+
+
+def _angles(environment: EnvironmentFile) -> dict[str, float]:
+    """Return the angles that the person and the back rest of the wheelchair give joints [deg]."""
+    found: dict[str, float] = {}
+    chair = environment.wheelchair
+    if chair is not None and chair.back_angle_deg:
+        found["trunk_flexion"] = -chair.back_angle_deg
+    return found if environment.person is None else {**found, **environment.person.angles}
 
 
 def articulated_model(environment: EnvironmentFile, text: str, where: str) -> str:
