@@ -8,15 +8,16 @@ import pytest
 from tcs.model.robots import load_robot
 from tcs.model.scene import EMPTY_ENVIRONMENT, Scene, SceneSpec, arm_chain
 from tcs.placement.refinement.dexterity_bound import (
-    _cosine,
-    _Interval,
+    _parts,
     _relaxed,
+    descent,
     dexterity_bound,
 )
+from tcs.placement.refinement.intervals import Interval, cosine
 
 
-def isotropies(chain, q):
-    """Return the isotropy at joint angles, shape (n, 7), from the geometric Jacobian."""
+def grams(chain, q):
+    """Return J J^T at joint angles, shape (n, 7), and the cosine between axes 5 and 7."""
     R, p = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
     axes, origins = [], []
     for i in range(7):
@@ -31,7 +32,12 @@ def isotropies(chain, q):
     tool = p + R @ chain.p[7]
     linear = [np.cross(z, tool - o) for z, o in zip(axes, origins, strict=True)]
     J = np.concatenate([np.stack(linear, axis=2), np.stack(axes, axis=2)], axis=1)
-    M = J @ J.transpose(0, 2, 1)
+    return J @ J.transpose(0, 2, 1), np.sum(axes[4] * axes[6], axis=1)
+
+
+def isotropies(chain, q):
+    """Return the isotropy at joint angles, shape (n, 7), from the geometric Jacobian."""
+    M, _ = grams(chain, q)
     trace = np.trace(M, axis1=1, axis2=2)
     return np.linalg.det(M).clip(0.0) ** (1 / 6) / (trace / 6)
 
@@ -57,9 +63,32 @@ def test_search_does_not_exceed_the_bound_and_comes_close(lowered, rng):
     chain = lowered.arrays.chain
     bound, found = dexterity_bound(chain, "isotropy"), attacked(chain, rng)
     assert found <= bound
-    # The relaxation, not the search, accounts for the difference: 0.391 against 0.419.
+    # The relaxation, not the search, accounts for the difference: 0.391 against 0.417.
     assert bound < 0.42
     assert found > 0.39
+
+
+def test_determinant_and_trace_are_bounded_at_every_angle_of_the_wrist(lowered, rng):
+    chain = lowered.arrays.chain
+    q, _, _ = random_angles(chain, rng, 4000)
+    M, cosine_57 = grams(chain, q)
+    c, s = np.abs(cosine_57), np.sqrt(1.0 - cosine_57**2)
+    parts = _parts(chain, Interval(q[:, 1:4], q[:, 1:4]))
+    excess = parts.determinant(c, s) - np.linalg.det(M)
+    lack = np.trace(M, axis1=1, axis2=2) - parts.trace(c, s, chain.p[7, 2])
+    assert np.all(excess >= -1e-12)
+    assert np.all(lack >= -1e-12)
+    # Some postures attain them nearly.
+    assert excess.min() < 1e-4
+    assert lack.min() < 1e-2
+
+
+def test_the_bound_falls_with_every_halving(lowered, rng):
+    chain = lowered.arrays.chain
+    coarse, fine = descent(chain, 0.05), descent(chain, 0.02)
+    assert np.all(np.diff(fine) <= 1e-12)
+    assert coarse[-1] > fine[-1] > 0.39
+    assert coarse[0] == fine[0]
 
 
 @pytest.mark.slow
@@ -73,7 +102,7 @@ def test_relaxed_isotropy_of_a_box_exceeds_the_isotropy_in_it(lowered, rng):
     chain = lowered.arrays.chain
     q, low, high = random_angles(chain, rng, 500)
     width = rng.uniform(0.0, 0.3, (len(q), 3))
-    box = _Interval(q[:, 1:4] - width, q[:, 1:4] + width)
+    box = Interval(q[:, 1:4] - width, q[:, 1:4] + width)
     bounds = _relaxed(chain, box)
     for _ in range(10):
         inside = q.copy()
@@ -85,12 +114,12 @@ def test_relaxed_isotropy_of_a_box_exceeds_the_isotropy_in_it(lowered, rng):
 
 def test_cosine_of_an_interval_holds_all_cosines(rng):
     low = rng.uniform(-7.0, 7.0, 3000)
-    angle = _Interval(low, low + rng.uniform(0.0, 3.0, low.size))
-    found = _cosine(angle)
+    angle = Interval(low, low + rng.uniform(0.0, 3.0, low.size))
+    found = cosine(angle)
     at = np.cos(rng.uniform(angle.low, angle.high, (200, low.size)))
     assert np.all(found.low <= at.min(axis=0) + 1e-12)
     assert np.all(found.high >= at.max(axis=0) - 1e-12)
-    whole = _cosine(_Interval(np.array([0.0, -0.1, 3.0]), np.array([1.0, 0.1, 3.3])))
+    whole = cosine(Interval(np.array([0.0, -0.1, 3.0]), np.array([1.0, 0.1, 3.3])))
     np.testing.assert_allclose(whole.high, [1.0, 1.0, np.cos(3.0 + 0.3)])
     np.testing.assert_allclose(whole.low, [np.cos(1.0), np.cos(0.1), -1.0])
 
