@@ -85,8 +85,9 @@ def main() -> int:
     for name in options.robots.split(","):
         rows.append((name, *outcome(name, options)))
         row(name, ", ".join(text for text in rows[-1][1:] if text))
-    record("robots" if not options.coarse else "coarse", COLUMNS, rows)
-    save(__file__, options)
+        # After each robot: an interrupted run keeps what it has.
+        record("coarse" if options.coarse else "robots", COLUMNS, rows)
+        save(options)
     return 0
 
 
@@ -111,19 +112,21 @@ def outcome(name: str, options) -> tuple[str, str, str, str, str]:
         if drafted.code != 0:
             return "", "", "", "", drafted.message
         shapes = len((folder / "drafted_primitives.csv").read_text().splitlines()) - 1
-        checked = run(["robot", "check", "drafted.yaml", "--json"], folder, options.limit)
+        checked = run(
+            ["robot", "check", "drafted.yaml", "--samples", "100", "--json"], folder, options.limit
+        )
         found = json.loads(checked.output) if checked.output.startswith("{") else {}
         problems = found.get("problems", [checked.message])
         scored = run(score_words(folder), folder, options.limit)
         if scored.code != 0:
             return seconds(drafted), str(shapes), str(checked.code), "", scored.message
         result = json.loads(scored.output)
-        reached = result.get("pairs", result.get("reached", ""))
+        reached = result["reached_pairs"]
         return (
             seconds(drafted),
             str(shapes),
             "sound" if checked.code == 0 else f"{len(problems)} to review",
-            f"{reached:,}" if isinstance(reached, int) else str(reached),
+            f"{reached:,} of {result['pairs']:,}",
             problems[0] if problems else "",
         )
 

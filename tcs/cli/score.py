@@ -41,6 +41,13 @@ def score(
         ),
     ] = False,
     robot: options.Robot = "pr2",
+    tool: Annotated[
+        str | None,
+        typer.Option(
+            help="Name or YAML file of a tool in the robot's hand, whose tip moves to the goals.",
+            show_default="none",
+        ),
+    ] = None,
     arms: Annotated[
         str | None,
         typer.Option(
@@ -156,6 +163,8 @@ def score(
         raise typer.BadParameter(
             "is for one arm and an environment that is not observed.", param_hint="--dry-run"
         )
+    if tool and (everything or arms):
+        raise typer.BadParameter("is for one task and one arm.", param_hint="--tool")
     if restart and blocks is None:
         raise typer.BadParameter("requires --blocks.", param_hint="--restart")
     if blocks and (observed or frames):
@@ -218,6 +227,11 @@ def score(
         return
     environment = environment or "wheelchair"
     path = out or default_path(task, environment, robot, arms)
+    if tool is not None:
+        from tcs.model.robots import holding
+
+        path = out or path.with_stem(f"{path.stem}-{Path(tool).stem}")
+        robot = holding(robot, tool)
     if out is None and person:
         # By default, do not overwrite the file of the papers' man.
         path = path.with_stem(f"{path.stem}-person")

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from tcs.model.robots.arms import BOTH, arm_references
 from tcs.model.robots.extras import robot_urdf
-from tcs.model.robots.loading import load_robot, robot_names
+from tcs.model.robots.held_tool import holding, load_robot, load_tool, tool_names
+from tcs.model.robots.loading import robot_names
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume, write_primitives
 from tcs.model.robots.robot_file import RobotFile, joint_limits
 from tcs.model.robots.urdf import Urdf, read_urdf
@@ -22,13 +23,16 @@ __all__ = [
     "Urdf",
     "arm_references",
     "as_obj",
+    "holding",
     "joint_limits",
     "kinematic_urdf",
     "load_robot",
+    "load_tool",
     "read_primitives",
     "read_urdf",
     "robot_names",
     "robot_urdf",
+    "tool_names",
     "union_volume",
     "write_primitives",
 ]
