@@ -1,4 +1,4 @@
-"""Re-check scores of drawn people in drawn postures of the head with Drake.
+"""Re-check scores of drawn people in drawn postures with Drake.
 
 Usage: python benchmarks/people.py [--bodies 20] [--pairs 100] [--seed 0] [--jobs 2]
 
@@ -35,8 +35,21 @@ GRIDS = {
     },
 }
 ROWS = (("shaving", "wheelchair"), ("bathing", "bed"))
-MOST_TURN, MOST_TILT = 1.0, 0.3
-"""Greatest angles of the head [rad]."""
+ANGLES = {
+    "head_turn": (-58.0, 58.0),
+    "head_tilt": (-18.0, 18.0),
+    "head_lean": (-20.0, 20.0),
+    **{
+        f"{joint}_{side}": ends
+        for side in ("left", "right")
+        for joint, ends in (
+            ("shoulder_flexion", (0.0, 60.0)),
+            ("shoulder_abduction", (0.0, 60.0)),
+            ("elbow_flexion", (5.0, 100.0)),
+        )
+    },
+}
+"""Least and greatest angle of each joint that is drawn [deg]."""
 
 
 def main() -> None:
@@ -54,18 +67,18 @@ def main() -> None:
     for number in range(options.bodies):
         # Women and men alternate, so that both sit and both lie.
         task, environment = row_of = ROWS[number // 2 % 2]
-        turn, tilt = generator.uniform(-1.0, 1.0, 2) * (MOST_TURN, MOST_TILT)
+        drawn = {joint: float(generator.uniform(*ends)) for joint, ends in ANGLES.items()}
+        angles = {f"{joint}_deg": angle for joint, angle in drawn.items()}
         body = people[number]
         with tempfile.TemporaryDirectory() as folder:
-            joints = {"head_turn": float(turn), "head_tilt": float(tilt)}
-            path = in_posture(Path(folder), environment, joints)
-            person = {"sex": body.sex, **body.measures}
+            path = on_small_grid(Path(folder), environment)
+            person = {"sex": body.sex, **body.measures, **angles}
             file = tcs.score(task, path, person=person, jobs=options.jobs)
             found = tcs.verify(file, pairs=options.pairs, dense=0, jobs=options.jobs)
         counts[row_of] += (1, found.checked, found.false_reached)
         row(
             f"{task}, person {number}",
-            f"{body.sex}, {body.stature:.3f} m, head turn {turn:+.2f}, tilt {tilt:+.2f} rad: "
+            f"{body.sex}, {body.stature:.3f} m, head turn {drawn['head_turn']:+.0f} deg: "
             f"{found.false_reached} false of {found.checked}",
         )
     for (task, environment), (bodies, checked, false) in counts.items():
@@ -76,14 +89,13 @@ def main() -> None:
     save(options)
 
 
-def in_posture(folder: Path, name: str, joints: dict[str, float]) -> Path:
-    """Write an environment on a small grid, with joints in other positions [m or rad]."""
+def on_small_grid(folder: Path, name: str) -> Path:
+    """Write an environment on a small grid."""
     content = {
         "name": f"small-{name}",
         "based_on": name,
         "grid": GRIDS[name],
         "observed": {},
-        "joints": joints,
     }
     path = folder / f"small-{name}.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")

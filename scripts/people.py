@@ -1,6 +1,7 @@
-"""Draw the picture of docs/people.md: three people in the wheelchair, from the side and from above.
+"""Draw the pictures of docs/people.md: people in the wheelchair, from the side and from above.
 
 python scripts/people.py --out docs/images/people.png
+python scripts/people.py --postures --out docs/images/postures.png
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -26,6 +28,12 @@ PEOPLE = (
     None,
     {"sex": "male", "stature_percentile": 95, "mass_percentile": 95},
 )
+POSTURES = (
+    {"posture": "arm_lifted_left"},
+    {"posture": "head_leaning_left"},
+    {"posture": "contracture"},
+    {"sex": "female", "stature_percentile": 5, "posture": {"trunk_flexion_deg": 20}},
+)
 VIEWS = ((0, 2), (0, 1))
 """Axes of W that are drawn: from the side and from above."""
 _BALL = Rotation.random(400, rng=0).apply([0.0, 0.0, 1.0])
@@ -37,13 +45,15 @@ def main() -> None:
     """Draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("docs/images/people.png"))
-    out = parser.parse_args().out
+    parser.add_argument("--postures", action="store_true", help="postures instead of sizes")
+    options = parser.parse_args()
+    out, people = options.out, POSTURES if options.postures else PEOPLE
     chair = load_environment("wheelchair").model_copy(update={"floor": False})
     alone = {"models": chair.models[:1], "body_frames": {}, "padding": {}, "errors": {}}
     furniture = len(environment_shapes(chair.model_copy(update=alone)).type)
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    rows = figure.subplots(2, len(PEOPLE), sharex=True, sharey="row", height_ratios=(2, 1))
-    for column, person in enumerate(PEOPLE):
+    figure = Figure(figsize=(3.0 * len(people), 5.0), layout="constrained")
+    rows = figure.subplots(2, len(people), sharex=True, sharey="row", height_ratios=(2, 1))
+    for column, person in enumerate(people):
         environment = chair if person is None else with_person(chair, person)
         shapes = environment_shapes(environment)
         for row, view in enumerate(VIEWS):
@@ -51,11 +61,14 @@ def main() -> None:
         title = "the papers' average man"
         if person is not None:
             title = person_text(load_person(person).to_json()).replace(" and", "\nand")
+            title = title.partition(" (head lean")[0].partition(" (shoulder")[0]
+            title = title.replace(", ", ",\n")
         rows[0, column].set_title(title, fontsize=9)
     for axes, label in ((rows[0, 0], "z [m]"), (rows[1, 0], "y [m]")):
         axes.set_ylabel(label)
     for axes in rows[1]:
         axes.set_xlabel("x [m]")
+        axes.xaxis.set_major_locator(MaxNLocator(3))
     with whole_file(out, "Picture") as file:
         file.write(as_png(figure, 90))
 
