@@ -186,6 +186,7 @@ def score(
         )
 
     from tcs.cli.values import person_values, settings
+    from tcs.model.checkup.quick import quick_problems
     from tcs.placement.scoring import BlockFolder, default_path, files
     from tcs.placement.scoring.engines import engine_named
 
@@ -235,6 +236,8 @@ def score(
     if out is None and person:
         # By default, do not overwrite the file of the papers' man.
         path = path.with_stem(f"{path.stem}-person")
+    for problem in quick_problems(robot):
+        terminal.note(f"warning, robot '{robot}': {problem} See: tcs robot check {robot}")
     if not observed and not frames:
         with _progress(task) as on_progress:
             result = files.score_to_file(
