@@ -23,10 +23,12 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from table import cell, header, parser, record, row, save
 
+from tcs.kernel.collide import BOUND, CENTRE, ROTATION, closer
 from tcs.model.robots import Primitive, RobotFile, load_robot, robot_names
 from tcs.model.robots.extras import model_with_extras
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
-from tcs.model.robots.self_collision import SelfCollision, sample_positions
+from tcs.model.robots.self_collision import sample_positions
+from tcs.model.robots.self_collision.blocked_at_boxes import packed
 from tcs.model.robots.urdf import Urdf
 from tcs.model.robots.urdf.surfaces import body_triangles, welded_top
 
@@ -123,7 +125,7 @@ def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[st
     """Print what shapes block although meshes are free, and return the worst pairs."""
     positions, poses = draw(bodies, postures, seed)
     robot, checked = bodies.robot, set(bodies.pairs())
-    plant, limits = SelfCollision(robot), robot.joint_limits()
+    judge, limits = Contacts(bodies, poses), robot.joint_limits()
     narrowed = {tuple(sorted(p)) for g in robot.disabled_groups if g.ranges for p in g.pairs}
     exempt_pairs = {tuple(sorted(pair)) for pair in robot.disabled_pairs}
     boxes = Boxes(bodies, poses, seed)
@@ -137,7 +139,7 @@ def blocked(line: str, bodies: Bodies, postures: int, seed: int) -> list[list[st
             if not limits[name][0] <= at[name] <= limits[name][1]
         }
         off = exempt_pairs - narrowed if outside else exempt_pairs
-        touching = (plant.touching(at) & checked) - off
+        touching = judge.touching(i, checked - off)
         if not all(bodies.are_apart(pair, poses, i) for pair in touching):
             continue
         struck = boxes.touching(i)
@@ -219,6 +221,47 @@ def body_poses(model: Urdf, positions: Mapping[str, FloatArray], postures: int) 
     return poses
 
 
+class Contacts:
+    """Pairs of bodies whose shapes are closer than the self margin."""
+
+    def __init__(self, bodies: Bodies, poses: Poses) -> None:
+        """Pack the shapes of each body, and place a ball around them in every posture."""
+        self._poses, self._margin = poses, bodies.robot.self_margin
+        shapes: dict[str, list[Primitive]] = {}
+        for shape in bodies.robot.load_primitives():
+            shapes.setdefault(shape.body, []).append(shape)
+        self._shapes = {body: packed(own) for body, own in shapes.items()}
+        self._balls = {body: self._ball(body) for body in shapes}
+
+    def touching(self, i: int, pairs: Iterable[BodyPair]) -> set[BodyPair]:
+        """Return which of some pairs of bodies have shapes in contact in posture i."""
+        return {pair for pair in pairs if self._are_near(pair, i) and self._touch(pair, i)}
+
+    def _ball(self, body: str) -> tuple[FloatArray, float]:
+        """Return the centres [m], shape (postures, 3), and the radius of a ball around a body."""
+        rows, (R, p) = self._shapes[body], self._poses[body]
+        centre = rows[:, CENTRE:ROTATION].mean(axis=0)
+        away = np.linalg.norm(rows[:, CENTRE:ROTATION] - centre, axis=1)
+        return R @ centre + p, float((away + rows[:, BOUND]).max())
+
+    def _are_near(self, pair: BodyPair, i: int) -> bool:
+        (first, reach), (second, more) = (self._balls[body] for body in pair)
+        away = first[i] - second[i]
+        return float(away @ away) < (reach + more + self._margin) ** 2
+
+    def _touch(self, pair: BodyPair, i: int) -> bool:
+        first, second = (self._shapes[body] for body in pair)
+        (R_A, p_A), (R_B, p_B) = ((self._poses[b][0][i], self._poses[b][1][i]) for b in pair)
+        R, p = R_A.T @ R_B, R_A.T @ (p_B - p_A)
+        placed = second.copy()
+        placed[:, CENTRE:ROTATION] = second[:, CENTRE:ROTATION] @ R.T + p
+        placed[:, ROTATION:] = (R @ second[:, ROTATION:].reshape(-1, 3, 3)).reshape(-1, 9)
+        away = first[:, None, CENTRE:ROTATION] - placed[None, :, CENTRE:ROTATION]
+        reach = first[:, None, BOUND] + placed[:, BOUND] + self._margin
+        near = np.argwhere(np.einsum("ijk,ijk->ij", away, away) < reach**2)
+        return any(closer(first, j, placed, k, self._margin) for j, k in near.tolist())
+
+
 class Boxes:
     """Random boxes about the arm, others in each posture."""
 
@@ -236,8 +279,9 @@ class Boxes:
         self._p = shoulder[:, None] + out
         self._size = rng.uniform(*EDGES, (*count, 3))
         self._R = Rotation.random(count[0] * count[1], rng=rng).as_matrix().reshape(*count, 3, 3)
-        self._shapes = [(p.body, _geometry(p), p.rotation, np.array(p.xyz)) for p in bodies.shapes]
-        self._bounds = [float(np.linalg.norm(_half_size(p))) for p in bodies.shapes]
+        self._shapes = [(p.body, _geometry(p), p.rotation) for p in bodies.shapes]
+        self._centres = np.array([p.xyz for p in bodies.shapes])
+        self._bounds = np.array([np.linalg.norm(_half_size(p)) for p in bodies.shapes])
 
     def touching(self, i: int) -> set[str] | None:
         """Return the bodies whose shapes touch a box in posture i, None if a mesh touches one."""
@@ -253,13 +297,14 @@ class Boxes:
     def _struck(self, i: int, box: coal.Box, X_AB: coal.Transform3s) -> set[str]:
         """Return the bodies of the arm whose shapes touch a box."""
         found = set[str]()
+        R, p = (np.array([self._poses[body][k][i] for body, *_ in self._shapes]) for k in (0, 1))
+        centres = np.einsum("nij,nj->ni", R, self._centres) + p
         reach = float(np.linalg.norm(box.halfSide)) + MARGIN
-        for (body, shape, R, p), bound in zip(self._shapes, self._bounds, strict=True):
-            R_A, p_A = self._poses[body][0][i], self._poses[body][1][i]
-            centre = R_A @ p + p_A
-            if body in found or np.linalg.norm(centre - X_AB.getTranslation()) > reach + bound:
-                continue
-            if _distance(shape, coal.Transform3s(R_A @ R, centre), box, X_AB) < MARGIN:
+        away = np.linalg.norm(centres - X_AB.getTranslation(), axis=1)
+        for k in np.flatnonzero(away <= reach + self._bounds):
+            body, shape, R_BP = self._shapes[k]
+            X_AP = coal.Transform3s(R[k] @ R_BP, centres[k])
+            if body not in found and _distance(shape, X_AP, box, X_AB) < MARGIN:
                 found.add(body)
         return found
 

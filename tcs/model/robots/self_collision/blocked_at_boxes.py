@@ -59,7 +59,7 @@ def blocked_at_boxes(robot: RobotFile, *, postures: int = 300, seed: int = 0) ->
     surfaces = SurfaceDistance(model, carried_triangles(robot, model))
     moved = model.links_moved_by(robot.arm_joints[0])
     shapes = {
-        body: _packed([shape for shape in robot.load_primitives() if shape.body == body])
+        body: packed([shape for shape in robot.load_primitives() if shape.body == body])
         for body in {shape.body for shape in robot.load_primitives()} & moved
         if surfaces.has(body)
     }
@@ -97,7 +97,7 @@ def _random_box(rng: np.random.Generator, centre: FloatArray, reach: float) -> F
     return np.asarray(pack(_shapes([BOX], [half], [R], [centre + out]))[0, 0])
 
 
-def _packed(primitives: list[Primitive]) -> FloatArray:
+def packed(primitives: list[Primitive]) -> FloatArray:
     """Return primitives of one body in its frame, packed, shape (n, 17)."""
     sizes = []
     for shape in primitives:
