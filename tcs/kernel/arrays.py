@@ -23,9 +23,10 @@ SPHERE, CAPSULE, BOX = 0, 1, 2
 
 
 class Chain(NamedTuple):
-    """A serial arm of six or seven revolute joints, each about the z axis of its own link frame.
+    """A serial arm of six or seven joints, each about or along the z axis of its own link frame.
 
-    X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1] Rz(qi), X_AT = X_AL7 F[7].
+    X_AL1 = F[0] Rz(q1), X_ALi = X_AL(i-1) F[i-1] Rz(qi), X_AT = X_AL7 F[7], with a translation by
+    `slides` times qi along z in place of Rz(qi) for a prismatic joint.
 
     An arm of six joints has a further joint before its first one, about the same axis, which has no
     limits and remains at 0: its own joints are q2 to q7.
@@ -41,6 +42,13 @@ class Chain(NamedTuple):
     """Upper joint limits [rad], shape (7,); +inf where continuous."""
     joints: int = 7
     """Number of joints of the arm, 6 or 7."""
+    slides: FloatArray = np.zeros(7)
+    """Motion of each prismatic joint per unit [m/m], 0 for a revolute joint, shape (7,). Coupled
+    joints count as one, whose motion is the sum of theirs."""
+    coupled: FloatArray = np.empty((0, 2))
+    """Links between coupled joints: index of their joint, and the fraction of its motion that the
+    link makes, shape (n, 2). Their frames, numbered from 8 on, are parallel to that of the joint's
+    link, and at the same place with the joint at 0."""
 
 
 class Shapes(NamedTuple):

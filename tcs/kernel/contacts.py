@@ -45,9 +45,9 @@ class Workspace(NamedTuple):
     near_count: IntArray
     """Number of entries in `near`, shape (1,)."""
     link_R: FloatArray
-    """Orientations of A, L1..L7 in A, shape (8, 3, 3)."""
+    """Orientations of A, L1..L7 and the coupled links in A, shape (8 + coupled, 3, 3)."""
     link_p: FloatArray
-    """Origins of A, L1..L7 in A [m], shape (8, 3)."""
+    """Origins of A, L1..L7 and the coupled links in A [m], shape (8 + coupled, 3)."""
     last: IntArray
     """Last pair in contact: partner of the arm (-1 for none), arm shape, partner's shape; shape
     (3,)."""
@@ -71,8 +71,8 @@ def new_workspace(problem: Problem) -> Workspace:
         np.empty_like(problem.environment[0]),
         np.zeros(problem.environment_body.size, np.int64),
         np.zeros(1, np.int64),
-        np.empty((8, 3, 3)),
-        np.empty((8, 3)),
+        np.empty((8 + len(problem.coupled), 3, 3)),
+        np.empty((8 + len(problem.coupled), 3)),
         np.full(3, -1, np.int64),
         np.eye(3),
         np.zeros(3),
@@ -195,6 +195,8 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
     groups, body_groups = len(problem.link_first) - 1, len(problem.body_first) - 1
     boxes, body_boxes = len(problem.link_body), len(problem.body_body)
     link_poses(problem.chain_R, problem.chain_p, q, work.link_R, work.link_p)
+    if len(problem.coupled):
+        _place_coupled_links(problem, work, q)
     partner, i, j = last[0], last[1], last[2]
     if partner >= 0 and pair_touches(problem, work, body_A, partner, i, j):
         return pair_code(problem, partner, i, j)
@@ -230,6 +232,18 @@ def arm_contact(problem: Problem, work: Workspace, body_A: FloatArray, q: FloatA
                 last[0], last[1], last[2] = ARM, touching[0], touching[1]
                 return pair_code(problem, ARM, last[1], last[2])
     return NO_CONTACT
+
+
+@inner
+def _place_coupled_links(problem: Problem, work: Workspace, q: FloatArray) -> None:
+    """Fill the poses of the links between coupled joints, behind the link of their joint."""
+    for n in range(len(problem.coupled)):
+        i = int(problem.coupled[n, 0])
+        behind = (1.0 - problem.coupled[n, 1]) * problem.chain_p[i, 3] * q[i]
+        for r in range(3):
+            work.link_p[8 + n, r] = work.link_p[i + 1, r] - behind * work.link_R[i + 1, r, 2]
+            for c in range(3):
+                work.link_R[8 + n, r, c] = work.link_R[i + 1, r, c]
 
 
 @jit

@@ -31,8 +31,9 @@ def link_poses(
 
     Args:
         chain_R: Rotations of the chain, shape (8, 3, 3).
-        chain_p: Translations of the chain [m], shape (8, 3).
-        q: Joint angles [rad], shape (7,).
+        chain_p: Translations of the chain [m], shape (8, 3); with a fourth column that holds
+            `Chain.slides` if there are prismatic joints.
+        q: Joint angles [rad], or positions [m], shape (7,).
         link_R: Filled with orientations, shape (8, 3, 3); row 0 is the identity, A itself.
         link_p: Filled with origins [m], shape (8, 3).
     """
@@ -40,10 +41,12 @@ def link_poses(
         link_p[0, r] = 0.0
         for c in range(3):
             link_R[0, r, c] = 1.0 if r == c else 0.0
+    sliding = chain_p.shape[1] > 3
     for i in range(7):
         F, f = chain_R[i], chain_p[i]
         R, S = link_R[i], link_R[i + 1]
-        cosine, sine = np.cos(q[i]), np.sin(q[i])
+        slides = sliding and f[3] > 0.0
+        cosine, sine = (1.0, 0.0) if slides else (np.cos(q[i]), np.sin(q[i]))
         for r in range(3):
             x = R[r, 0] * F[0, 0] + R[r, 1] * F[1, 0] + R[r, 2] * F[2, 0]
             y = R[r, 0] * F[0, 1] + R[r, 1] * F[1, 1] + R[r, 2] * F[2, 1]
@@ -51,6 +54,8 @@ def link_poses(
             S[r, 2] = R[r, 0] * F[0, 2] + R[r, 1] * F[1, 2] + R[r, 2] * F[2, 2]
             step = R[r, 0] * f[0] + R[r, 1] * f[1] + R[r, 2] * f[2]
             link_p[i + 1, r] = link_p[i, r] + step
+            if slides:
+                link_p[i + 1, r] += S[r, 2] * f[3] * q[i]
 
 
 @inner
@@ -140,6 +145,11 @@ def jacobian(chain_R: FloatArray, chain_p: FloatArray, q: FloatArray, J: FloatAr
         offset = R[7, r, 0] * f[0] + R[7, r, 1] * f[1] + R[7, r, 2] * f[2]
         tool[r] = p[7, r] + offset
     fill_jacobian(R, p, tool, J)
+    if chain_p.shape[1] > 3:
+        for i in range(7):
+            if chain_p[i, 3] > 0.0:
+                for r in range(3):
+                    J[r, i], J[3 + r, i] = 0.0, chain_p[i, 3] * R[i + 1, r, 2]
 
 
 @inner

@@ -44,14 +44,17 @@ class Problem(NamedTuple):
     chain_R: FloatArray
     """Rotations of the chain, shape (8, 3, 3)."""
     chain_p: FloatArray
-    """Translations of the chain [m], shape (8, 3)."""
+    """Translations of the chain [m], shape (8, 3); with a fourth column, `Chain.slides`, if there
+    are prismatic joints."""
+    coupled: FloatArray
+    """As in `Chain`."""
     joints: int
     """Number of joints of the arm, as in `Chain`."""
     links: FloatArray
     """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
     their groups, shape (n_arm + arm groups, 17)."""
     link_frame: IntArray
-    """Link of each row in `links`, 7 .. 1, shape (n_arm + arm groups,)."""
+    """Link of each row in `links`, 7 .. 1 or the number of a coupled link's frame, shape (n_arm + arm groups,)."""
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
     link_first: IntArray
@@ -124,7 +127,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     Raises:
         UnknownNameError: If there is no measure of that name.
     """
-    order = np.argsort(-scene.arm.frame.astype(np.int64), kind="stable")
+    order = np.argsort(-_rank(scene.chain, scene.arm.frame.astype(np.int64)), kind="stable")
     R_AB = np.swapaxes(scene.arm_base_R, 1, 2)
     from_arm_base = scene.body.p - scene.arm_base_p[:, None]
     body_A = scene.body._replace(
@@ -142,7 +145,8 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
         measure=dexterity(measure),
         arm=any_solver(scene.chain),
         chain_R=_own(scene.chain.R),
-        chain_p=_own(scene.chain.p),
+        chain_p=with_slides(scene.chain),
+        coupled=_own(scene.chain.coupled),
         joints=scene.chain.joints,
         links=with_boxes(links, link_first)[0],
         link_frame=np.append(frame, frame[link_first[:-1]]),
@@ -203,9 +207,32 @@ def with_environment(problem: Problem, scene: SceneArrays) -> Problem:
     )
 
 
+def with_slides(chain: Chain) -> FloatArray:
+    """Return the translations of a chain, with a column for its prismatic joints if it has any."""
+    if not np.any(chain.slides):
+        return _own(chain.p)
+    return _own(np.column_stack([chain.p, np.append(chain.slides, 0.0)]))
+
+
+def travel(chain: Chain) -> FloatArray:
+    """Return how far each prismatic joint moves from 0 [m], 0 for a revolute joint, shape (7,)."""
+    slides = chain.slides > 0.0
+    farthest = np.maximum(np.abs(chain.lower), np.abs(chain.upper))
+    return np.where(slides, np.where(slides, farthest, 0.0) * chain.slides, 0.0)
+
+
+def _rank(chain: Chain, frame: IntArray) -> FloatArray:
+    """Return the numbers of links, those of coupled links between those beside them."""
+    rank = np.arange(8.0 + len(chain.coupled))
+    rank[8:] = chain.coupled[:, 0] + 0.5
+    return rank[frame]
+
+
 def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:
     """Return an upper bound of the distance of the arm's shapes from the origin of A [m]."""
-    reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(chain.p[:7], axis=1))])
+    steps = np.linalg.norm(chain.p[:7], axis=1) + travel(chain)
+    reach = np.concatenate([[0.0], np.cumsum(steps)])
+    reach = np.append(reach, reach[chain.coupled[:, 0].astype(np.int64) + 1])
     out = np.linalg.norm(links[:, CENTRE : CENTRE + 3], axis=1) + links[:, BOUND]
     return float(np.max(reach[frame] + out, initial=0.0))
 

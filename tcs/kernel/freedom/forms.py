@@ -78,6 +78,9 @@ def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
     """
     if not np.any(rows):
         return no_freedom()
+    slides = chain.slides > 0.0
+    farthest = np.maximum(np.abs(chain.lower), np.abs(chain.upper))
+    longest = float(farthest[slides] @ chain.slides[slides])
     forms, steps, first, samples, parents, poses = [], [], [0], [], [], []
     for row in rows:
         form = np.concatenate([row, *_basis(row)])
@@ -98,7 +101,7 @@ def free_goals(rows: FloatArray, chain: Chain) -> FreeGoals:
         samples=np.array(samples, np.int64),
         parents=np.concatenate(parents).astype(np.int64),
         u=np.ascontiguousarray(np.concatenate(poses)),
-        reach=float(np.linalg.norm(chain.p[1:], axis=1).sum() + np.linalg.norm(chain.p[0])),
+        reach=float(np.linalg.norm(chain.p, axis=1).sum() + longest),
     )
 
 

@@ -1,14 +1,17 @@
 """Constants of the closed form of an arm of six joints.
 
-Two classes have one. In numbers of the arm's own axes, 1 to 6:
+Three classes have one. In numbers of the arm's own axes, 1 to 6:
 
 * spherical wrist: axes 1 and 2 meet, and axes 4, 5 and 6 meet in one point. With a further joint
   before the first one this is an arm of `tcs.kernel.analytic`, solved with that joint at 0.
 * parallel axes: axes 2, 3 and 4 are parallel, and axes 5 and 6 meet.
+* three prismatic joints, in any order with three revolute ones, of which neighbours are not
+  parallel: the orientation of the goal gives the angles, and its position the rest.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +26,7 @@ from tcs.kernel.analytic.solver import (
 )
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.lines import PARALLEL_TOLERANCE, axis_distance
+from tcs.kernel.problem import with_slides
 
 
 class SixJointArm(NamedTuple):
@@ -35,7 +39,7 @@ class SixJointArm(NamedTuple):
     """Rotations of the chain, shape (8, 3, 3)."""
     p: FloatArray
     """Translations of the chain [m], L6 and L7 of an arm with parallel axes shifted to where its
-    axes 5 and 6 meet, shape (8, 3)."""
+    axes 5 and 6 meet, shape (8, 3); (8, 4) with prismatic joints, as in `Problem`."""
     lower: FloatArray
     """Joint limits [rad], shape (7,); infinite where continuous."""
     upper: FloatArray
@@ -50,6 +54,11 @@ def six_joint_arm(chain: Chain) -> SixJointArm:
     Raises:
         ArmClassError: If the arm has no closed form; the message says what it lacks.
     """
+    lower, upper = (np.array(a, dtype=np.float64) for a in (chain.lower, chain.upper))
+    if np.any(chain.slides):
+        _check_sliding(chain)
+        p, wrist = with_slides(chain), outside_solver(chain)
+        return SixJointArm(wrist, np.array(chain.R, order="C"), p, lower, upper)
     unlimited = chain._replace(lower=np.full(7, -np.inf), upper=np.full(7, np.inf))
     p, wrist = np.array(chain.p, order="C"), outside_solver(unlimited)
     try:
@@ -59,13 +68,43 @@ def six_joint_arm(chain: Chain) -> SixJointArm:
         wrist = solver
     except ArmClassError:
         p = _with_wrist_at_meeting_point(chain)
-    lower, upper = (np.array(a, dtype=np.float64) for a in (chain.lower, chain.upper))
     return SixJointArm(wrist=wrist, R=np.array(chain.R, order="C"), p=p, lower=lower, upper=upper)
 
 
 def has_spherical_wrist(arm: SixJointArm) -> bool:
     """Return whether an arm is in the spherical-wrist class, else its axes are parallel."""
     return len(arm.wrist.branches) > 0
+
+
+def is_sliding(arm: SixJointArm) -> bool:
+    """Return whether an arm has prismatic joints."""
+    return arm.p.shape[1] > 3
+
+
+def _check_sliding(chain: Chain) -> None:
+    """Check that an arm with prismatic joints has a closed form.
+
+    Raises:
+        ArmClassError: If it does not have three of each type, or two neighbouring axes of rotation
+            are parallel.
+    """
+    slides = chain.slides[1:] > 0.0
+    if int(slides.sum()) != 3:
+        raise ArmClassError(
+            f"the arm has {int(slides.sum())} prismatic joints among six. With prismatic joints, "
+            "three of them and three revolute ones are supported."
+        )
+    R, axes = np.eye(3), []
+    for i in range(7):
+        R = R @ chain.R[i]
+        if i and not slides[i - 1]:
+            axes.append(R[:, 2])
+    for first, second in itertools.pairwise(axes):
+        if np.linalg.norm(np.cross(first, second)) < PARALLEL_TOLERANCE:
+            raise ArmClassError(
+                "two neighbouring revolute joints of the arm with prismatic joints are parallel, "
+                "so that it cannot take every orientation: such arms are not supported."
+            )
 
 
 def _with_wrist_at_meeting_point(chain: Chain) -> FloatArray:

@@ -37,7 +37,11 @@ class SixJointSolver(NamedTuple):
 def new_six_joint_solver(problem: Problem) -> SixJointSolver:
     """Return the solver of a problem's arm, with scratch memory for one worker."""
     arm = problem.arm
-    chain = Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper, problem.joints)
+    p = problem.chain_p
+    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
+    chain = Chain(
+        problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides
+    )
     return SixJointSolver(
         six_joint_arm(chain),
         np.empty((MOST_SOLUTIONS, 7)),

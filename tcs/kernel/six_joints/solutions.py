@@ -19,6 +19,8 @@ ROUNDING = 1e-12
 """What rounding may add to a cosine."""
 ALIGNED = 1e-18
 """Squared length of a vector [m^2 or 1] that has no direction."""
+COPLANAR = 1e-9
+"""Triple product of three directions below which they lie in a plane."""
 FORTH, BACK = int_constant(1), int_constant(-1)
 """Directions of a rotation: by the matrix, or by its transpose."""
 
@@ -47,6 +49,8 @@ def solve_six_joints(
         for b in range(len(arm.wrist.branches)):
             sample_joints(arm.wrist, goal, arm.wrist.branches[b], 0.0, solutions[found])
             found += 1
+    elif arm.p.shape[1] > 3:
+        found = _three_slides(arm, R_AG, p_AG, solutions)
     else:
         found = _parallel_axes(arm, R_AG, p_AG, solutions)
     kept = 0
@@ -83,7 +87,8 @@ def within_limits(arm: SixJointArm, solutions: FloatArray, count: int) -> int:
         for k in range(7):
             lower, upper, angle = arm.lower[k], arm.upper[k], solutions[n, k]
             middle = 0.5 * (lower + upper) if np.isfinite(lower) else 0.0
-            angle -= TURN * np.ceil((angle - middle - np.pi) / TURN)
+            if arm.p.shape[1] <= 3 or arm.p[k, 3] == 0.0:
+                angle -= TURN * np.ceil((angle - middle - np.pi) / TURN)
             inside = inside and lower <= angle <= upper
             solutions[kept, k] = angle
         kept += 1 if inside else 0
@@ -117,6 +122,75 @@ def _is_known(solutions: FloatArray, kept: int, n: int) -> bool:
         if apart < ROUNDING:
             return True
     return False
+
+
+@inner
+def _three_slides(
+    arm: SixJointArm, R_AG: FloatArray, p_AG: FloatArray, solutions: FloatArray
+) -> int:
+    """Fill the solutions of an arm of three prismatic and three revolute joints, in any order.
+
+    Prismatic joints leave the orientation alone, so it gives the three angles. Each prismatic joint
+    then has a known direction, and the position is linear in the three.
+    """
+    # Rotations before, between and after the revolute joints.
+    between = np.empty((4, 3, 3))
+    turning, sliding = np.empty(3, np.int64), np.empty(3, np.int64)
+    turns = slides = 0
+    total = _product(arm.R[0], arm.R[1], FORTH)
+    for i in range(1, 7):
+        if arm.p[i, 3] > 0.0:
+            sliding[slides] = i
+            slides += 1
+        else:
+            between[turns] = total
+            turning[turns] = i
+            turns += 1
+            total = np.eye(3)
+        total = _product(total, arm.R[i + 1], FORTH)
+    between[3] = total
+    M = _product(_product(_transposed(between[0]), R_AG, FORTH), between[3], BACK)
+    row, f = between[1][2], between[2][:, 2]
+    middles = np.empty(2)
+    link_R, link_p = np.empty((8, 3, 3)), np.empty((8, 3))
+    R_AT, p_AT = np.empty((3, 3)), np.empty(3)
+    cosine, sine = row[0] * f[0] + row[1] * f[1], row[1] * f[0] - row[0] * f[1]
+    found = 0
+    for j in range(_angles(cosine, sine, M[2, 2] - row[2] * f[2], middles)):
+        inner = _product(_rotated(between[1], middles[j]), between[2], FORTH)
+        first = _azimuth(M[0, 2], M[1, 2]) - _azimuth(inner[0, 2], inner[1, 2])
+        N = _product(_transposed(_product(_rotated(np.eye(3), first), inner, FORTH)), M, FORTH)
+        q = solutions[found]
+        for k in range(7):
+            q[k] = 0.0
+        q[turning[0]], q[turning[1]] = first, middles[j]
+        q[turning[2]] = np.arctan2(N[1, 0], N[0, 0])
+        link_poses(arm.R, arm.p, q, link_R, link_p)
+        place_tool(arm.R, arm.p, link_R, link_p, R_AT, p_AT)
+        a, b, c = (
+            link_R[sliding[0] + 1][:, 2],
+            link_R[sliding[1] + 1][:, 2],
+            link_R[sliding[2] + 1][:, 2],
+        )
+        v = p_AG - p_AT
+        volume = _triple(a, b, c)
+        if abs(volume) < COPLANAR:
+            continue
+        q[sliding[0]] = _triple(v, b, c) / (volume * arm.p[sliding[0], 3])
+        q[sliding[1]] = _triple(a, v, c) / (volume * arm.p[sliding[1], 3])
+        q[sliding[2]] = _triple(a, b, v) / (volume * arm.p[sliding[2], 3])
+        found += 1
+    return found
+
+
+@inner
+def _triple(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
+    """Return the triple product a . (b x c)."""
+    return (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )
 
 
 @inner

@@ -39,6 +39,7 @@ def newton_solutions(
     """
     q = np.zeros((starts, 7))
     q[:, 1:] = np.random.default_rng(0).uniform(-np.pi, np.pi, (starts, 6))
+    turns = chain.slides == 0.0
     arrived = [np.empty((0, 7))]
     for _ in range(ITERATIONS):
         error, J = _errors(chain, q, R_AG, p_AG)
@@ -50,14 +51,16 @@ def newton_solutions(
         step = (np.swapaxes(J, 1, 2) @ np.linalg.solve(damped, error[..., None]))[..., 0]
         length = np.linalg.norm(step, axis=1, keepdims=True)
         q[:, 1:] += step * np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))
-    return _distinct(np.pi - np.remainder(np.pi - np.concatenate(arrived), 2.0 * np.pi))
+    found = np.concatenate(arrived)
+    found[:, turns] = np.pi - np.remainder(np.pi - found[:, turns], 2.0 * np.pi)
+    return _distinct(found)
 
 
 def within(chain: Chain, solutions: FloatArray) -> FloatArray:
     """Return the solutions within the joint limits, shifted into them by full turns, (n, 7)."""
     limited = np.isfinite(chain.lower) & np.isfinite(chain.upper)
     middle = np.where(limited, chain.lower, 0.0) / 2 + np.where(limited, chain.upper, 0.0) / 2
-    turns = np.ceil((solutions - middle - np.pi) / (2.0 * np.pi))
+    turns = np.ceil((solutions - middle - np.pi) / (2.0 * np.pi)) * (chain.slides == 0.0)
     shifted = solutions - turns * 2.0 * np.pi
     inside = np.all((shifted >= chain.lower) & (shifted <= chain.upper), axis=1)
     return np.asarray(shifted[inside])
@@ -80,14 +83,20 @@ def _errors(
     R, p = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
     axes, origins = [], []
     for i in range(7):
-        p = p + R @ chain.p[i]
-        R = R @ chain.R[i] @ _rotations(q[:, i])
+        slide = chain.slides[i]
+        p, R = p + R @ chain.p[i], R @ chain.R[i]
+        if slide:
+            p = p + R[:, :, 2] * (slide * q[:, i, None])
+        else:
+            R = R @ _rotations(q[:, i])
         axes.append(R[:, :, 2])
         origins.append(p)
     p, R = p + R @ chain.p[7], R @ chain.R[7]
     columns = [
-        np.concatenate([z, np.cross(z, p - o)], axis=1)
-        for z, o in zip(axes[1:], origins[1:], strict=True)
+        np.concatenate([np.zeros_like(z), slide * z], axis=1)
+        if slide
+        else np.concatenate([z, np.cross(z, p - o)], axis=1)
+        for z, o, slide in zip(axes[1:], origins[1:], chain.slides[1:], strict=True)
     ]
     # The rotation vector from the tool to the goal: half the antisymmetric part, to its full angle.
     E = R_AG @ np.swapaxes(R, 1, 2)

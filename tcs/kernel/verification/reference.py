@@ -27,6 +27,9 @@ Pose = tuple[FloatArray, FloatArray]
 """Rotation matrix, shape (3, 3), and position [m], shape (3,)."""
 
 
+ORIGIN = np.zeros(3)
+
+
 def compose(X_AB: Pose, X_BC: Pose) -> Pose:
     """Return X_AC."""
     return X_AB[0] @ X_BC[0], X_AB[1] + X_AB[0] @ X_BC[1]
@@ -48,16 +51,32 @@ def link_poses(chain: Chain, q: FloatArray) -> list[Pose]:
     X: Pose = (np.eye(3), np.zeros(3))
     poses = []
     for i in range(7):
-        X = compose(compose(X, (chain.R[i], chain.p[i])), (rot_z(q[i]), np.zeros(3)))
+        slide = chain.slides[i]
+        moved = (np.eye(3), np.array([0.0, 0.0, slide * q[i]])) if slide else (rot_z(q[i]), ORIGIN)
+        X = compose(compose(X, (chain.R[i], chain.p[i])), moved)
         poses.append(X)
     poses.append(compose(X, (chain.R[7], chain.p[7])))
     return poses
 
 
+def coupled_pose(chain: Chain, q: FloatArray, poses: list[Pose], frame: int) -> Pose:
+    """Return the pose in A of the link frame of that number, given `link_poses`."""
+    if frame <= 7:
+        return poses[frame - 1]
+    joint, fraction = int(chain.coupled[frame - 8, 0]), chain.coupled[frame - 8, 1]
+    back = (fraction - 1.0) * chain.slides[joint] * q[joint]
+    return compose(poses[joint], (np.eye(3), np.array([0.0, 0.0, back])))
+
+
 def jacobian(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the Jacobian of the tool in A, shape (6, joints), rows [angular; linear]."""
     *links, tool = link_poses(chain, q)
-    columns = [np.concatenate([R[:, 2], np.cross(R[:, 2], tool[1] - p)]) for R, p in links]
+    columns = [
+        np.concatenate([np.zeros(3), slide * R[:, 2]])
+        if slide
+        else np.concatenate([R[:, 2], np.cross(R[:, 2], tool[1] - p)])
+        for (R, p), slide in zip(links, chain.slides, strict=True)
+    ]
     return np.array(columns[7 - chain.joints :]).T
 
 

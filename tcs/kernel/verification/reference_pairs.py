@@ -33,6 +33,7 @@ from tcs.kernel.verification.reference import (
     Placed,
     Pose,
     compose,
+    coupled_pose,
     distance,
     free_joint,
     inverse,
@@ -125,7 +126,10 @@ class PlacedScene:
         """Return the arm's shapes in A at joint angles q [rad]."""
         poses = link_poses(self.scene.chain, q)
         shapes = shapes_of(self.scene.arm, 0)
-        return [s.moved(poses[f - 1]) for s, f in zip(shapes, self.scene.arm.frame, strict=True)]
+        return [
+            s.moved(coupled_pose(self.scene.chain, q, poses, int(f)))
+            for s, f in zip(shapes, self.scene.arm.frame, strict=True)
+        ]
 
     def gripper_touches(self, with_body: bool) -> bool:
         """Return whether the gripper at the goal touches the robot's body, or the environment."""
@@ -143,7 +147,7 @@ class PlacedScene:
         Contacts of the gripper with environment and body are left to `gripper_touches`.
         """
         arm, scene = self.arm_at(q), self.scene
-        free = scene.arm.frame < 7
+        free = scene.arm.frame != 7
         links = list(itertools.compress(arm, free))
         once = np.tril(scene.arm_vs_arm, -1) & (free[:, None] | free[None])
         return (

@@ -35,7 +35,11 @@ def six_joint_scans(problem: Problem, pairs: IntArray, joints: FloatArray) -> ND
         joints: Filled with the joint angles of each solution [rad], shape (n, 7).
     """
     arm, work = problem.arm, new_workspace(problem)
-    chain = Chain(problem.chain_R, problem.chain_p, arm.lower, arm.upper, problem.joints)
+    p = problem.chain_p
+    slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
+    chain = Chain(
+        problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides
+    )
     values = np.full(len(pairs), -1.0)
     for i, (configuration, goal) in enumerate(pairs):
         if not _place(problem, work, configuration, goal):

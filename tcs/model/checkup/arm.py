@@ -16,7 +16,7 @@ from tcs.kernel.analytic.solver import FIRST, ArmSolver, arm_solver
 from tcs.kernel.arrays import Chain, FloatArray
 from tcs.kernel.lines import axis_distance
 from tcs.kernel.numeric.solutions import numeric_solutions
-from tcs.kernel.six_joints.arm import SixJointArm, has_spherical_wrist, six_joint_arm
+from tcs.kernel.six_joints.arm import SixJointArm, has_spherical_wrist, is_sliding, six_joint_arm
 from tcs.kernel.six_joints.solutions import six_joint_solutions
 from tcs.model.scene import Scene, arm_chain
 
@@ -29,7 +29,11 @@ ON_GOAL = 1e-6
 pose, which does not count."""
 
 ClassName = Literal[
-    "spherical-wrist", "spherical-shoulder", "six-joint spherical-wrist", "six-joint parallel-axes"
+    "spherical-wrist",
+    "spherical-shoulder",
+    "six-joint spherical-wrist",
+    "six-joint parallel-axes",
+    "three prismatic joints",
 ]
 
 _MEETING = (("2-3", (2, 3)), ("5-6-7", (5, 6, 7)), ("1-2-3", (1, 2, 3)), ("5-6", (5, 6)))
@@ -46,7 +50,7 @@ class ArmClass:
             the free joint. "spherical-shoulder": axes 1, 2 and 3 meet, and axes 5 and 6; joint 7 is
             the free joint. "six-joint spherical-wrist": of six joints, axes 1 and 2 meet, and so do
             axes 4, 5 and 6; "six-joint parallel-axes": axes 2, 3 and 4 are parallel, and axes 5 and
-            6 meet. None: none of these, so there is no closed form.
+            6 meet. "three prismatic joints": three more are revolute. None: none of these, so there is no closed form.
         reason: Why the arm is in no class, else empty.
         distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.
@@ -133,9 +137,11 @@ def _six_joint_class(chain: Chain) -> ArmClass:
         arm = six_joint_arm(chain)
     except ArmClassError as error:
         return ArmClass(None, str(error), distances, None, joints=6)
-    name: ClassName = (
-        "six-joint spherical-wrist" if has_spherical_wrist(arm) else "six-joint parallel-axes"
-    )
+    name: ClassName = "six-joint parallel-axes"
+    if is_sliding(arm):
+        name = "three prismatic joints"
+    elif has_spherical_wrist(arm):
+        name = "six-joint spherical-wrist"
     return ArmClass(name, "", distances, arm, joints=6)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from tcs.errors import RobotError, UnknownNameError
@@ -20,7 +21,7 @@ def check_robot(robot: RobotFile, where: str) -> None:
     Raises:
         UnknownNameError: If the file names an unknown link, joint or frame.
         RobotError: If the URDF or the primitives cannot be used, the arm is not a chain of
-            revolute joints from its base to the tool, a posture exceeds the hard limits, or an
+            revolute and prismatic joints from its base to the tool, a posture exceeds the hard limits, or an
             extra frame or body has the name of a link.
     """
     try:
@@ -101,24 +102,49 @@ def _primitives(robot: RobotFile, where: str) -> tuple[Primitive, ...]:
 
 
 def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
-    """Check that the arm is a chain of revolute joints from arm base to tool."""
+    """Check that the arm is a chain of joints from arm base to tool."""
     at = f"{where}, field 'arm_joints'"
     for name in robot.arm_joints:
         joint = model.joint(name, at)
-        if joint.type not in ("revolute", "continuous"):
-            raise RobotError(f"{at}: '{name}' is {joint.type}, but must be revolute or continuous.")
+        if not joint.is_movable:
+            raise RobotError(
+                f"{at}: '{name}' is {joint.type}, but must be revolute, continuous or prismatic."
+            )
+        if joint.type == "prismatic" and not all(map(math.isfinite, joint.hard)):
+            raise RobotError(f"{at}: '{name}' is prismatic and has no limits. Add them to the URDF.")
+    _check_coupled(robot, model, where)
     extras = {extra.name: extra.parent for extra in (*robot.frames, *robot.bodies)}
     tip = robot.tool_frame
     while tip in extras:
         tip = extras[tip]
     chain = model.chain(robot.arm_base, tip)
-    moving = [] if chain is None else [joint.name for joint in chain if joint.is_movable]
+    coupled = {name for names in robot.followers().values() for name in names}
+    movable = [joint.name for joint in chain or () if joint.is_movable]
+    moving = [name for name in movable if name not in coupled]
     if tuple(moving) != robot.arm_joints:
         found = ", ".join(moving) if chain is not None else "no chain of joints"
         raise RobotError(
             f"{at}: from '{robot.arm_base}' to '{robot.tool_frame}' the URDF has {found}, "
             f"but the file lists {', '.join(robot.arm_joints)}."
         )
+
+
+def _check_coupled(robot: RobotFile, model: Urdf, where: str) -> None:
+    """Check that joints coupled to one of the arm are prismatic, parallel and move as much."""
+    at = f"{where}, field 'coupled'"
+    for name, leader in robot.coupled.items():
+        if leader not in robot.arm_joints:
+            raise UnknownNameError("joint of the arm", leader, robot.arm_joints, where=at)
+        if name in robot.arm_joints:
+            raise RobotError(f"{at}: '{name}' is a joint of the arm itself. Leave it out there.")
+    for leader, names in robot.followers().items():
+        for joint in (model.joints[leader], *(model.joints[name] for name in names)):
+            mimic = joint.mimic
+            if joint.type != "prismatic" or (mimic and (mimic.multiplier, mimic.offset) != (1, 0)):
+                raise RobotError(
+                    f"{at}: '{joint.name}' and '{leader}' are coupled, but only prismatic joints "
+                    "that move by the same distance can be."
+                )
 
 
 def _check_positions(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -14,6 +15,7 @@ from tcs.errors import RobotError, UnknownNameError
 from tcs.files.documents import Clearance, Document, Entries, JointPosition, Placed, Size, checked
 from tcs.model.robots.primitives import Primitive, quaternion_of_rpy, read_primitives
 from tcs.model.robots.urdf import WORLD, Urdf, read_urdf
+from tcs.model.robots.urdf.model import Mimic
 from tcs.model.robots.urdf.packages import resolve_uri
 
 Name = Annotated[str, Field(min_length=1)]
@@ -41,6 +43,15 @@ class Mount(Placed):
 
     link: Name
     """Name of the further link, the root of the robot."""
+    drive: Range | None = None
+    """How far the robot drives along the x axis of its root link, back and forth [m], as the joint
+    `drive` of the scored arm; None if its base stands still."""
+
+    @model_validator(mode="after")
+    def _drive_includes_standing_still(self) -> Self:
+        if self.drive is not None and not self.drive[0] <= 0.0 <= self.drive[1]:
+            raise ValueError("drive: must be [back, forth] in metres, back <= 0 <= forth")
+        return self
 
 
 class ExtraFrame(_OnLink):
@@ -103,7 +114,11 @@ class RobotFile(Document):
     arm_base: Name
     """A: the link that carries joint 1 of the scored arm."""
     arm_joints: Annotated[tuple[Name, ...], Field(min_length=LEAST_JOINTS, max_length=MOST_JOINTS)]
-    """The six or seven joints of the scored arm, from A to the tool."""
+    """The six or seven joints of the scored arm, from A to the tool; of coupled ones, the one that
+    the others follow."""
+    coupled: Annotated[Mapping[Name, Name], Entries] = {}
+    """Joints that move as another one does, like the segments of a telescope, with the joint that
+    they follow; those that the URDF couples need no entry."""
     rest: Mapping[Name, JointPosition] = {}
     """Rest posture of the scored arm [rad]; a joint that is left out is at 0, or at the limit
     nearest to 0."""
@@ -166,6 +181,19 @@ class RobotFile(Document):
         groups = tuple(g.model_copy(update={"ranges": {}}) for g in self.disabled_groups)
         return self.model_copy(update={"disabled_groups": groups})
 
+    def followers(self) -> dict[str, tuple[str, ...]]:
+        """Return the joints coupled to each joint of the scored arm that has any.
+
+        Raises:
+            RobotError: If the URDF cannot be used.
+        """
+        joints = self.model().joints.values()
+        found = {
+            leader: tuple(j.name for j in joints if j.mimic and j.mimic.leader == leader)
+            for leader in self.arm_joints
+        }
+        return {leader: names for leader, names in found.items() if names}
+
     def require_seven_joints(self, purpose: str) -> None:
         """Refuse an arm of six joints.
 
@@ -222,7 +250,8 @@ class RobotFile(Document):
             RobotError: If the URDF cannot be used.
         """
         collision_only = self.surfaces == "collision"
-        return _model(self.urdf_path(), self.mount, collision_only, self.ignored_links)
+        coupled = tuple(self.coupled.items())
+        return _model(self.urdf_path(), self.mount, collision_only, self.ignored_links, coupled)
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits in force of every movable joint [rad or m]; infinite if continuous.
@@ -327,20 +356,32 @@ class RobotFile(Document):
 
 
 @cache
-def _model(path: Path, mount: Mount | None, collision_only: bool, ignored: tuple[str, ...]) -> Urdf:
-    """Return a URDF on a mount, with the surfaces that count.
+def _model(
+    path: Path,
+    mount: Mount | None,
+    collision_only: bool,
+    ignored: tuple[str, ...],
+    coupled: tuple[tuple[str, str], ...],
+) -> Urdf:
+    """Return a URDF on a mount, with the surfaces that count and its joints coupled.
 
     Raises:
         RobotError: If the URDF cannot be used, or the name of the mount is taken.
+        UnknownNameError: If a coupled joint is unknown.
     """
     model = read_urdf(path)
+    for name, leader in coupled:
+        model.joint(leader, "field 'coupled'")
+        follower = model.joint(name, "field 'coupled'")
+        joint = replace(follower, mimic=Mimic(leader=leader, multiplier=1.0, offset=0.0))
+        model = Urdf(path=path, links=model.links, joints={**model.joints, name: joint})
     if collision_only or ignored:
         model = model.with_surfaces(collision_only=collision_only, ignored=ignored)
     if mount is None:
         return model
     if mount.link in (*model.links, WORLD):
         raise RobotError(f"link '{mount.link}' of the mount: the name is taken. Choose another.")
-    return model.mounted_on(mount.link, mount.xyz, mount.rpy)
+    return model.mounted_on(mount.link, mount.xyz, mount.rpy, mount.drive)
 
 
 def joint_limits(robot: RobotFile) -> dict[str, tuple[float, float]]:

@@ -58,9 +58,9 @@ class LoweredScene:
 
 def _flat(item: object) -> Iterator[object]:
     """Yield the leaves of nested named tuples, in order."""
-    if isinstance(item, Chain) and item.joints == 7:
-        # Scenes of seven joints keep the digests that files were written with.
-        item = item[:-1]
+    if isinstance(item, Chain) and not np.any(item.slides):
+        # Scenes of revolute joints keep the digests that files were written with.
+        item = item[:-3] if item.joints == 7 else item[:-2]
     if isinstance(item, SceneArrays) and not len(item.freedom):
         item = item[:-1]
     if isinstance(item, tuple):

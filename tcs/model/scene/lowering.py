@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import Frame
+from pydrake.multibody.tree import Frame, PrismaticJoint
 
 from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays, Shapes
@@ -17,6 +17,7 @@ from tcs.model.grid import Grid
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
 from tcs.model.scene.lowered_scene import LoweredScene, read_only
+from tcs.model.scene.plant import coupled_frames, standing_contacts
 from tcs.model.scene.scene import Scene
 from tcs.model.tasks import Task
 
@@ -54,7 +55,10 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     rule = ContactRule.of(
         built.parts,
         scene.spec.robot.disabled_pairs,
-        () if task is None else task.allowed_contacts,
+        (
+            *(() if task is None else task.allowed_contacts),
+            *standing_contacts(scene.spec.robot, built.parts),
+        ),
         where=f"{where}, allowed contacts",
     )
     arm = [part for part in built.parts if part.group is Group.ARM]
@@ -123,10 +127,13 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
         scene: The scene, its arm at zero.
     """
     built, state = scene.built, scene.plant_context
-    axes = []
-    for joint in built.arm_joints:
+    axes, slides = [], []
+    for joint, followers in zip(built.arm_joints, built.coupled_joints, strict=True):
         X_AJ = joint.frame_on_child().CalcPose(state, built.arm_base_frame)
-        axes.append(JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), joint.revolute_axis()))
+        is_prismatic = isinstance(joint, PrismaticJoint)
+        direction = joint.translation_axis() if is_prismatic else joint.revolute_axis()
+        axes.append(JointAxis(X_AJ.rotation().matrix(), X_AJ.translation(), direction))
+        slides.append((1.0 + len(followers)) if is_prismatic else 0.0)
     # An arm of six joints has one more before its first, about the same axis, which remains at 0.
     fixed = JOINTS - len(axes)
     R_AL, p_AL = link_frames((*axes[:1] * fixed, *axes))
@@ -141,6 +148,8 @@ def arm_chain(scene: Scene) -> tuple[Chain, list[RigidTransform]]:
         lower=np.concatenate([np.full(fixed, -np.inf), built.arm_lower]),
         upper=np.concatenate([np.full(fixed, np.inf), built.arm_upper]),
         joints=len(axes),
+        slides=np.array([0.0] * fixed + slides),
+        coupled=coupled_frames(built.coupled_joints, fixed),
     )
     return chain, X_AL
 
@@ -149,9 +158,13 @@ def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> l
     """Return the poses of the arm's shapes in the link frames that carry them."""
     query = scene.query_object()
     X_WA = scene.built.arm_base_frame.CalcPoseInWorld(scene.plant_context)
+    joints = scene.built.coupled_joints
+    # With all joints at zero, links between coupled joints have the frame of their joint's link.
+    between = coupled_frames(joints, JOINTS - len(joints))[:, 0].astype(int)
+    frames = [*X_AL, *(X_AL[i] for i in between)]
     poses = []
     for part in parts:
-        X_WL = X_WA @ X_AL[part.carrier - 1]
+        X_WL = X_WA @ frames[part.carrier - 1]
         poses.append(X_WL.inverse() @ query.GetPoseInWorld(part.geometry))
     return poses
 

@@ -34,7 +34,7 @@ from tcs.errors import EnvironmentFileError, RobotError
 from tcs.kernel.arrays import FloatArray
 from tcs.model.robots import Primitive, RobotFile, robot_urdf
 from tcs.model.scene.contacts import ContactRule, Group, Part, apply_rule, shape_of
-from tcs.model.scene.environment import WORLD
+from tcs.model.scene.environment import FLOOR, WORLD
 from tcs.model.scene.environment_plant import add_environment, environment_parts
 from tcs.model.scene.joints import EnvironmentJoints
 from tcs.model.scene.spec import SceneSpec
@@ -53,6 +53,7 @@ class ScenePlant:
         scene_graph: The scene graph.
         base_joints: base_x, base_y, base_yaw.
         arm_joints: The scored arm's joints, in the robot file's order.
+        coupled_joints: The joints that follow each of these, in the order of the chain.
         arm_lower: Their lower limits [rad], -inf where continuous.
         arm_upper: Their upper limits [rad], +inf where continuous.
         torso_joint: The prismatic joint of the torso, None for a robot without one.
@@ -70,7 +71,8 @@ class ScenePlant:
     plant: MultibodyPlant
     scene_graph: SceneGraph
     base_joints: tuple[Joint, ...]
-    arm_joints: tuple[RevoluteJoint, ...]
+    arm_joints: tuple[RevoluteJoint | PrismaticJoint, ...]
+    coupled_joints: tuple[tuple[Joint, ...], ...]
     arm_lower: FloatArray
     arm_upper: FloatArray
     torso_joint: Joint | None
@@ -105,15 +107,21 @@ def build_plant(
 
     torso = plant.GetJointByName(robot.torso_joint, instance) if robot.torso_joint else None
     arm_joints = tuple(plant.GetJointByName(name, instance) for name in robot.arm_joints)
+    followers = robot.followers()
+    coupled_joints = tuple(
+        tuple(plant.GetJointByName(name, instance) for name in followers.get(leader, ()))
+        for leader in robot.arm_joints
+    )
     inspector = scene_graph.model_inspector()
     parts = (
-        *_robot_parts(plant, inspector, primitives, arm_joints, torso),
+        *_robot_parts(plant, inspector, primitives, arm_joints, coupled_joints, torso),
         *environment_parts(plant, inspector, added, environment),
     )
     for part in parts:
         shape_of(inspector, part)
     _check_names(parts, environment.name)
     where = f"environment '{environment.name}', allowed contacts"
+    allowed_contacts = (*allowed_contacts, *standing_contacts(robot, parts))
     rule = ContactRule.of(parts, robot.disabled_pairs, allowed_contacts, where=where)
     apply_rule(scene_graph, parts, rule)
     limits = robot.joint_limits()
@@ -123,6 +131,7 @@ def build_plant(
         scene_graph=scene_graph,
         base_joints=base_joints,
         arm_joints=arm_joints,
+        coupled_joints=coupled_joints,
         arm_lower=np.array([limits[name][0] for name in robot.arm_joints]),
         arm_upper=np.array([limits[name][1] for name in robot.arm_joints]),
         torso_joint=torso,
@@ -206,12 +215,22 @@ def _robot_parts(
     inspector: SceneGraphInspector,
     geometries: Iterable[GeometryId],
     arm_joints: tuple[Joint, ...],
+    coupled_joints: tuple[tuple[Joint, ...], ...],
     torso: Joint | None,
 ) -> tuple[Part, ...]:
     """Return the robot's shapes as parts, with the arm link or the mount of each."""
     above = {joint.child_body().index(): joint for joint in _joints(plant)}
     # The last joint carries link 7, whatever the number of joints.
     arm_link = {joint.index(): 7 - i for i, joint in enumerate(reversed(arm_joints))}
+    between = 8
+    for leader, followers in zip(arm_joints, coupled_joints, strict=True):
+        # The last one of coupled joints carries the link of their joint, the others carry links
+        # with frames of their own.
+        *others, last = _along(plant, (leader, *followers))
+        arm_link[last.index()] = arm_link[leader.index()]
+        for joint in others:
+            arm_link[joint.index()] = between
+            between += 1
     parts = []
     for geometry in geometries:
         body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
@@ -227,6 +246,43 @@ def _robot_parts(
             link = joint.parent_body()
         parts.append(Part(geometry, body.index(), group, carrier, body.name(), 0.0))
     return tuple(parts)
+
+
+def _along(plant: MultibodyPlant, joints: Iterable[Joint]) -> list[Joint]:
+    """Return coupled joints in the order of the chain."""
+    above = {joint.child_body().index(): joint for joint in _joints(plant)}
+
+    def depth(joint: Joint) -> int:
+        link, steps = joint.parent_body().index(), 0
+        while link in above:
+            link, steps = above[link].parent_body().index(), steps + 1
+        return steps
+
+    return sorted(joints, key=depth)
+
+
+def coupled_frames(joints: Iterable[tuple[Joint, ...]], first: int) -> FloatArray:
+    """Return `Chain.coupled` of the joints that follow each joint of an arm.
+
+    Args:
+        joints: The followers of each joint.
+        first: Index in the chain of the first joint.
+    """
+    return np.array(
+        [
+            (first + i, (k + 1) / (len(followers) + 1))
+            for i, followers in enumerate(joints)
+            for k in range(len(followers))
+        ]
+    ).reshape(-1, 2)
+
+
+def standing_contacts(robot: RobotFile, parts: Iterable[Part]) -> tuple[tuple[str, str], ...]:
+    """Return the contacts with the floor of a base that drives with the arm, as part of it."""
+    if robot.mount is None or robot.mount.drive is None:
+        return ()
+    names = {part.name for part in parts}
+    return tuple((body, FLOOR) for body in robot.standing_bodies if {body, FLOOR} <= names)
 
 
 def _joints(plant: MultibodyPlant) -> Iterable[Joint]:

@@ -58,6 +58,11 @@ class Scene:
         joints = self.built.arm_joints
         self._arm_positions = np.array([joint.position_start() for joint in joints])
         self._arm_velocities = np.array([joint.velocity_start() for joint in joints])
+        self._followers = [
+            (i, joint.position_start(), joint.velocity_start())
+            for i, followers in enumerate(self.built.coupled_joints)
+            for joint in followers
+        ]
         self._pads: dict[str, float] = {}
         self._of_environment: set[str] = set()
         self._part_of = {part.geometry: part for part in self.built.parts}
@@ -98,7 +103,7 @@ class Scene:
         return used
 
     def set_arm(self, positions: ArrayLike) -> None:
-        """Set the joints of the scored arm [rad], in the robot file's order.
+        """Set the joints of the scored arm [rad or m] and those coupled to them, in its order.
 
         Limits are not enforced. Seven numbers for an arm of six joints are those of the kernel's
         chain, whose first joint remains at 0.
@@ -116,6 +121,8 @@ class Scene:
             )
         q = self.built.plant.GetPositions(self._state).copy()
         q[self._arm_positions] = values
+        for i, position, _ in self._followers:
+            q[position] = values[i]
         self.built.plant.SetPositions(self._state, q)
 
     def set_joint(self, name: str, value: float) -> None:
@@ -181,7 +188,10 @@ class Scene:
             world,
             world,
         )
-        return np.array(jacobian[:, self._arm_velocities])
+        columns = np.array(jacobian[:, self._arm_velocities])
+        for i, _, velocity in self._followers:
+            columns[:, i] += jacobian[:, velocity]
+        return columns
 
     def query_object(self) -> QueryObject:
         """Return Drake's query object at the current state."""

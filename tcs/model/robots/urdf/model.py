@@ -26,6 +26,10 @@ class Mimic:
     offset: float
 
 
+DRIVE = "drive"
+"""Name of the joint of a robot that drives with its arm."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
     """One joint of a URDF [m or rad]."""
@@ -105,15 +109,21 @@ class Urdf:
         """Name of the link without a parent joint."""
         return next(link for link in self.links if link not in self.parent_joints)
 
-    def mounted_on(self, link: str, xyz: Vector, rpy: Vector) -> Urdf:
+    def mounted_on(
+        self, link: str, xyz: Vector, rpy: Vector, drive: tuple[float, float] | None = None
+    ) -> Urdf:
         """Return the tree with its root fixed to a new root link.
 
         Args:
             link: Name of the new root.
             xyz: Position of the present root in the new one [m].
             rpy: Its roll, pitch, yaw about the fixed axes of the new one [rad].
+            drive: How far the present root moves along its x axis [m], by the joint DRIVE; None if
+                it is fixed.
         """
         joint = replace(fixed_joint(link, self.root, xyz, rpy), name=f"{link}_mount")
+        if drive is not None:
+            joint = replace(joint, name=DRIVE, type="prismatic", hard=drive, soft=drive)
         links = {link: (), **self.links}
         return Urdf(path=self.path, links=links, joints={joint.name: joint, **self.joints})
 

