@@ -54,7 +54,8 @@ class Problem(NamedTuple):
     """The arm's shapes, packed, in link frames, nearest to the tool first, then the boxes around
     their groups, shape (n_arm + arm groups, 17)."""
     link_frame: IntArray
-    """Link of each row in `links`, 7 .. 1 or the number of a coupled link's frame, shape (n_arm + arm groups,)."""
+    """Link of each row in `links`, 7 .. 1 or the number of a coupled link's frame, shape
+    (n_arm + arm groups,)."""
     link_body: IntArray
     """Robot body of each shape in `links`, shape (n_arm,)."""
     link_first: IntArray

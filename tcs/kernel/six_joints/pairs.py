@@ -39,9 +39,7 @@ def new_six_joint_solver(problem: Problem) -> SixJointSolver:
     arm = problem.arm
     p = problem.chain_p
     slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(
-        problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides
-    )
+    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
     return SixJointSolver(
         six_joint_arm(chain),
         np.empty((MOST_SOLUTIONS, 7)),

@@ -37,9 +37,7 @@ def six_joint_scans(problem: Problem, pairs: IntArray, joints: FloatArray) -> ND
     arm, work = problem.arm, new_workspace(problem)
     p = problem.chain_p
     slides = p[:7, 3].copy() if p.shape[1] > 3 else np.zeros(7)
-    chain = Chain(
-        problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides
-    )
+    chain = Chain(problem.chain_R, p[:, :3].copy(), arm.lower, arm.upper, problem.joints, slides)
     values = np.full(len(pairs), -1.0)
     for i, (configuration, goal) in enumerate(pairs):
         if not _place(problem, work, configuration, goal):

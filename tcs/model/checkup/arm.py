@@ -50,7 +50,8 @@ class ArmClass:
             the free joint. "spherical-shoulder": axes 1, 2 and 3 meet, and axes 5 and 6; joint 7 is
             the free joint. "six-joint spherical-wrist": of six joints, axes 1 and 2 meet, and so do
             axes 4, 5 and 6; "six-joint parallel-axes": axes 2, 3 and 4 are parallel, and axes 5 and
-            6 meet. "three prismatic joints": three more are revolute. None: none of these, so there is no closed form.
+            6 meet. "three prismatic joints": three more are revolute. None: none of these, so there
+            is no closed form.
         reason: Why the arm is in no class, else empty.
         distances: Distance of axes from meeting in one point [m], by their numbers; None if two
             neighbours are parallel.

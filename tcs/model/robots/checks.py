@@ -21,8 +21,8 @@ def check_robot(robot: RobotFile, where: str) -> None:
     Raises:
         UnknownNameError: If the file names an unknown link, joint or frame.
         RobotError: If the URDF or the primitives cannot be used, the arm is not a chain of
-            revolute and prismatic joints from its base to the tool, a posture exceeds the hard limits, or an
-            extra frame or body has the name of a link.
+            revolute and prismatic joints from its base to the tool, a posture exceeds the hard
+            limits, or an extra frame or body has the name of a link.
     """
     try:
         model = robot.model()
@@ -111,7 +111,9 @@ def _check_arm(robot: RobotFile, model: Urdf, where: str) -> None:
                 f"{at}: '{name}' is {joint.type}, but must be revolute, continuous or prismatic."
             )
         if joint.type == "prismatic" and not all(map(math.isfinite, joint.hard)):
-            raise RobotError(f"{at}: '{name}' is prismatic and has no limits. Add them to the URDF.")
+            raise RobotError(
+                f"{at}: '{name}' is prismatic and has no limits. Add them to the URDF."
+            )
     _check_coupled(robot, model, where)
     extras = {extra.name: extra.parent for extra in (*robot.frames, *robot.bodies)}
     tip = robot.tool_frame

@@ -78,7 +78,9 @@ def base_outline(scene: Scene) -> FloatArray:
     """
     scene.place_base(0.0, 0.0, 0.0)
     plant, standing = scene.built.plant, scene.spec.robot.standing_bodies
-    body = [part for part in scene.built.parts if part.group is Group.BODY]
-    base = [part for part in body if plant.get_body(part.body).name() in standing] or body
+    # The base of a robot that drives with its arm belongs to the arm.
+    robot = [part for part in scene.built.parts if part.group is not Group.ENVIRONMENT]
+    base = [part for part in robot if plant.get_body(part.body).name() in standing]
+    base = base or [part for part in robot if part.group is Group.BODY]
     corners = [part_solid(scene, part, Category.ROBOT).corners[:, :2] for part in base]
     return outline(np.concatenate(corners))
