@@ -15,6 +15,8 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 PAGE = CHECKOUT / "THIRD_PARTY.md"
 TOOLS = {"benchmarks", "dev", "docs"}
 """Extras for work on tcs itself; nobody gets their packages with tcs."""
+STATED = {"hello-robot-stretch-urdf": "BSD-3-Clause-Clear", "pyglet": "BSD-3-Clause"}
+"""Licences of packages whose metadata have none, as their licence files say."""
 FIRST = """\
 # Third parties
 
@@ -99,7 +101,8 @@ def _licence(name: str) -> str:
         for line in about.get_all("Classifier") or []
         if line.startswith("License ::")
     ]
-    stated = about.get("License-Expression") or "; ".join(classifiers) or about.get("License") or ""
+    stated = STATED.get(name) or about.get("License-Expression") or "; ".join(classifiers)
+    stated = stated or about.get("License") or ""
     if not stated:
         raise SystemExit(f"{name} declares no licence: state it in {Path(__file__).name}.")
     return stated.splitlines()[0]
