@@ -74,6 +74,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "robustness": ("--scores", SCORES),
     "population": ("--scores", SCORES),
     "head_turn": (),
+    "postures": (),
     "people": (),
     "equal_reachability": ("--scores", SCORES),
     "printed_grid": (),
