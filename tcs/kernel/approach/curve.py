@@ -9,12 +9,13 @@ import numpy as np
 from tcs.kernel.analytic.ik import sample_joints, wrist_goal
 from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.approach.grid import PIECES, LineGrid
-from tcs.kernel.approach.scene import list_groups, list_shapes
+from tcs.kernel.approach.scene import keep_near, list_groups, list_shapes
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
 from tcs.kernel.contacts import Workspace
 from tcs.kernel.motion.edges import listed_are_free_until, take_middle
 from tcs.kernel.motion.pairs import take_posture
+from tcs.kernel.motion.planes import take_twists
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace
 from tcs.kernel.motion.straight import (
     OFF_LINE,
@@ -53,10 +54,13 @@ class CurveWorkspace(NamedTuple):
     """Level of the grid at the end of the piece that is blocked, and the pair; shape (2,)."""
     pieces: IntArray
     """Number of pieces of the spline, shape (1,)."""
+    near: IntArray
+    """Pairs of groups: all listed, then those that may meet on the current piece, shape
+    (2, pairs)."""
 
 
-def new_curve() -> CurveWorkspace:
-    """Return memory for one worker."""
+def new_curve(pairs: int) -> CurveWorkspace:
+    """Return memory for one worker, for a number of pairs in the scene."""
     most = FEWEST * 2**DOUBLINGS + 1
     return CurveWorkspace(
         np.empty((most, 7)),
@@ -65,6 +69,7 @@ def new_curve() -> CurveWorkspace:
         np.empty((4, 3)),
         np.zeros(2, np.int64),
         np.zeros(1, np.int64),
+        np.tile(np.arange(pairs), (2, 1)),
     )
 
 
@@ -146,7 +151,7 @@ def spline_is_free(
     groups = list_groups(problem, work, scene, motion, points, tangents)
     for n in range(pieces):
         take_piece(motion, points, tangents, n)
-        free = _free_until(problem, scene, motion, groups, max(PARTS // pieces, 1))
+        free = _free_until(problem, scene, motion, curve.near, groups, max(PARTS // pieces, 1))
         if free < 1.0:
             curve.blocked[0] = min(int((n + free) / pieces * PIECES) + 1, PIECES)
             curve.blocked[1] = motion.contact[0]
@@ -156,17 +161,27 @@ def spline_is_free(
 
 @inner
 def _free_until(
-    problem: Problem, scene: MotionScene, motion: MotionWorkspace, groups: int, parts: int
+    problem: Problem,
+    scene: MotionScene,
+    motion: MotionWorkspace,
+    near: IntArray,
+    groups: int,
+    parts: int,
 ) -> float:
     """Return how far the current curve is certified in a number of parts; 1 for all of it.
 
     Only the first pairs of the scene, those of `groups`, and of their shapes are checked.
     """
-    for part in range(parts):
+    take_middle(motion, 0.0, 1.0)
+    take_posture(scene, motion)
+    take_twists(motion)
+    left = keep_near(scene, motion, near[0], groups, near[1])
+    for part in range(parts if left else 0):
         begin, end = part / parts, (part + 1) / parts
         take_middle(motion, begin, end)
         take_posture(scene, motion)
-        count = list_shapes(problem, scene, motion, groups)
+        take_twists(motion)
+        count = list_shapes(problem, scene, motion, groups, near[1], left)
         free = listed_are_free_until(scene, motion, count, begin, end)
         if free < end:
             return free

@@ -46,6 +46,10 @@ class LineGrid(NamedTuple):
     NOWHERE, shape (BRANCHES, PIECES + 1, MAX_SAMPLES)."""
     nearest: IntArray
     """Scratch, shape (MAX_SAMPLES,)."""
+    spans: IntArray
+    """First and last column in which nodes may be open, shape (BRANCHES, PIECES + 1, 2)."""
+    deepest: IntArray
+    """Last level with open nodes of each branch, or NOWHERE, shape (BRANCHES,)."""
     measure: FloatArray
     """Measure of the nodes at the goal, shape (BRANCHES, MAX_SAMPLES)."""
     origin: FloatArray
@@ -63,6 +67,8 @@ def new_grid() -> LineGrid:
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.bool_),
         np.zeros((BRANCHES, PIECES + 1, MAX_SAMPLES), np.int64),
         np.zeros(MAX_SAMPLES, np.int64),
+        np.zeros((BRANCHES, PIECES + 1, 2), np.int64),
+        np.zeros(BRANCHES, np.int64),
         np.zeros((BRANCHES, MAX_SAMPLES)),
         np.empty(2),
         np.empty(PIECES + 1),
@@ -98,6 +104,32 @@ def place_columns(arm: ArmSolver, grid: LineGrid, through: float) -> int:
 
 
 @inner
+def place_fine_columns(arm: ArmSolver, grid: LineGrid, through: float, step: float) -> int:
+    """Choose angles of the free joint at a finer spacing around one of them, `through`.
+
+    Args:
+        arm: The arm.
+        grid: `origin` is filled.
+        through: An angle within the limits [rad].
+        step: Spacing of the others [rad].
+
+    Returns:
+        Their number.
+    """
+    most = (MAX_SAMPLES - 2) // 2
+    before = min(most, int((through - arm.lower[arm.free]) / step)) if is_limited(arm) else most
+    after = min(most, int((arm.upper[arm.free] - through) / step)) if is_limited(arm) else most
+    grid.origin[0], grid.origin[1] = through - before * step, step
+    return before + 1 + after
+
+
+@inner
+def is_limited(arm: ArmSolver) -> bool:
+    """Return whether the free joint has limits."""
+    return bool(arm.upper[arm.free] - arm.lower[arm.free] < np.inf)
+
+
+@inner
 def open_levels(
     arm: ArmSolver,
     search: Search,
@@ -124,6 +156,7 @@ def open_levels(
         Whether any node of the last level can be reached.
     """
     narrow = last - first + 1 < columns
+    grid.deepest[b] = NOWHERE
     for level in range(PIECES + 1):
         is_open, is_free = grid.is_open[b, level], grid.is_free[b, level]
         for i in range(columns):
@@ -146,6 +179,8 @@ def open_levels(
                     grid.measure[b, first + i] = search.measure[i]
         if high == NOWHERE:
             return False
+        grid.deepest[b] = level
+        grid.spans[b, level, 0], grid.spans[b, level, 1] = low, high
         if not narrow:
             first, last = max(low - most, 0), min(high + most, columns - 1)
     return True
@@ -153,10 +188,15 @@ def open_levels(
 
 @inner
 def find_onward(grid: LineGrid, b: int, columns: int, most: int) -> None:
-    """Fill `onward` of one branch from the open nodes."""
-    for i in range(columns):
-        grid.onward[b, PIECES, i] = i if grid.is_open[b, PIECES, i] else NOWHERE
-    nearest = grid.nearest
+    """Fill `onward` of one branch from the open nodes, which are in the columns of `spans`."""
+    nearest, spans = grid.nearest, grid.spans[b]
+    for level in range(PIECES + 1):
+        onward = grid.onward[b, level]
+        for i in range(columns):
+            onward[i] = NOWHERE
+    for i in range(spans[PIECES, 0], spans[PIECES, 1] + 1):
+        if grid.is_open[b, PIECES, i]:
+            grid.onward[b, PIECES, i] = i
     for back in range(PIECES):
         level = PIECES - 1 - back
         ahead, onward, is_open = (
@@ -164,18 +204,60 @@ def find_onward(grid: LineGrid, b: int, columns: int, most: int) -> None:
             grid.onward[b, level],
             grid.is_open[b, level],
         )
+        low, high = spans[level, 0], spans[level, 1]
+        first, last = max(low - most, 0), min(high + most, columns - 1)
         seen = -columns
-        for i in range(columns):
+        for i in range(first, high + 1):
             if ahead[i] != NOWHERE:
                 seen = i
             nearest[i] = seen
         seen = 3 * columns
-        for n in range(columns):
-            i = columns - 1 - n
+        for n in range(last - low + 1):
+            i = last - n
             if ahead[i] != NOWHERE:
                 seen = i
-            j = nearest[i] if i - nearest[i] <= seen - i else seen
-            onward[i] = j if is_open[i] and abs(j - i) <= most else NOWHERE
+            if i <= high and is_open[i]:
+                j = nearest[i] if i - nearest[i] <= seen - i else seen
+                onward[i] = j if abs(j - i) <= most else NOWHERE
+
+
+@inner
+def close_node(grid: LineGrid, b: int, level: int, column: int, columns: int, most: int) -> None:
+    """Close a node, and find other nodes onward from those whose lines lead through it.
+
+    Args:
+        grid: `onward` is changed as `find_onward` would fill it.
+        b: The branch.
+        level: Level of the node.
+        column: Its column.
+        columns: Number of columns.
+        most: Greatest number of columns that the free joint moves from level to level.
+    """
+    grid.is_open[b, level, column] = False
+    grid.onward[b, level, column] = NOWHERE
+    first = last = column
+    while level > 0 and first <= last:
+        level -= 1
+        ahead, onward = grid.onward[b, level + 1], grid.onward[b, level]
+        low, high = max(first - most, 0), min(last + most, columns - 1)
+        first, last = columns, NOWHERE
+        for i in range(low, high + 1):
+            if onward[i] == NOWHERE or ahead[onward[i]] != NOWHERE:
+                continue
+            onward[i] = _nearest_to(ahead, i, columns, most)
+            if onward[i] == NOWHERE:
+                first, last = min(first, i), i
+
+
+@inner
+def _nearest_to(ahead: IntArray, i: int, columns: int, most: int) -> int:
+    """Return the nearest column to i that leads on, the lower one of two, or NOWHERE."""
+    for away in range(most + 1):
+        if i >= away and ahead[i - away] != NOWHERE:
+            return i - away
+        if i + away < columns and ahead[i + away] != NOWHERE:
+            return i + away
+    return NOWHERE
 
 
 @inner

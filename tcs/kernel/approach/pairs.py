@@ -9,6 +9,7 @@ import numpy as np
 from tcs.kernel.analytic.ik import sample_joints
 from tcs.kernel.analytic.pairs import measure_of, samples_hold_measure
 from tcs.kernel.analytic.scratch import Search, new_search, sort_candidates
+from tcs.kernel.analytic.solver import ArmSolver
 from tcs.kernel.approach.curve import (
     CurveWorkspace,
     fill_spline,
@@ -20,11 +21,13 @@ from tcs.kernel.approach.grid import (
     NOWHERE,
     PIECES,
     LineGrid,
+    close_node,
     column_at,
     find_onward,
     new_grid,
     open_levels,
     place_columns,
+    place_fine_columns,
     place_levels,
     take_path,
 )
@@ -53,6 +56,11 @@ NEAR = 8
 """Number of columns on either side of the posture that scoring found, whose line is tried first."""
 MOST_CURVES = 100
 """Greatest number of motions that are followed for a pair."""
+NARROW = 16
+"""Greatest number of columns of a window that is searched again if no line leads beyond it: further
+on it may be narrower than their spacing."""
+FINE, TIMES = 8, 2
+"""Factor by which the columns are closer then, and how often."""
 SHIFTS = 4
 """Number of times that the columns are moved by a part of their spacing, until a line is free."""
 ENOUGH = 1_000_000
@@ -93,7 +101,7 @@ def new_approach(problem: Problem) -> Approach:
         new_grid(),
         scene,
         new_motion_workspace(scene),
-        new_curve(),
+        new_curve(len(scene.pair)),
         np.empty(3),
         np.zeros(6, np.int64),
         np.zeros(1, np.int64),
@@ -138,16 +146,78 @@ def approach_pair(problem: Problem, approach: Approach, fastest: FloatArray, q: 
         if _search(problem, approach, fastest):
             return REACHED
         if approach.contact[0] == NO_CONTACT:
-            return APPROACH_LIMITS
+            if _search_narrow(problem, approach, fastest):
+                return REACHED
+            if approach.contact[0] == NO_CONTACT:
+                return APPROACH_LIMITS
+            break
     return APPROACH_BLOCKED
 
 
 @inner
 def _search(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
     """Fill `search.best` with the best approachable node; return whether there is one."""
-    columns, search = approach.columns, approach.search
     for b in range(len(problem.arm.branches)):
-        _open(problem, approach, b, 0, columns[0] - 1)
+        _open(problem, approach, b, 0, approach.columns[0] - 1)
+    return _follow_candidates(problem, approach, fastest)
+
+
+@inner
+def _search_narrow(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
+    """Search where no line leads beyond a narrow window, at a finer spacing around that.
+
+    Returns:
+        Whether a node is approachable; the best one on its branch fills `search.best`.
+    """
+    arm, grid, columns = problem.arm, approach.grid, approach.columns
+    first, step = grid.origin[0], grid.origin[1]
+    for b in range(len(arm.branches)):
+        level = grid.deepest[b]
+        if level == NOWHERE or level == PIECES:
+            continue
+        low, high = grid.spans[b, level, 0], grid.spans[b, level, 1]
+        if high - low >= NARROW:
+            continue
+        angle, spacing = first + 0.5 * (low + high) * step, step
+        for _ in range(TIMES):
+            spacing /= FINE
+            _place_fine(arm, approach, fastest, angle, spacing)
+            for other in range(len(arm.branches)):
+                for i in range(columns[0]):
+                    grid.onward[other, 0, i] = NOWHERE
+            if _open(problem, approach, b, 0, columns[0] - 1):
+                if _follow_candidates(problem, approach, fastest):
+                    return True
+                break
+            level = grid.deepest[b]
+            if level == NOWHERE:
+                break
+            low, high = grid.spans[b, level, 0], grid.spans[b, level, 1]
+            angle = grid.origin[0] + 0.5 * (low + high) * spacing
+    return False
+
+
+@inner
+def _place_fine(
+    arm: ArmSolver, approach: Approach, fastest: FloatArray, through: float, spacing: float
+) -> None:
+    """Place columns at a fine spacing around an angle of the free joint [rad]."""
+    columns, grid = approach.columns, approach.grid
+    columns[0], columns[4] = place_fine_columns(arm, grid, through, spacing), 0
+    columns[1] = _most_columns(arm, grid, fastest)
+    columns[2] = int((through - grid.origin[0]) / grid.origin[1] + 0.5)
+
+
+@inner
+def _most_columns(arm: ArmSolver, grid: LineGrid, fastest: FloatArray) -> int:
+    """Return the number of columns that the free joint may move from level to level."""
+    return int(PATH_SPEED * fastest[arm.free] / (PIECES * grid.origin[1]))
+
+
+@inner
+def _follow_candidates(problem: Problem, approach: Approach, fastest: FloatArray) -> bool:
+    """Fill `search.best` with the best approachable open node; return whether there is one."""
+    columns, search = approach.columns, approach.search
     for rank in range(_list_candidates(problem, approach)):
         n = search.order[rank]
         b, i = search.found_branch[n], search.found_pair[n, 0]
@@ -173,9 +243,16 @@ def follow_posture(problem: Problem, approach: Approach, fastest: FloatArray, q:
     """
     _prepare(problem, approach, fastest, q)
     b, columns = approach.columns[3], approach.columns
-    if not _open(problem, approach, b, 0, columns[0] - 1):
-        return CLOSED
-    return _follow(problem, approach, fastest, b, columns[2], True)
+    arm, spacing, outcome = problem.arm, approach.grid.origin[1], CLOSED
+    for n in range(TIMES + 1):
+        if n > 0:
+            spacing /= FINE
+            _place_fine(arm, approach, fastest, q[arm.free], spacing)
+        if _open(problem, approach, b, 0, columns[0] - 1):
+            outcome = _follow(problem, approach, fastest, b, columns[2], True)
+        if outcome == DONE or outcome == BLOCKED:
+            break
+    return outcome
 
 
 @inner
@@ -198,7 +275,7 @@ def _prepare(problem: Problem, approach: Approach, fastest: FloatArray, q: Float
     place_line(approach.work, approach.curve)
     angle = q[arm.free]
     columns[0] = place_columns(arm, grid, angle)
-    columns[1] = int(PATH_SPEED * fastest[arm.free] / (PIECES * grid.origin[1]))
+    columns[1] = _most_columns(arm, grid, fastest)
     columns[2] = int((angle - grid.origin[0]) / grid.origin[1] + 0.5)
     columns[3], columns[4] = 0, 0
     approach.contact[0] = NO_CONTACT
@@ -266,8 +343,7 @@ def _follow(
             outcome = BLOCKED
             if approach.contact[0] == NO_CONTACT:
                 approach.contact[0] = contact
-        grid.is_open[b, level, column_at(grid, b, column, level)] = False
-        find_onward(grid, b, columns[0], columns[1])
+        close_node(grid, b, level, column_at(grid, b, column, level), columns[0], columns[1])
     if outcome != DONE:
         grid.is_open[b, 0, column] = False
         grid.onward[b, 0, column] = NOWHERE

@@ -13,9 +13,15 @@ import numpy as np
 
 from tcs.kernel.arrays import FloatArray, IntArray
 from tcs.kernel.cache import inner
-from tcs.kernel.collide import COLUMNS
+from tcs.kernel.collide import COLUMNS, spheres_overlap
 from tcs.kernel.contacts import Workspace
-from tcs.kernel.motion.pairs import is_near, take_posture
+from tcs.kernel.motion.pairs import (
+    ROUNDING,
+    is_near,
+    is_near_on_piece,
+    place_shape,
+    take_posture,
+)
 from tcs.kernel.motion.scene import MotionScene, MotionWorkspace, motion_scene
 from tcs.kernel.problem import Problem
 
@@ -114,7 +120,35 @@ def list_groups(
 
 
 @inner
-def list_shapes(problem: Problem, scene: MotionScene, motion: MotionWorkspace, groups: int) -> int:
+def keep_near(
+    scene: MotionScene, motion: MotionWorkspace, groups: IntArray, count: int, kept: IntArray
+) -> int:
+    """List the pairs of groups that may meet on the current piece; return their number.
+
+    Args:
+        scene: The scene.
+        motion: Scratch, with the current posture.
+        groups: Pairs of groups.
+        count: Their number.
+        kept: Filled with those that may meet.
+    """
+    near = 0
+    for n in range(count):
+        if is_near_on_piece(scene, motion, groups[n]):
+            kept[near] = groups[n]
+            near += 1
+    return near
+
+
+@inner
+def list_shapes(
+    problem: Problem,
+    scene: MotionScene,
+    motion: MotionWorkspace,
+    groups: int,
+    near: IntArray,
+    near_count: int,
+) -> int:
     """List the pairs of shapes that may meet on the current piece; return their number.
 
     Args:
@@ -122,12 +156,15 @@ def list_shapes(problem: Problem, scene: MotionScene, motion: MotionWorkspace, g
         scene: The first pairs are those of groups; its further pairs are filled.
         motion: Scratch, with the current posture; `pairs` is filled.
         groups: Number of pairs of groups.
+        near: Those of them that may meet on a piece around the current one.
+        near_count: Their number.
     """
     at_environment, count = len(problem.links), groups
     at_body = at_environment + len(problem.gap_environment[0])
     first = problem.link_first
-    for k in range(groups):
-        if not is_near(scene, motion, k, True):
+    for n in range(near_count):
+        k = near[n]
+        if not is_near_on_piece(scene, motion, k):
             continue
         j = scene.pair[k, 1]
         if j < at_environment:
@@ -209,6 +246,12 @@ def _may_meet(
         k: Row of the pairs.
     """
     if gap <= 0.0:
+        return False
+    # Most pairs are far apart: the shapes are in place, but for the arm's own.
+    place_shape(scene, motion, i)
+    if base == 0 and not spheres_overlap(
+        motion.shapes, i, motion.shapes, j, gap + motion.motion[i, 0] + ROUNDING
+    ):
         return False
     scene.pair[k, 0], scene.pair[k, 1], scene.pair[k, 2] = i, j, base
     scene.gap[k] = gap

@@ -25,6 +25,8 @@ GRID = toy_grid()
 BACK = np.array([-0.1, 0.0, 0.0])
 """From the goal to the begin of the approach, in the tool frame [m]."""
 FEW = slice(0, 40)
+SLACK = 2e-3
+"""Distance of joint limits from a motion [rad]: windows get narrower than the spacing of 0.0125."""
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +155,30 @@ def test_limits_end_approaches(scene, scores, found):
     score_approaches(build_problem(stiff, GRID), lines(stiff), here)
     assert here.reason[0] == APPROACH_LIMITS
     assert here.contact[0] == NO_CONTACT
+
+
+def test_windows_narrower_than_the_columns_are_found(scene, found):
+    count = found_again = 0
+    for n in np.flatnonzero(found.reason == REACHED)[:20]:
+        h, g = map(int, found.pair[n])
+        spline = approach_spline(build_problem(scene, GRID), lines(scene), h, g, found.joints[n])
+        assert spline is not None
+        # Limits around a known motion leave few values of the free joint at each level.
+        points, chain = spline[0], scene.chain
+        lower, upper = chain.lower.copy(), chain.upper.copy()
+        kept = np.isfinite(lower) & np.isfinite(upper)
+        lower[kept] = np.maximum(lower, points.min(axis=0) - SLACK)[kept]
+        upper[kept] = np.minimum(upper, points.max(axis=0) + SLACK)[kept]
+        narrow = scene._replace(chain=chain._replace(lower=lower, upper=upper))
+        here = ReachedPairs(*(array[n : n + 1].copy() for array in found))
+        problem = build_problem(narrow, GRID)
+        score_approaches(problem, lines(narrow), here)
+        if here.reason[0] == REACHED:
+            assert approach_spline(problem, lines(narrow), h, g, here.joints[0]) is not None
+            found_again += 1
+        count += 1
+    # The other lines leave the limits between the levels, or another line is found and blocked.
+    assert found_again > count / 2 > 5
 
 
 def test_an_arm_without_a_closed_form_is_refused(scene):
