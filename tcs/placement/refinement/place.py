@@ -30,18 +30,26 @@ from tcs.placement.refinement.space import Space
 FloorRange = tuple[tuple[float, float], tuple[float, float]]
 """Least and greatest x, and y, of the base [m]."""
 
-STEP = 0.1
-"""Distance of base positions of the first grid [m], unless the region is large."""
-MOST_ALONG = 31
-"""Most values of the first grid along x, and along y."""
-HEADINGS = 8
-"""Headings of the first grid."""
-SCREENED = 24
-"""Base poses that are scored at all tool poses."""
+
+class Fineness(NamedTuple):
+    """How fine a grid of base poses is."""
+
+    step: float
+    """Distance of base positions [m], unless the region is large."""
+    most_along: int
+    """Most values along x, and along y."""
+    headings: int
+    screened: int
+    """Base poses that are scored at all tool poses."""
+
+
+FIRST = Fineness(step=0.1, most_along=31, headings=8, screened=24)
+SECOND = Fineness(step=0.05, most_along=61, headings=24, screened=96)
+"""Where a single base pose is requested and none of the first grid reaches all tool poses."""
 STARTS = 6
 """Base poses that are refined if none of these reaches all tool poses."""
-PATH_TRIES = 3
-"""Base poses at which a joint path is searched."""
+PATH_TRIES = 24
+"""Most base poses at which a joint path is searched."""
 ROUNDS = 24
 """Rounds of the refinement."""
 MOST_STOPS = 8
@@ -92,7 +100,8 @@ def place(
 
     Base poses of a grid are tried at a few tool poses that are far from each other; those that
     reach the most are tried at all. If none reaches all, the best are refined between the grid
-    points. The last call's robot and obstacles stay prepared, so further calls are faster.
+    points, and for a single stop a finer grid is tried. The last call's robot and obstacles stay
+    prepared, so further calls are faster.
 
     Args:
         robot: Name of a robot, path of its file, or a robot.
@@ -132,9 +141,16 @@ def place(
     continuous: list[bool] = []
     while len(found) < stops and np.any(serving < 0):
         left = np.flatnonzero(serving < 0)
-        grid = _grid(scene, X_WG[left], region, torso)
+        grid = _grid(scene, X_WG[left], region, torso, FIRST)
         scorer = PoseScorer.of(scene, X_WG[left], grid, jobs)
-        bases = _best(scorer, scene)
+        bases = _best(scorer, scene, FIRST)
+        most = int(bases[0].reached.sum())
+        if stops == 1 and 0 < most < count:
+            grid = _grid(scene, X_WG, region, torso, SECOND)
+            finer = PoseScorer.of(scene, X_WG, grid, jobs)
+            of_finer = _best(finer, scene, SECOND)
+            if of_finer[0].reached.sum() > most:
+                scorer, bases = finer, of_finer
         if not bases[0].reached.any():
             break
         base, path = _with_path(scorer, bases)
@@ -182,8 +198,14 @@ def _checked(poses: ArrayLike) -> FloatArray:
     return X
 
 
-def _grid(scene: PoseScene, poses: FloatArray, region: FloorRange | None, torso: float) -> Grid:
-    """Return the first grid of base poses."""
+def _grid(
+    scene: PoseScene,
+    poses: FloatArray,
+    region: FloorRange | None,
+    torso: float,
+    fineness: Fineness,
+) -> Grid:
+    """Return a grid of base poses."""
     if region is None:
         # The arm base is up to this far from the robot's base.
         far = scene.reach + float(np.hypot(*scene.arm_base[:2]))
@@ -196,12 +218,12 @@ def _grid(scene: PoseScene, poses: FloatArray, region: FloorRange | None, torso:
     for name, (low_end, high_end) in zip(("base_x", "base_y"), region, strict=True):
         if not low_end <= high_end:
             raise TcsError(f"region: {name} from {low_end:g} to {high_end:g} m is empty.")
-        count = min(MOST_ALONG, int((high_end - low_end) / STEP) + 1)
+        count = min(fineness.most_along, int((high_end - low_end) / fineness.step) + 1)
         count = max(count, 2) if high_end > low_end else 1
         step = (high_end - low_end) / (count - 1) if count > 1 else 0.0
         spec[name] = {"unit": "m", "start": low_end, "step": step, "count": count}
-    turn = 360.0 / HEADINGS
-    spec["base_yaw"] = {"unit": "deg", "start": 0.0, "step": turn, "count": HEADINGS}
+    turn = 360.0 / fineness.headings
+    spec["base_yaw"] = {"unit": "deg", "start": 0.0, "step": turn, "count": fineness.headings}
     spec["torso"] = {"unit": "m", "start": torso, "step": 0.0, "count": 1}
     return Grid.from_spec(spec, where="region")
 
@@ -219,11 +241,11 @@ class _Base(NamedTuple):
     """Arm joints of the best solution [rad], shape (n, 7)."""
 
 
-def _best(scorer: PoseScorer, scene: PoseScene) -> list[_Base]:
+def _best(scorer: PoseScorer, scene: PoseScene, fineness: Fineness) -> list[_Base]:
     """Return base poses that reach as many tool poses as any, the most dexterous first."""
     grid = scorer.grid
     values = np.stack([*grid.values(np.arange(grid.size)).values()], axis=1)
-    few = _screened(scorer, scene, values)
+    few = _screened(scorer, scene, values, fineness.screened)
     scores = scorer.score(_points(values[few]))
     counts = scores.reached.sum(axis=1)
     order = np.lexsort((-scores.dexterity.mean(axis=1), -counts))
@@ -258,7 +280,7 @@ def _with_path(scorer: PoseScorer, bases: list[_Base]) -> tuple[_Base, FloatArra
     return bases[0], None
 
 
-def _screened(scorer: PoseScorer, scene: PoseScene, values: FloatArray) -> IntArray:
+def _screened(scorer: PoseScorer, scene: PoseScene, values: FloatArray, most: int) -> IntArray:
     """Return the base poses that reach the most of a few tool poses far from each other."""
     alive = np.flatnonzero(_within_reach(scorer, scene, values))
     if not alive.size:
@@ -266,14 +288,14 @@ def _screened(scorer: PoseScorer, scene: PoseScene, values: FloatArray) -> IntAr
     reached = np.zeros(len(values))
     dexterity_sum = np.zeros(len(values))
     for goal in _far_apart(scorer.problem.goal_p[0], scorer.problem.goal_R[0]):
-        if alive.size <= SCREENED:
+        if alive.size <= most:
             break
         found = scorer.of_goals([goal]).score(_points(values[alive]))
         reached[alive] += found.reached[:, 0]
         dexterity_sum[alive] += found.dexterity[:, 0]
         alive = alive[reached[alive] == reached[alive].max()]
     order = np.argsort(-dexterity_sum[alive], kind="stable")
-    return alive[order[:SCREENED]]
+    return alive[order[:most]]
 
 
 def _within_reach(scorer: PoseScorer, scene: PoseScene, values: FloatArray) -> BoolArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,21 @@ def test_region_and_obstacles_are_respected(placed):
     assert found.stops == ()
     assert found.reachability == 0.0
     assert not found.joints.any()
+
+
+def test_a_finer_grid_is_tried_where_the_first_does_not_suffice(monkeypatch):
+    module = importlib.import_module("tcs.placement.refinement.place")
+    best = module._best
+
+    def worse(scorer, scene, fineness):
+        bases = best(scorer, scene, fineness)
+        if fineness is module.FIRST:
+            bases = [base._replace(reached=base.reached & (np.arange(8) > 0)) for base in bases]
+        return bases
+
+    monkeypatch.setattr(module, "_best", worse)
+    region = ((0.4, 0.7), (-0.2, 0.2))
+    assert tcs.place("iiwa7", line(0.3), region=region).reached.all()
 
 
 def test_poses_too_far_apart_need_two_stops():
