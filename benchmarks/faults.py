@@ -3,13 +3,14 @@
 Usage: python benchmarks/faults.py [--flips 150] [--kernel-flips 20] [--signals 170] [--seed 0]
 
 `--flips` damages one bit each in the machine code of small functions, `--kernel-flips` in that of
-the kernel, which `tcs score` then has to compile again. `--signals` starts tcs score, robustify,
-report and capability from-ik in turn and sends SIGINT, SIGTERM or SIGKILL at a random moment. Every
-count of a fault should be 0; the exit code is 1 if one is not.
+the kernel, which `tcs score` then has to compile again. `--signals` starts tcs score (also with
+blocks), robustify, report and capability from-ik in turn and sends SIGINT, SIGTERM or SIGKILL at a
+random moment. Every count of a fault should be 0; the exit code is 1 if one is not.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import logging
 import os
@@ -274,11 +275,13 @@ class Command:
         name: Its name in the table.
         words: Its arguments; `{out}` is the file that it writes.
         out: Name of that file.
+        keeps: Names of folders that it makes and keeps.
     """
 
     name: str
     words: tuple[str, ...]
     out: str
+    keeps: tuple[str, ...] = ()
 
     def run(self, folder: Path, variables: dict[str, str]) -> subprocess.Popen[str]:
         """Start the command in a folder."""
@@ -314,6 +317,7 @@ SIGNAL_COLUMNS = (
     "left by SIGINT or SIGTERM",
     "left by SIGKILL",
     "still there after the next run",
+    "other scores in the end",
 )
 
 
@@ -329,6 +333,12 @@ def signals(folder: Path, tries: int, rng: random.Random) -> int:
     subprocess.run([*TCS, *make, "--out", str(scores)], check=True, capture_output=True)
     commands = (
         Command("score", (*make, "--out", "{out}"), "out.tcs"),
+        Command(
+            "score --blocks",
+            (*make, "--blocks", "blocks", "--out", "{out}"),
+            "out.tcs",
+            keeps=("blocks",),
+        ),
         Command("robustify", ("robustify", "{out}", "--sets", "40", "--samples", "64"), "out.tcs"),
         Command(
             "report",
@@ -347,7 +357,7 @@ def signals(folder: Path, tries: int, rng: random.Random) -> int:
         found = interrupted(command, folder / str(number), share, variables, scores, rng)
         row(f"signals, {command.name}", ", ".join(f"{k} {found[k]}" for k in SIGNAL_COLUMNS))
         rows.append([command.name, *(str(found[column]) for column in SIGNAL_COLUMNS)])
-        faults += sum(found[column] for column in (*SIGNAL_COLUMNS[2:6], SIGNAL_COLUMNS[7]))
+        faults += sum(found[column] for column in (*SIGNAL_COLUMNS[2:6], *SIGNAL_COLUMNS[7:]))
     record("signals", ["", *SIGNAL_COLUMNS], rows)
     return faults
 
@@ -394,16 +404,28 @@ def interrupted(
             len(new)
         )
     command.run(folder, variables).communicate()
+    if command.name.startswith("score"):
+        counts["other scores in the end"] = digest(folder / command.out) != digest(scores)
     counts["still there after the next run"] = len(leftovers(folder, command))
     return counts
 
 
+def digest(path: Path) -> bytes:
+    """Return a hash of the scores in a file."""
+    table = tcs.load(path).nominal.scores
+    arrays = (table.reason, table.dexterity, table.pair, table.arm_joints)
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).digest()
+
+
 def leftovers(folder: Path, command: Command) -> set[Path]:
-    """Return what is in the folder beside the file that the command writes."""
+    """Return what is in the folder beside what the command writes."""
+    kept = [path for name in command.keeps for path in (folder / name).rglob("*")]
     return {
         path
-        for path in (*folder.iterdir(), *(folder / "tmp").iterdir())
-        if path.name not in (command.out, "tmp")
+        for path in (*folder.iterdir(), *(folder / "tmp").iterdir(), *kept)
+        if path.name not in (command.out, "tmp", "lock", *command.keeps)
+        and path.suffix != ".block"
+        and not (path.is_dir() and path in kept)
     }
 
 

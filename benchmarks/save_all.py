@@ -82,6 +82,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "experiment": (),
     "lines": (),
     "pick_and_place": (),
+    "engines": (),
     "faults": (),
     "edges": (),
     "fuzz": ("--mutants", "5000"),
