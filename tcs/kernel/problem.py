@@ -128,7 +128,7 @@ def build_problem(scene: SceneArrays, grid: GridArrays, measure: str = DEFAULT_M
     Raises:
         UnknownNameError: If there is no measure of that name.
     """
-    order = np.argsort(-_rank(scene.chain, scene.arm.frame.astype(np.int64)), kind="stable")
+    order = arm_order(scene)
     R_AB = np.swapaxes(scene.arm_base_R, 1, 2)
     from_arm_base = scene.body.p - scene.arm_base_p[:, None]
     body_A = scene.body._replace(
@@ -222,11 +222,15 @@ def travel(chain: Chain) -> FloatArray:
     return np.where(slides, np.where(slides, farthest, 0.0) * chain.slides, 0.0)
 
 
-def _rank(chain: Chain, frame: IntArray) -> FloatArray:
-    """Return the numbers of links, those of coupled links between those beside them."""
-    rank = np.arange(8.0 + len(chain.coupled))
-    rank[8:] = chain.coupled[:, 0] + 0.5
-    return rank[frame]
+def arm_order(scene: SceneArrays) -> IntArray:
+    """Return the order of the arm's shapes in a problem: nearest to the tool first.
+
+    Coupled links have their place between those beside them.
+    """
+    rank = np.arange(8.0 + len(scene.chain.coupled))
+    rank[8:] = scene.chain.coupled[:, 0] + 0.5
+    order: IntArray = np.argsort(-rank[scene.arm.frame.astype(np.int64)], kind="stable")
+    return order
 
 
 def _arm_radius(chain: Chain, links: FloatArray, frame: IntArray) -> float:

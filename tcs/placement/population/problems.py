@@ -7,7 +7,7 @@ import numpy as np
 from tcs.kernel.arrays import FloatArray, GridArrays, SceneArrays
 from tcs.kernel.collide import pack
 from tcs.kernel.groups import with_group_rows
-from tcs.kernel.problem import TOUCH, UNCHECKED, Problem, build_problem
+from tcs.kernel.problem import TOUCH, UNCHECKED, Problem, arm_order, build_problem
 
 
 class PersonProblems:
@@ -26,8 +26,7 @@ class PersonProblems:
         states, origin = len(arrays.goal_p), np.zeros(1)
         grid = GridArrays(states, origin, origin, origin, len(arrays.arm_base_p))
         self._problem = problem = build_problem(arrays, grid, measure)
-        # The order of the arm's shapes in a problem: nearest to the tool first.
-        order = np.argsort(-arrays.arm.frame.astype(np.int64), kind="stable")
+        order = arm_order(arrays)
         self._pads = arrays.arm.pad[order], arrays.body.pad
         self._checked = arrays.arm_vs_environment[order], arrays.body_vs_environment
         self._first = problem.link_first, problem.body_first
