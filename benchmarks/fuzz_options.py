@@ -107,6 +107,7 @@ COMMANDS = (
     Command("population", ("scores.tcs",), ("--bodies", "2", "--sets", "2", "--jobs", "1")),
     Command("refine", ("scores.tcs",), ("--starts", "1", "--rounds", "1", "--out", "out.tcs")),
     Command("check", ("scores.tcs", "map.tcm")),
+    Command("environment check", ("kitchen.yaml",)),
     Command("app", ("scores.tcs",), _WINDOW),
     # Refused whatever the options are, so that none of the calls listens.
     Command("serve", ("none.tcs",), ("--host", "0.0.0.0"), is_refused=True),

@@ -16,7 +16,7 @@ from tcs.kernel.problem import UNCHECKED, Problem
 from tcs.kernel.scores import Scores
 from tcs.kernel.sweep import score_slice
 from tcs.placement.scoring import sweep
-from tcs.placement.scoring.sweep import SLICE
+from tcs.placement.scoring.engines import SLICE
 from tcs.placement.tables import Reason
 
 GRID_PARTS = (8, 4, 2, 1)

@@ -164,7 +164,7 @@ def test_an_edit_in_an_imported_file_recompiles_the_code(tmp_path):
     assert (first_hits, again_hits) == (0, 1)
     assert (again, again_folder) == (first, first_folder)
     text = source.read_text()
-    line = "cosine, sine = np.cos(q[i]), np.sin(q[i])"
+    line = "(np.cos(q[i]), np.sin(q[i]))"
     assert line in text
     source.write_text(text.replace(line, line.replace("q[i]", "(2.0 * q[i])")))
     edited, edited_hits, edited_folder = run()

@@ -237,7 +237,7 @@ def test_a_joint_beyond_its_limit_by_rounding_is_not_moved(bed_trials):
     """The last value of a grid may be; moving it back would add an error that was not drawn."""
     believed = bed_trials.positions(0, {"person_x": np.zeros(1)})[0]["head_rest"][0]
     limits = (believed + 1e-12, believed + 1.0)
-    joints = SimpleNamespace(limits=lambda name: limits)
+    joints = SimpleNamespace(limits=lambda name: limits, default=lambda name: 0.0)
     scene = SimpleNamespace(built=SimpleNamespace(environment_joints=joints))
     (arm,) = bed_trials.arms
     found = dataclasses.replace(bed_trials, arms=(dataclasses.replace(arm, scene=scene),))
