@@ -8,6 +8,8 @@
                                                     so many shapes, and keeps those of the others;
                                                     with 60+120, adds up to 120 where the first 60
                                                     leave the surface bare
+    python scripts/fit_primitives.py tiago --parts  fits the parts of bodies that scripts/fits.yaml
+                                                    names again, and keeps all other shapes
 
 The results are deterministic. Each command takes a few minutes; pairs depend on the primitives.
 The last lines say how many postures the shapes block although the surfaces are free of
@@ -19,13 +21,14 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from tcs.errors import TcsError
 from tcs.files.paths import data_folder
-from tcs.model.robots import RobotFile, load_robot, write_primitives
-from tcs.model.robots.fitting import Target, fit_robot, refit, target_of
+from tcs.model.robots import RobotFile, load_robot, read_primitives, write_primitives
+from tcs.model.robots.fitting import Part, Target, fit_robot, refit, refit_parts, target_of
 from tcs.model.robots.self_collision import blocked_at_boxes, blocked_by_shapes, renewed_groups
 
 FITS = Path(__file__).parent / "fits.yaml"
@@ -36,7 +39,7 @@ _NUMBERS = re.compile(r"([1-9]\d*)(?:\+([1-9]\d*))?")
 
 def main() -> int:
     """Rewrite primitives or pairs of the robot given on the command line."""
-    names = [a for a in sys.argv[1:] if a != "--pairs" and "=" not in a]
+    names = [a for a in sys.argv[1:] if a not in ("--pairs", "--parts") and "=" not in a]
     more = [a.split("=") for a in sys.argv[1:] if "=" in a]
     if len(names) != 1 or not all(len(m) == 2 and _NUMBERS.fullmatch(m[1]) for m in more):
         print(__doc__, file=sys.stderr)
@@ -48,6 +51,10 @@ def main() -> int:
             if path.suffix != ".yaml":
                 path = data_folder() / "models" / "robots" / f"{robot.name}.yaml"
             rewrite_pairs(robot, path)
+        elif "--parts" in sys.argv:
+            shapes = refit_parts(robot, read_primitives(Path(robot.primitives)), parts_of(robot))
+            write_primitives(Path(robot.primitives), shapes)
+            print_blocked(robot)
         elif more:
             shapes = refit(robot, {body: numbers(robot, body, text) for body, text in more})
             write_primitives(Path(robot.primitives), shapes)
@@ -66,7 +73,8 @@ def rewrite_primitives(robot: RobotFile) -> None:
     fits = fit_robot(
         robot, lambda done, total: print(f"{done}/{total}", file=sys.stderr), chosen_fits(robot)
     )
-    write_primitives(Path(robot.primitives), [p for f in fits for p in f.fit.primitives])
+    shapes = [p for f in fits for p in f.fit.primitives]
+    write_primitives(Path(robot.primitives), refit_parts(robot, shapes, parts_of(robot)))
     print("| body | shapes | hull [l] | union [l] | excess |")
     print("|---|---|---|---|---|")
     for found in fits:
@@ -80,15 +88,27 @@ def rewrite_primitives(robot: RobotFile) -> None:
 def chosen_fits(robot: RobotFile) -> dict[str, Target | None]:
     """Return how FITS says that bodies of a robot are fitted; None for those that it keeps."""
     chosen: dict[str, Target | None] = {}
-    fits = yaml.safe_load(FITS.read_text(encoding="utf-8")).get(robot.name) or {}
-    for body, fit in fits.items():
+    for body, fit in _fits(robot).items():
         if fit == "kept":
             chosen[body] = None
         elif isinstance(fit, int | str):
             chosen[body] = numbers(robot, body, str(fit))
-        else:
+        elif "shapes" in fit:
             chosen[body] = Target(protrusion=fit["protrusion"], max_shapes=fit["shapes"])
     return chosen
+
+
+def parts_of(robot: RobotFile) -> dict[str, list[Part]]:
+    """Return the parts of bodies of a robot that FITS names."""
+    return {
+        body: [Part(**part) for part in fit["parts"]]
+        for body, fit in _fits(robot).items()
+        if isinstance(fit, dict) and "parts" in fit
+    }
+
+
+def _fits(robot: RobotFile) -> dict[str, Any]:
+    return yaml.safe_load(FITS.read_text(encoding="utf-8")).get(robot.name) or {}
 
 
 def numbers(robot: RobotFile, body: str, text: str) -> Target:

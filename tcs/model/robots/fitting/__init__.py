@@ -1,13 +1,25 @@
 """Fitting: boxes and capsules that enclose the meshes of a robot, and the check that they do.
 
 In: a robot file and the triangles of its meshes. Out: primitives for each body (`fit_robot`), more
-of them for some (`refit`), and how those of a robot file enclose its surface (`enclosure`).
+of them for some (`refit`) or for parts of some (`refit_parts`), and how those of a robot file
+enclose its surface (`enclosure`).
 """
 
 from __future__ import annotations
 
-from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, target_of
+from tcs.model.robots.fitting.bodies import BodyFit, fit_robot, refit, refit_parts, target_of
 from tcs.model.robots.fitting.covering import Target
 from tcs.model.robots.fitting.enclosure import BodyEnclosure, enclosure
+from tcs.model.robots.fitting.parts import Part
 
-__all__ = ["BodyEnclosure", "BodyFit", "Target", "enclosure", "fit_robot", "refit", "target_of"]
+__all__ = [
+    "BodyEnclosure",
+    "BodyFit",
+    "Part",
+    "Target",
+    "enclosure",
+    "fit_robot",
+    "refit",
+    "refit_parts",
+    "target_of",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from tcs.errors import UnknownNameError
 from tcs.model.robots.fitting.bounding import corner_points, enclose, hull_volume, moved
 from tcs.model.robots.fitting.covering import Fit, Target, fit_triangles
 from tcs.model.robots.fitting.enclosure import surfaces_to_enclose
+from tcs.model.robots.fitting.parts import Part, refit_part
 from tcs.model.robots.primitives import Primitive, read_primitives, union_volume
 from tcs.model.robots.robot_file import RobotFile
 from tcs.model.robots.urdf import Urdf
@@ -177,6 +178,31 @@ def refit(robot: RobotFile, targets: Mapping[str, Target]) -> tuple[Primitive, .
     return tuple(shape for fitted in found.values() for shape in fitted)
 
 
+def refit_parts(
+    robot: RobotFile,
+    shapes: Sequence[Primitive],
+    parts: Mapping[str, Sequence[Part]],
+) -> tuple[Primitive, ...]:
+    """Return primitives that enclose a robot, parts of some bodies fitted again one by one.
+
+    Args:
+        robot: The robot.
+        shapes: Primitives that enclose it.
+        parts: Parts by body.
+
+    Raises:
+        UnknownNameError: If a body has no primitive.
+        RobotError: If a mesh cannot be read.
+    """
+    found = _by_body(shapes)
+    surfaces = surfaces_to_enclose(robot)
+    for body, some in parts.items():
+        _check_has_shapes(robot, found, body)
+        for part in some:
+            found[body] = refit_part(body, surfaces[body][2], found[body], part)
+    return tuple(shape for fitted in found.values() for shape in fitted)
+
+
 def _targets(
     robot: RobotFile,
     model: Urdf,
@@ -209,8 +235,13 @@ def target_of(robot: RobotFile, body: str, most: int, patches: int = 0) -> Targe
 
 def _shapes_by_body(robot: RobotFile) -> dict[str, tuple[Primitive, ...]]:
     """Return the shapes of the primitives file by body."""
+    return _by_body(read_primitives(Path(robot.primitives)))
+
+
+def _by_body(shapes: Iterable[Primitive]) -> dict[str, tuple[Primitive, ...]]:
+    """Return shapes by body."""
     found: dict[str, tuple[Primitive, ...]] = {}
-    for shape in read_primitives(Path(robot.primitives)):
+    for shape in shapes:
         found[shape.body] = (*found.get(shape.body, ()), shape)
     return found
 

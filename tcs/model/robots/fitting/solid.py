@@ -61,10 +61,51 @@ def solid_of(triangles: FloatArray, pitch: float, reach: float) -> Solid:
     fits = ndimage.distance_transform_edt(~surface) * pitch > CLOSING
     parts, _ = ndimage.label(fits)
     reached = ndimage.distance_transform_edt(parts != parts[0, 0, 0]) * pitch <= CLOSING
-    empty = reached & ~surface
+    return _measured(reached & ~surface, first * pitch, pitch)
+
+
+def solid_within(
+    whole: Solid, triangles: FloatArray, low: FloatArray, high: FloatArray, pitch: float
+) -> Solid:
+    """Return the part of a solid between two corners, on a finer grid.
+
+    Args:
+        whole: The solid of all triangles.
+        triangles: Corners [m], shape (n, 3, 3).
+        low: Least coordinates of the part in the frame of the triangles [m], shape (3,).
+        high: Greatest coordinates [m], shape (3,).
+        pitch: Distance of the points of the grid [m].
+    """
+    border = CLOSING + whole.pitch
+    first = np.floor((low - border) / pitch)
+    size = np.ceil((high + border) / pitch - first).astype(np.int64) + 1
+    points = np.round(cut(_touching(triangles, low - border, high + border), pitch) / pitch)
+    cells = (points.reshape(-1, 3) - first).astype(np.int64)
+    surface = np.zeros(size, np.bool_)
+    surface[tuple(cells[((cells >= 0) & (cells < size)).all(axis=1)].T)] = True
+    axes = [
+        np.round(((first[k] + np.arange(size[k])) * pitch - whole.origin[k]) / whole.pitch)
+        .astype(np.int64)
+        .clip(0, whole.outside.shape[k] - 1)
+        for k in range(3)
+    ]
+    is_outside = whole.outside[np.ix_(*axes)] > 0.0
+    fits = is_outside & (ndimage.distance_transform_edt(~surface) * pitch > CLOSING)
+    reached = ndimage.distance_transform_edt(~fits) * pitch <= CLOSING
+    return _measured(reached & ~surface, first * pitch, pitch)
+
+
+def _touching(triangles: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the triangles whose boxes touch the space between two corners."""
+    near = (triangles.min(axis=1) <= high) & (triangles.max(axis=1) >= low)
+    return np.asarray(triangles[near.all(axis=1)])
+
+
+def _measured(empty: BoolArray, origin: FloatArray, pitch: float) -> Solid:
+    """Return the solid around the points of a grid that are empty."""
     return Solid(
         outside=(ndimage.distance_transform_edt(empty) * pitch).astype(np.float32),
         depth=(ndimage.distance_transform_edt(~empty) * pitch).astype(np.float32),
-        origin=first * pitch,
+        origin=origin,
         pitch=pitch,
     )

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import UnknownNameError
 from tcs.model.robots import load_robot
-from tcs.model.robots.fitting import covering
+from tcs.model.robots.fitting import candidates
 from tcs.model.robots.fitting.bodies import HAND, fit_robot, refit
 from tcs.model.robots.fitting.bounding import (
     best_candidate,
@@ -20,6 +20,7 @@ from tcs.model.robots.fitting.bounding import (
     tightest_orientation,
 )
 from tcs.model.robots.fitting.covering import Target, fit_triangles
+from tcs.model.robots.fitting.parts import Part, refit_part
 from tcs.model.robots.primitives import enclosed, read_primitives, union_volume
 from tcs.model.robots.urdf.surfaces import body_triangles
 
@@ -140,8 +141,8 @@ def test_fitting_one_body_again_changes_no_other(pr2):
 
 def test_patches_cover_what_few_shapes_leave_bare(monkeypatch):
     # A tenth of the usual candidates is enough for a ring.
-    monkeypatch.setattr(covering, "_SEEDS", 30)
-    monkeypatch.setattr(covering, "_CAPSULES", 60)
+    monkeypatch.setattr(candidates, "_SEEDS", 30)
+    monkeypatch.setattr(candidates, "_CAPSULES", 60)
     ring = np.asarray(trimesh.creation.annulus(0.09, 0.1, 0.02).triangles)
     few, patched = (fit_triangles("b", ring, Target(0.008, 4, most)) for most in (0, 20))
     for fit in (few, patched):
@@ -149,3 +150,24 @@ def test_patches_cover_what_few_shapes_leave_bare(monkeypatch):
     assert len(few.primitives) < len(patched.primitives) <= 24
     # Four shapes grow to contain the rest of the ring; patches follow it.
     assert patched.union < 0.7 * few.union
+
+
+def test_a_part_is_fitted_more_closely_than_the_rest(monkeypatch):
+    monkeypatch.setattr(candidates, "_SEEDS", 40)
+    # A drum with a narrower one on top, and a box around both, which that on top does not fill.
+    lower = trimesh.creation.cylinder(0.1, 0.1, sections=24)
+    upper = trimesh.creation.cylinder(0.06, 0.08, sections=24).apply_translation((0, 0, 0.09))
+    drum = triangles_of(lower, upper)
+    box = enclose("b", corner_points(drum), "box", np.eye(3))
+    part = Part(
+        (-0.1, -0.1, 0.06), (0.1, 0.1, 0.14), 0.006, 16, patches=8, axes="z", capsules=False
+    )
+    shapes = refit_part("b", drum, (box,), part)
+    assert enclosed(shapes, drum).all()
+    # Points beside the drum on top, farther from it than shapes may protrude.
+    angle = np.linspace(0.0, 2.0 * np.pi, 60)[:, None, None]
+    r, z = np.meshgrid(np.linspace(0.07, 0.1, 6), np.linspace(0.07, 0.125, 6))
+    x, y, z = np.broadcast_arrays(r * np.cos(angle), r * np.sin(angle), z)
+    beside = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    assert box.contains(beside).all()
+    assert not np.any([shape.contains(beside) for shape in shapes], axis=0).any()
