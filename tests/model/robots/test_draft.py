@@ -9,7 +9,7 @@ from tcs.model.robots import load_robot
 from tcs.model.robots.draft import DraftOptions, draft_robot
 from tcs.model.robots.draft_files import write_draft
 from tcs.model.robots.draft_frames import on_floor
-from tcs.model.robots.fitting import covering, fit_robot
+from tcs.model.robots.fitting import candidates, fit_robot
 from tcs.model.robots.fitting.bodies import ARM, COARSE
 from tcs.model.robots.fitting.enclosure import enclosure
 from tcs.model.robots.primitives import enclosed
@@ -215,8 +215,8 @@ def test_links_may_be_ignored_and_collision_meshes_be_used(tmp_path):
 
 def test_a_coarse_fit_has_fewer_shapes_that_enclose(drafted, tmp_path, monkeypatch):
     # A tenth of the usual candidates is enough for a ring.
-    monkeypatch.setattr(covering, "_SEEDS", 30)
-    monkeypatch.setattr(covering, "_CAPSULES", 60)
+    monkeypatch.setattr(candidates, "_SEEDS", 30)
+    monkeypatch.setattr(candidates, "_CAPSULES", 60)
     ring = trimesh.creation.annulus(0.05, 0.06, 0.1, sections=16)
     ring.export(tmp_path / "ring.stl")
     file = tmp_path / "ring.urdf"
