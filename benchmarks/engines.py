@@ -15,7 +15,7 @@ from distributed import LocalCluster
 from table import header, parser, record, row, save
 
 import tcs
-from tcs.placement.scoring.engines import Dask, Engine, Processes, Threads
+from tcs.placement.scoring.engines import Dask, Processes, ScoringEngine, Threads
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
     with LocalCluster(
         n_workers=options.jobs, threads_per_worker=1, dashboard_address=":0"
     ) as cluster:
-        engines: dict[str, Engine] = {
+        engines: dict[str, ScoringEngine] = {
             "threads": Threads(options.jobs),
             "processes": Processes(options.jobs),
             "dask, local workers": Dask(cluster.scheduler_address),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tcs.kernel.arrays import BOX, CAPSULE, SPHERE, Chain, Shapes
-from tcs.kernel.verification.reference import Placed
+from tcs.kernel.verification.reference import PlacedShape
 
 
 def rotation(rng):
@@ -38,7 +38,7 @@ def right_angles(rng):
 def placed(shape_type, size, R=None, p=(0.0, 0.0, 0.0), pad=0.0, body=0):
     """Return one shape at one pose."""
     R = np.eye(3) if R is None else R
-    return Placed(
+    return PlacedShape(
         shape_type, np.asarray(size, float), np.asarray(R), np.asarray(p, float), pad, body
     )
 

@@ -310,7 +310,7 @@ def into_limits(angle: float, lower: float, upper: float) -> tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedShape:
     """One shape at one pose."""
 
     type: int
@@ -320,10 +320,10 @@ class Placed:
     pad: float
     body: int
 
-    def moved(self, X: Pose) -> Placed:
+    def moved(self, X: Pose) -> PlacedShape:
         """Return the shape at X times its pose."""
         R, p = compose(X, (self.R, self.p))
-        return Placed(self.type, self.size, R, p, self.pad, self.body)
+        return PlacedShape(self.type, self.size, R, p, self.pad, self.body)
 
     @property
     def radius(self) -> float:
@@ -343,10 +343,10 @@ class Placed:
         return np.array([0.0, 0.0, self.size[1] if self.type == CAPSULE else 0.0])
 
 
-def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
+def shapes_of(shapes: Shapes, state: int) -> list[PlacedShape]:
     """Return the shapes in one state, one object each."""
     return [
-        Placed(
+        PlacedShape(
             int(shapes.type[i]),
             shapes.size[i],
             shapes.R[state, i],
@@ -358,7 +358,7 @@ def shapes_of(shapes: Shapes, state: int) -> list[Placed]:
     ]
 
 
-def distance(a: Placed, b: Placed) -> float:
+def distance(a: PlacedShape, b: PlacedShape) -> float:
     """Return the distance between the cores of two shapes, 0 if they overlap, less the radii [m].
 
     A core is a box, some of whose half sizes may be 0. Cores overlap if no separating axis exists;
@@ -370,7 +370,7 @@ def distance(a: Placed, b: Placed) -> float:
     return least - a.radius - b.radius
 
 
-def separation(a: Placed, b: Placed) -> float:
+def separation(a: PlacedShape, b: PlacedShape) -> float:
     """Return the widest gap that one of the 15 candidate axes shows between the cores [m].
 
     It is at most their distance, and not above 0 if they overlap.
@@ -387,7 +387,7 @@ def separation(a: Placed, b: Placed) -> float:
     return widest
 
 
-def _edges_to_box(a: Placed, b: Placed) -> float:
+def _edges_to_box(a: PlacedShape, b: PlacedShape) -> float:
     """Return the least distance from the edges of core a to core b [m]."""
     starts, ways = [], []
     for along in range(3):

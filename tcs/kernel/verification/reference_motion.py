@@ -13,14 +13,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from tcs.kernel.arrays import Chain, FloatArray, Shapes
-from tcs.kernel.verification.reference import Placed, distance
+from tcs.kernel.verification.reference import PlacedShape, distance
 from tcs.kernel.verification.reference_pairs import PlacedScene
 
 FAR = 0.05
 """Excess [m] beyond which bounding spheres decide."""
 
 
-def checked_pairs(placed: PlacedScene, q: FloatArray) -> Iterator[tuple[Placed, Placed, float]]:
+def checked_pairs(
+    placed: PlacedScene, q: FloatArray
+) -> Iterator[tuple[PlacedShape, PlacedShape, float]]:
     """Yield the pairs of shapes to check at joint angles q, with the distance to keep [m]."""
     arm, scene = placed.arm_at(q), placed.scene
     for i, shape in enumerate(arm):

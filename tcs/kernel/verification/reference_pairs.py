@@ -30,7 +30,7 @@ from tcs.kernel.scores import (
 )
 from tcs.kernel.verification.newton_solutions import newton_solutions, within
 from tcs.kernel.verification.reference import (
-    Placed,
+    PlacedShape,
     Pose,
     compose,
     coupled_pose,
@@ -77,12 +77,12 @@ class PlacedScene:
     """A scene with the robot at one configuration; all poses are in the arm base A."""
 
     scene: SceneArrays
-    environment: list[Placed]
-    body: list[Placed]
+    environment: list[PlacedShape]
+    body: list[PlacedShape]
     X_AG: Pose
     clearance: float = math.inf
 
-    def touches(self, a: Placed, b: Placed, margin: float) -> bool:
+    def touches(self, a: PlacedShape, b: PlacedShape, margin: float) -> bool:
         """Return whether two shapes collide, and update `clearance`.
 
         Args:
@@ -102,7 +102,7 @@ class PlacedScene:
         return excess < 0.0
 
     def any_touch(
-        self, first: list[Placed], others: list[Placed], checked: BoolArray, margin: float
+        self, first: list[PlacedShape], others: list[PlacedShape], checked: BoolArray, margin: float
     ) -> bool:
         """Return whether any checked pair of shapes collides.
 
@@ -122,7 +122,7 @@ class PlacedScene:
         pairs = np.argwhere(near & checked)
         return any(self.touches(first[i], others[j], margin) for i, j in pairs)
 
-    def arm_at(self, q: FloatArray) -> list[Placed]:
+    def arm_at(self, q: FloatArray) -> list[PlacedShape]:
         """Return the arm's shapes in A at joint angles q [rad]."""
         poses = link_poses(self.scene.chain, q)
         shapes = shapes_of(self.scene.arm, 0)
@@ -157,7 +157,7 @@ class PlacedScene:
         )
 
 
-def _column(shapes: list[Placed], name: str) -> FloatArray:
+def _column(shapes: list[PlacedShape], name: str) -> FloatArray:
     """Return one attribute of shapes, shape (n, ...)."""
     return np.array([getattr(shape, name) for shape in shapes])
 

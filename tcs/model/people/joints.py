@@ -6,12 +6,13 @@ rotation of the shoulder, supination of the forearm, turn and lean to the person
 face upward.
 
 Source of the ranges, `models/people/range_of_motion.csv`, means of healthy people:
-    cfr: normal range of motion of the spine, 38 CFR 4.71a, general rating formula, note 2.
-    boone, macedo, walker: Boone and Azen (men up to 54 years), Macedo and Magee (women of 18 to 59
-        years) and Walker et al. (women and men of 65 to 85 years), as tabulated together by Norkin
-        and White, Measurement of Joint Motion, table A.1.
-    cdc: CDC Normal Joint Range of Motion Study (Soucie et al., Haemophilia 17, 2011).
-    usual: the usual figures of clinical texts, where no measurement by age and sex was at hand.
+
+- cfr: normal range of motion of the spine, 38 CFR 4.71a, general rating formula, note 2.
+- boone, macedo, walker: Boone and Azen (men up to 54 years), Macedo and Magee (women of 18 to 59
+  years) and Walker et al. (women and men of 65 to 85 years), as tabulated together by Norkin and
+  White, Measurement of Joint Motion, table A.1.
+- cdc: CDC Normal Joint Range of Motion Study (Soucie et al., Haemophilia 17, 2011).
+- usual: the usual figures of clinical texts, where no measurement by age and sex was at hand.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 The models `person_seated.sdf` and `person_lying.sdf` have the joints of the papers. When a posture
 or an axis of the grid names another joint of the person, the model is rebuilt with all of
-`tcs.model.people.JOINTS`: the links keep their shapes and frames, and where no angle is given the
-posture of the file. Joints are at the origins of the links, about the axes of their parents: x down
-the body or out along the limb, y to the front, z to the person's right.
+`tcs.model.people.joints.JOINTS`: the links keep their shapes and frames, and where no angle is
+given the posture of the file. Joints are at the origins of the links, about the axes of their
+parents: x down the body or out along the limb, y to the front, z to the person's right.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from tcs.placement.constraints import (
 from tcs.placement.scoring.approaches import approach_entry, approach_lines
 from tcs.placement.scoring.arms import score_arms
 from tcs.placement.scoring.blocks import BlockFolder
-from tcs.placement.scoring.engines import Engine
+from tcs.placement.scoring.engines import ScoringEngine
 from tcs.placement.scoring.job import Job, data_references, load_job
 from tcs.placement.scoring.person import person_entry
 from tcs.placement.scoring.robot_shapes import robot_shapes
@@ -70,7 +70,7 @@ class ScoringSetup:
     """Whether a goal counts as reached only by postures that can be approached."""
     blocks: BlockFolder | None = None
     """Where finished blocks of the grid are kept; None to keep none."""
-    engine: Engine | None = None
+    engine: ScoringEngine | None = None
     """Who scores; None for `jobs` threads of this process."""
 
     @classmethod
@@ -89,7 +89,7 @@ class ScoringSetup:
         person: PersonLike | None = None,
         approach: bool = False,
         blocks: BlockFolder | None = None,
-        engine: Engine | None = None,
+        engine: ScoringEngine | None = None,
     ) -> Self:
         """Load and check everything, and build the scene.
 
@@ -248,7 +248,7 @@ def score(
     person: PersonLike | None = None,
     approach: bool = False,
     blocks: BlockFolder | None = None,
-    engine: Engine | None = None,
+    engine: ScoringEngine | None = None,
     **sets: Unpack[SetOptions],
 ) -> ScoreFile:
     """Score a task on the whole grid of an environment and build the sets to choose from.

@@ -26,7 +26,7 @@ from tcs.placement.scoring.approaches import (
     warm_up_approaches,
 )
 from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept, key_of
-from tcs.placement.scoring.engines import Engine, Part, Threads, Work
+from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
 from tcs.placement.tables import ScoreTable
 
@@ -72,7 +72,7 @@ def sweep(
     excluded: NDArray[np.bool_] | None = None,
     approaches: ApproachLines | None = None,
     blocks: BlockFolder | None = None,
-    engine: Engine | None = None,
+    engine: ScoringEngine | None = None,
 ) -> Sweep:
     """Score every configuration of the grid against every goal.
 
@@ -206,7 +206,7 @@ def _opened(
 
 
 def _scored(
-    work: Work, engine: Engine, kept: Kept | None
+    work: Work, engine: ScoringEngine, kept: Kept | None
 ) -> Generator[tuple[Part, Block], None, None]:
     """Yield the scores of all parts of the grid, kept ones first, and keep the new ones."""
     size, length = _size(work.problem), engine.length if kept is None else BLOCK

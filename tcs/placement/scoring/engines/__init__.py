@@ -10,15 +10,15 @@ from __future__ import annotations
 from tcs.placement.scoring.engines.choice import ENGINES, engine_named
 from tcs.placement.scoring.engines.cluster import Dask
 from tcs.placement.scoring.engines.local import Processes, Threads
-from tcs.placement.scoring.engines.work import SLICE, Engine, Part, Work
+from tcs.placement.scoring.engines.work import SLICE, Part, ScoringEngine, Work
 
 __all__ = [
     "ENGINES",
     "SLICE",
     "Dask",
-    "Engine",
     "Part",
     "Processes",
+    "ScoringEngine",
     "Threads",
     "Work",
     "engine_named",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from tcs.errors import TcsError, UnknownNameError
 from tcs.placement.scoring.engines.cluster import Dask
 from tcs.placement.scoring.engines.local import Processes, Threads
-from tcs.placement.scoring.engines.work import Engine
+from tcs.placement.scoring.engines.work import ScoringEngine
 
 ENGINES = ("threads", "processes", "dask")
 
 
-def engine_named(name: str, *, jobs: int, scheduler: str | None = None) -> Engine:
+def engine_named(name: str, *, jobs: int, scheduler: str | None = None) -> ScoringEngine:
     """Return an engine.
 
     Args:

@@ -33,12 +33,12 @@ class Dask:
     scheduler: str
     """Address of the scheduler, e.g. "tcp://10.0.0.1:8786"."""
     length: int = 8 * SLICE
-    """As in `Engine`: some 50 ms of work, ten times what it takes to send the scores."""
+    """As in `ScoringEngine`: some 50 ms of work, ten times what it takes to send the scores."""
 
     def scored(
         self, work: Work, parts: Sequence[Part]
     ) -> Generator[tuple[Part, Block], None, None]:
-        """As in `Engine`."""
+        """As in `ScoringEngine`."""
         with self._connected() as client:
             threads = sum(client.nthreads().values())
             # A task of its own and not scattered data, which would be lost with the worker that

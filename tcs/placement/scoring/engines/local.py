@@ -27,7 +27,7 @@ class Threads:
     jobs: int
     """Number of threads."""
     length: int = SLICE
-    """As in `Engine`."""
+    """As in `ScoringEngine`."""
 
     def __post_init__(self) -> None:
         """Raise TcsError if there is no thread."""
@@ -36,7 +36,7 @@ class Threads:
     def scored(
         self, work: Work, parts: Sequence[Part]
     ) -> Generator[tuple[Part, Block], None, None]:
-        """As in `Engine`."""
+        """As in `ScoringEngine`."""
         yield from Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator")(
             delayed(_with_part)(work, part) for part in parts
         )
@@ -53,7 +53,7 @@ class Processes:
     jobs: int
     """Number of processes."""
     length: int = 8 * SLICE
-    """As in `Engine`: some 50 ms of work, ten times what it takes to send the scores."""
+    """As in `ScoringEngine`: some 50 ms of work, ten times what it takes to send the scores."""
 
     def __post_init__(self) -> None:
         """Raise TcsError if there is no process."""
@@ -62,7 +62,7 @@ class Processes:
     def scored(
         self, work: Work, parts: Sequence[Part]
     ) -> Generator[tuple[Part, Block], None, None]:
-        """As in `Engine`."""
+        """As in `ScoringEngine`."""
         packed = PackedWork.of(work)
         left = dict.fromkeys(parts)
         while left:

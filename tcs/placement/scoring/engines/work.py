@@ -95,7 +95,7 @@ class Work(NamedTuple):
         return scores
 
 
-class Engine(Protocol):
+class ScoringEngine(Protocol):
     """Scores the parts of a grid. The scores are the same with every engine."""
 
     @property
