@@ -1,4 +1,4 @@
-"""Engines: the same scores whoever computes them, also if workers end or cannot be reached."""
+"""Engines: the same scores by each of them, also if workers end or cannot be reached."""
 
 import logging
 import os
