@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from tcs.errors import SelectionError
 from tcs.model.grid import Axis, InitialConfiguration
 from tcs.placement.constraints import Constraints, Obstacle, Region
-from tcs.placement.selection import TravelWeights, UtilityWeights
-from tcs.service.requests import BasePose, Limited, SelectRequest, TravelCosts
+from tcs.placement.selection import TravelWeights, UtilityWeights, nearest_table
+from tcs.placement.store import ScoreFile
+from tcs.service.requests import BasePose, Limited, Observed, SelectRequest, TravelCosts
 
 
 def settings_of(values: Mapping[str, float], where: str) -> dict[str, float]:
@@ -52,6 +53,16 @@ def observed_of(values: Mapping[str, float], axes: Sequence[Axis]) -> dict[str, 
                 f"'observed': '{axis.name}' is scored in {axis.unit}. Use the key {right}."
             )
     return found
+
+
+def table_of(file: ScoreFile, request: Observed) -> int:
+    """Return the number of the table nearest to what is observed.
+
+    Raises:
+        TcsError: As `tcs.placement.selection.nearest_table`.
+    """
+    observed = observed_of(request.observed, file.observed_axes)
+    return nearest_table(file, None, observed, request.frames).index
 
 
 def state_of(

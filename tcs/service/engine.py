@@ -14,12 +14,12 @@ from tcs.files.writing import scratch_folder
 from tcs.model.catalogue import catalogue
 from tcs.placement.constraints import scored_entries
 from tcs.placement.reasons import explain, fix_weights
-from tcs.placement.selection import Top, nearest_table, select
-from tcs.placement.store import ScoreFile
+from tcs.placement.selection import Executability, Top, select
 from tcs.service.conversions import (
     constraints_of,
     observed_of,
     state_of,
+    table_of,
     travel_of,
     utility_of,
 )
@@ -31,15 +31,20 @@ from tcs.service.requests import (
     ExplainRequest,
     FloorRequest,
     JobRequest,
+    MotionsRequest,
     OutcomeRequest,
     PlanRequest,
+    PopulationRequest,
+    RefineRequest,
     SceneRequest,
     ScoreHereRequest,
+    ScoreRequest,
     SelectRequest,
 )
 from tcs.service.responses import FileEntry, JobStatus
 from tcs.service.score_files import ScoreFiles
 from tcs.service.sent_documents import SentDocuments
+from tcs.service.set_work import SetWork
 from tcs.service.views import Views
 from tcs.service.work import SceneWork
 
@@ -69,6 +74,7 @@ class Engine:
         self._jobs = Jobs(limits)
         self._views = Views(self._files)
         self._work = SceneWork(self._files, self._sent, limits)
+        self._set_work = SetWork(self._files, limits)
 
     def __enter__(self) -> Self:
         """Return the engine."""
@@ -140,9 +146,12 @@ class Engine:
         """
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
-            choice = select(
+            motions = self._files.motions(request.file) if request.executable else None
+            here = state_of(request.here, request.torso, request.at)
+            choose = partial(
+                select,
                 file,
-                state_of(request.here, request.torso, request.at),
+                here,
                 weights=utility_of(request),
                 travel=travel_of(request),
                 constraints=constraints_of(request, request.prefer),
@@ -153,7 +162,11 @@ class Engine:
                 observed=observed_of(request.observed, file.observed_axes),
                 frames=request.frames,
             )
-        result = {**choice.to_json(file.metadata["measure"]), **scored_entries(file)}
+            choice = choose(motions=motions)
+            result = {**choice.to_json(file.metadata["measure"]), **scored_entries(file)}
+            if motions is not None:
+                compared = Executability.of(file, motions, choice, choose())
+                result["executable"] = compared.to_json(choice)
         return dict(without_infinities(result))
 
     def explain(self, request: ExplainRequest) -> dict[str, Any]:
@@ -199,7 +212,7 @@ class Engine:
         """
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
-            return floor_of(file, self._table(file, request), request.state)
+            return floor_of(file, table_of(file, request), request.state)
 
     def outcome(self, request: OutcomeRequest) -> dict[str, Any]:
         """Return what is reached from a base pose, as `tcs.service.floor.outcome_of`.
@@ -211,12 +224,7 @@ class Engine:
         with self._files.held(request.file).lock:
             file = self._files.loaded(request.file)
             stated = state_of(request.here, request.torso, request.at)
-            return outcome_of(file, self._table(file, request), stated, best=request.best)
-
-    def _table(self, file: ScoreFile, request: FloorRequest | OutcomeRequest) -> int:
-        """Return the number of the table nearest to what is observed."""
-        observed = observed_of(request.observed, file.observed_axes)
-        return nearest_table(file, None, observed, request.frames).index
+            return outcome_of(file, table_of(file, request), stated, best=request.best)
 
     def submit(self, request: JobRequest) -> JobStatus:
         """Queue a job, and return its state.
@@ -275,20 +283,29 @@ class Engine:
 
     def _work_of(self, request: JobRequest) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
         """Return what a job does and the function that does it, after quick checks."""
-        if isinstance(request, EvaluateRequest):
+        if not isinstance(request, ScoreRequest):
             self._files.held(request.file)
-            return "evaluate", self._plainly(partial(self._work.evaluate, request))
-        if isinstance(request, PlanRequest):
-            self._files.held(request.file)
-            return "plan", self._plainly(partial(self._work.plan, request))
-        if isinstance(request, SceneRequest):
-            self._files.held(request.file)
-            return "scene", self._plainly(partial(self._work.scene, request))
+            return self._work_with_file(request)
         if (request.task is None) == (request.task_yaml is None):
             raise ServiceError("give 'task' or 'task_yaml', and not both.")
         if isinstance(request, ScoreHereRequest):
             return "score-here", self._plainly(partial(self._work.score_here, request))
         return "score", self._plainly(partial(self._work.score, request))
+
+    def _work_with_file(
+        self, request: JobRequest
+    ) -> tuple[str, Callable[[Progress], dict[str, Any]]]:
+        """Return what a job with a score file does and the function that does it."""
+        work: dict[type[Any], tuple[str, Callable[[Any, Progress], dict[str, Any]]]] = {
+            EvaluateRequest: ("evaluate", self._work.evaluate),
+            PlanRequest: ("plan", self._work.plan),
+            SceneRequest: ("scene", self._work.scene),
+            PopulationRequest: ("population", self._set_work.population),
+            RefineRequest: ("refine", self._set_work.refine),
+            MotionsRequest: ("motions", self._set_work.motions),
+        }
+        what, done = work[type(request)]
+        return what, self._plainly(partial(done, request))
 
     def _plainly(
         self, work: Callable[[Progress], dict[str, Any]]

@@ -9,8 +9,11 @@ from tcs.service.requests import (
     EvaluateRequest,
     ExplainRequest,
     FloorRequest,
+    MotionsRequest,
     OutcomeRequest,
     PlanRequest,
+    PopulationRequest,
+    RefineRequest,
     SceneRequest,
     ScoreHereRequest,
     ScoreRequest,
@@ -49,6 +52,9 @@ OPERATIONS = (
     Operation("score-here", ScoreHereRequest, is_job=True),
     Operation("evaluate", EvaluateRequest, is_job=True),
     Operation("plan", PlanRequest, is_job=True),
+    Operation("population", PopulationRequest, is_job=True),
+    Operation("refine", RefineRequest, is_job=True),
+    Operation("motions", MotionsRequest, is_job=True),
     Operation("scene", SceneRequest, is_job=True),
 )
 """Every request with a body of JSON."""

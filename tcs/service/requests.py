@@ -77,6 +77,8 @@ class SelectRequest(TravelCosts, Limited, Observed, State):
     environment_penalty: Number = 0.01
     preference_penalty: Number = 0.05
     max_members: Annotated[int, Field(strict=True, ge=1, le=3)] | None = None
+    executable: Annotated[bool, Field(strict=True)] = False
+    """Count only goals to which a job `motions` of this file found a motion."""
 
 
 class ExplainRequest(TravelCosts, Observed, State):
@@ -158,5 +160,49 @@ class PlanRequest(Observed, State):
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
 
-JobRequest = ScoreRequest | ScoreHereRequest | EvaluateRequest | PlanRequest | SceneRequest
+class PopulationRequest(Observed):
+    """Count the people of a population whom the best sets serve, as `tcs population`; a job."""
+
+    file: FileId
+    bodies: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 1000
+    sex: Text = "any"
+    sets: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
+    min_apart: Number = 0.5
+    errors: Annotated[bool, Field(strict=True)] = False
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+
+class RefineRequest(Observed):
+    """Refine the best sets between the grid points, as `tcs refine`; a job."""
+
+    file: FileId
+    objective: Text = "score"
+    starts: Annotated[int, Field(strict=True, ge=1, le=100)] = 6
+    rounds: Annotated[int, Field(strict=True, ge=1, le=1000)] = 40
+    samples: Annotated[int, Field(strict=True, ge=1, le=10_000)] = 64
+    keep_success: Annotated[bool, Field(strict=True)] = True
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+
+class MotionsRequest(Observed):
+    """Find which goals can be done, in and out and back to rest, as `tcs motions`; a job."""
+
+    file: FileId
+    within: Number = 0.05
+    pairs: Annotated[bool, Field(strict=True)] = False
+    most: Annotated[int, Field(strict=True, ge=1)] | None = None
+    sample: Annotated[int, Field(strict=True, ge=1)] | None = None
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+
+JobRequest = (
+    ScoreRequest
+    | ScoreHereRequest
+    | EvaluateRequest
+    | PlanRequest
+    | PopulationRequest
+    | RefineRequest
+    | MotionsRequest
+    | SceneRequest
+)
 """Requests that take longer than a moment: they become jobs."""

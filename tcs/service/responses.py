@@ -42,7 +42,7 @@ class JobStatus(BaseModel):
     job: str
     """Its name."""
     what: str
-    """What it does: score, score-here, evaluate or plan."""
+    """What it does: the name of the request, e.g. score-here or plan."""
     state: JobState
     """`done`, `failed` and `cancelled` are final."""
     done: int = 0

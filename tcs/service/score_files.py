@@ -12,8 +12,9 @@ from pathlib import Path
 from tcs.errors import BusyError, NotFoundError, ServiceError, StoreError
 from tcs.files.paths import is_path
 from tcs.files.reading import read_bytes
+from tcs.files.writing import scratch_folder
 from tcs.output.words import frame_name, person_text
-from tcs.placement.store import ScoreFile, load_scores
+from tcs.placement.store import MotionFile, ScoreFile, load_scores, save_scores
 from tcs.service.limits import Limits
 from tcs.service.responses import FileEntry
 
@@ -49,6 +50,7 @@ class ScoreFiles:
         self._lock = threading.RLock()
         self._held: OrderedDict[str, HeldFile] = OrderedDict()
         self._loaded: OrderedDict[str, ScoreFile] = OrderedDict()
+        self._motions: OrderedDict[str, MotionFile] = OrderedDict()
         self._number = itertools.count()
 
     def add(self, content: bytes, *, is_ours: bool = False, is_pinned: bool = False) -> HeldFile:
@@ -92,6 +94,17 @@ class ScoreFiles:
             held.is_pinned |= is_pinned
             self._held.move_to_end(digest)
             return held
+
+    def add_made(self, file: ScoreFile) -> HeldFile:
+        """Hold a score file that was made here.
+
+        Raises:
+            BusyError: If it does not fit beside the pinned files.
+        """
+        with scratch_folder() as folder:
+            path = folder / "made.tcs"
+            save_scores(path, file)
+            return self.add(path.read_bytes(), is_ours=True)
 
     def read(self, path: Path) -> HeldFile:
         """Hold a file that is named when the service starts, until it ends.
@@ -163,6 +176,28 @@ class ScoreFiles:
                         "that was sent. Score the task on this server."
                     )
         return file
+
+    def motions(self, digest: str) -> MotionFile:
+        """Return the motions that were found for a file.
+
+        Raises:
+            NotFoundError: If there are none, or they were not used for long.
+        """
+        with self._lock:
+            if digest not in self._motions:
+                raise NotFoundError(
+                    "no motions of this score file are held. Find them with a job `motions`."
+                )
+            self._motions.move_to_end(digest)
+            return self._motions[digest]
+
+    def hold_motions(self, digest: str, motions: MotionFile) -> None:
+        """Hold the motions of a file, in place of others of the same file."""
+        with self._lock:
+            self._motions[digest] = motions
+            self._motions.move_to_end(digest)
+            while len(self._motions) > self._limits.loaded_files:
+                self._motions.popitem(last=False)
 
     def _remember(self, digest: str, file: ScoreFile) -> None:
         self._loaded[digest] = file

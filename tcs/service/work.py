@@ -6,9 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tcs.errors import SelectionError
-from tcs.placement.selection import nearest_table
-from tcs.placement.store import ScoreFile, save_scores
-from tcs.service.conversions import constraints_of, observed_of, settings_of, state_of
+from tcs.placement.store import ScoreFile
+from tcs.service.conversions import (
+    constraints_of,
+    observed_of,
+    settings_of,
+    state_of,
+    table_of,
+)
 from tcs.service.jobs import Progress
 from tcs.service.limits import Limits
 from tcs.service.requests import (
@@ -99,7 +104,7 @@ class SceneWork:
             seed=request.seed,
             select=request.select,
             members=request.members,
-            table=self._table(file, request) if request.observed or request.frames else None,
+            table=table_of(file, request) if request.observed or request.frames else None,
             body_collisions=request.body_collisions,
             jobs=self._limits.threads,
             on_progress=progress,
@@ -162,13 +167,9 @@ class SceneWork:
 
     def _held(self, scored: ScoreFile) -> dict[str, Any]:
         """Hold a new score file and return its summary."""
-        from tcs.files.writing import scratch_folder
         from tcs.placement.scoring import summary
 
-        with scratch_folder() as folder:
-            path = folder / "scored.tcs"
-            save_scores(path, scored)
-            entry = self._files.add(path.read_bytes(), is_ours=True).entry
+        entry = self._files.add_made(scored).entry
         return {
             "task": entry.task,
             "environment": entry.environment,
@@ -176,11 +177,6 @@ class SceneWork:
             "file": entry.file,
             "file_bytes": entry.bytes,
         }
-
-    def _table(self, file: ScoreFile, request: EvaluateRequest | PlanRequest) -> int:
-        """Return the number of the table nearest to what is observed."""
-        observed = observed_of(request.observed, file.observed_axes)
-        return nearest_table(file, None, observed, request.frames).index
 
     def _stops(self, file: ScoreFile, request: PlanRequest) -> Sequence[int] | InitialConfiguration:
         """Return the stops of a plan, as `tcs plan` chooses them."""
@@ -195,7 +191,7 @@ class SceneWork:
             if here is None:
                 raise SelectionError("'exactly' requires 'here'.")
             return exact_state(file, here, observed)
-        table, indices = self._table(file, request), tuple(request.configuration)
+        table, indices = table_of(file, request), tuple(request.configuration)
         if not indices:
             shown = ShownSet.of(file, here, request.max_members, observed)
             table, indices = shown.table, shown.indices

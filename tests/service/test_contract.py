@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import threading
 import time
@@ -24,8 +25,11 @@ from tcs.service import (
     FloorRequest,
     JobStatus,
     Limits,
+    MotionsRequest,
     OutcomeRequest,
     PlanRequest,
+    PopulationRequest,
+    RefineRequest,
     ScoreRequest,
     SelectRequest,
 )
@@ -59,7 +63,9 @@ def client(engine):
 def assistant(engine):
     with (
         start_blocking_portal() as portal,
-        portal.wrap_async_context_manager(mcp.Client(make_assistant_server(engine))) as client,
+        portal.wrap_async_context_manager(
+            mcp.Client(make_assistant_server(engine, job_seconds=0.0))
+        ) as client,
     ):
         yield Assistant(engine, portal, client)
 
@@ -109,10 +115,8 @@ class Assistant:
 
 
 @pytest.fixture(params=["engine", "http", "assistant"])
-def service(request, engine, client, assistant, monkeypatch):
+def service(request, engine, client, assistant):
     """The engine, directly, over HTTP and as tools of an assistant."""
-    # A job that is submitted as a tool is waited for by other means here.
-    monkeypatch.setattr("tcs.service.assistant._WAIT", 0.0)
     return {"engine": engine, "http": client, "assistant": assistant}[request.param]
 
 
@@ -267,6 +271,56 @@ def test_jobs_are_cancelled_and_the_queue_is_bounded(service, slow_job):
     service.cancel(running.job)
     assert service.wait(running.job).state == "cancelled"
     assert service.job(running.job).result is None
+
+
+JOBS_OF_SETS = {
+    "tcs.placement.population.population": (
+        PopulationRequest,
+        {"bodies": 7, "sex": "female", "sets": 3, "errors": True, "seed": 5},
+        lambda given: {
+            "bodies": len(given["people"]),
+            "sex": "any" if given["people"].is_male.any() else "female",
+            "sets": given["top"].count,
+            "errors": given["errors"],
+            "seed": given["seed"],
+        },
+    ),
+    "tcs.placement.refinement.refine": (
+        RefineRequest,
+        {"objective": "margin", "starts": 2, "rounds": 3, "samples": 4, "keep_success": False},
+        lambda given: given,
+    ),
+    "tcs.motion.examine.examine": (
+        MotionsRequest,
+        {"within": 0.1, "most": 4, "sample": 3, "seed": 6},
+        lambda given: given,
+    ),
+}
+
+
+@pytest.mark.parametrize("function", JOBS_OF_SETS)
+def test_jobs_of_sets_pass_their_options_on(service, file, function, monkeypatch):
+    model, fields, of_arguments = JOBS_OF_SETS[function]
+    called = {}
+
+    def recorded(scored, people=None, **options):
+        called.update(options, people=people, scored=scored)
+        options["on_progress"](1, 2)
+        raise TcsError("recorded.")
+
+    module, _, name = function.rpartition(".")
+    # Some modules have the name of their function, which their package hands on in their place.
+    monkeypatch.setattr(importlib.import_module(module), name, recorded)
+    status = service.wait(service.submit(model(file=file, **fields)).job)
+    assert (status.state, status.problem) == ("failed", "recorded.")
+    assert (status.done, status.total) == (1, 2)
+    assert {key: of_arguments(called)[key] for key in fields} == fields
+    assert called["table"] == called["scored"].nominal_index
+
+
+def test_executable_sets_need_motions(service, file):
+    with pytest.raises(NotFoundError, match="Find them with a job `motions`"):
+        service.select(SelectRequest(file=file, here=HERE, at=AT, executable=True))
 
 
 def test_failed_job_has_one_line(service, tmp_path):
