@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
+from tcs.files.mapped import CHUNK_BYTES, chunks, large_zeros, release
 
 LEVEL = 3
 """Compression level of zlib. Joint angles are nearly incompressible: higher levels and lzma take
@@ -39,15 +40,21 @@ class AtMost:
 
 def compress(array: NDArray[Any]) -> dict[str, Any]:
     """Return an array of numbers as plain containers around its compressed bytes."""
-    little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
-    size = little.dtype.itemsize
+    values = np.ascontiguousarray(array)
+    size = values.dtype.itemsize
+    flat = values.reshape(-1, 1)
+    compressor = zlib.compressobj(LEVEL)
+    parts = []
     # Bytes of equal significance together: signs and exponents repeat, mantissas do not.
-    planes = little.reshape(-1, 1).view(np.uint8).reshape(-1, size).T
-    compressed = zlib.compress(planes.tobytes(), LEVEL)
+    for plane in range(size):
+        for rows in chunks(flat):
+            little = flat[rows].astype(values.dtype.newbyteorder("<"), copy=False)
+            parts.append(compressor.compress(little.view(np.uint8)[:, plane].tobytes()))
+    parts.append(compressor.flush())
     return {
         "type": f"{array.dtype.kind}{size}",
         "shape": list(array.shape),
-        "bytes": np.frombuffer(compressed, dtype=np.uint8),
+        "bytes": np.frombuffer(b"".join(parts), dtype=np.uint8),
     }
 
 
@@ -141,11 +148,15 @@ def decompress(
             f"has an array '{name}' of type {found} and shape {stated}, which does not belong there"
         )
     dtype = np.dtype(f"<{found}")
-    planes = np.frombuffer(
-        _inflated(name, data, math.prod(stated) * dtype.itemsize), dtype=np.uint8
-    )
-    values = np.ascontiguousarray(planes.reshape(dtype.itemsize, -1).T).view(dtype)
-    return values.reshape(stated).astype(dtype.newbyteorder("="), copy=False)
+    rows = math.prod(stated)
+    if rows * dtype.itemsize > MAX_BYTES:
+        raise StoreFormatError(
+            f"has an array '{name}' of {rows * dtype.itemsize} bytes; at most {MAX_BYTES} are "
+            "allowed"
+        )
+    values: NDArray[np.uint8] = large_zeros((rows, dtype.itemsize), np.uint8)
+    _inflate(name, data, values)
+    return values.view(dtype).reshape(stated).astype(dtype.newbyteorder("="), copy=False)
 
 
 def _fits(length: int | AtMost | None, stated: int) -> bool:
@@ -155,20 +166,35 @@ def _fits(length: int | AtMost | None, stated: int) -> bool:
     return length is None or length == stated
 
 
-def _inflated(name: str, data: NDArray[np.uint8], size: int) -> bytes:
-    """Return the decompressed bytes; raise unless there are exactly `size` of them."""
-    if size > MAX_BYTES:
-        raise StoreFormatError(
-            f"has an array '{name}' of {size} bytes; at most {MAX_BYTES} are allowed"
-        )
+def _inflate(name: str, data: NDArray[np.uint8], values: NDArray[np.uint8]) -> None:
+    """Fill the columns of an array, one after the other, with exactly the decompressed bytes."""
     decompressor = zlib.decompressobj()
+    waiting: bytes | memoryview = np.ascontiguousarray(data).data
+    size = values.size
+
+    def next_bytes(most: int) -> bytes:
+        nonlocal waiting
+        found = decompressor.decompress(waiting, most)
+        waiting = decompressor.unconsumed_tail
+        return found
+
+    def damaged(what: object) -> StoreFormatError:
+        return StoreFormatError(f"has a damaged array '{name}' ({what})")
+
     try:
-        inflated = decompressor.decompress(data.tobytes(), size + 1)
+        for column in values.T:
+            filled = 0
+            while filled < column.size:
+                found = next_bytes(min(CHUNK_BYTES, column.size - filled))
+                if not found:
+                    raise damaged(f"not {size} bytes")
+                column[filled : filled + len(found)] = np.frombuffer(found, np.uint8)
+                filled += len(found)
+                release(values)
+        if next_bytes(1) or not decompressor.eof or decompressor.unused_data:
+            raise damaged(f"not {size} bytes")
     except (zlib.error, MemoryError) as error:
-        raise StoreFormatError(f"has a damaged array '{name}' ({error})") from None
-    if len(inflated) != size or not decompressor.eof or decompressor.unused_data:
-        raise StoreFormatError(f"has a damaged array '{name}' (not {size} bytes)")
-    return inflated
+        raise damaged(error) from None
 
 
 def differences(ascending: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -154,7 +154,7 @@ STEP = Quantity(
     "a micrometre is below any positioning",
 )
 AXIS_VALUES = Quantity(
-    *("number of values", "", 1, 20_000_000),
+    *("number of values", "", 1, 100_000_000),
     "`count` of an axis",
     "as many configurations as a whole grid may have",
 )

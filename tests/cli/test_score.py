@@ -96,8 +96,9 @@ def test_a_dry_run_estimates_and_writes_nothing(tcs_command, corner, corner_file
     scores = tcs.load(corner_file).nominal.scores
     assert (row["configurations"], row["goals"], row["blocks"]) == (36, 8, 1)
     # The grid fits into one slice, so nothing is estimated but the time.
-    arrays = (scores.reason, scores.pair, scores.dexterity, scores.arm_joints)
+    arrays = (scores.reason, scores.reached, scores.pair, scores.dexterity, scores.arm_joints)
     assert row["memory_bytes"] == sum(array.nbytes for array in arrays)
+    assert row["scratch_bytes"] == 0
     assert 0 < row["disk_bytes"] < row["memory_bytes"]
     assert row["scoring_seconds"] > 0
     ran = tcs_command(*words)

@@ -19,8 +19,9 @@ from tcs.model.grid.configuration import InitialConfiguration
 ROBOT_AXES = {"base_x": "m", "base_y": "m", "base_yaw": "deg", "torso": "m"}
 """The last axes of every grid, in flat order, and the unit of each."""
 
-MAX_CONFIGURATIONS = 20_000_000
-"""Largest number of configurations of a grid: scores of more would not fit into memory."""
+MAX_CONFIGURATIONS = 100_000_000
+"""Largest number of configurations of a grid, a thousand times the paper's: with twenty goals, a
+score file has two billion reasons, the most that are read (`tcs.files.compression.MAX_BYTES`)."""
 
 
 @dataclass(frozen=True, slots=True)

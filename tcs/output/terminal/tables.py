@@ -62,7 +62,14 @@ def report_estimates(result: Mapping[str, Any]) -> None:
     """Print what scoring would take."""
     rows = result["rows"]
     table = new_table(
-        "task", "environment", ">configurations", ">goals", ">scoring", ">memory", ">disk"
+        "task",
+        "environment",
+        ">configurations",
+        ">goals",
+        ">scoring",
+        ">memory",
+        ">scratch",
+        ">disk",
     )
     for row in rows:
         seconds, error = row["scoring_seconds"], row["scoring_seconds_error"]
@@ -73,6 +80,7 @@ def report_estimates(result: Mapping[str, Any]) -> None:
             str(row["goals"]),
             f"{seconds:.1f} s +- {error:.1f}",
             f"{row['memory_bytes'] / 1e6:.1f} MB",
+            f"{row['scratch_bytes'] / 1e6:.1f} MB",
             f"{row['disk_bytes'] / 1e6:.1f} MB",
         )
     out = results_console()
@@ -91,9 +99,12 @@ def report_scores(result: Mapping[str, Any]) -> None:
                 f"goal {goal_text(goal['goal'], goal.get('name'))}: the gripper touches "
                 f"{body_name(goal['part'])} of this person"
             )
+    candidates = "reach at least one goal"
+    if result["tile"]:
+        candidates = f"stand for all others within squares of {result['tile']:g} m"
     out.print(
         f"{result['configurations']:,} configurations x {result['goals']} goals scored in "
-        f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} reach at least one goal, "
+        f"{result['scoring_seconds']:.2f} s; {result['candidates']:,} {candidates}, "
         f"{result['sets']:,} sets kept."
     )
     if result["ik"] == "numeric":

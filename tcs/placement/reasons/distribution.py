@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tcs.files.mapped import chunks
 from tcs.placement.tables import Reason, ScoreTable
 
 CHECKS = (
@@ -83,15 +84,20 @@ class Distribution:
     @classmethod
     def of(cls, scores: ScoreTable, goal: int) -> Distribution:
         """Return the distribution for one goal of a score table."""
-        reason, pair = scores.reason[:, goal], scores.pair[:, goal]
-        counts = np.bincount(reason, minlength=len(Reason))
-        blocked = pair >= 0
+        counts = np.zeros(len(Reason), dtype=np.int64)
         # One number for pair and reason, so that one pass counts both.
-        keys = pair[blocked].astype(np.int64) * len(Reason) + reason[blocked]
-        found, times = np.unique(keys, return_counts=True)
+        times = np.zeros(len(scores.pair_names) * len(Reason), dtype=np.int64)
+        for rows in chunks(scores.reason, scores.pair):
+            reason, pair = scores.reason[rows, goal], scores.pair[rows, goal]
+            counts += np.bincount(reason, minlength=len(Reason))
+            blocked = pair >= 0
+            keys = pair[blocked].astype(np.int64) * len(Reason) + reason[blocked]
+            times += np.bincount(keys, minlength=times.size)
         pairs = [
-            BlockingPair(scores.pair_names[key // len(Reason)], Reason(key % len(Reason)), count)
-            for key, count in zip(found.tolist(), times.tolist(), strict=True)
+            BlockingPair(
+                scores.pair_names[key // len(Reason)], Reason(key % len(Reason)), int(times[key])
+            )
+            for key in np.flatnonzero(times).tolist()
         ]
         pairs.sort(key=lambda one: (-one.count, one.pair, one.reason))
         return cls({one: int(counts[one]) for one in Reason}, tuple(pairs))

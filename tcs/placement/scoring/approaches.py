@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import ArmClassError
+from tcs.files.mapped import chunks
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.problem import Problem
 from tcs.model.tasks import TOOL_SPEED
@@ -85,7 +86,7 @@ def score_with_approach(
     problem: Problem,
     lines: ApproachLines,
     reason: NDArray[np.uint8],
-    contact: NDArray[np.int32],
+    contact: NDArray[Any],
     dexterity: NDArray[np.float32],
     joints: NDArray[np.float32],
     *,
@@ -107,14 +108,17 @@ def score_with_approach(
     """
     from tcs.kernel.approach.sweep import ReachedPairs, score_approaches
 
-    pairs = np.argwhere(reason == 0)
+    found_pairs = (
+        np.argwhere(reason[rows] == 0) + np.array([rows.start, 0]) for rows in chunks(reason)
+    )
+    pairs = np.concatenate([np.empty((0, 2), np.int64), *found_pairs])
     rows, columns = pairs.T
 
     def part(start: int) -> ReachedPairs:
         chosen = slice(start, start + SLICE)
         at = rows[chosen], columns[chosen]
         scores = ReachedPairs(
-            pairs[chosen], reason[at], contact[at], dexterity[at],
+            pairs[chosen], reason[at], contact[at].astype(np.int32), dexterity[at],
             joints[chosen].copy(),
         )  # fmt: skip
         score_approaches(problem, lines, scores)

@@ -8,8 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.errors import RobotError
+from tcs.files.mapped import chunks, large_zeros
 from tcs.placement.constraints.scored import KEY as CONSTRAINTS
 from tcs.placement.scoring.sweep import ANALYTIC, NUMERIC
 from tcs.placement.store import ARMS, OF_ARM, ScoreFile
@@ -64,15 +66,23 @@ def joined(tables: Sequence[ScoreTable]) -> ScoreTable:
     """Return the scores of several arms as one table, those of the first arm first."""
     names = tuple(dict.fromkeys(pair for table in tables for pair in table.pair_names))
     number = {pair: i for i, pair in enumerate(names)}
-    pairs = []
+    shape = (sum(table.configurations for table in tables), tables[0].goals)
+    dexterity: NDArray[np.float32] = large_zeros(shape, np.float32)
+    reason: NDArray[np.uint8] = large_zeros(shape, np.uint8)
+    pair: NDArray[np.int32] = large_zeros(shape, np.int32)
+    begin = 0
     for table in tables:
         # The last entry stands for -1, no contact.
         renumbered = np.array([*(number[pair] for pair in table.pair_names), -1], dtype=np.int32)
-        pairs.append(renumbered[table.pair])
+        for rows in chunks(table.dexterity, table.reason, table.pair, dexterity, reason, pair):
+            to = slice(begin + rows.start, begin + rows.stop)
+            dexterity[to], reason[to] = table.dexterity[rows], table.reason[rows]
+            pair[to] = renumbered[table.pair[rows]]
+        begin += table.configurations
     return ScoreTable(
-        dexterity=np.concatenate([table.dexterity for table in tables]),
-        reason=np.concatenate([table.reason for table in tables]),
-        pair=np.concatenate(pairs),
+        dexterity=dexterity,
+        reason=reason,
+        pair=pair,
         pair_names=names,
         arm_joints=np.concatenate([table.arm_joints for table in tables]),
         weights=tables[0].weights,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tcs.files.compression import compress
+from tcs.files.mapped import LEAST_BYTES
 from tcs.kernel.problem import build_problem
 from tcs.kernel.sweep import gripper_contacts
 from tcs.placement.scoring.blocks import BLOCK, Block
@@ -19,6 +20,9 @@ from tcs.placement.scoring.sweep import warm_up
 SAMPLES = 24
 """Slices that are scored, spread evenly over the grid. Environment states and base positions differ
 in how many goals are near; 24 hit each part of the grids that ship."""
+
+PAIR_BYTES = (1, 1, 2, 4)
+"""Bytes of each pair of configuration and goal: reason, whether reached, bodies, dexterity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +41,9 @@ class Estimate:
     scoring_seconds_error: float
     """Standard error of the time from the spread of the slices [s]."""
     memory_bytes: int
-    """Memory of the scores, beside that of the program."""
+    """Memory of the scores, beside that of the program and of its scratch files."""
+    scratch_bytes: int
+    """Size of scratch files, to which scores beyond the memory are mapped."""
     disk_bytes: int
     """Size of the scores in a file or in blocks, without the sets."""
 
@@ -60,15 +66,17 @@ def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
     work = Work(problem, gripper_contacts(problem))
     size, goals = job.scored_grid.size, len(job.task.goals)
     starts = np.unique(np.linspace(0, max(0, size - SLICE), SAMPLES).astype(int))
-    seconds, memory, disk, scored = [], 0, 0, 0
+    seconds, joints, disk, scored = [], 0, 0, 0
     for start in starts.tolist():
         begun = time.thread_time()
         block = work.score(Part(start, min(start + SLICE, size)))
         seconds.append(time.thread_time() - begun)
         scored += len(block.reason)
-        memory += sum(array.nbytes for array in block)
+        joints += block.joints.nbytes
         disk += _stored_bytes(block)
     slices = size / SLICE / jobs
+    arrays = [size * goals * width for width in PAIR_BYTES]
+    mapped = sum(array for array in arrays if array >= LEAST_BYTES)
     spread = float(np.std(seconds, ddof=1)) if len(seconds) > 1 else 0.0
     return Estimate(
         task=job.task.name,
@@ -79,7 +87,8 @@ def estimate(job: Job, *, measure: str, jobs: int) -> Estimate:
         blocks=-(-size // BLOCK),
         scoring_seconds=sum(seconds) / scored * size / jobs,
         scoring_seconds_error=slices * spread / len(seconds) ** 0.5,
-        memory_bytes=round(memory / scored * size),
+        memory_bytes=sum(arrays) - mapped + round(joints / scored * size),
+        scratch_bytes=mapped,
         disk_bytes=round(disk / scored * size),
     )
 

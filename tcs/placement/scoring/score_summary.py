@@ -39,6 +39,7 @@ def summary(file: ScoreFile) -> dict[str, Any]:
         "rule": file.nominal.sets.rule,
         "same_environment": file.nominal.sets.same_environment,
         "max_members": file.nominal.sets.max_members,
+        "tile": max(table.sets.tile for table in file.tables),
         "candidates": sum(len(table.sets.candidates) for table in file.tables),
         "sets": sum(table.sets.sets for table in file.tables),
         "best": _set_summary(file, file.nominal.sets.best),

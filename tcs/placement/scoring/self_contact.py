@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tcs.files.mapped import chunks
 from tcs.model.robots import RobotFile
 from tcs.placement.tables import Reason, ScoreTable
 
@@ -67,8 +68,12 @@ def prevailing_self_contact(
     reached = 0
     for scores in tables:
         reached += int(scores.reached.sum())
-        arm = np.isin(scores.reason, (Reason.ARM_BLOCKED, Reason.GRIPPER_BLOCKED_BY_ROBOT))
-        counts = np.bincount(scores.pair[arm], minlength=len(scores.pair_names))
+        counts = np.zeros(len(scores.pair_names), dtype=np.int64)
+        for rows in chunks(scores.reason, scores.pair):
+            arm = np.isin(
+                scores.reason[rows], (Reason.ARM_BLOCKED, Reason.GRIPPER_BLOCKED_BY_ROBOT)
+            )
+            counts += np.bincount(scores.pair[rows][arm], minlength=len(counts))
         for bodies, count in zip(scores.pair_names, counts.tolist(), strict=True):
             if bodies[1] in robot_bodies:
                 refused[bodies] = refused.get(bodies, 0) + count

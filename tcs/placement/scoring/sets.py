@@ -14,6 +14,15 @@ from tcs.kernel.arrays import IntArray
 from tcs.kernel.sets.pairs import BestPairs, CellPairs, MemberPairs, SetArrays, bound_cells
 from tcs.model.grid import ROBOT_AXES, Grid
 from tcs.placement.scoring.base_lattice import lattice_of
+from tcs.placement.scoring.thinning import (
+    MOST_CANDIDATES,
+    TILE,
+    Candidates,
+    best_pair,
+    representatives,
+    tiles_of,
+    undominated,
+)
 from tcs.placement.scoring.triples import kept_triples
 from tcs.placement.tables import ScoreTable, SetTable, tc_manipulability, tc_reachability
 from tcs.placement.tables.groups import Groups
@@ -55,7 +64,9 @@ def build_sets(
 ) -> SetTable:
     """Return every set of one, two or three configurations that a rule keeps.
 
-    The search is exact over all sets; the result does not depend on `jobs`.
+    The search is exact over all sets; the result does not depend on `jobs`. Of more than
+    `MOST_CANDIDATES` candidates, those are kept that stand for all others (`representatives`), and
+    the best single and the best pair of all (`best_pair`).
 
     Args:
         scores: Scores of every configuration of the grid.
@@ -85,6 +96,73 @@ def build_sets(
     if jobs < 1:
         raise TcsError(f"Sets: {jobs} jobs; must be at least 1.")
     candidates = candidates_of(scores.reached, scores.weights, rule)
+    if rule == "code2015" or len(candidates) <= MOST_CANDIDATES:
+        return _sets_of(scores, grid, candidates, checked, jobs)
+    few, undominated = _representatives(scores, grid, candidates, same_environment)
+    sets = _sets_of(scores, grid, few, checked, jobs, tile=TILE)
+    if max_members == 1:
+        return sets
+    best = best_pair(
+        undominated,
+        scores.weights,
+        least_distance=min_distance - DISTANCE_TOLERANCE,
+        least_manipulability=sets.limits.manipulability,
+        to_beat=sum(sets.scores_of(sets.best)),
+    )
+    if best is None:
+        return sets
+    members = undominated.number[list(best)]
+    return _sets_of(scores, grid, np.union1d(few, members), checked, jobs, tile=TILE)
+
+
+def _representatives(
+    scores: ScoreTable, grid: Grid, candidates: NDArray[np.int32], same_environment: bool
+) -> tuple[NDArray[np.int32], Candidates]:
+    """Return candidates that stand for all, and those that are as good as all where they stand.
+
+    The first are the singles with the greatest P_M and with the greatest P_R + P_M, and others.
+    """
+    place, xy = base_cells(grid, candidates)
+    state = grid.state_of(candidates)
+    every = Candidates(
+        number=candidates,
+        reached=scores.reached[candidates],
+        dexterity=scores.dexterity[candidates].astype(np.float64),
+        xy=xy[place],
+        place=place.astype(np.int64),
+        tile=tiles_of(xy)[place],
+        state=state if same_environment else np.zeros_like(state),
+        kind=state + candidates // grid.arm_size * (grid.arm_size // grid.state_size),
+    )
+    single = tc_manipulability(every.dexterity, scores.weights)
+    total = tc_reachability(every.reached, scores.weights) + single
+    best = candidates[[np.argmax(single), np.argmax(total)]]
+    left = every.some(undominated(every))
+    few = left.number[representatives(left)]
+    return np.union1d(few, best).astype(np.int32), left
+
+
+def _sets_of(
+    scores: ScoreTable,
+    grid: Grid,
+    candidates: NDArray[np.int32],
+    options: SetOptions,
+    jobs: int,
+    *,
+    tile: float = 0.0,
+) -> SetTable:
+    """Return every set of some candidates that the rule keeps.
+
+    Args:
+        scores: Scores of every configuration of the grid.
+        grid: The grid.
+        candidates: Flat indices of the candidates, ascending.
+        options: All options of the kept sets.
+        jobs: Number of threads.
+        tile: See `SetTable.tile`.
+    """
+    rule, max_members = options["rule"], options["max_members"]
+    same_environment, min_distance = options["same_environment"], options["min_distance"]
     state = grid.state_of(candidates)
     cell, cell_xy = base_cells(grid, candidates)
     arrays = _grouped(
@@ -127,6 +205,7 @@ def build_sets(
         best=best,
         best_single=best_single,
         lattice=lattice_of(scores, grid),
+        tile=tile,
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tcs.files.mapped import chunks
 from tcs.placement.tables import Reason
 
 SAMPLED = (Reason.JOINT_LIMITS, Reason.ARM_BLOCKED)
@@ -117,7 +118,7 @@ def scan_counts(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
             each stratum that has so many: without any, the recall would be unknown. So two pairs
             are scanned if `dense` is 1 and neither stratum is empty.
     """
-    sizes = {r: int(np.count_nonzero(reason == r)) for r in SAMPLED}
+    sizes = {r: count_of(reason, r) for r in SAMPLED}
     total = sum(sizes.values())
     if total == 0 or dense == 0:
         return dict.fromkeys(SAMPLED, 0)
@@ -129,11 +130,33 @@ def scan_counts(reason: NDArray[np.uint8], dense: int) -> dict[Reason, int]:
     return {first: max(min(dense - rest, sizes[first]), least), second: rest}
 
 
-def random_pairs(rng: np.random.Generator, chosen: NDArray[np.bool_], count: int | None) -> Pairs:
-    """Return up to `count` distinct random pairs at which `chosen` is true; all if it is None."""
-    flat = np.flatnonzero(chosen)
-    picked = flat
+def count_of(reason: NDArray[np.uint8], one: Reason) -> int:
+    """Return the number of pairs with a reason."""
+    return sum(int(np.count_nonzero(reason[rows] == one)) for rows in chunks(reason))
+
+
+def random_pairs(
+    rng: np.random.Generator, reason: NDArray[np.uint8], one: Reason, count: int | None
+) -> Pairs:
+    """Return up to `count` distinct random pairs that have a reason; all if it is None.
+
+    Args:
+        rng: Where the random numbers come from.
+        reason: A `Reason` for each pair, shape (H, G).
+        one: The reason.
+        count: The number.
+    """
+    total, goals = count_of(reason, one), reason.shape[1]
+    picked = np.arange(total)
     if count is not None:
-        picked = rng.choice(flat, size=min(count, len(flat)), replace=False)
-    goals = chosen.shape[1]
-    return [(int(i // goals), int(i % goals)) for i in picked]
+        picked = rng.choice(total, size=min(count, total), replace=False)
+    order = np.argsort(picked)
+    flat = np.empty(picked.size, dtype=np.int64)
+    before = done = 0
+    for rows in chunks(reason):
+        here = np.flatnonzero(reason[rows] == one)
+        end = int(np.searchsorted(picked, before + here.size, sorter=order))
+        of_rows = order[done:end]
+        flat[of_rows] = here[picked[of_rows] - before] + rows.start * goals
+        before, done = before + here.size, end
+    return [(int(i // goals), int(i % goals)) for i in flat]

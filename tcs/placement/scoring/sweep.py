@@ -6,13 +6,14 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.mapped import chunks, large_zeros, release
 from tcs.kernel.analytic.solver import is_outside
 from tcs.kernel.cache import is_compiled
 from tcs.kernel.dexterity import DEFAULT_MEASURE
@@ -99,7 +100,8 @@ def sweep(
         UnknownNameError: If there is no measure of that name.
         TcsError: If `jobs` is less than 1, or the workers of the engine are lost.
         ArmClassError: If there are approaches, and the arm has no closed form.
-        OutputError: If blocks cannot be kept in the folder, or another process is at work there.
+        OutputError: If blocks cannot be kept in the folder, another process is at work there, or
+            there is no room for a scratch file.
     """
     if jobs < 1:
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
@@ -107,9 +109,9 @@ def sweep(
     compile_seconds = warm_up(problem, on_compile, approaches)
     size, goals = _size(problem), problem.goal_p.shape[1]
     begun = time.perf_counter()
-    reason = np.empty((size, goals), np.uint8)
-    contact = np.empty((size, goals), np.int32)
-    dexterity = np.empty((size, goals), np.float32)
+    reason: NDArray[np.uint8] = large_zeros((size, goals), np.uint8)
+    contact: NDArray[Any] = large_zeros((size, goals), _code_type(problem))
+    dexterity: NDArray[np.float32] = large_zeros((size, goals), np.float32)
     joints = {}
     done = 0
     work = Work(problem, gripper_contacts(problem), excluded)
@@ -122,6 +124,8 @@ def sweep(
             reason[rows], contact[rows], dexterity[rows] = block[:3]
             joints[part] = block.joints
             done += part.stop - part.start
+            for array in (reason, contact, dexterity):
+                release(array)
             if on_progress is not None:
                 on_progress(done, size)
     # Parts are finished in any order.
@@ -135,7 +139,8 @@ def sweep(
         )
     done_at = time.perf_counter()
     names = _name_contacts(contact, lowered, problem)
-    winners = np.cumsum([0, *np.count_nonzero((reason == 0).reshape(tables, -1), axis=1)])
+    states = [slice(i * size // tables, (i + 1) * size // tables) for i in range(tables)]
+    winners = np.cumsum([0, *(_reached(reason[rows]) for rows in states)])
     divided = tuple(
         ScoreTable(
             dexterity=dexterity[rows],
@@ -145,8 +150,7 @@ def sweep(
             arm_joints=winning[winners[i] : winners[i + 1]],
             weights=np.asarray(weights, dtype=np.float64),
         )
-        for i in range(tables)
-        for rows in [slice(i * size // tables, (i + 1) * size // tables)]
+        for i, rows in enumerate(states)
     )
     return Sweep(
         divided,
@@ -196,12 +200,8 @@ def _opened(
     """Return a context manager of the blocks of a problem in a folder, or of None."""
     if blocks is None:
         return nullcontext()
-    others = problem.environment_bodies + problem.robot_bodies
     return blocks.opened(
-        key(),
-        goals=problem.goal_p.shape[1],
-        joints=JOINTS,
-        contacts=problem.robot_bodies * others,
+        key(), goals=problem.goal_p.shape[1], joints=JOINTS, contacts=_codes(problem)
     )
 
 
@@ -229,17 +229,34 @@ def _scored(
         yield part, block
 
 
+def _reached(reason: NDArray[np.uint8]) -> int:
+    """Return the number of reached pairs."""
+    return sum(int(np.count_nonzero(reason[rows] == 0)) for rows in chunks(reason))
+
+
+def _codes(problem: Problem) -> int:
+    """Return the number of contact codes."""
+    return int(problem.robot_bodies * (problem.environment_bodies + problem.robot_bodies))
+
+
+def _code_type(problem: Problem) -> type[np.int16] | type[np.int32]:
+    """Return the smaller type that has all contact codes and -1."""
+    return np.int16 if _codes(problem) <= np.iinfo(np.int16).max else np.int32
+
+
 def _name_contacts(
-    contact: NDArray[np.int32], lowered: LoweredScene, problem: Problem
+    contact: NDArray[Any], lowered: LoweredScene, problem: Problem
 ) -> tuple[tuple[str, str], ...]:
     """Replace contact codes, in place, by indices into the returned pairs of names."""
     others = problem.environment_bodies + problem.robot_bodies
     both = (*lowered.environment_bodies, *lowered.robot_bodies)
     # One entry per code; NO_CONTACT (-1) indexes the last one.
-    occurs = np.zeros(problem.robot_bodies * others + 1, dtype=np.bool_)
-    occurs[contact] = True
+    occurs = np.zeros(_codes(problem) + 1, dtype=np.bool_)
+    for rows in chunks(contact):
+        occurs[contact[rows]] = True
     codes = np.flatnonzero(occurs[:-1])
-    index = np.full(occurs.size, -1, dtype=np.int32)
-    index[codes] = np.arange(codes.size, dtype=np.int32)
-    np.take(index, contact, out=contact, mode="wrap")
+    index = np.full(occurs.size, -1, dtype=contact.dtype)
+    index[codes] = np.arange(codes.size, dtype=contact.dtype)
+    for rows in chunks(contact):
+        contact[rows] = index[contact[rows]]
     return tuple((lowered.robot_bodies[code // others], both[code % others]) for code in codes)

@@ -13,6 +13,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from tcs.errors import TcsError
+from tcs.files.mapped import large_zeros
 from tcs.kernel.problem import Problem, build_problem
 from tcs.kernel.verification.dense import DENSE_SAMPLES, dense_scans
 from tcs.placement.scoring.drake_check import (
@@ -27,6 +28,7 @@ from tcs.placement.scoring.strata import (
     STRATA,
     Pairs,
     Stratum,
+    count_of,
     estimated_recall,
     random_pairs,
     scan_counts,
@@ -180,11 +182,11 @@ def verify(
     measure = file.metadata["measure"]
     checker = _FileChecker.of(file, jobs)
     rng = np.random.default_rng(seed)
-    reason = np.concatenate([table.scores.reason for table in file.tables])
-    reached = random_pairs(rng, reason == Reason.REACHED, pairs)
+    reason = _reasons(file)
+    reached = random_pairs(rng, reason, Reason.REACHED, pairs)
     counts = dict.fromkeys(STRATA, limit) if strata else scan_counts(reason, dense)
-    unreached = {r: random_pairs(rng, reason == r, count) for r, count in counts.items()}
-    again = random_pairs(rng, reason == Reason.REACHED, dense)
+    unreached = {r: random_pairs(rng, reason, r, count) for r, count in counts.items()}
+    again = random_pairs(rng, reason, Reason.REACHED, dense)
     of_refined = checker.refined_pairs()
     total = len(reached) + len(of_refined) + sum(map(len, unreached.values())) + len(again)
     count = itertools.count(1)
@@ -198,10 +200,8 @@ def verify(
     hits = {r: checker.hits(part, step) for r, part in unreached.items()}
     scan_seconds = time.perf_counter() - begun
     shortfall = checker.shortfall(again, step)
-    stored = int(np.count_nonzero(reason == Reason.REACHED))
-    found = tuple(
-        stratum_of(r, stored, int(np.count_nonzero(reason == r)), part) for r, part in hits.items()
-    )
+    stored = count_of(reason, Reason.REACHED)
+    found = tuple(stratum_of(r, stored, count_of(reason, r), part) for r, part in hits.items())
     recall, interval = estimated_recall(
         stored, [s.pairs for s in found], [s.scanned for s in found], [s.missed for s in found]
     )
@@ -225,6 +225,16 @@ def verify(
         shortfall_checked=len(shortfall),
         mean_shortfall=float(np.mean(shortfall)) if shortfall else None,
     )
+
+
+def _reasons(file: ScoreFile) -> NDArray[np.uint8]:
+    """Return the reasons of all tables, those of the first one first."""
+    tables = [table.scores.reason for table in file.tables]
+    if len(tables) == 1:
+        return tables[0]
+    rows = sum(map(len, tables))
+    joined: NDArray[np.uint8] = large_zeros((rows, tables[0].shape[1]), np.uint8)
+    return np.concatenate(tables, out=joined)
 
 
 def check_pairs(file: ScoreFile, table: int, pairs: Sequence[tuple[int, int]]) -> list[Finding]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tcs.errors import StoreFormatError
-from tcs.files.compression import check_claims, compress, decompress, smallest_unsigned
+from tcs.files.compression import check_claims, compress, decompress
 from tcs.files.joblib_file import check_header, header
+from tcs.files.mapped import chunks, large_zeros
 from tcs.files.reader import explained
 from tcs.model.grid import Grid
 from tcs.placement.store.refined_encoding import decode_refined, encode_refined
@@ -101,13 +104,21 @@ def _read_scores(
 
 
 def _encode_scores(scores: ScoreTable, sets: SetTable) -> dict[str, Any]:
-    rest = scores.reached.copy()
-    rest[sets.candidates] = False
     return {
         # The dexterity of the candidates is stored with the sets.
-        "dexterity_rest": compress(scores.dexterity[rest]),
+        "dexterity_rest": compress(
+            np.concatenate(
+                [
+                    np.empty(0, np.float32),
+                    *(
+                        scores.dexterity[rows][rest]
+                        for rows, rest in _rest(scores.reason, sets, scores.dexterity)
+                    ),
+                ]
+            )
+        ),
         "reason": compress(scores.reason),
-        "pair_plus_one": compress(smallest_unsigned(scores.pair.astype(np.int64) + 1)),
+        "pair_plus_one": compress(_plus_one(scores.pair)),
         "pair_names": [list(names) for names in scores.pair_names],
         "arm_joints": compress(scores.arm_joints),
     }
@@ -117,30 +128,74 @@ def _decode_scores(encoded: dict[str, Any], sets: SetTable, size: int) -> ScoreT
     reason = decompress(encoded, "reason", "u1", (size, sets.weights.size))
     if len(sets.candidates) and sets.candidates[-1] >= size:
         raise StoreFormatError("has sets of more configurations than scores")
-    dexterity = np.zeros(reason.shape, dtype=np.float32)
-    dexterity[sets.candidates] = sets.dexterity
-    rest = reason == Reason.REACHED
-    rest[sets.candidates] = False
-    dexterity[rest] = decompress(encoded, "dexterity_rest", "f4", (int(np.count_nonzero(rest)),))
-    pair = decompress(encoded, "pair_plus_one", "u", reason.shape).astype(np.int64) - 1
     names = encoded.get("pair_names")
     if not isinstance(names, list) or not all(
         isinstance(n, list) and len(n) == 2 and all(isinstance(body, str) for body in n)
         for n in names
     ):
         raise StoreFormatError("has pair_names that are not pairs of names")
-    if np.any(pair >= len(names)):
-        raise StoreFormatError(f"has a pair of bodies beyond its {len(names)} pair_names")
+    stored = decompress(encoded, "pair_plus_one", "u", reason.shape)
+    pair: NDArray[Any] = large_zeros(reason.shape, _pair_type(len(names)))
+    for rows in chunks(stored, pair):
+        if np.any(stored[rows] > len(names)):
+            raise StoreFormatError(f"has a pair of bodies beyond its {len(names)} pair_names")
+        pair[rows] = stored[rows]
+        pair[rows] -= 1
+    reached = sum(int(np.count_nonzero(reason[rows] == Reason.REACHED)) for rows in chunks(reason))
     return ScoreTable(
-        dexterity=dexterity,
+        dexterity=_decode_dexterity(encoded, sets, reason),
         reason=reason,
-        pair=pair.astype(np.int32),
+        pair=pair,
         pair_names=tuple((first, second) for first, second in names),
-        arm_joints=decompress(
-            encoded, "arm_joints", "f4", (int(np.count_nonzero(reason == Reason.REACHED)), 7)
-        ),
+        arm_joints=decompress(encoded, "arm_joints", "f4", (reached, 7)),
         weights=sets.weights,
     )
+
+
+def _decode_dexterity(
+    encoded: dict[str, Any], sets: SetTable, reason: NDArray[np.uint8]
+) -> NDArray[np.float32]:
+    """Return the dexterity of every pair: of the candidates, and of the others that are reached."""
+    count = sum(int(np.count_nonzero(rest)) for _, rest in _rest(reason, sets))
+    values = decompress(encoded, "dexterity_rest", "f4", (count,))
+    dexterity: NDArray[np.float32] = large_zeros(reason.shape, np.float32)
+    done = 0
+    for rows, rest in _rest(reason, sets, dexterity):
+        found = values[done : done + int(np.count_nonzero(rest))]
+        dexterity[rows][rest] = found
+        done += len(found)
+    dexterity[sets.candidates] = sets.dexterity
+    return dexterity
+
+
+def _rest(
+    reason: NDArray[np.uint8], sets: SetTable, *others: NDArray[Any]
+) -> Iterator[tuple[slice, NDArray[np.bool_]]]:
+    """Yield rows, and which of their pairs are reached by configurations without sets.
+
+    Args:
+        reason: Reasons of all pairs, shape (H, G).
+        sets: The sets.
+        *others: Further arrays of as many rows, of which the caller reads the same ones.
+    """
+    alone = np.ones((len(reason), 1), dtype=np.bool_)
+    alone[sets.candidates] = False
+    for rows in chunks(reason, *others):
+        yield rows, (reason[rows] == Reason.REACHED) & alone[rows]
+
+
+def _plus_one(pair: NDArray[Any]) -> NDArray[Any]:
+    """Return numbers of pairs of bodies without a sign, in the smallest type for the greatest."""
+    greatest = max((int(pair[rows].max(initial=-1)) for rows in chunks(pair)), default=-1)
+    stored: NDArray[Any] = large_zeros(pair.shape, np.min_scalar_type(greatest + 1))
+    for rows in chunks(pair, stored):
+        stored[rows] = pair[rows].astype(np.int32) + 1
+    return stored
+
+
+def _pair_type(names: int) -> type[np.int16] | type[np.int32]:
+    """Return the type of indices into names of pairs, as `ScoreTable.pair`."""
+    return np.int16 if names <= np.iinfo(np.int16).max else np.int32
 
 
 def _dict(value: object, what: str) -> dict[str, Any]:

@@ -102,6 +102,9 @@ def check_sets_of(scores: ScoreTable, sets: SetTable) -> None:
         StoreError: If they are not.
     """
     candidates = candidates_of(scores.reached, scores.weights, sets.rule)
+    if sets.tile:
+        # Some of them stand for the others.
+        candidates = candidates[np.isin(candidates, sets.candidates)]
     if not (
         np.array_equal(sets.weights, scores.weights)
         and np.array_equal(sets.candidates, candidates)

@@ -47,6 +47,7 @@ def encode_sets(sets: SetTable) -> dict[str, Any]:
         "min_distance": float(sets.min_distance),
         "same_environment": bool(sets.same_environment),
         "state_size": int(sets.state_size),
+        "tile": float(sets.tile),
         "weights": compress(sets.weights),
         "candidate_step": _encode_ascending(sets.candidates.astype(np.int64)),
         "reached": compress(sets.reached.astype(np.uint8)),
@@ -86,6 +87,9 @@ def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
         TcsError: If the sets contradict themselves.
     """
     check_types(encoded, _PLAIN)
+    # Files from before there were such sets do not name it.
+    if type(encoded.get("tile", 0.0)) is not float:
+        raise StoreFormatError("lacks a valid 'tile' (float)")
     configurations = grid.size
     weights = decompress(encoded, "weights", "f8", (AtMost(int(GOALS.high)),))
     candidates = ascending_from(
@@ -107,6 +111,7 @@ def decode_sets(encoded: dict[str, Any], grid: Grid) -> SetTable:
     pair_cells = np.stack(np.divmod(numbers, max(len(cell_xy), 1)), axis=1)
     return SetTable(
         **{name: encoded[name] for name in _PLAIN},
+        tile=encoded.get("tile", 0.0),
         arm_size=grid.arm_size,
         weights=weights,
         candidates=candidates.astype(np.int32),

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from tcs.errors import GridError
 from tcs.model.grid import Axis, Grid
 from tcs.placement.tables import Reason, ScoreTable
-from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 FloatArray = NDArray[np.float64]
 _PLACE = ("base_x", "base_y")
@@ -75,7 +74,6 @@ class PlaceMap:
     def _of_rows(cls, scores: ScoreTable, grid: Grid, state: int | None) -> PlaceMap:
         """Return the map of one state, or of all for None."""
         rows = rows_of_state(grid, state)
-        reached, dexterity = scores.reached[rows], scores.dexterity[rows]
         # Contact of the body does not depend on the goal.
         blocked = scores.has_no_free_body[rows]
         excluded = np.asarray(scores.reason[rows, 0] == Reason.EXCLUDED)
@@ -83,10 +81,8 @@ class PlaceMap:
         return cls(
             x=grid.axis("base_x").values,
             y=grid.axis("base_y").values,
-            reachability=best_per_place(grid, tc_reachability(reached, scores.weights), state),
-            manipulability=best_per_place(
-                grid, tc_manipulability(dexterity, scores.weights), state
-            ),
+            reachability=best_per_place(grid, scores.reachability(rows), state),
+            manipulability=best_per_place(grid, scores.manipulability(rows), state),
             free=best_per_place(grid, ~blocked, state),
             excluded=~best_per_place(grid, ~excluded, state) if np.any(excluded) else None,
             # Axes of one value are left out. Headings and torso heights come first.

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from tcs.files.mapped import chunks, large_zeros
 from tcs.placement.tables.checks import ArrayTable, Shapes, length_of, require
 from tcs.placement.tables.equations import tc_manipulability, tc_reachability
 
 WEIGHT_SUM_TOLERANCE = 1e-9
 """Weights must sum to 1; dividing by the sum leaves 1e-16 per goal; this tolerates
 millions of goals and still refuses weights that were never normalised."""
+
+EVERY = slice(None)
+"""All configurations."""
 
 
 class Reason(IntEnum):
@@ -42,14 +48,15 @@ class ScoreTable(ArrayTable):
     """Scores of H initial configurations at G goals; arrays are read-only.
 
     Rows follow the flat order of the grid: C order over (environment state, base x,
-    base y, base yaw, torso level).
+    base y, base yaw, torso level). Arrays over all pairs may be mapped to a scratch file
+    (`tcs.files.mapped`): work on some of their rows at a time.
     """
 
     dexterity: NDArray[np.float32]
     """Greatest dexterity over all collision-free solutions, 0 where not reached, shape (H, G)."""
     reason: NDArray[np.uint8]
     """A `Reason` for each pair of configuration and goal, shape (H, G)."""
-    pair: NDArray[np.int32]
+    pair: NDArray[np.int16] | NDArray[np.int32]
     """The bodies in contact, as index into `pair_names`; -1 where none, shape (H, G)."""
     pair_names: tuple[tuple[str, str], ...]
     """Names of two bodies in contact."""
@@ -71,7 +78,7 @@ class ScoreTable(ArrayTable):
             "weights": (np.float64, (goals,)),
             "dexterity": (np.float32, (rows, goals)),
             "reason": (np.uint8, (rows, goals)),
-            "pair": (np.int32, (rows, goals)),
+            "pair": (_pair_type(self.pair), (rows, goals)),
             "arm_joints": (np.float32, (None, 7)),
         }
         self._check_arrays("score table", shapes)
@@ -86,28 +93,34 @@ class ScoreTable(ArrayTable):
             and abs(float(weights.sum()) - 1.0) <= WEIGHT_SUM_TOLERANCE,
             "score table: weights must be >= 0 and sum to 1.",
         )
-        require(
-            bool(np.all(self.reason <= max(Reason))),
-            f"score table: reason outside 0..{max(Reason):d}.",
-        )
-        require(
-            bool(np.all((self.dexterity >= 0.0) & (self.dexterity < np.inf))),
-            "score table: dexterity must be finite and >= 0.",
-        )
-        require(
-            not np.any(self.dexterity[~reached]),
-            "score table: dexterity must be 0 where the goal is not reached.",
-        )
-        require(
-            bool(np.all((self.pair >= -1) & (self.pair < len(self.pair_names)))),
-            f"score table: pair outside -1..{len(self.pair_names) - 1}.",
-        )
+        for rows in chunks(self.dexterity, self.reason, self.pair, reached):
+            self._check_rows(rows)
         require(
             len(self.arm_joints) == np.count_nonzero(reached),
             f"score table: {len(self.arm_joints)} rows of arm joints for "
             f"{np.count_nonzero(reached)} reached pairs; the numbers must be equal.",
         )
         require(bool(np.all(np.isfinite(self.arm_joints))), "score table: arm joints not finite.")
+
+    def _check_rows(self, rows: slice) -> None:
+        """Check the ranges of the values of some configurations."""
+        dexterity, pair = self.dexterity[rows], self.pair[rows]
+        require(
+            bool(np.all(self.reason[rows] <= max(Reason))),
+            f"score table: reason outside 0..{max(Reason):d}.",
+        )
+        require(
+            bool(np.all((dexterity >= 0.0) & (dexterity < np.inf))),
+            "score table: dexterity must be finite and >= 0.",
+        )
+        require(
+            not np.any(dexterity[~self.reached[rows]]),
+            "score table: dexterity must be 0 where the goal is not reached.",
+        )
+        require(
+            bool(np.all((pair >= -1) & (pair < len(self.pair_names)))),
+            f"score table: pair outside -1..{len(self.pair_names) - 1}.",
+        )
 
     @property
     def configurations(self) -> int:
@@ -122,33 +135,49 @@ class ScoreTable(ArrayTable):
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
         """Whether the goal is reached, shape (H, G)."""
-        reached = np.asarray(self.reason == Reason.REACHED)
+        reached: NDArray[np.bool_] = large_zeros(self.reason.shape, np.bool_)
+        for rows in chunks(self.reason, reached):
+            np.equal(self.reason[rows], Reason.REACHED, out=reached[rows])
         reached.flags.writeable = False
         return reached
 
     @property
     def has_no_free_body(self) -> NDArray[np.bool_]:
         """Whether a configuration's body is in contact or was not checked, shape (H,)."""
-        reason = self.reason
-        stuck = (reason == Reason.BODY_BLOCKED) | (reason == Reason.EXCLUDED)
-        return np.asarray(np.any(stuck, axis=1))
+        stuck = np.empty(self.configurations, dtype=np.bool_)
+        for rows in chunks(self.reason):
+            reason = self.reason[rows]
+            either = (reason == Reason.BODY_BLOCKED) | (reason == Reason.EXCLUDED)
+            np.any(either, axis=1, out=stuck[rows])
+        return stuck
 
     @cached_property
     def _reached_pairs(self) -> NDArray[np.intp]:
         """Flat (h, g) numbers of the reached pairs, ascending, shape (R,)."""
         return np.flatnonzero(self.reached)
 
-    def reachability(self) -> NDArray[np.float64]:
-        """Return P_R of each configuration by itself, TCS eq. (1), shape (H,)."""
-        return tc_reachability(self.reached, self.weights)
+    def reachability(self, rows: slice | NDArray[np.int64] = EVERY) -> NDArray[np.float64]:
+        """Return P_R of each configuration, or of some, by itself, TCS eq. (1), shape (H,)."""
+        return self._of_rows(tc_reachability, self.reached[rows])
 
-    def manipulability(self) -> NDArray[np.float64]:
-        """Return P_M of each configuration by itself, TCS eq. (4), shape (H,)."""
-        return tc_manipulability(self.dexterity, self.weights)
+    def manipulability(self, rows: slice | NDArray[np.int64] = EVERY) -> NDArray[np.float64]:
+        """Return P_M of each configuration, or of some, by itself, TCS eq. (4), shape (H,)."""
+        return self._of_rows(tc_manipulability, self.dexterity[rows])
+
+    def _of_rows(
+        self, equation: Callable[..., NDArray[np.float64]], values: NDArray[Any]
+    ) -> NDArray[np.float64]:
+        """Return an equation of the values of each configuration, worked out some at a time."""
+        found = np.empty(len(values))
+        for part in chunks(values):
+            found[part] = equation(values[part], self.weights)
+        return found
 
     def reason_counts(self) -> dict[str, int]:
         """Return the number of pairs of configuration and goal with each reason, by its name."""
-        counts = np.bincount(self.reason.ravel(), minlength=len(Reason))
+        counts = np.zeros(len(Reason), dtype=np.int64)
+        for rows in chunks(self.reason):
+            counts += np.bincount(self.reason[rows].ravel(), minlength=len(Reason))
         return {reason.name.lower(): int(counts[reason]) for reason in Reason}
 
     def joints_of(self, h: int, g: int) -> NDArray[np.float32] | None:
@@ -172,3 +201,8 @@ class ScoreTable(ArrayTable):
             return None
         row = int(np.searchsorted(self._reached_pairs, h * self.goals + g))
         return np.asarray(self.arm_joints[row])
+
+
+def _pair_type(pair: object) -> DTypeLike:
+    """Return the type that the numbers of pairs of bodies must have: 16 bits, or 32 if they do."""
+    return np.int32 if getattr(pair, "dtype", None) == np.int32 else np.int16

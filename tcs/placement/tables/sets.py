@@ -39,6 +39,9 @@ DISTANCE_TOLERANCE = 1e-9
 class SetTable(ArrayTable):
     """All kept sets (tau in the TCS paper) of C candidates in N base cells; read-only.
 
+    The candidates are all configurations that the rule keeps as singles, or of very many some that
+    stand for the others.
+
     Order of the sets, which also breaks ties: the singles by configuration index, then the
     pairs (a, b), a < b, in lexicographic order, then the triples likewise.
     """
@@ -94,6 +97,9 @@ class SetTable(ArrayTable):
     """Configuration index of the best set of one; () without candidates."""
     lattice: BaseLattice
     """Where the base can drive."""
+    tile: float = 0.0
+    """Side of the squares of the floor within which a candidate stands for others [m]; 0 if every
+    configuration that the rule keeps is a candidate."""
 
     def __post_init__(self) -> None:
         """Check the arrays against each other and make them read-only.
@@ -129,6 +135,7 @@ class SetTable(ArrayTable):
             f"set table: max_members must be 1 to {MOST_MEMBERS}.",
         )
         require(0.0 <= self.min_distance < np.inf, "set table: min_distance must be finite, >= 0.")
+        require(0.0 <= self.tile < np.inf, "set table: tile must be finite, >= 0.")
         require(
             self.state_size > 0 and self.arm_size > 0 and self.arm_size % self.state_size == 0,
             "set table: state_size must be positive, and arm_size a multiple of it.",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import OutputError
+from tcs.files import mapped
 from tcs.files.compression import compress
 from tcs.placement.scoring.blocks import FORMAT, BlockFolder
 from tcs.placement.scoring.engines import Work
@@ -74,6 +75,15 @@ def test_finished_blocks_are_not_scored_again(run, plain, small_job, tmp_path):
     assert_same(table, plain)
     assert scored == 0
     assert run(restart=True)[1] == len(files(tmp_path))
+
+
+def test_scores_beyond_the_memory_are_the_same(run, plain, monkeypatch):
+    monkeypatch.setattr(mapped, "LEAST_BYTES", 1)
+    monkeypatch.setattr(mapped, "CHUNK_BYTES", 100)
+    table, _ = run()
+    for name in ("reason", "dexterity", "pair", "arm_joints", "reached", "has_no_free_body"):
+        np.testing.assert_array_equal(getattr(table, name), getattr(plain, name))
+    assert table.pair_names == plain.pair_names
 
 
 def test_an_interrupted_run_continues(run, plain, small_job, tmp_path):

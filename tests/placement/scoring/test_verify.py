@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 
 from tcs.errors import StoreMismatchError, TcsError
+from tcs.files import mapped
 from tcs.model.grid import Grid
 from tcs.placement.scoring import build_sets, load_job, score, summary, verify
-from tcs.placement.scoring.strata import SAMPLED, STRATA, estimated_recall, scan_counts
+from tcs.placement.scoring.strata import (
+    SAMPLED,
+    STRATA,
+    estimated_recall,
+    random_pairs,
+    scan_counts,
+)
 from tcs.placement.store import StateTables
 from tcs.placement.tables import Reason
 from tests.environments import BESIDE, write_environment
@@ -233,3 +240,15 @@ def test_a_file_that_reaches_nothing_claims_nothing(tmp_path):
     for key in ("max_position_error", "max_isotropy_error", "recall", "recall_ci95"):
         assert plain[key] is None
     assert plain["mean_shortfall"] is None
+
+
+@pytest.mark.parametrize("count", [0, 5, 400, None])
+def test_random_pairs_do_not_depend_on_the_size_of_chunks(count, monkeypatch):
+    reason = np.random.default_rng(3).integers(0, 7, size=(700, 3)).astype(np.uint8)
+    flat = np.flatnonzero(reason == Reason.ARM_BLOCKED)
+    picked = flat
+    if count is not None:
+        picked = np.random.default_rng(8).choice(flat, size=min(count, flat.size), replace=False)
+    monkeypatch.setattr(mapped, "CHUNK_BYTES", 50)
+    found = random_pairs(np.random.default_rng(8), reason, Reason.ARM_BLOCKED, count)
+    assert [3 * h + g for h, g in found] == picked.tolist()

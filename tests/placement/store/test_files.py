@@ -1,5 +1,6 @@
 import dataclasses
 import errno
+import mmap
 import os
 import resource
 import tracemalloc
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from tcs.errors import OutputError, StoreError, StoreFormatError
+from tcs.files import compression, mapped
 from tcs.files.compression import compress, decompress
 from tcs.placement.store import FORMAT_VERSION, ScoreFile, load_scores, save_scores
 from tcs.placement.store.encoding import encode
@@ -426,6 +428,39 @@ def test_a_claim_beyond_what_the_file_holds_allocates_nothing(path, file, name, 
         tracemalloc.stop()
     # The file, its unpickled bytes, and what the sound parts decompress to.
     assert peak < 4 * size + 16 * 1024**2
+
+
+def test_a_table_beyond_the_memory_is_mapped_and_the_same(path, file, monkeypatch):
+    save_scores(path, file)
+    monkeypatch.setattr(mapped, "LEAST_BYTES", 1)
+    monkeypatch.setattr(mapped, "CHUNK_BYTES", 100)
+    monkeypatch.setattr(compression, "CHUNK_BYTES", 100)
+    loaded = load_scores(path)
+    assert_same(file, loaded)
+    assert isinstance(base_of(loaded.nominal.scores.reason), mmap.mmap)
+    assert loaded.nominal.scores.reason_counts() == file.nominal.scores.reason_counts()
+    for values in ("reachability", "manipulability"):
+        np.testing.assert_array_equal(
+            getattr(loaded.nominal.scores, values)(), getattr(file.nominal.scores, values)()
+        )
+    save_scores(path, loaded)
+    assert_same(file, load_scores(path))
+
+
+def base_of(array):
+    """What an array keeps its numbers in."""
+    while isinstance(array, np.ndarray):
+        array = array.base
+    return array.obj if isinstance(array, memoryview) else array
+
+
+@pytest.mark.parametrize("tile", [1, "x", None, -0.1, float("nan")])
+def test_a_tile_that_is_none_is_refused(path, file, tile):
+    content = encode(file)
+    content["tables"][0]["sets"]["tile"] = tile
+    joblib.dump(content, path)
+    with pytest.raises(StoreFormatError, match="tile"):
+        load_scores(path)
 
 
 def test_a_large_file_of_equal_reasons_is_no_bomb(path):

@@ -43,7 +43,7 @@ def random_scores(grid, goals, seed, *, levels=0, share=0.5):
     return ScoreTable(
         dexterity=np.where(reached, dexterity, np.float32(0.0)),
         reason=reason,
-        pair=np.where(named, rng.integers(0, 3, size=shape), -1).astype(np.int32),
+        pair=np.where(named, rng.integers(0, 3, size=shape), -1).astype(np.int16),
         pair_names=(("arm", "chair"), ("base", "chair"), ("gripper", "head")),
         arm_joints=rng.uniform(-2.0, 2.0, (int(reached.sum()), 7)).astype(np.float32),
         weights=raw / raw.sum(),
