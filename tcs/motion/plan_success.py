@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from tcs.errors import TcsError
 from tcs.kernel.motion.edges import certified
 from tcs.kernel.motion.trees import new_trees
-from tcs.model.grid import Grid
 from tcs.model.scene import LoweredScene, Scene, lower
 from tcs.model.scene.lowering import environment_at
 from tcs.motion.motion_plan import MotionPlan, Segment, StopPlan
@@ -144,8 +143,8 @@ class _Place:
     planned: StopPlan
     job: Job
     scene: Scene
-    grid: Grid
     lowered: LoweredScene
+    stops: StopGrid
     values: Mapping[str, float]
     """Value of each axis [m or rad]."""
 
@@ -155,18 +154,21 @@ class _Place:
         axes = job.scored_grid.axes
         values = {axis.name: value_of(planned.at, axis.name) for axis in axes}
         grid = single_grid(axes, list(values.values()))
-        return cls(planned, job, scene, grid, lower(scene, job.task, grid), values)
+        lowered = lower(scene, job.task, grid)
+        return cls(planned, job, scene, lowered, StopGrid.of(job, scene, grid, lowered), values)
 
     @property
     def nominal(self) -> dict[str, float]:
         """Positions of the environment's joints without error [m or rad]."""
-        return {axis.name: self.values[axis.name] for axis in self.grid.environment_axes}
+        return {
+            axis.name: self.values[axis.name] for axis in self.stops.configurations.environment_axes
+        }
 
     def displaced(self, state: Mapping[str, float], seed: int) -> Stop:
         """Return the stop with the environment's joints at some positions, the live scene too."""
         arrays = environment_at(self.lowered, self.scene, self.job.task, [state])
         lowered = dataclasses.replace(self.lowered, arrays=arrays)
-        stop = StopGrid.of(self.job, self.scene, self.grid, lowered).stop(0, new_trees(seed))
+        stop = self.stops.with_environment(lowered).stop(0, new_trees(seed))
         stop.place({**self.values, **state})
         for name, value in state.items():
             self.scene.set_joint(name, value)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tcs.errors import TaskError
-from tcs.kernel.arrays import BoolArray, FloatArray
+from tcs.kernel.arrays import FloatArray
 from tcs.kernel.motion.edges import NO_PAIR, posture_contact
 from tcs.kernel.motion.groups import grouped
 from tcs.kernel.motion.idle import list_needed
 from tcs.kernel.motion.scene import (
     MotionScene,
     MotionWorkspace,
-    motion_scene,
     new_motion_workspace,
+    placed,
+    torso_scene,
     with_pairs,
 )
 from tcs.kernel.motion.trees import Trees, new_trees
@@ -63,8 +64,9 @@ class StopGrid:
     """Velocity limits [rad/s], shape (7,)."""
     acceleration: FloatArray
     """Acceleration limits [rad/s^2], shape (7,)."""
-    needed: dict[int, BoolArray] = field(default_factory=dict)
-    """For each torso level met so far, which pairs of the robot's own shapes may touch."""
+    scenes: dict[int, tuple[MotionScene, MotionScene]] = field(default_factory=dict)
+    """For each torso level met so far, the scenes of paths and of straight motions, with the
+    environment in no particular place."""
 
     @classmethod
     def of(cls, job: Job, scene: Scene, grid: Grid, lowered: LoweredScene) -> StopGrid:
@@ -100,6 +102,17 @@ class StopGrid:
             acceleration=np.array(acceleration),
         )
 
+    def with_environment(self, lowered: LoweredScene) -> StopGrid:
+        """Return the same configurations with the shapes of the environment elsewhere.
+
+        Args:
+            lowered: The same scene lowered otherwise, without boxes that paths keep out of.
+        """
+        if self.job.task.keep_out:
+            lowered = with_keep_out(lowered, self.job.task)
+        problem = build_problem(lowered.arrays, lowered.grid)
+        return replace(self, lowered=lowered, problem=problem)
+
     def stop(self, configuration: int, trees: Trees) -> Stop:
         """Return the stop at a configuration; the live scene stays as it is.
 
@@ -107,33 +120,37 @@ class StopGrid:
             configuration: Flat index among those that are lowered.
             trees: Memory of the planner, with its random state.
         """
-        every = self._without_idle_pairs(motion_scene(self.problem, configuration), configuration)
-        motion = grouped(every)
+        torso = configuration % self.problem.torso_levels
+        if torso not in self.scenes:
+            self.scenes[torso] = self._scenes_at(torso)
+        paths, straight = self.scenes[torso]
+        motion = placed(paths, self.problem, configuration)
         work = new_motion_workspace(motion)
         lines, line_work = motion, work
-        if self.job.task.keep_out:
-            # The boxes are the last bodies of the environment.
-            first = self.problem.environment_bodies - len(self.job.task.keep_out)
-            other = every.body[every.pair[:, 1]]
-            outside = (other < first) | (other >= self.problem.environment_bodies)
-            lines = grouped(with_pairs(every, outside))
+        if straight is not paths:
+            lines = placed(straight, self.problem, configuration)
             line_work = new_motion_workspace(lines)
         return Stop(self, configuration, motion, work, lines, line_work, trees)
 
-    def _without_idle_pairs(self, scene: MotionScene, configuration: int) -> MotionScene:
-        """Return a scene without pairs of the robot's own shapes that never touch.
+    def _scenes_at(self, torso: int) -> tuple[MotionScene, MotionScene]:
+        """Return the scenes of paths and of straight motions at a torso level, to be placed.
 
-        Which these are depends on the torso alone.
+        Pairs of the robot's own shapes that never touch are left out.
         """
-        torso = configuration % self.problem.torso_levels
-        own = scene.body[scene.pair[:, 1]] >= self.problem.environment_bodies
-        if torso not in self.needed:
-            needed = np.ones(len(scene.pair), np.bool_)
-            list_needed(scene, new_motion_workspace(scene), needed)
-            self.needed[torso] = needed[own]
-        needed = np.ones(len(scene.pair), np.bool_)
-        needed[own] = self.needed[torso]
-        return with_pairs(scene, needed)
+        every, first_robot = torso_scene(self.problem, torso), self.problem.environment_bodies
+        other = every.body[every.pair[:, 1]]
+        own = with_pairs(every, other >= first_robot)
+        needed = np.ones(len(own.pair), np.bool_)
+        list_needed(own, new_motion_workspace(own), needed)
+        kept = np.ones(len(every.pair), np.bool_)
+        kept[other >= first_robot] = needed
+        paths = grouped(with_pairs(every, kept))
+        if not self.job.task.keep_out:
+            return paths, paths
+        # The boxes are the last bodies of the environment.
+        first = first_robot - len(self.job.task.keep_out)
+        outside = (other < first) | (other >= first_robot)
+        return paths, grouped(with_pairs(every, kept & outside))
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ class MotionScene(NamedTuple):
     link_frame: IntArray
     """Link of each shape in `links`, 1 .. 7, shape (n_arm,)."""
     fixed: FloatArray
-    """Environment and rest of the robot within reach, packed, in A, shape (n_fixed, 17)."""
+    """Environment and rest of the robot, packed, in A, shape (n_fixed, 17)."""
     pair: IntArray
     """Checked pairs: shape of the arm, other shape, and link that carries the other shape, 0 if it
     is fixed; shape (n_pairs, 3). The other link is the one nearer to the base."""
@@ -58,7 +58,8 @@ class MotionScene(NamedTuple):
     """First and one after the last of the pairs below each pair, equal if there are none; shape
     (n_pairs, 2), or (0, 2) without groups. They are apart if the pair is, see `groups`."""
     centre: FloatArray
-    """Centre of the fixed shape of each pair in A [m], shape (3, n_pairs); 0 where both move."""
+    """Centre in A of the fixed shape of each pair that is checked always [m], shape
+    (3, those pairs); 0 where both move."""
     bound: FloatArray
     """Sum of the radii of the bounding spheres of each pair [m], shape (n_pairs,)."""
     gap: FloatArray
@@ -121,6 +122,74 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
         problem: The scene and its grid.
         configuration: Flat index of the initial configuration.
     """
+    scene = torso_scene(problem, configuration % problem.torso_levels)
+    return placed(scene, problem, configuration)
+
+
+def torso_scene(problem: Problem, torso: int) -> MotionScene:
+    """Return a scene at a torso level, with its environment in no particular place.
+
+    Which pairs are checked is the same at all configurations of that level, and so are the boxes
+    around groups of shapes: `placed` places what else there is.
+
+    Args:
+        problem: The scene and its grid.
+        torso: The torso level.
+    """
+    # The boxes around groups of shapes come after the shapes, and are left out.
+    count, others = len(problem.link_body), len(problem.body_body)
+    fixed = np.concatenate([problem.environment[0], problem.body_A[torso, :others]])
+    gap_fixed = np.concatenate(
+        [problem.gap_environment[:count], problem.gap_body[:count, :others]], axis=1
+    )
+    links = np.ascontiguousarray(problem.links[:count])
+    link_frame = np.ascontiguousarray(problem.link_frame[:count])
+    gap_arm = problem.gap_arm[:count, :count]
+    arm, other = np.nonzero(gap_fixed > 0.0)
+    apart = link_frame[:, None] != link_frame[None]
+    first, second = np.nonzero(np.tril((gap_arm > 0.0) & apart))
+    # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
+    pair = np.concatenate(
+        [
+            np.stack([arm, count + other, np.zeros_like(arm)], axis=1),
+            np.stack([second, first, link_frame[first]], axis=1),
+        ]
+    )
+    gap = np.concatenate([gap_fixed[arm, other], gap_arm[first, second]])
+    order = np.argsort(pair[:, 0], kind="stable")
+    lower, upper = problem.arm.lower, problem.arm.upper
+    reach = _reach(problem.chain_p, links, link_frame)
+    return MotionScene(
+        chain_R=problem.chain_R,
+        chain_p=problem.chain_p,
+        lower=lower,
+        upper=upper,
+        period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
+        reach=reach,
+        weight=(reach / reach.max()) ** 2,
+        links=links,
+        link_frame=link_frame,
+        fixed=fixed,
+        body=np.concatenate(
+            [
+                problem.link_body + problem.environment_bodies,
+                problem.environment_body,
+                problem.body_body + problem.environment_bodies,
+            ]
+        ),
+        **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
+    )
+
+
+def placed(scene: MotionScene, problem: Problem, configuration: int) -> MotionScene:
+    """Return a scene with its environment as at one initial configuration.
+
+    Args:
+        scene: From `torso_scene` of the configuration's torso level, with all pairs or some, with
+            groups or without; or from this function.
+        problem: The scene and its grid.
+        configuration: Flat index of the initial configuration.
+    """
     sizes = (problem.base_x.size, problem.base_y.size, problem.base_yaw.size, problem.torso_levels)
     state, x, y, yaw, torso = (
         int(i) for i in np.unravel_index(configuration, (problem.environment_states, *sizes))
@@ -133,49 +202,9 @@ def motion_scene(problem: Problem, configuration: int) -> MotionScene:
     R_WA = R_WB @ problem.base_R[torso]
     p_WA = p_WB + R_WB @ problem.base_p[torso]
     environment = _moved(problem.environment[state], R_WA.T, -R_WA.T @ p_WA)
-    # The boxes around groups of shapes come after the shapes, and are left out.
-    count, others = len(problem.link_body), len(problem.body_body)
-    fixed = np.concatenate([environment, problem.body_A[torso, :others]])
-    gap_fixed = np.concatenate(
-        [problem.gap_environment[:count], problem.gap_body[:count, :others]], axis=1
-    )
-    links = np.ascontiguousarray(problem.links[:count])
-    link_frame = np.ascontiguousarray(problem.link_frame[:count])
-    gap_arm = problem.gap_arm[:count, :count]
-    body = np.concatenate(
-        [problem.environment_body, problem.body_body + problem.environment_bodies]
-    )
-    within = _within_reach(problem.chain_p, links, link_frame, fixed, gap_fixed)
-    near = np.flatnonzero(within.any(axis=0))
-    arm, other = np.nonzero(within[:, near])
-    apart = link_frame[:, None] != link_frame[None]
-    first, second = np.nonzero(np.tril((gap_arm > 0.0) & apart))
-    # `links` begin at the tool, so the shape of greater index is on the link nearer to the base.
-    pair = np.concatenate(
-        [
-            np.stack([arm, count + other, np.zeros_like(arm)], axis=1),
-            np.stack([second, first, link_frame[first]], axis=1),
-        ]
-    )
-    gap = np.concatenate([gap_fixed[:, near][arm, other], gap_arm[first, second]])
-    order = np.argsort(pair[:, 0], kind="stable")
-    lower, upper = problem.arm.lower, problem.arm.upper
-    reach = _reach(problem.chain_p, links, link_frame)
-    fixed = np.ascontiguousarray(fixed[near])
-    return MotionScene(
-        chain_R=problem.chain_R,
-        chain_p=problem.chain_p,
-        lower=lower,
-        upper=upper,
-        period=np.where(np.isfinite(lower) & np.isfinite(upper), 0.0, FULL_TURN),
-        reach=reach,
-        weight=(reach / reach.max()) ** 2,
-        links=links,
-        link_frame=link_frame,
-        fixed=fixed,
-        body=np.concatenate([problem.link_body + problem.environment_bodies, body[near]]),
-        **pair_fields(links, fixed, pair[order].astype(np.int64), gap[order]),
-    )
+    fixed = np.concatenate([environment, scene.fixed[len(environment) :]])
+    always = scene.pair[: scene.first_pair[-1]]
+    return scene._replace(fixed=fixed, centre=_centres(always, len(scene.links), fixed))
 
 
 def with_pairs(scene: MotionScene, kept: BoolArray) -> MotionScene:
@@ -210,9 +239,7 @@ def pair_fields(
     roots = np.arange(len(links))
     if below is not None:
         roots = np.union1d(always[:, 0], always[of_two_links, 1])
-    moving = pair[:, 2] > 0
     shapes = np.concatenate([links, fixed])
-    centre = np.where(moving[:, None], 0.0, shapes[pair[:, 1], CENTRE : CENTRE + 3])
     return {
         "pair": np.ascontiguousarray(pair),
         "roots": roots.astype(np.int64),
@@ -220,7 +247,7 @@ def pair_fields(
         "first_pair": first_pair,
         "first_moving": first_pair[:-1] + fixed_pairs,
         "gap": np.ascontiguousarray(gap),
-        "centre": np.ascontiguousarray(centre.T),
+        "centre": _centres(always, len(links), fixed),
         "bound": shapes[pair[:, 0], BOUND] + shapes[pair[:, 1], BOUND],
     }
 
@@ -262,14 +289,18 @@ def _moved(rows: FloatArray, R: FloatArray, p: FloatArray) -> FloatArray:
     return moved
 
 
-def _within_reach(
-    chain_p: FloatArray, links: FloatArray, link_frame: IntArray, fixed: FloatArray, gap: FloatArray
-) -> BoolArray:
-    """Return whether each shape of the arm may come near each fixed shape, (n_arm, n_fixed)."""
-    out = _reach_from(0, chain_p, links, link_frame)
-    away = np.linalg.norm(fixed[:, CENTRE : CENTRE + 3], axis=1) - fixed[:, BOUND]
-    meets = away[None] <= out[:, None] + gap
-    return np.asarray((gap > 0.0) & meets)
+def _centres(pair: IntArray, links: int, fixed: FloatArray) -> FloatArray:
+    """Return the centre of the fixed shape of each pair [m], 0 where both move, (3, n_pairs).
+
+    Args:
+        pair: Pairs, shape (n_pairs, 3).
+        links: Number of shapes of the arm.
+        fixed: Fixed shapes, packed, shape (n_fixed, 17).
+    """
+    centre = np.zeros((3, len(pair)))
+    still = np.flatnonzero(pair[:, 2] == 0)
+    centre[:, still] = fixed[pair[still, 1] - links, CENTRE : CENTRE + 3].T
+    return centre
 
 
 def _reach(chain_p: FloatArray, links: FloatArray, link_frame: IntArray) -> FloatArray:
