@@ -10,9 +10,15 @@ from tcs.kernel.collide import BOUND, CENTRE, ROTATION, SIZE, TYPE
 from tcs.kernel.motion.edges import NO_PAIR, certified, posture_contact
 from tcs.kernel.motion.groups import NONE, boxes_around, grouped
 from tcs.kernel.motion.idle import without_idle_pairs
-from tcs.kernel.motion.scene import motion_scene, new_motion_workspace
+from tcs.kernel.motion.scene import (
+    motion_scene,
+    new_motion_workspace,
+    placed,
+    torso_scene,
+)
 from tcs.kernel.problem import build_problem
-from tcs.kernel.verification.reference_motion import straight_curve
+from tcs.kernel.verification.reference_motion import least_excess, straight_curve
+from tcs.kernel.verification.reference_pairs import placed_scene
 from tests.kernel.arms import drake_arm
 from tests.kernel.motion.toys import HERE, within_limits
 from tests.kernel.shapes import rotation
@@ -27,7 +33,7 @@ def chain():
 
 
 @pytest.fixture(scope="module")
-def plain(chain):
+def many(chain):
     """Return a random scene whose arm has each of its shapes eight times, each time elsewhere."""
     rng = np.random.default_rng(3)
     scene = toy_scene(chain, 0, obstacles=12)
@@ -41,12 +47,17 @@ def plain(chain):
         R=np.array([[rotation(rng) for _ in which]]),
         p=scene.arm.p[:, which] + rng.normal(scale=0.04, size=(1, len(which), 3)),
     )
-    many = scene._replace(
+    return scene._replace(
         arm=arm,
         arm_vs_arm=scene.arm_vs_arm[np.ix_(which, which)],
         arm_vs_body=scene.arm_vs_body[which],
         arm_vs_environment=scene.arm_vs_environment[which],
     )
+
+
+@pytest.fixture(scope="module")
+def plain(many):
+    """Return that scene, prepared at one configuration."""
     return without_idle_pairs(motion_scene(build_problem(many, toy_grid()), HERE))
 
 
@@ -114,6 +125,26 @@ def test_postures_and_curves_are_judged_as_without_groups(plain, chain, rng):
         outcomes.append(certified(scene, work, curve) == 1.0)
         assert outcomes[-1] == (certified(plain, plain_work, curve) == 1.0)
     assert 3 < sum(outcomes) < len(outcomes)
+
+
+def test_a_scene_is_placed_at_every_configuration(many, chain, rng):
+    problem = build_problem(many, toy_grid())
+    sizes = (problem.base_x.size, problem.base_y.size, problem.base_yaw.size)
+    size = problem.environment_states * int(np.prod(sizes)) * problem.torso_levels
+    judged = []
+    for torso in range(problem.torso_levels):
+        scene = grouped(torso_scene(problem, torso))
+        # Of both states of the environment, far from each other.
+        for h in (torso, size // 2 + 4 * problem.torso_levels + torso):
+            # Placing again replaces where the environment was.
+            scene = placed(scene, problem, h)
+            work, reference = new_motion_workspace(scene), placed_scene(many, toy_grid(), h, 0)[0]
+            for _ in range(12):
+                q = within_limits(rng, chain)
+                touches = least_excess(reference, q) < 0.0
+                assert (posture_contact(scene, work, q) != NO_PAIR) == touches
+                judged.append(touches)
+    assert 5 < sum(judged) < len(judged) - 5
 
 
 def test_an_arm_of_few_shapes_is_left_as_it_is(chain):
