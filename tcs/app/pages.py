@@ -12,7 +12,16 @@ LANGUAGES = ("en", "de")
 """Languages of the page; the texts of each are in one file."""
 _TYPES = {".js": "text/javascript", ".css": "text/css", ".json": "application/json"}
 _NAMES = (
-    *("api.js", "main.js", "map.js", "panels.js", "texts.js", "style.css"),
+    *(
+        "api.js",
+        "editing.js",
+        "main.js",
+        "map.js",
+        "panels.js",
+        "texts.js",
+        "things.js",
+        "style.css",
+    ),
     *(f"{language}.json" for language in LANGUAGES),
 )
 _POLICY = (

@@ -97,9 +97,17 @@ class Client:
         """
         return self._response("GET", f"/v1/files/{file}").content
 
+    def environment_of(self, file: str) -> str:
+        """Return the environment of a score file as YAML, as `Engine.environment_of`."""
+        return self._response("GET", f"/v1/files/{file}/environment").text
+
     def view_of(self, file: str) -> bytes:
         """Return a page with the scene in 3-D, as `Engine.view_of`."""
         return self._response("GET", f"/v1/files/{file}/view").content
+
+    def report_of(self, file: str) -> bytes:
+        """Return the report of a score file as a page, as `Engine.report_of`."""
+        return self._response("GET", f"/v1/files/{file}/report").content
 
     def select(self, request: SelectRequest) -> dict[str, Any]:
         """Return the set with the greatest utility, as `Engine.select`."""

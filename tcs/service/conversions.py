@@ -10,7 +10,14 @@ from tcs.model.grid import Axis, InitialConfiguration
 from tcs.placement.constraints import Constraints, Obstacle, Region
 from tcs.placement.selection import TravelWeights, UtilityWeights, nearest_table
 from tcs.placement.store import ScoreFile
-from tcs.service.requests import BasePose, Limited, Observed, SelectRequest, TravelCosts
+from tcs.service.requests import (
+    BasePose,
+    ForbiddenRegion,
+    Limited,
+    Observed,
+    SelectRequest,
+    TravelCosts,
+)
 
 
 def settings_of(values: Mapping[str, float], where: str) -> dict[str, float]:
@@ -97,16 +104,26 @@ def constraints_of(request: Limited, prefer: Sequence[str] = ()) -> Constraints:
     Raises:
         TcsError: If one is not of its form.
     """
-    regions = [
-        Region.parse(given) if isinstance(given, str) else Region.of(given, "'forbid'")
-        for given in request.forbid
-    ]
     return Constraints(
         only=tuple(request.only),
         keep=tuple(request.keep),
-        forbid=tuple(regions),
+        forbid=regions_of(request.forbid),
         blocked=tuple(Obstacle.parse(given) for given in request.blocked),
         prefer=tuple(prefer),
+    )
+
+
+def regions_of(given: Sequence[ForbiddenRegion]) -> tuple[Region, ...]:
+    """Return the forbidden regions of a request.
+
+    Raises:
+        SelectionError: If one is not of its form.
+    """
+    return tuple(
+        Region.parse(one)
+        if isinstance(one, str)
+        else Region.of([list(vertex) for vertex in one], "'forbid'")
+        for one in given
     )
 
 

@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
-from tcs.errors import ServiceError, TcsError, UnknownNameError
+from tcs.errors import EnvironmentFileError, ServiceError, TcsError, UnknownNameError
+from tcs.files.documents import checked
 from tcs.files.json_values import without_infinities
 from tcs.files.writing import scratch_folder
 from tcs.model.catalogue import catalogue
@@ -127,6 +128,22 @@ class Engine:
         """
         return self._files.content(file)
 
+    def environment_of(self, file: str) -> str:
+        """Return the environment of a score file, as the text of a file for `--environment`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            EnvironmentFileError: If a model of it does not ship with tcs.
+        """
+        from tcs.model.scene import EnvironmentFile
+        from tcs.model.scene.changes import environment_text
+
+        with self._files.held(file).lock:
+            content = self._files.loaded(file).environment
+        where = "environment of the score file"
+        environment = checked(content, EnvironmentFile, where, EnvironmentFileError)
+        return environment_text(environment, portable=True)
+
     def view_of(self, file: str) -> bytes:
         """Return a page with the scene in 3-D, as `tcs view --export`; it takes some seconds.
 
@@ -136,6 +153,16 @@ class Engine:
             ServiceError: If it cannot be made, e.g. because the models have changed.
         """
         return self._views.page(file)
+
+    def report_of(self, file: str) -> bytes:
+        """Return the report of a score file as a page, as `tcs report`; it takes some seconds.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            BusyError: If another page is being made.
+            ServiceError: If it cannot be made, e.g. because the models have changed.
+        """
+        return self._views.page(file, "report")
 
     def select(self, request: SelectRequest) -> dict[str, Any]:
         """Return the set with the greatest utility, as `tcs select --json`.
@@ -303,6 +330,7 @@ class Engine:
             PopulationRequest: ("population", self._set_work.population),
             RefineRequest: ("refine", self._set_work.refine),
             MotionsRequest: ("motions", self._set_work.motions),
+            RescoreRequest: ("rescore", self._work.rescore),
         }
         what, done = work[type(request)]
         return what, self._plainly(partial(done, request))

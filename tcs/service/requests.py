@@ -113,6 +113,8 @@ class SceneRequest(Document):
     """Return the outlines of furniture, person and base from above, in each state; a job."""
 
     file: FileId
+    state: Annotated[int, Field(strict=True, ge=0)] | None = None
+    """The one state to outline; all by default."""
 
 
 class ScoreRequest(Limited):
@@ -135,6 +137,35 @@ class ScoreRequest(Limited):
 
 class ScoreHereRequest(ScoreRequest, Observed):
     """Score the scene as it is observed now, as `tcs score --observed` or `--frames`; a job."""
+
+
+class Move(Document):
+    """How a thing is moved on the floor, along the axes of what it stands on."""
+
+    x: Number = 0.0
+    y: Number = 0.0
+    turn_deg: Number = 0.0
+
+
+class Piece(Document):
+    """A piece of furniture on the floor, one of `tcs.model.scene.pieces.PIECES`."""
+
+    piece: Text
+    x: Number
+    y: Number
+    turn_deg: Number = 0.0
+
+
+class RescoreRequest(State):
+    """Score the task of a score file again where its environment has been changed; a job."""
+
+    file: FileId
+    move: Annotated[dict[str, Move], Field(max_length=100)] = Field(default_factory=dict)
+    add: Annotated[list[Piece], Field(max_length=20)] = Field(default_factory=list)
+    joints: Settings = Field(default_factory=dict)
+    forbid: Annotated[list[ForbiddenRegion], Field(max_length=100)] = Field(default_factory=list)
+    only_state: Annotated[bool, Field(strict=True)] = False
+    max_members: Annotated[int, Field(strict=True, ge=1, le=3)] = 2
 
 
 class EvaluateRequest(Observed):
@@ -203,6 +234,7 @@ JobRequest = (
     | PopulationRequest
     | RefineRequest
     | MotionsRequest
+    | RescoreRequest
     | SceneRequest
 )
 """Requests that take longer than a moment: they become jobs."""

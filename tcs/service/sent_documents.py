@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tcs.errors import DataFileError, EnvironmentFileError, ServiceError, TaskError, one_line
 from tcs.files.documents import read_mapping
 from tcs.files.paths import is_path
+
+if TYPE_CHECKING:
+    from tcs.model.scene import EnvironmentFile
 
 
 class SentDocuments:
@@ -47,6 +50,16 @@ class SentDocuments:
                     f"sent environment: 'file' is '{one_line(file)}'; must name a model file that "
                     "ships, relative to the data folder."
                 )
+        return path
+
+    def made(self, environment: EnvironmentFile) -> Path:
+        """Return the path of a file with an environment that was made here."""
+        from tcs.model.scene.changes import environment_text
+
+        text = environment_text(environment)
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        path = self._folder / f"changed-environment-{digest[:16]}.yaml"
+        path.write_text(text, encoding="utf-8")
         return path
 
     def without_folder(self, message: str) -> str:

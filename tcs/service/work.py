@@ -19,6 +19,7 @@ from tcs.service.limits import Limits
 from tcs.service.requests import (
     EvaluateRequest,
     PlanRequest,
+    RescoreRequest,
     SceneRequest,
     ScoreHereRequest,
     ScoreRequest,
@@ -89,6 +90,19 @@ class SceneWork:
         progress(1, 1)
         return {**self._held(scored), "observation": scored.metadata["observation"]}
 
+    def rescore(self, request: RescoreRequest, progress: Progress) -> dict[str, Any]:
+        """Return the summary of the task scored in the changed environment; as `score`.
+
+        Raises:
+            StoreMismatchError: If the models are not those the file was made from.
+            TcsError: As `tcs.score`, and if a change is not possible.
+        """
+        from tcs.service.rescoring import rescored
+
+        file = self._files.for_scene(request.file)
+        scored = rescored(file, request, self._sent, self._limits.threads, progress)
+        return self._held(scored)
+
     def evaluate(self, request: EvaluateRequest, progress: Progress) -> dict[str, Any]:
         """Return the success of a set under random errors, as `tcs evaluate --json`.
 
@@ -140,7 +154,7 @@ class SceneWork:
         from tcs.service.scene_outlines import scene_outlines
 
         file = self._files.for_scene(request.file)
-        return scene_outlines(file, progress)
+        return scene_outlines(file, progress, request.state)
 
     def _models(self, request: ScoreRequest) -> tuple[Any, Any, str]:
         """Return task, environment and robot by name, or by the path of what was sent."""

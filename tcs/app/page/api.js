@@ -21,6 +21,11 @@ export function post(operation, request) {
   });
 }
 
+// Sends a score file of this machine.
+export function send(chosen) {
+  return asked("v1/files", { method: "POST", headers: { "Content-Type": "application/octet-stream" }, body: chosen });
+}
+
 export function cancel(job) {
   return asked(`v1/jobs/${job}`, { method: "DELETE" });
 }

@@ -1,9 +1,11 @@
 // The page: what is chosen, and what follows from each change of it.
 
-import { Refusal, cancel, ended, get, post } from "./api.js";
+import { Refusal, cancel, ended, get, post, send } from "./api.js";
+import { Editing, thingName } from "./editing.js";
 import { FloorMap, paint } from "./map.js";
 import { by, made, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
 import { load, sentence, t } from "./texts.js";
+import { Things, overlap, turned } from "./things.js";
 
 const PERSONS = {
   default: null,
@@ -15,15 +17,33 @@ const PERSONS = {
 const SETTLED = 350; // time after the last change at which places are suggested [ms]
 const SIZES = [1, 2];
 
-const page = { files: [], floors: [], scene: null, state: 0, torso: 0, outcome: null, asked: 0, suggesting: 0, known: null };
-const map = new FloorMap(by("map"), (pose, isClick) => move(pose, { best: isClick && by("best").checked }));
+const page = { files: [], torso: 0, outcome: null, asked: 0, suggesting: 0, known: null, own: {}, rescored: new Set() };
+// What is shown: a score file, its floors by state, the state, and its scene. `whole` has every state, with the changes of the scene.
+let [view, whole] = [shownFile(null, 0), shownFile(null, 0)];
+const things = new Things();
+const map = new FloorMap(by("map"), {
+  onPose: (pose, isClick) => move(pose, { best: isClick && by("best").checked }),
+  onThing: (name, pose, isEnd) => editing.dragged(name, pose, isEnd),
+  onRegion: (first, second) => editing.region(first, second),
+});
+const editing = new Editing(map, things, {
+  get file() { return file().file; },
+  get at() { return at(); },
+  get states() { return whole.floors.find(Boolean).states; },
+  fault, moved, redraw: showScene, restore, scored, nearest,
+});
+
+function shownFile(digest, state) {
+  return { file: digest, floors: [], state, scene: null };
+}
 
 const file = () => page.files.find((one) => one.file === by("file").value);
-const floor = () => page.floors[page.state] ?? page.floors.find(Boolean);
-const at = () => floor().states[page.state];
+const floor = () => view.floors[view.state] ?? view.floors.find(Boolean);
+const at = () => floor().states[view.state];
+const fileName = (ending) => `${file().task}-${file().environment}-${file().robot}${things.isChanged || editing.at ? "-changed" : ""}${ending}`.replaceAll(" ", "-");
 
 function fault(error) {
-  by("fault").textContent = error instanceof Refusal ? error.message : String(error);
+  by("fault").textContent = error instanceof Refusal ? error.message : String(error.message ?? error);
 }
 
 async function start() {
@@ -48,10 +68,11 @@ function say() {
   by("limits").replaceChildren();
   for (const text of t("limits")) made("li", text, by("limits"));
   showLegend();
+  editing.say();
 }
 
 async function listFiles(chosen) {
-  page.files = await get("v1/files");
+  page.files = (await get("v1/files")).filter((one) => !page.rescored.has(one.file));
   options(by("file"), page.files.map((one) => [one.file, one.title]), chosen);
 }
 
@@ -65,28 +86,101 @@ function offerTasks() {
 
 function offerEnvironments() {
   const task = page.known.tasks.find((one) => one.name === by("task").value);
-  const known = task.environments.map((name) => [name, name]);
+  const known = (task?.environments ?? page.known.environments.map((one) => one.name)).map((name) => [name, name]);
   options(by("environment"), known, file()?.environment);
+  if (page.own.environment) made("option", t("own"), by("environment"), { value: "" });
 }
 
 async function openFile(wanted = new URLSearchParams()) {
-  Object.assign(page, { floors: [], scene: null, state: Number(wanted.get("state") ?? 0), outcome: null });
+  editing.clear();
+  page.outcome = null;
+  view = whole = shownFile(file().file, Number(wanted.get("state") ?? 0));
   by("view").replaceChildren();
   by("environmentStates").hidden = true;
-  by("download").href = `v1/files/${file().file}`;
-  by("download").download = `${file().task}-${file().environment}-${file().robot}.tcs`;
-  page.floors[page.state] = await post("floor", { file: file().file, state: page.state });
+  await floorOf(view, view.state);
   options(by("torso"), floor().torsos.map((value) => [value, value.toFixed(2)]), wanted.get("torso"));
   page.torso = Number(by("torso").value);
   map.floor(floor(), by("score-of").value);
-  map.scene([]);
+  map.scene([], null, things);
   map.suggest([]);
+  links();
   const given = ["x", "y", "yaw"].map((name) => wanted.get(name)).every((value) => value !== null);
   const pose = given ? { x: Number(wanted.get("x")), y: Number(wanted.get("y")), yaw: Number(wanted.get("yaw")) } : bestPlace();
   await move(pose, { best: !given });
   // The rest arrives while the page is in use.
-  outlines(file().file).catch(fault);
-  otherStates(file().file).catch(fault);
+  const opened = view;
+  page.original = opened;
+  sceneOf(opened, {}, opened.state).then(() => {
+    if (opened !== whole) return;
+    editing.offer(opened.scene, opened.scene.states[opened.state]?.outlines ?? [], wanted.get("changes"));
+    showScene();
+    if (floor().states.length > 1) sceneOf(opened).then(showScene).catch(fault);
+  }).catch(fault);
+  otherStates(opened).catch(fault);
+}
+
+async function floorOf(shown, state) {
+  shown.floors[state] ??= await post("floor", { file: shown.file, state });
+  return shown.floors[state];
+}
+
+function links() {
+  by("download").href = `v1/files/${view.file}`;
+  by("download").download = fileName(".tcs");
+  by("downloadEnvironment").href = `v1/files/${view.file}/environment`;
+  by("downloadEnvironment").download = `${file().environment}-changed.yaml`.replaceAll(" ", "-");
+  by("report").href = `v1/files/${view.file}/report`;
+}
+
+// Shows scores of the changed scene: of the visible state alone, or of all.
+async function scored(digest, { isOne, state }) {
+  page.rescored.add(digest);
+  const states = whole.floors.find(Boolean).states;
+  const number = isOne ? 0 : states.findIndex((one) => isSame(one, state));
+  const next = shownFile(digest, number);
+  await floorOf(next, number);
+  view = next;
+  if (!isOne || states.length < 2) whole = next;
+  await shownAnew();
+  // The map moves outlines by itself; only other postures have other outlines.
+  if (Object.keys(things.joints).length || editing.at) {
+    sceneOf(next, structuredClone(things.moves)).then(() => next === view && showScene()).catch(fault);
+  } else {
+    const known = page.original?.scene;
+    const number = known?.settings.findIndex((one) => isSame(one, at())) ?? -1;
+    if (number >= 0) next.scene = { ...known, states: isOne ? [known.states[number]] : known.states };
+    showScene();
+  }
+  if (!isOne) otherStates(next).catch(fault);
+}
+
+const isSame = (state, other) => Object.entries(state).every(([name, value]) => Math.abs(other[name] - value) < 1e-6);
+
+async function shownAnew() {
+  map.floor(floor(), by("score-of").value);
+  showScene();
+  listStates();
+  links();
+  by("view").replaceChildren();
+  await move(map.pose);
+}
+
+// Goes back to the file as it was scored, in the present state.
+async function restore() {
+  const state = at();
+  view = whole = page.original;
+  const { states } = await floorOf(view, 0);
+  view.state = Math.max(states.findIndex((one) => isSame(one, state)), 0);
+  await floorOf(view, view.state);
+  await shownAnew();
+  otherStates(view).catch(fault);
+}
+
+// Shows a state of the table while a slider moves.
+async function nearest(state) {
+  if (view === whole && view.state === state) return;
+  view = whole;
+  await changeState(state);
 }
 
 // Returns the base position with the greatest score, where the page begins.
@@ -100,43 +194,76 @@ function bestPlace() {
   return best;
 }
 
-async function outlines(asked) {
-  const job = await post("scene", { file: asked });
+// Fetches the scene of a file; what was moved is taken back in it, because the map moves the outlines itself.
+async function sceneOf(shown, moves = {}, only = null) {
+  const job = await post("scene", { file: shown.file, state: only });
   const done = await ended(job.job, () => {});
-  if (asked !== file().file) return;
   if (!done.result) throw new Refusal(done.problem);
-  page.scene = done.result;
-  showScene();
+  const scene = done.result;
+  const person = scene.things.find((one) => one.category === "person")?.name;
+  for (const state of scene.states.filter(Boolean)) {
+    state.outlines = state.outlines.filter((one) => !things.isAdded(one.thing.replace(/_[bc]$/, "")));
+    for (const one of state.outlines) one.points = one.points.map((point) => things.unmoved(one.thing, point, moves));
+    state.goals = state.goals.map(([x, y, z]) => [...things.unmoved(person, [x, y], moves), z]);
+  }
+  scene.settings = shown.floors.find(Boolean).states;
+  if (only !== null) scene.states = scene.settings.map((_, i) => (i === only ? scene.states[0] : null));
+  shown.scene = scene;
 }
 
+const sceneNow = () => view.scene ?? whole.scene ?? page.lastScene;
+const stateNow = () => sceneNow()?.states[view.scene ? view.state : 0];
+
 function showScene() {
-  const state = page.scene?.states[page.state];
-  map.scene(state?.outlines ?? [], page.scene?.base);
+  if (view.scene) page.lastScene = view.scene;
+  map.scene(stateNow()?.outlines ?? [], sceneNow()?.base, things);
   marks();
+  under();
+}
+
+// What follows a thing while it is dragged.
+function moved() {
+  map.placeThings();
+  marks();
+  under();
 }
 
 function marks() {
-  const positions = page.scene?.states[page.state]?.goals ?? [];
+  const person = sceneNow()?.things.find((one) => one.category === "person")?.name;
+  const positions = (stateNow()?.goals ?? []).map((at) => (things.find(person) ? things.moved(person, at) : at));
   const goals = page.outcome?.goals ?? [];
   map.marks(positions.map((position, i) => ({ at: position, number: i + 1, reached: goals[i]?.reached })));
 }
 
-async function otherStates(asked) {
-  for (let state = 0; state < floor().states.length; state++) {
-    page.floors[state] ??= await post("floor", { file: asked, state });
-    if (asked !== file().file) return;
+// Says what the base is under, e.g. the bed.
+function under() {
+  const { x, y, yaw } = map.pose;
+  const base = map.base.map((point) => turned(point, yaw)).map(([px, py]) => [px + x, py + y]);
+  const isFree = page.outcome?.goals.some((goal) => !["body_blocked", "excluded"].includes(goal.reason));
+  const names = new Set();
+  for (const { thing, points } of isFree ? map.outlines : []) {
+    const there = things.find(thing) ? points.map((point) => things.moved(thing, point)) : points;
+    if (overlap(base, there)) names.add(thingName(thing));
+  }
+  by("under").textContent = names.size ? t("under", { things: [...names].join(", ") }) : "";
+}
+
+async function otherStates(shown) {
+  for (let state = 0; state < shown.floors.find(Boolean).states.length; state++) {
+    await floorOf(shown, state);
+    if (shown !== view) return;
   }
   listStates();
 }
 
 function listStates() {
-  if (page.floors.filter(Boolean).length < floor().states.length) return;
-  showStates(page.floors, by("score-of").value, page.state, paint, (state) => changeState(state));
+  if (view.floors.filter(Boolean).length < floor().states.length) return;
+  showStates(view.floors, by("score-of").value, view.state, paint, (state) => changeState(state).catch(fault));
 }
 
 async function changeState(state) {
-  page.state = state;
-  page.floors[state] ??= await post("floor", { file: file().file, state });
+  await floorOf(view, state);
+  view.state = state;
   map.floor(floor(), by("score-of").value);
   showScene();
   listStates();
@@ -147,9 +274,11 @@ async function changeState(state) {
 async function move(pose, { best = false, torso = page.torso } = {}) {
   const yaw = ((pose.yaw % 360) + 360) % 360;
   page.torso = torso;
-  map.place({ x: pose.x, y: pose.y, yaw });
+  const { x, y } = map.within(pose);
+  pose = { x, y };
+  map.place({ x, y, yaw });
   const number = ++page.asked;
-  const request = { file: file().file, here: [pose.x, pose.y, yaw], torso, at: at(), best };
+  const request = { file: view.file, here: [pose.x, pose.y, yaw], torso, at: at(), best };
   let outcome;
   try {
     outcome = await post("outcome", request);
@@ -182,7 +311,9 @@ function show(outcome) {
   showGoals(outcome, (goal) => why(goal).catch(fault), (goal) => fixOf(goal).catch(fault));
   showExpert(outcome, command());
   marks();
-  const hash = { file: file().file, state: page.state, x: x.toFixed(3), y: y.toFixed(3), yaw: yaw.toFixed(1), torso: page.torso };
+  under();
+  const hash = { file: file().file, state: view === whole ? view.state : 0, x: x.toFixed(3), y: y.toFixed(3), yaw: yaw.toFixed(1), torso: page.torso };
+  if (things.isChanged) hash.changes = things.saved();
   history.replaceState(null, "", `#${new URLSearchParams(hash)}`);
 }
 
@@ -191,13 +322,14 @@ function command() {
   const settings = Object.entries(at()).map(([name, value]) => ` --at ${name}=${value}`).join("");
   const weights = ["alpha", "beta", "gamma"].map((name) => ` --${name} ${by(name).value}`).join("");
   const here = `--here ${x.toFixed(3)} ${y.toFixed(3)} ${yaw.toFixed(1)} --torso ${page.torso}${settings}`;
-  const name = `${file().task}-${file().environment}-${file().robot}.tcs`;
-  return `tcs select ${name} ${here}${weights}\ntcs explain ${name} --goal 0 ${here}`;
+  const name = fileName(".tcs");
+  const scoring = `tcs score ${file().task} --environment ${by("downloadEnvironment").download} --robot ${file().robot} --out ${name}\n`;
+  return `${things.isChanged || editing.at ? scoring : ""}tcs select ${name} ${here}${weights}\ntcs explain ${name} --goal 0 ${here}`;
 }
 
 function explained(goal) {
   const { x, y, yaw } = map.pose;
-  return post("explain", { file: file().file, goal: goal.goal, here: [x, y, yaw], torso: page.torso, at: at() });
+  return post("explain", { file: view.file, goal: goal.goal, here: [x, y, yaw], torso: page.torso, at: at() });
 }
 
 async function why(goal) {
@@ -219,7 +351,7 @@ async function go(member) {
   const pose = { x: member.base_x, y: member.base_y, yaw: member.base_yaw_deg };
   page.torso = member.torso;
   map.place(pose);
-  if (state >= 0 && state !== page.state) await changeState(state);
+  if (state >= 0 && state !== view.state) await changeState(state);
   else await move(pose);
   by("map").focus({ preventScroll: true });
 }
@@ -227,7 +359,7 @@ async function go(member) {
 async function suggest(number) {
   const { x, y, yaw } = map.pose;
   const weights = Object.fromEntries(["alpha", "beta", "gamma"].map((name) => [name, Number(by(name).value)]));
-  const asked = { file: file().file, here: [x, y, yaw], torso: page.torso, at: at(), ...weights };
+  const asked = { file: view.file, here: [x, y, yaw], torso: page.torso, at: at(), ...weights };
   const choices = [];
   for (const max_members of SIZES) {
     try {
@@ -241,9 +373,33 @@ async function suggest(number) {
   if (number === page.asked) showCards(choices, (member) => go(member).catch(fault), (choice) => map.suggest(choice.members));
 }
 
+// Opens a file of this machine: a score file, or a task or an environment to score, which the service checks.
+async function openOwn(chosen) {
+  if (!chosen) return;
+  if (chosen.name.endsWith(".tcs")) {
+    const entry = await send(chosen);
+    await listFiles(entry.file);
+    await openFile();
+    by("jobWords").textContent = t("opened", { name: chosen.name });
+    return;
+  }
+  const text = await chosen.text();
+  const kind = /^goals:/m.test(text) ? "task" : "environment";
+  page.own[kind] = text;
+  const select = by(kind);
+  select.querySelector("[value='']")?.remove();
+  made("option", chosen.name, select, { value: "" });
+  select.value = "";
+  by("jobWords").textContent = t(kind === "task" ? "ownTask" : "ownEnvironment", { name: chosen.name });
+}
+
 async function scoreNow() {
   const person = PERSONS[by("person").value];
-  const request = { task: by("task").value, environment: by("environment").value, robot: by("robot").value };
+  const request = { robot: by("robot").value };
+  for (const kind of ["task", "environment"]) {
+    if (by(kind).value) request[kind] = by(kind).value;
+    else request[`${kind}_yaml`] = page.own[kind];
+  }
   const job = await post("score", person ? { ...request, person } : request);
   by("job").hidden = false;
   by("cancel").onclick = () => cancel(job.job).catch(fault);
@@ -264,7 +420,7 @@ function show3d() {
   const view = by("view");
   view.replaceChildren();
   const waiting = made("p", t("loading3d"), view, { role: "status" });
-  const frame = made("iframe", undefined, view, { title: t("view3d"), sandbox: "allow-scripts", src: `v1/files/${file().file}/view` });
+  const frame = made("iframe", undefined, view, { title: t("view3d"), sandbox: "allow-scripts", src: `v1/files/${view.file}/view` });
   frame.onload = () => waiting.remove();
 }
 
@@ -284,15 +440,17 @@ by("score").onsubmit = (event) => {
   event.preventDefault();
   scoreNow().catch((error) => { by("job").hidden = true; fault(error); });
 };
+by("ownFile").onchange = () => openOwn(by("ownFile").files[0]).catch(fault);
 by("score-of").onchange = () => { map.floor(floor(), by("score-of").value); listStates(); };
 by("map").onkeydown = (event) => {
+  if (editing.keyed(event)) return event.preventDefault();
   const headings = floor()?.headings_deg ?? [];
   const pose = map.keyed(event, headings.length > 1 ? headings[1] - headings[0] : 15);
   if (!pose) return;
   event.preventDefault();
-  move(pose);
+  move(pose).catch(fault);
 };
-by("turn").onclick = () => by("map").onkeydown(new KeyboardEvent("keydown", { key: "r" }));
+by("turn").onclick = () => { editing.choose("robot"); by("map").onkeydown(new KeyboardEvent("keydown", { key: "r" })); };
 by("pose").onsubmit = (event) => event.preventDefault();
 by("pose").onchange = () => {
   const [x, y, yaw] = ["x", "y", "yaw"].map((id) => Number(by(id).value));

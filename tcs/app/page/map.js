@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis
-const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209] };
+const COLOURS = { person: "#e3a57f", furniture: "#7b8794", blocked: [196, 202, 209], added: "#8a7350", region: "#b3003b" };
 const HANDLE = 0.62; // distance of the handle from the middle of the base [m]
 const DRAG = 4; // movement that makes a click a drag [px]
 const UNKNOWN_BASE = [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]]; // until the outline is there [m]
@@ -42,15 +42,19 @@ function element(name, attributes, parent, text) {
 const points = (list) => list.map(([x, y]) => `${x},${-y}`).join(" ");
 
 export class FloorMap {
-  // `onPose` is called with {x, y, yaw} [m, deg] and whether the base was put there by a click.
-  constructor(svg, onPose) {
+  // `onPose` is called with {x, y, yaw} [m, deg] and whether the base was put there by a click, `onThing` with the name and the new
+  // pose of a thing and whether it was let go, `onRegion` with the corners of a region that was drawn.
+  constructor(svg, { onPose, onThing, onRegion }) {
     this.svg = svg;
-    this.onPose = onPose;
+    Object.assign(this, { onPose, onThing, onRegion });
+    this.isDrawing = false;
+    this.things = null;
+    this.subject = "robot";
     this.pose = { x: 0, y: 0, yaw: 0 };
     this.base = UNKNOWN_BASE;
     this.canvas = document.createElement("canvas");
     this.image = element("image", { preserveAspectRatio: "none" }, svg);
-    this.below = element("g", { "pointer-events": "none" }, svg);
+    this.below = element("g", {}, svg);
     this.stops = element("g", { "pointer-events": "none" }, svg);
     this.robot = element("g", {}, svg);
     this.goals = element("g", { "pointer-events": "none" }, svg);
@@ -71,14 +75,50 @@ export class FloorMap {
     this.#ruler();
   }
 
-  scene(outlines, base) {
-    this.below.replaceChildren();
+  // Draws the scene, a group for each thing, in the order of its lowest outline; what stands on a thing moves with it.
+  scene(outlines, base, things) {
     this.base = base ?? UNKNOWN_BASE;
-    for (const { category, points: list } of outlines) {
-      element("polygon", { points: points(list), fill: COLOURS[category], stroke: "#00000088", "stroke-width": 0.01 }, this.below);
-    }
+    [this.outlines, this.things] = [outlines, things];
+    this.#drawThings();
     this.#ruler();
     this.#draw();
+  }
+
+  #drawThings() {
+    this.below.replaceChildren();
+    this.groups = new Map();
+    if (!this.things) return;
+    const group = (thing) => {
+      if (this.groups.has(thing.name)) return this.groups.get(thing.name);
+      const above = thing.on ? this.things.find(thing.on) : null;
+      const made = element("g", { class: "thing", "data-name": thing.name }, above ? group(above) : this.below);
+      this.groups.set(thing.name, made);
+      return made;
+    };
+    const line = { stroke: "#00000088", "stroke-width": 0.01 };
+    const isAbove = ({ thing }) => (this.things.find(thing)?.on ? 1 : 0);
+    for (const { category, points: list, thing } of [...this.outlines].sort((a, b) => isAbove(a) - isAbove(b))) {
+      const parent = this.things.find(thing);
+      element("polygon", { points: points(list), fill: COLOURS[category], ...line }, parent ? group(parent) : this.below);
+    }
+    for (const one of [...this.things.added, ...this.things.regions]) {
+      const look = one.piece === "region"
+        ? { fill: `${COLOURS.region}22`, stroke: COLOURS.region, "stroke-width": 0.02, "stroke-dasharray": "0.08 0.05" }
+        : { fill: COLOURS.added, ...line };
+      for (const list of this.things.outlines(one)) element("polygon", { points: points(list), ...look }, group(one));
+      if (one.piece === "door") element("path", { d: "M0 .45A.9 .9 0 0 0 .9 -.45L0 -.45", fill: "none", ...line, "stroke-dasharray": "0.04" }, group(one));
+    }
+    this.placeThings();
+  }
+
+  // Moves the groups to where their things are.
+  placeThings() {
+    for (const [name, group] of this.groups ?? []) {
+      const { x, y, turn } = this.things.pose(name);
+      const [cx, cy] = this.things.find(name).centre ?? [0, 0];
+      group.setAttribute("transform", `translate(${x} ${-y}) rotate(${-turn} ${cx} ${-cy})`);
+      group.classList.toggle("chosen", name === this.subject);
+    }
   }
 
   #ruler() {
@@ -131,39 +171,81 @@ export class FloorMap {
     element("circle", { cx: HANDLE, cy: 0, r: 0.085, fill: "#fff", class: "handle", ...line }, this.robot);
   }
 
-  #at(event) {
-    const screen = this.svg.getScreenCTM().inverse();
+  #at(event, within = this.svg) {
+    const screen = within.getScreenCTM().inverse();
     const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(screen);
     return [point.x, -point.y];
   }
 
   #down(event) {
     if (event.button) return;
+    const what = event.target.getAttribute("class");
+    const thing = event.target.closest(".thing");
     const start = this.#at(event);
     const before = this.pose;
-    const what = event.target.getAttribute("class");
+    if (this.isDrawing) return this.#follow(event, this.#rectangle(start));
+    if (thing) return this.#follow(event, this.#dragThing(event, thing, start));
+    this.#follow(event, {
+      move: (moved) => {
+        const [x, y] = this.#at(moved);
+        if (what === "handle") this.onPose({ ...before, yaw: (Math.atan2(y - before.y, x - before.x) * 180) / Math.PI }, false);
+        else if (what) this.onPose({ ...before, ...this.#inside(before.x + x - start[0], before.y + y - start[1]) }, false);
+      },
+      up: () => {},
+      click: () => what !== "handle" && this.onPose({ ...before, ...this.#inside(...start) }, true),
+    });
+  }
+
+  // Follows a pointer until it is let go: a click if it hardly moved, else moves and an end.
+  #follow(event, { move, up, click }) {
     let dragged = false;
     this.svg.setPointerCapture(event.pointerId);
-    const move = (moved) => {
-      const far = Math.hypot(moved.clientX - event.clientX, moved.clientY - event.clientY);
-      if (!what || (!dragged && far < DRAG)) return;
-      dragged = true;
-      const [x, y] = this.#at(moved);
-      if (what === "handle") {
-        this.onPose({ ...before, yaw: (Math.atan2(y - before.y, x - before.x) * 180) / Math.PI }, false);
-      } else {
-        this.onPose({ ...before, ...this.#inside(before.x + x - start[0], before.y + y - start[1]) }, false);
-      }
+    const moves = (moved) => {
+      dragged ||= Math.hypot(moved.clientX - event.clientX, moved.clientY - event.clientY) >= DRAG;
+      if (dragged) move(moved);
     };
-    const up = () => {
-      this.svg.removeEventListener("pointermove", move);
-      this.svg.removeEventListener("pointerup", up);
-      this.svg.removeEventListener("pointercancel", up);
-      if (!dragged && what !== "handle") this.onPose({ ...before, ...this.#inside(...start) }, true);
+    const end = (last) => {
+      this.svg.removeEventListener("pointermove", moves);
+      for (const name of ["pointerup", "pointercancel"]) this.svg.removeEventListener(name, end);
+      if (dragged) up(last);
+      else click();
     };
-    this.svg.addEventListener("pointermove", move);
-    this.svg.addEventListener("pointerup", up);
-    this.svg.addEventListener("pointercancel", up);
+    this.svg.addEventListener("pointermove", moves);
+    for (const name of ["pointerup", "pointercancel"]) this.svg.addEventListener(name, end);
+  }
+
+  #dragThing(event, group, start) {
+    const name = group.dataset.name;
+    const before = { ...this.things.pose(name) };
+    const parent = group.parentNode;
+    const begun = this.#at(event, parent);
+    const there = (moved) => {
+      const [x, y] = this.#at(moved, parent);
+      return { ...before, x: before.x + x - begun[0], y: before.y + y - begun[1] };
+    };
+    return {
+      move: (moved) => this.onThing(name, there(moved), false),
+      up: (last) => this.onThing(name, there(last), true),
+      click: () => this.onPose({ ...this.pose, ...this.#inside(...start) }, true),
+    };
+  }
+
+  #rectangle([x, y]) {
+    const shown = element("rect", { fill: `${COLOURS.region}33`, stroke: COLOURS.region, "stroke-width": 0.02 }, this.svg);
+    const corner = (event) => this.#inside(...this.#at(event));
+    return {
+      move: (event) => {
+        const to = corner(event);
+        const size = { x: Math.min(x, to.x), y: -Math.max(y, to.y), width: Math.abs(to.x - x), height: Math.abs(to.y - y) };
+        for (const [key, value] of Object.entries(size)) shown.setAttribute(key, value);
+      },
+      up: (event) => {
+        const to = corner(event);
+        shown.remove();
+        this.onRegion([x, y], [to.x, to.y]);
+      },
+      click: () => shown.remove(),
+    };
   }
 
   #inside(x, y) {
@@ -172,12 +254,16 @@ export class FloorMap {
     return { x: Math.min(Math.max(x, left + edge), right - edge), y: Math.min(Math.max(y, low + edge), high - edge) };
   }
 
-  // Returns the pose after an arrow key or R, null for other keys.
-  keyed(event, turn) {
-    const { x, y, yaw } = this.pose;
+  // Returns the pose {x, y, yaw} after an arrow key or R, null for other keys.
+  keyed(event, turn, { x, y, yaw } = this.pose) {
     const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (steps) return { yaw, ...this.#inside(x + steps[0] * this.step, y + steps[1] * this.step) };
+    if (steps) return { yaw, x: x + steps[0] * this.step, y: y + steps[1] * this.step };
     if (event.key.toLowerCase() === "r" && !event.ctrlKey && !event.metaKey) return { x, y, yaw: yaw + (event.shiftKey ? -turn : turn) };
     return null;
+  }
+
+  // Returns a pose with its position moved into the map.
+  within(pose) {
+    return { ...pose, ...this.#inside(pose.x, pose.y) };
   }
 }

@@ -27,6 +27,23 @@ def made_from(file: ScoreFile) -> dict[str, Any]:
     }
 
 
+def recorded_job(record: Mapping[str, Any]) -> Job:
+    """Return the job that the metadata of a score file names, before its scene is built.
+
+    Args:
+        record: The metadata, or a record of `made_from`.
+
+    Raises:
+        UnknownNameError: If its task, environment or robot does not exist.
+        DataFileError: If a file that it names cannot be used.
+    """
+    return load_job(
+        *(record[key] for key in ("task", "environment", "robot")),
+        constraints=recorded_constraints(record),
+        person=recorded_person(record),
+    )
+
+
 def rebuild_scene(file: ScoreFile, *, meshes: bool = False) -> tuple[Job, Scene, LoweredScene]:
     """Return the job a file was scored from, its live scene, and that scene as arrays.
 
@@ -83,11 +100,7 @@ def rebuild_made_from(record: Mapping[str, Any], *, meshes: bool = False) -> tup
 def _rebuilt(
     record: Mapping[str, Any], observed: tuple[Axis, ...], meshes: bool
 ) -> tuple[Job, Scene, LoweredScene]:
-    job = load_job(
-        *(record[key] for key in ("task", "environment", "robot")),
-        constraints=recorded_constraints(record),
-        person=recorded_person(record),
-    )
+    job = recorded_job(record)
     # A file that was scored live has an observed state of its own.
     job = dataclasses.replace(job, observed=observed)
     scene = job.scene(meshes=meshes)

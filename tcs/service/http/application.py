@@ -105,6 +105,13 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
     async def view(file: str) -> Response:
         return HTMLResponse(await anyio.to_thread.run_sync(engine.view_of, file))
 
+    async def environment(file: str) -> Response:
+        text = await anyio.to_thread.run_sync(engine.environment_of, file)
+        return Response(text, media_type="application/yaml")
+
+    async def report(file: str) -> Response:
+        return HTMLResponse(await anyio.to_thread.run_sync(engine.report_of, file))
+
     body = {"required": True, "content": {_FILE: {"schema": {"type": "string"}}}}
     _route(app, "GET", "/v1/list", known, "List tasks, environments and robots.")
     _route(app, "GET", "/v1/files", files, "List the score files that are held.")
@@ -113,6 +120,11 @@ def _add_files(app: FastAPI, engine: Engine) -> None:
         openapi_extra={"requestBody": body},
     )  # fmt: skip
     _route(app, "GET", "/v1/files/{file}", fetch, "Fetch a score file.")
+    _route(
+        app, "GET", "/v1/files/{file}/environment", environment,
+        "Fetch the environment of a score file, as YAML.",
+    )  # fmt: skip
+    _route(app, "GET", "/v1/files/{file}/report", report, "Return the report, as a page.")
     _route(app, "GET", "/v1/files/{file}/view", view, "Return a page with the scene in 3-D.")
 
 
