@@ -37,6 +37,7 @@ from tcs.service.requests import (
     PlanRequest,
     PopulationRequest,
     RefineRequest,
+    RescoreRequest,
     SceneRequest,
     ScoreHereRequest,
     ScoreRequest,
