@@ -20,9 +20,11 @@ def refine(
     objective: Annotated[
         str,
         typer.Option(
-            metavar="score|success|margin",
-            help="What to maximise: P_R + P_M, the success under the errors of the environment, or "
-            "the success with the base displaced by up to 5 cm and 5 deg.",
+            metavar="score|success|margin|ball|toc",
+            help="What to maximise: P_R + P_M; the success under the errors of the environment; "
+            "the success with the base displaced by up to 5 cm and 5 deg; among the sets with the "
+            "greatest P_R, the radius of the ball of displacements in which no goal is lost; or "
+            "the score of TOC, 10 P_R + P_M, the latter times 0.95 for two or more.",
         ),
     ] = "score",
     starts: Annotated[

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
@@ -14,6 +14,7 @@ from tcs.errors import UnknownNameError
 from tcs.kernel.arrays import Chain, FloatArray, GridArrays, SceneArrays, Shapes
 from tcs.kernel.freedom.forms import COLUMNS
 from tcs.model.grid import Grid
+from tcs.model.scene.attached import AttachedPoses
 from tcs.model.scene.chain import JointAxis, link_frames
 from tcs.model.scene.contacts import ContactRule, Group, Part, shape_of
 from tcs.model.scene.lowered_scene import LoweredScene, read_only
@@ -71,19 +72,17 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
     scene.set_arm(np.zeros(len(built.arm_joints)))
     torso_levels = grid.axis("torso").values
     chain, X_AL = arm_chain(scene)
-    arm_base, body_poses = _torso_states(scene, body, torso_levels)
+    arm_base, body_poses = _torso_states(scene, torso_levels)
     for axis in grid.environment_axes:
         built.environment_joints.check_axis(axis, where=where)
-    environment_poses, goal_matrices = _environment_states(
-        scene, environment_parts, task, grid.environment_states()
-    )
+    environment_poses, goal_matrices = _environment_states(scene, task, grid.environment_states())
 
     arrays = SceneArrays(
         chain=chain,
         arm_base_R=_rotations(_matrices([arm_base]))[0],
         arm_base_p=_origins(_matrices([arm_base]))[0],
         arm=_shapes(scene, arm, robot_bodies, _matrices([_arm_poses(scene, arm, X_AL)])),
-        body=_shapes(scene, body, robot_bodies, _matrices(body_poses)),
+        body=_shapes(scene, body, robot_bodies, body_poses),
         environment=_shapes(scene, environment_parts, environment_bodies, environment_poses),
         arm_vs_arm=rule.checked(arm, arm),
         arm_vs_body=rule.checked(arm, body),
@@ -169,19 +168,24 @@ def _arm_poses(scene: Scene, parts: list[Part], X_AL: list[RigidTransform]) -> l
     return poses
 
 
-def _torso_states(
-    scene: Scene, parts: list[Part], levels: Iterable[float]
-) -> tuple[list[RigidTransform], list[list[RigidTransform]]]:
-    """Return X_BA, and the poses of the rest of the robot in B, for each torso level."""
-    arm_base, poses = [], []
+def _torso_states(scene: Scene, levels: Iterable[float]) -> tuple[list[RigidTransform], FloatArray]:
+    """Return X_BA, and the poses of the rest of the robot in B, for each torso level.
+
+    Returns:
+        The latter of shape (levels, parts, 3, 4).
+    """
+    attached = scene.attached(Group.BODY)
+    arm_base, frames, X_BW = [], [], RigidTransform()
     for level in levels:
         scene.set_torso(float(level))
         X_BW = scene.base_pose().inverse()
-        query = scene.query_object()
         X_WA = scene.built.arm_base_frame.CalcPoseInWorld(scene.plant_context)
         arm_base.append(X_BW @ X_WA)
-        poses.append([X_BW @ query.GetPoseInWorld(part.geometry) for part in parts])
-    return arm_base, poses
+        frames.append(attached.frames_in_world(scene.plant_context))
+    # The torso does not move the base.
+    X_WG = attached.at(_stacked(frames, len(attached.frames)))
+    R_BW, p_BW = X_BW.rotation().matrix(), X_BW.translation()[:, None]
+    return arm_base, np.concatenate([R_BW @ X_WG[..., :3], R_BW @ X_WG[..., 3:] + p_BW], axis=-1)
 
 
 def environment_at(
@@ -205,11 +209,8 @@ def environment_at(
         TcsError: If a joint follows another one, or a position exceeds its limits.
     """
     before = scene.positions()
-    environment_parts = [part for part in scene.built.parts if part.group is Group.ENVIRONMENT]
     try:
-        environment_poses, goal_matrices = _environment_states(
-            scene, environment_parts, task, states
-        )
+        environment_poses, goal_matrices = _environment_states(scene, task, states)
     finally:
         scene.restore(before)
     moved = lowered.arrays.environment._replace(
@@ -233,43 +234,40 @@ def torso_at(lowered: LoweredScene, scene: Scene, levels: Iterable[float]) -> Sc
         grid gives.
     """
     before = scene.positions()
-    body = [part for part in scene.built.parts if part.group is Group.BODY]
     try:
         scene.place_base(0.0, 0.0, 0.0)
         scene.set_arm(np.zeros(len(scene.built.arm_joints)))
-        arm_base, poses = _torso_states(scene, body, levels)
+        arm_base, poses = _torso_states(scene, levels)
     finally:
         scene.restore(before)
-    matrices, arm_bases = _matrices(poses), _matrices([arm_base])
+    arm_bases = _matrices([arm_base])
     return lowered.arrays._replace(
         arm_base_R=_rotations(arm_bases)[0],
         arm_base_p=_origins(arm_bases)[0],
-        body=lowered.arrays.body._replace(R=_rotations(matrices), p=_origins(matrices)),
+        body=lowered.arrays.body._replace(R=_rotations(poses), p=_origins(poses)),
     )
 
 
 def _environment_states(
-    scene: Scene, parts: list[Part], task: Task | None, states: Iterable[Mapping[str, float]]
+    scene: Scene, task: Task | None, states: Iterable[Mapping[str, float]]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the poses in W of the environment's shapes and of the goals, for each state.
 
     Returns:
         Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
     """
-    goals_in_frames = [] if task is None else _goals_in_frames(scene, task)
+    of_parts = scene.attached(Group.ENVIRONMENT)
+    of_goals = AttachedPoses.of([] if task is None else _goals_in_frames(scene, task))
     shapes, goals = [], []
     for state in states:
         for name, value in state.items():
             scene.set_joint(name, value)
-        query = scene.query_object()
-        shapes.append([query.GetPoseInWorld(part.geometry).GetAsMatrix34() for part in parts])
-        goals.append(
-            [
-                (frame.CalcPoseInWorld(scene.plant_context) @ X_HG).GetAsMatrix34()
-                for frame, X_HG in goals_in_frames
-            ]
-        )
-    return _stacked(shapes, len(parts)), _stacked(goals, len(goals_in_frames))
+        shapes.append(of_parts.frames_in_world(scene.plant_context))
+        goals.append(of_goals.frames_in_world(scene.plant_context))
+    return (
+        of_parts.at(_stacked(shapes, len(of_parts.frames))),
+        of_goals.at(_stacked(goals, len(of_goals.frames))),
+    )
 
 
 def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:
@@ -328,7 +326,7 @@ def _matrices(states: list[list[RigidTransform]]) -> FloatArray:
     return _stacked([[X.GetAsMatrix34() for X in poses] for poses in states], count)
 
 
-def _stacked(states: list[list[FloatArray]], count: int) -> FloatArray:
+def _stacked(states: Sequence[Sequence[FloatArray] | FloatArray], count: int) -> FloatArray:
     return np.array(states, dtype=np.float64).reshape(len(states), count, 3, 4)
 
 

@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context
 
 from tcs.errors import TcsError, UnknownNameError
 from tcs.kernel.arrays import FloatArray
+from tcs.model.scene.attached import AttachedPoses
 from tcs.model.scene.contacts import Group, Part
 from tcs.model.scene.plant import ScenePlant, build_plant
 from tcs.model.scene.spec import SceneSpec
@@ -63,6 +64,7 @@ class Scene:
             for i, followers in enumerate(self.built.coupled_joints)
             for joint in followers
         ]
+        self._attached: dict[Group, AttachedPoses] = {}
         self._pads: dict[str, float] = {}
         self._of_environment: set[str] = set()
         self._part_of = {part.geometry: part for part in self.built.parts}
@@ -84,6 +86,14 @@ class Scene:
     def arm_limits(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper limits of the arm [rad], infinite where continuous."""
         return self.built.arm_lower, self.built.arm_upper
+
+    def attached(self, group: Group) -> AttachedPoses:
+        """Return the poses of the shapes of a group in their bodies, in the order of the parts."""
+        if group not in self._attached:
+            parts = [part for part in self.built.parts if part.group is group]
+            inspector = self.built.scene_graph.model_inspector()
+            self._attached[group] = AttachedPoses.of_parts(self.built.plant, inspector, parts)
+        return self._attached[group]
 
     def place_base(self, x: float, y: float, yaw: float) -> None:
         """Place the robot's base B at (x, y) in W [m] with heading `yaw` [rad]."""

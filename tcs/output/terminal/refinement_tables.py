@@ -31,6 +31,12 @@ def report_refined(result: Mapping[str, Any]) -> None:
             f"success {cause} from {success['before']:.1%} to {success['after']:.1%}, in "
             f"{success['samples']:,} other samples than those that chose the set"
         )
+    if result.get("ball") is not None:
+        ball = result["ball"]
+        out.print(
+            f"no goal is lost with the bases displaced by up to {100.0 * ball['after']:.1f} cm, "
+            f"{100.0 * ball['before']:.1f} cm before, in {ball['samples']:,} samples"
+        )
     out.print(
         f"{result['sets']} sets refined, {result['scored']:,} configurations scored in "
         f"{result['seconds']:.1f} s; wrote {result['file']}"

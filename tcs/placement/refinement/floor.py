@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -61,6 +61,35 @@ def successes(samples: Samples, weights: FloatArray, sets: Sequence[Points]) -> 
     )
 
 
+@dataclass(frozen=True, eq=False)
+class RememberedSamples:
+    """Samples that evaluate each configuration once."""
+
+    of: Samples
+    """The samples."""
+    known: dict[bytes, BoolArray] = field(default_factory=dict)
+    """Goals that a configuration reaches in each sample, by its arm and values."""
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.of.samples
+
+    def hardest(self, count: int) -> Self:
+        """Return the samples with the largest changes."""
+        return type(self)(self.of.hardest(count))
+
+    def reached(self, points: Points) -> BoolArray:
+        """Return which goals each configuration reaches in each sample, shape (n, samples, G)."""
+        keys = [row.tobytes() for row in np.column_stack([points.arm, points.values])]
+        missing = {key: i for i, key in enumerate(keys) if key not in self.known}
+        if missing:
+            rows = np.array(list(missing.values()))
+            found = self.of.reached(Points(points.values[rows], points.arm[rows]))
+            self.known.update(zip(missing, found, strict=True))
+        return np.stack([self.known[key] for key in keys])
+
+
 def settled(walks: Sequence[Walk], screen: SuccessFloor, judge: SuccessFloor) -> list[Walk]:
     """Return walks moved back until they keep the floor in other samples than those of the search.
 
@@ -73,11 +102,12 @@ def settled(walks: Sequence[Walk], screen: SuccessFloor, judge: SuccessFloor) ->
         The walks that keep the floor, the best first. The walk that started at the best set of the
         grid is among them.
     """
-    kept = sorted((walk for walk in walks if _settles(walk, screen)), key=_worst_last)
-    while not judge.keeps([kept[0].present.points])[0]:
-        if not _settles(kept[0], judge):
-            del kept[0]
-        kept.sort(key=_worst_last)
+    kept = sorted(_settled(walks, screen), key=_worst_last)
+    judged: set[int] = set()
+    while id(kept[0]) not in judged:
+        first = _settled(kept[:1], judge)
+        judged.update(map(id, first))
+        kept = sorted([*first, *kept[1:]], key=_worst_last)
     return kept
 
 
@@ -85,8 +115,23 @@ def _worst_last(walk: Walk) -> float:
     return -walk.value
 
 
-def _settles(walk: Walk, floor: SuccessFloor) -> bool:
-    """Move a walk back until it keeps the floor; return whether it does."""
-    while not (keeps := bool(floor.keeps([walk.present.points])[0])) and walk.passed:
-        walk.move_back()
-    return keeps
+def _settled(walks: Sequence[Walk], floor: SuccessFloor) -> list[Walk]:
+    """Return the walks that keep the floor somewhere, moved back to a late place where they do.
+
+    The last place is tried, then those between one that keeps the floor and one that does not, by
+    bisection: each walk takes few evaluations.
+    """
+    keeping = [-1] * len(walks)
+    failing = [len(walk.passed) + 1 for walk in walks]
+    tried = [len(walk.passed) for walk in walks]
+    open_ = list(range(len(walks)))
+    while open_:
+        keeps = floor.keeps([walks[k].course[tried[k]][0].points for k in open_])
+        for k, kept in zip(open_, keeps, strict=True):
+            (keeping if kept else failing)[k] = tried[k]
+            tried[k] = (keeping[k] + failing[k]) // 2
+        open_ = [k for k in open_ if failing[k] - keeping[k] > 1]
+    found = [k for k in range(len(walks)) if keeping[k] >= 0]
+    for k in found:
+        walks[k].move_back(len(walks[k].passed) - keeping[k])
+    return [walks[k] for k in found]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray, GridArrays
 from tcs.kernel.problem import Problem, build_problem, with_environment
-from tcs.kernel.sweep import gripper_contacts
+from tcs.kernel.sweep import blocked_grippers, gripper_contacts
 from tcs.model.grid import ROBOT_AXES
 from tcs.model.scene import environment_at, torso_at
 from tcs.placement.refinement.points import Points
@@ -65,6 +65,23 @@ class PerturbedPoints:
 
         Parallel(n_jobs=self.jobs, prefer="threads")(delayed(fill)(part) for part in parts)
         return out
+
+    def free_grippers(self, state: Mapping[str, float]) -> BoolArray:
+        """Return at which goals some arm's gripper touches nothing, whatever the base pose.
+
+        Args:
+            state: Positions of the environment's axes without error, by name [m or rad].
+
+        Returns:
+            Shape (samples, G). A goal at which no gripper is free is reached from nowhere.
+        """
+        free = np.zeros((self.samples, self.trials.weights.size), dtype=np.bool_)
+        for arm in self.trials.arms:
+            problem = build_problem(
+                arm.lowered.arrays, arm.lowered.grid, str(self.trials.file.metadata["measure"])
+            )
+            free |= ~blocked_grippers(self._scenes(arm, problem, dict(state)).problem)
+        return free
 
     def _parts(self, points: Points, rows: NDArray[np.intp]) -> Iterator[_Part]:
         """Yield the work for configurations with one arm."""

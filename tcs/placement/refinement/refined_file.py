@@ -15,11 +15,15 @@ from tcs.model.grid import InitialConfiguration
 from tcs.model.random_streams import check_draws, named_generator
 from tcs.placement.refinement.bound import upper_bound
 from tcs.placement.refinement.displaced import DisplacedBases
-from tcs.placement.refinement.floor import HARDEST, SuccessFloor, settled
+from tcs.placement.refinement.floor import HARDEST, RememberedSamples, SuccessFloor, settled
 from tcs.placement.refinement.objectives import (
+    BallObjective,
+    Features,
+    Objective,
     Samples,
     ScoreObjective,
     SuccessObjective,
+    TocObjective,
 )
 from tcs.placement.refinement.perturbed import PerturbedPoints
 from tcs.placement.refinement.points import Points, PointScorer
@@ -32,9 +36,12 @@ from tcs.placement.store import ScoreFile
 from tcs.placement.tables import RefinedTable, SetTable, tc_reachability
 from tcs.placement.tables.success import NO_MEMBER
 
-OBJECTIVES = ("score", "success", "margin")
-"""What a refinement maximises: P_R + P_M, the success under the errors of the environment, or the
-success with the base displaced."""
+OBJECTIVES = ("score", "success", "margin", "ball", "toc")
+"""What a refinement maximises: P_R + P_M, the success under the errors of the environment, the
+success with the base displaced, the radius within which a displaced base loses no goal, or the
+score of TOC."""
+WITHOUT_SAMPLES = ("score", "toc")
+"""Objectives that depend on the scores alone."""
 KEY = "refinement"
 """Entry of the metadata: for each table, None or the settings and figures of its refinement."""
 MOST_STARTS = 50
@@ -80,8 +87,10 @@ def refine(
     Args:
         file: A score file, which is not modified.
         objective: "score", P_R + P_M; "success", the mean of P_R under the errors of the
-            environment; or "margin", the mean of P_R with the base displaced by up to 5 cm and
-            5 deg. The samples of the means are the same for all configurations.
+            environment; "margin", the mean of P_R with the base displaced by up to 5 cm and
+            5 deg; "ball", among the sets with the greatest P_R the radius of the largest ball of
+            displacements of the bases in which no goal is lost; or "toc", 10 P_R + P_M, the latter
+            times 0.95 for a set of two or more. The samples are the same for all configurations.
         starts: Number of sets to start from; up to three single configurations come on top.
         rounds: Greatest number of rounds of the search.
         samples: Number of samples of the success.
@@ -121,27 +130,29 @@ def refine(
     scorer = PointScorer.of(file, number, jobs)
     scorer.warm_up(on_compile)
     sets = file.tables[number].sets
-    is_scored = objective == "score"
+    is_scored = objective in WITHOUT_SAMPLES
     draw = _samples(file, number, scorer, objective, seed)
     drawn = draw(samples, SAMPLES_STREAM)
     search = LocalSearch(
         scorer,
         Space.of(file.configurations, sets),
-        ScoreObjective(sets.weights) if is_scored else SuccessObjective(sets.weights, drawn),
+        _objective(objective, sets, drawn),
         named_generator(seed, STREAM),
     )
     starts_at = starting_sets(file, number, starts)
-    keep = is_scored and keep_success
+    keep = objective == "score" and keep_success
     if keep:
         hardest = _floor(search, drawn.hardest(-(-samples // HARDEST)), sets)
         search = dataclasses.replace(search, keeps=hardest.keeps)
     walks, scored = search.run(starts_at, rounds, on_progress or (lambda done, total: None))
-    fresh = draw(FRESH_SAMPLES, CHECK_STREAM)
+    judging = draw(FRESH_SAMPLES, CHECK_STREAM)
+    fresh = RememberedSamples(judging)
     if keep:
         screen = _floor(search, fresh.hardest(FRESH_SAMPLES // HARDEST), sets)
         walks = settled(walks, screen, _floor(search, fresh, sets))
     refined = _as_table(walks, sets.weights)
     success = None if is_scored and not keep else _success(search, walks[0], fresh, sets)
+    ball = _ball(search, walks[0], judging, sets) if objective == "ball" else None
     settings = {
         "program_version": version("tcs"),
         "objective": objective,
@@ -149,10 +160,11 @@ def refine(
         "rounds": rounds,
         "samples": None if success is None else samples,
         "keep_success": keep,
-        "displaced": success is not None and isinstance(fresh, DisplacedBases),
+        "displaced": success is not None and isinstance(judging, DisplacedBases),
         "seed": seed,
         "scored": scored,
         "success": success,
+        "ball": ball,
         "bound": upper_bound(file, number, scorer),
         "seconds": time.perf_counter() - begun,
     }
@@ -240,19 +252,32 @@ def _samples(
 ) -> Callable[[int, str], Samples]:
     """Return a function that draws samples, given their number and the name of the stream.
 
-    They are errors of the environment; displacements of the base for the objective "margin", and
-    where no joint of the environment has an error.
+    They are errors of the environment; displacements of the base for the objectives "margin" and
+    "ball", and where no joint of the environment has an error.
     """
     built = [(arm.job, arm.scene, arm.lowered) for arm in scorer.arms]
     trials = Trials.built(file, table, built)
 
     def drawn(samples: int, stream: str) -> Samples:
-        if objective == "margin" or (objective == "score" and not trials.errors.errors):
+        if objective == "ball":
+            return DisplacedBases.in_ball(scorer, samples, named_generator(seed, stream))
+        if objective == "margin" or (objective in WITHOUT_SAMPLES and not trials.errors.errors):
             return DisplacedBases.drawn(scorer, samples, named_generator(seed, stream))
         offsets = trials.errors.draw(samples, seed, stream=stream)
         return PerturbedPoints(trials, offsets, scorer.jobs)
 
     return drawn
+
+
+def _objective(name: str, sets: SetTable, drawn: Samples) -> Objective:
+    """Return one of the objectives."""
+    if name == "score":
+        return ScoreObjective(sets.weights)
+    if name == "toc":
+        return TocObjective(sets.weights)
+    if name == "ball" and isinstance(drawn, DisplacedBases):
+        return BallObjective(sets.weights, drawn)
+    return SuccessObjective(sets.weights, drawn)
 
 
 def _floor(search: LocalSearch, samples: Samples, sets: SetTable) -> SuccessFloor:
@@ -271,6 +296,19 @@ def _success(
         reached = np.logical_or.reduce(fresh.reached(points), axis=0)
         of_sets.append(float(tc_reachability(reached, sets.weights).mean()))
     return {"before": of_sets[0], "after": of_sets[1], "samples": fresh.samples}
+
+
+def _ball(
+    search: LocalSearch, walk: Walk, fresh: Samples, sets: SetTable
+) -> dict[str, float | int]:
+    """Return the radius of the ball [m] of the grid's best set and of a refined set."""
+    judge = _objective("ball", sets, fresh)
+    assert isinstance(judge, BallObjective)
+    radii = []
+    for points in (search.points_of(sets.best), walk.present.points):
+        features = judge.features(points, search.scorer.score(points))
+        radii.append(float(judge.radius(Features(*(array[None] for array in features)))[0]))
+    return {"before": radii[0], "after": radii[1], "samples": fresh.samples}
 
 
 def _as_table(walks: Sequence[Walk], weights: np.ndarray[Any, Any]) -> RefinedTable:

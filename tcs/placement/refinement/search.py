@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tcs.kernel.arrays import BoolArray
 from tcs.model.grid import Grid
-from tcs.placement.refinement.objectives import Features, Objective, values_of
+from tcs.placement.refinement.objectives import Features, Objective
 from tcs.placement.refinement.points import Points, PointScores
 from tcs.placement.refinement.space import Space
 
@@ -85,9 +85,15 @@ class Walk:
         self.passed.append((self.present, self.value))
         self.present, self.value = members, value
 
-    def move_back(self) -> None:
-        """Return to where the walk was before the last move."""
-        self.present, self.value = self.passed.pop()
+    def move_back(self, moves: int) -> None:
+        """Return to where the walk was before its last moves."""
+        for _ in range(moves):
+            self.present, self.value = self.passed.pop()
+
+    @property
+    def course(self) -> list[tuple[Evaluated, float]]:
+        """The members and objectives of all places, the start first, the present one last."""
+        return [*self.passed, (self.present, self.value)]
 
     @property
     def members(self) -> int:
@@ -166,7 +172,7 @@ class LocalSearch:
         for start in starts:
             present = found.rows(slice(first, first + len(start)))
             reached, dexterity = present.features
-            value = values_of(self.objective, Features(reached[None], dexterity[None]))
+            value = self.objective.values(Features(reached[None], dexterity[None]))
             walks.append(Walk(start, present, float(value[0])))
             first += len(start)
         return walks
@@ -275,12 +281,11 @@ class LocalSearch:
         for start in range(0, values.size, CHUNK):
             flat = np.arange(start, min(start + CHUNK, values.size))
             pairs = list(zip(choices, np.unravel_index(flat, shape), strict=True))
-            found = values_of(
-                self.objective,
+            found = self.objective.values(
                 Features(
                     np.stack([part.feature_reached[i] for part, i in pairs], axis=1),
                     np.stack([part.feature_dexterity[i] for part, i in pairs], axis=1),
-                ),
+                )
             )
             members = np.stack([part.values[i] for part, i in pairs], axis=1)
             found[~self.space.allowed(members)] = -np.inf

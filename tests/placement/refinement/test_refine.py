@@ -228,7 +228,7 @@ def test_perturbed_points_on_the_grid_are_those_of_trials(scored):
     assert found.any()
 
 
-@pytest.mark.parametrize("objective", ["success", "margin"])
+@pytest.mark.parametrize("objective", ["success", "margin", "ball"])
 def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
     monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 30)
     found = tcs.refine(scored, objective=objective, starts=1, rounds=1, samples=2)
@@ -236,6 +236,22 @@ def test_success_is_judged_on_other_samples(scored, monkeypatch, objective):
     assert found["success"]["samples"] == 30
     assert 0.0 < found["success"]["before"] < 1.0
     assert 0.0 < found["success"]["after"] < 1.0
+    assert (found["ball"] is not None) == (objective == "ball")
+
+
+def test_the_ball_grows(scored, monkeypatch):
+    monkeypatch.setattr("tcs.placement.refinement.refined_file.FRESH_SAMPLES", 100)
+    refined = tcs.refine(scored, objective="ball", starts=1, rounds=3, samples=32)
+    found = refinement_summary(refined)
+    assert found["ball"]["after"] > found["ball"]["before"]
+    assert found["after"]["reachability"] >= found["before"]["reachability"]
+
+
+def test_the_score_of_toc_is_that_of_the_set(scored):
+    refined = tcs.refine(scored, objective="toc", starts=1, rounds=1).nominal.refined
+    factor = np.where(refined.sizes > 1, 0.95, 1.0)
+    expected = 10.0 * refined.reachability + factor * refined.manipulability
+    np.testing.assert_allclose(refined.objective, expected)
 
 
 @pytest.mark.parametrize(
