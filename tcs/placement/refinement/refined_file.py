@@ -307,7 +307,8 @@ def _ball(
     radii = []
     for points in (search.points_of(sets.best), walk.present.points):
         features = judge.features(points, search.scorer.score(points))
-        radii.append(float(judge.radius(Features(*(array[None] for array in features)))[0]))
+        of_set = Features(features.reached[None], features.dexterity[None])
+        radii.append(float(judge.radius(of_set)[0]))
     return {"before": radii[0], "after": radii[1], "samples": fresh.samples}
 
 
