@@ -7,6 +7,7 @@ import warnings
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ from tcs.output import terminal
 
 if TYPE_CHECKING:
     from tcs.service import Engine
+    from tcs.service.ros import FrameNames
 
 Files = Annotated[
     list[Path] | None,
@@ -25,6 +27,49 @@ Files = Annotated[
 ]
 
 
+@dataclass(frozen=True, kw_only=True)
+class _FrameOptions:
+    """Options of the frames in tf."""
+
+    environment_frame: Annotated[
+        str, typer.Option(help="Frame in tf that is the origin of the environment, z up.")
+    ] = "environment"
+    base_frame: Annotated[
+        str, typer.Option(help="Frame in tf of the robot's base on the floor.")
+    ] = "base_footprint"
+    person_frame: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="BODY=FRAME",
+            help="Frame in tf of a body frame of the person, e.g. head=human/head; may be "
+            "repeated.",
+        ),
+    ] = None
+    max_age: Annotated[
+        float, typer.Option(min=0.0, help="Longest age of a transform that is not static (s).")
+    ] = 5.0
+
+    def names(self) -> FrameNames:
+        """Return the names of the frames.
+
+        Raises:
+            typer.BadParameter: If a frame of the person is not of its form, or given twice.
+        """
+        from tcs.service.ros import FrameNames
+
+        person: dict[str, str] = {}
+        for text in self.person_frame or ():
+            body, equals, frame = text.partition("=")
+            if not (body and equals and frame) or body in person:
+                raise typer.BadParameter(
+                    f"'{text}' must be BODY=FRAME, each body frame once.",
+                    param_hint="--person-frame",
+                )
+            person[body] = frame
+        return FrameNames(environment=self.environment_frame, base=self.base_frame, person=person)
+
+
+@expand_options
 def serve(
     files: Files = None,
     host: Annotated[
@@ -50,11 +95,21 @@ def serve(
             help="Answer an assistant on standard input and output, by the Model Context Protocol.",
         ),
     ] = False,
+    ros1: Annotated[
+        bool, typer.Option("--ros1", help="Answer as a node of ROS 1, with the services of /tcs.")
+    ] = False,
+    *,
+    frames: _FrameOptions,
     jobs: options.Jobs = 2,
 ) -> None:
     """Serve the engine over HTTP: score, select, explain, evaluate and plan as requests."""
+    if assistant + ros1 > 1:
+        raise typer.BadParameter("give one of them.", param_hint="--mcp, --ros1")
     if assistant:
         _serve_assistant(files, jobs)
+        return
+    if ros1:
+        _serve_ros1(files, frames, jobs)
         return
     http = _http("serve")
     access = http.checked_access(host, token)
@@ -102,6 +157,23 @@ def _serve_assistant(files: list[Path] | None, jobs: int) -> None:
         ) from None
     with _engine(files, jobs, terminal.note) as engine:
         serve_assistant(engine)
+
+
+def _serve_ros1(files: list[Path] | None, frames: _FrameOptions, jobs: int) -> None:
+    """Answer as a node of ROS 1 until interrupted.
+
+    Raises:
+        ServiceError: If a package of ROS 1 is not installed, or no master answers.
+    """
+    from tcs.service.ros.ros1 import Ros1Node
+
+    names = frames.names()
+    with (
+        _engine(files, jobs, typer.echo) as engine,
+        Ros1Node(engine, names, max_age=frames.max_age) as node,
+    ):
+        terminal.note("the services of ROS 1 are at /tcs: `rosservice list`; Ctrl-C ends.")
+        node.run()
 
 
 def _http(command: str) -> Any:

@@ -32,6 +32,10 @@ class FileEntry(BaseModel):
     """Number of goals."""
     configurations: int
     """Number of configurations of its grid."""
+    settings: list[str]
+    """Axes of the environment, by the keys of `at`, e.g. "bed_height" or "head_rest_deg"."""
+    body_frames: list[str]
+    """Body frames that may be observed, by the keys of `frames`, e.g. "head"."""
 
 
 class JobStatus(BaseModel):

@@ -229,4 +229,9 @@ def _entry(digest: str, size: int, file: ScoreFile) -> FileEntry:
         title=" · ".join([*(frame_name(name) for name in names.values()), *file.arms, *person]),
         goals=file.nominal.sets.weights.size,
         configurations=file.configurations.size,
+        settings=[
+            f"{axis.name}_deg" if axis.unit == "deg" else axis.name
+            for axis in file.configurations.environment_axes
+        ],
+        body_frames=list(file.body_frames),
     )

@@ -25,9 +25,10 @@ def test_select_prints_the_choice(tcs_command, small_file):
     result = ran.json
     assert set(result) == {
         "members", "measure", "reachability", "manipulability", "cost", "utility", "seconds",
-        "unreachable", "net_utility", "moves",
+        "unreachable", "net_utility", "moves", "configurations",
     }  # fmt: skip
     choice = tcs.select(tcs.load(small_file), state())
+    assert result["configurations"] == [choice.indices[i] for i in choice.order]
     # The order of the tour, which is not that of the indices.
     assert result["members"] == [choice.members[i].to_json() for i in choice.order]
     assert result["utility"] == choice.utility

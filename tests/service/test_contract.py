@@ -37,6 +37,9 @@ from tcs.service.assistant import make_assistant_server
 from tcs.service.client import Client
 from tcs.service.http import Access, Server, make_application
 from tcs.service.operations import OPERATIONS
+from tcs.service.ros import FrameNames
+from tcs.service.ros.ros1 import Ros1Node
+from tcs.service.ros.ros1_types import ros1_modules, ros1_types
 from tests.placement.store.example import METADATA, score_file
 
 HERE = (1.4, -1.2, 180.0)
@@ -70,11 +73,10 @@ def assistant(engine):
         yield Assistant(engine, portal, client)
 
 
-class Assistant:
-    """The methods of the engine by the tools of an assistant, which sends no files."""
+class ByName:
+    """The methods of the engine by requests with a name; files are not sent."""
 
-    def __init__(self, engine, portal, client):
-        self._portal, self._client = portal, client
+    def __init__(self, engine):
         self.add_file, self.content_of = engine.add_file, engine.content_of
         self.wait = engine.wait
 
@@ -88,13 +90,8 @@ class Assistant:
 
         return call
 
-    def _called(self, tool, given):
-        result = self._portal.call(self._client.call_tool, tool, given)
-        content = json.loads(result.content[0].text)
-        if result.is_error:
-            assert "\n" not in content["detail"]
-            raise getattr(tcs.errors, content["title"])(content["detail"])
-        return content
+    def _called(self, name, given):
+        raise NotImplementedError
 
     def catalogue(self):
         return self._called("list", {})
@@ -114,10 +111,56 @@ class Assistant:
         return JobStatus(**self._called(tool.replace("-", "_"), given))
 
 
-@pytest.fixture(params=["engine", "http", "assistant"])
-def service(request, engine, client, assistant):
-    """The engine, directly, over HTTP and as tools of an assistant."""
-    return {"engine": engine, "http": client, "assistant": assistant}[request.param]
+class Assistant(ByName):
+    """Requests as tools of an assistant."""
+
+    def __init__(self, engine, portal, client):
+        super().__init__(engine)
+        self._portal, self._client = portal, client
+
+    def _called(self, name, given):
+        result = self._portal.call(self._client.call_tool, name, given)
+        content = json.loads(result.content[0].text)
+        if result.is_error:
+            assert "\n" not in content["detail"]
+            raise getattr(tcs.errors, content["title"])(content["detail"])
+        return content
+
+
+class Ros(ByName):
+    """Requests as services of ROS; `call` sends a text to a service and returns its response."""
+
+    def __init__(self, engine, call):
+        super().__init__(engine)
+        self._call = call
+
+    def _called(self, name, given):
+        response = self._call(name, json.dumps(given))
+        if not response.success:
+            assert "\n" not in response.detail
+            raise getattr(tcs.errors, response.error)(response.detail)
+        return json.loads(response.answer)
+
+
+@pytest.fixture(scope="module")
+def ros1(engine, ros1_master):
+    with Ros1Node(engine, FrameNames(), max_age=5.0), ros1_types() as types:
+        rospy = ros1_modules().rospy
+
+        def call(name, text):
+            return rospy.ServiceProxy(f"/tcs/{name}", types.srv.Call)(text)
+
+        yield Ros(engine, call)
+
+
+# rospy leaves the sockets of its connections to the collector.
+COLLECTED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+
+
+@pytest.fixture(params=["engine", "client", "assistant", pytest.param("ros1", marks=COLLECTED)])
+def service(request):
+    """The engine, directly, over HTTP, as tools of an assistant and as a node of ROS."""
+    return request.getfixturevalue(request.param)
 
 
 @pytest.fixture(scope="module")

@@ -196,9 +196,9 @@ class Choice:
     def to_json(self, measure: str) -> dict[str, Any]:
         """Return the choice as plain containers, as printed by `tcs select --json`.
 
-        Members are in the order of the tour. Keys of success, observation, refined set,
-        constraints and warnings are there only if success was estimated, the file has observed
-        axes, a refined set is chosen, there are constraints or warnings.
+        Members and their configuration indices are in the order of the tour. Keys of success,
+        observation, refined set, constraints and warnings are there only if success was estimated,
+        the file has observed axes, a refined set is chosen, there are constraints or warnings.
 
         Args:
             measure: Name of the dexterity measure behind the manipulability.
@@ -206,6 +206,7 @@ class Choice:
         plain: dict[str, Any] = {
             "measure": measure,
             "members": [self.members[i].to_json() for i in self.order],
+            "configurations": [self.indices[i] for i in self.order],
             # The sum of seven sevenths is 1 only after rounding.
             "reachability": round(self.reachability, 12),
             "manipulability": round(self.manipulability, 12),
