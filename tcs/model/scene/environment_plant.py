@@ -32,7 +32,6 @@ from tcs.model.scene.obstacle_shapes import obstacle_shapes
 from tcs.model.scene.person_joints import articulated_model, person_joints
 from tcs.model.scene.resized_person import (
     padding_of,
-    person_shapes,
     resized_model,
     scales_of,
 )
@@ -122,12 +121,11 @@ def environment_parts(
     """Return every collision shape of the environment, in the order of the environment file."""
     parts = []
     scales = scales_of(environment)
-    shapes = person_shapes(environment) if scales else {}
     for link, body in added.links.items():
         model = link.split("::", maxsplit=1)[0]
         for geometry in plant.GetCollisionGeometriesForBody(body):
             name = link if model in added.named_by_link else inspector.GetName(geometry)
-            pad = padding_of(environment, link, scales, shapes)
+            pad = padding_of(environment, link, scales)
             parts.append(Part(geometry, body.index(), Group.ENVIRONMENT, 0, name, pad))
     if added.floor:
         world = plant.world_body()

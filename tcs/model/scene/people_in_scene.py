@@ -8,6 +8,7 @@ the frame of the latter.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -28,7 +29,9 @@ from tcs.model.scene.resized_person import (
     PARENTS,
     ROOT,
     Poses,
+    covers_of,
     motion_to_support,
+    numbers_of_parts,
     padding_of,
     person_shapes,
     poses_in_file,
@@ -57,7 +60,9 @@ class _PartOfLink(NamedTuple):
     link: int
     """Number of its link in `_LINKS`."""
     shape: int
-    """Its number among the shapes of the link."""
+    """Its number among the shapes of the link, of other people than the papers' man."""
+    of_man: int
+    """Number of the shape among those of the link of the papers' man."""
 
 
 class _LinkPoses(NamedTuple):
@@ -110,14 +115,21 @@ class PeopleInScene:
         self._arrays = environment_at(lowered, scene, task, states)
         shapes = person_shapes(environment)
         self._shapes = {link: shapes[self._names[i]] for i, link in enumerate(_LINKS)}
-        self._by_name = shapes
         self._before = poses_in_file(environment)
         self._at_zero, articulated = reference_poses(environment)
         carriers = _carriers(scene, bodies)
         self._nodes = _nodes(carriers)
         self._base = _base(carriers)
         self._poses = self._read_poses(scene, bodies, carriers, articulated, states)
-        self._parts = _parts(scene, bodies)
+        numbers = [
+            numbers_of_parts(name, self._shapes[link])
+            for link, name in zip(_LINKS, self._names, strict=True)
+        ]
+        self.rows, self._parts = _rows(
+            _parts(scene, bodies), numbers, len(self._arrays.environment.pad)
+        )
+        """Number of the part of the papers' man's scene in each row of the environment, shape (n,):
+        some of his shapes are several of other people."""
         self._anchors = self._read_anchors(task)
 
     def arrays_for(self, scales: Mapping[str, Scale], states: IntArray) -> SceneArrays:
@@ -133,32 +145,52 @@ class PeopleInScene:
         """
         of_names = scales_by_link(self._environment.person_model, scales)
         of_links = [of_names[name] for name in self._names]
+        covers = {
+            link: covers_of(self._environment, self._names[i], self._shapes[link], of_links[i])
+            for i, link in enumerate(_LINKS)
+        }
         stretched = {
-            link: [shape.stretch(scale) for shape in self._shapes[link]]
-            for link, scale in zip(_LINKS, of_links, strict=True)
+            link: list(itertools.chain.from_iterable(found)) for link, found in covers.items()
         }
         R, p = self._poses.R[states], self._origins(of_links, stretched, states)
-        pads = self._paddings(of_names)
-        before = self._paddings({})
+        pads, before = self._paddings(of_names), self._paddings({})
         whole = self._arrays.environment
-        sizes, paddings, centres = whole.size.copy(), whole.pad.copy(), whole.p[states]
+        sizes, paddings = whole.size[self.rows], whole.pad[self.rows]
+        turned, centres = whole.R[states][:, self.rows], whole.p[states][:, self.rows]
         for part in self._parts:
-            shape = stretched[_LINKS[part.link]][part.shape]
+            link = _LINKS[part.link]
+            shape = stretched[link][part.shape]
             sizes[part.row, : shape.size.size] = shape.size
             paddings[part.row] = pads[part.link]
             centres[:, part.row] = p[:, part.link] + R[:, part.link] @ shape.p_LoSo_L
+            # Where the orientation stays, the digits that Drake computed are kept.
+            if shape.R_LS is not self._shapes[link][part.of_man].R_LS:
+                turned[:, part.row] = R[:, part.link] @ shape.R_LS
         goal_p = self._arrays.goal_p[states]
-        for goal, (link, anchor) in self._anchors.items():
-            position = anchor.position(of_links[link], pads[link] - before[link])
-            goal_p[:, goal] = p[:, link] + R[:, link] @ position
-        environment = whole._replace(size=sizes, pad=paddings, R=whole.R[states], p=centres)
+        for goal, (on, anchor) in self._anchors.items():
+            grown = pads[on] - before[on]
+            position = anchor.position(of_links[on], covers[_LINKS[on]], grown)
+            goal_p[:, goal] = p[:, on] + R[:, on] @ position
+        environment = whole._replace(
+            type=whole.type[self.rows],
+            size=sizes,
+            pad=paddings,
+            body=whole.body[self.rows],
+            frame=whole.frame[self.rows],
+            R=turned,
+            p=centres,
+        )
         return self._arrays._replace(
-            environment=environment, goal_R=self._arrays.goal_R[states], goal_p=goal_p
+            environment=environment,
+            arm_vs_environment=self._arrays.arm_vs_environment[:, self.rows],
+            body_vs_environment=self._arrays.body_vs_environment[:, self.rows],
+            goal_R=self._arrays.goal_R[states],
+            goal_p=goal_p,
         )
 
     def _paddings(self, scales: Mapping[str, Scale]) -> list[float]:
         """Return the padding of each link [m]; of the papers' man without scales."""
-        return [padding_of(self._environment, name, scales, self._by_name) for name in self._names]
+        return [padding_of(self._environment, name, scales) for name in self._names]
 
     def _origins(
         self,
@@ -318,6 +350,34 @@ def _parts(scene: Scene, bodies: Mapping[str, RigidBody]) -> list[_PartOfLink]:
     for row, part in enumerate(found):
         if part.body in index:
             link = index[part.body]
-            parts.append(_PartOfLink(row, link, count[link]))
+            parts.append(_PartOfLink(row, link, count[link], count[link]))
             count[link] += 1
     return parts
+
+
+def _rows(
+    parts: list[_PartOfLink], numbers: Sequence[Sequence[int]], count: int
+) -> tuple[IntArray, list[_PartOfLink]]:
+    """Return the rows of the environment with other people, and the parts of the person in them.
+
+    Args:
+        parts: The shapes of the papers' man.
+        numbers: For each link, how many shapes of other people each of them is.
+        count: Number of shapes of the environment with the papers' man.
+    """
+    times = np.ones(count, dtype=np.intp)
+    for part in parts:
+        times[part.row] = numbers[part.link][part.of_man]
+    first = np.cumsum(times) - times
+    before = [np.cumsum([0, *of_link]) for of_link in numbers]
+    found = [
+        _PartOfLink(
+            int(first[part.row]) + k,
+            part.link,
+            int(before[part.link][part.of_man]) + k,
+            part.of_man,
+        )
+        for part in parts
+        for k in range(times[part.row])
+    ]
+    return np.repeat(np.arange(count), times), found

@@ -1,4 +1,4 @@
-"""Shapes of one link of the person: boxes and capsules that are stretched along the link's axes."""
+"""Shapes of one link of the person: boxes and capsules, read from and written to SDFormat."""
 
 from __future__ import annotations
 
@@ -12,27 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from tcs.errors import EnvironmentFileError
 from tcs.kernel.arrays import FloatArray
-from tcs.model.people import Scale
-
-_THINNEST = 1e-4
-"""Least length of a capsule between the centres of its caps [m]: it stays a capsule."""
-
-
-DIRECTIONS = 500
-"""Directions in which extents are compared: 9 deg apart, so that a centimetre is found to 0.1 mm,
-and along the axes, which limbs are stretched along."""
-
-
-def _spread(count: int) -> FloatArray:
-    """Return unit vectors spread evenly over the sphere, on a spiral, shape (count, 3)."""
-    i = np.arange(count)
-    z = 1.0 - (2.0 * i + 1.0) / count
-    angle = i * math.pi * (3.0 - math.sqrt(5.0))
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
-
-
-_DIRECTIONS = np.concatenate([_spread(DIRECTIONS), np.eye(3)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,41 +25,6 @@ class LinkShape:
     """Orientation, shape (3, 3)."""
     p_LoSo_L: FloatArray
     """Position [m], shape (3,)."""
-
-    def stretch(self, scale: Scale) -> LinkShape:
-        """Return the shape stretched along x, y and z of the link.
-
-        The edges of a box keep their directions and have the lengths that they are mapped to. A
-        capsule is as long, with its caps, as its axis is mapped to; its radius is the geometric
-        mean of what it is mapped to across the axis.
-        """
-        factors = np.linalg.norm(np.array(scale)[:, None] * self.R_LS, axis=0)
-        p = np.array(scale) * self.p_LoSo_L
-        if self.is_box:
-            return LinkShape(True, factors * self.size, self.R_LS, p)
-        radius, half = self.size
-        thick = radius * math.sqrt(factors[0] * factors[1])
-        long = max(factors[2] * (half + radius) - thick, _THINNEST / 2)
-        return LinkShape(False, np.array([thick, long]), self.R_LS, p)
-
-    def overshoot(self, scale: Scale) -> float:
-        """Return how far the surface, mapped along the link's axes, stands out of `stretch` [m].
-
-        A capsule that is stretched unevenly becomes elliptic, and its caps longer or flatter than
-        round. Both bodies are convex: it is the greatest difference of their extents over the
-        directions, of which DIRECTIONS are taken.
-        """
-        mapped = np.array(scale)[:, None] * self.R_LS
-        stretched = self.stretch(scale)
-        beyond = self._extents(_DIRECTIONS @ mapped) - stretched._extents(_DIRECTIONS @ self.R_LS)
-        return max(0.0, float(beyond.max()))
-
-    def _extents(self, along: FloatArray) -> FloatArray:
-        """Return the extents from the centre along directions in S, shapes (n, 3) and (n,)."""
-        if self.is_box:
-            return np.asarray(np.abs(along) @ self.size)
-        radius, half = self.size
-        return np.asarray(np.abs(along[:, 2]) * half + np.linalg.norm(along, axis=1) * radius)
 
     def nearest(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return the point of the surface nearest to a point of the link.
@@ -108,24 +52,14 @@ class LinkShape:
         surface[axis] = normal[axis] * self.size[axis]
         return -float(depth[axis]), surface, normal
 
-    def follow(self, surface: FloatArray, normal: FloatArray, stretched: LinkShape) -> FloatArray:
-        """Return where a surface point of this shape is on the same shape stretched.
-
-        Args:
-            surface: Point of the surface, in S.
-            normal: Outward normal there, in S; it is also the normal at the new point.
-            stretched: What `stretch` returned.
-
-        Returns:
-            The new point in L [m], shape (3,).
-        """
+    def reach(self, direction: FloatArray) -> float:
+        """Return how far the shape extends from the origin of L along a unit vector in L [m]."""
+        across = direction @ self.R_LS
         if self.is_box:
-            moved = surface * stretched.size / self.size
+            half = float(np.abs(across) @ self.size)
         else:
-            (radius, half), (thick, long) = self.size, stretched.size
-            along = surface - radius * normal
-            moved = along * (long / half) + thick * normal
-        return np.asarray(stretched.p_LoSo_L + stretched.R_LS @ moved)
+            half = float(self.size[0] + abs(across[2]) * self.size[1])
+        return float(direction @ self.p_LoSo_L) + half
 
     def extent(self, R: FloatArray, p: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the corners of the bounding box with the link at a pose R, p, each shape (3,)."""
@@ -157,10 +91,18 @@ def read_shape(element: ElementTree.Element, where: str) -> LinkShape:
 
 
 def write_shape(element: ElementTree.Element, shape: LinkShape) -> None:
-    """Write sizes and position of a shape to the element it was read from."""
+    """Write size and pose of a shape to an element with a shape of the same type."""
     pose = element.find("pose")
-    if pose is not None:
-        write_position(pose, shape.p_LoSo_L)
+    if pose is None:
+        pose = ElementTree.Element("pose")
+        element.insert(0, pose)
+    turned = not np.array_equal(read_pose(pose)[0], shape.R_LS)
+    write_position(pose, shape.p_LoSo_L)
+    if turned:
+        pose.attrib.clear()
+        pose.set("rotation_format", "quat_xyzw")
+        quaternion = Rotation.from_matrix(shape.R_LS).as_quat()
+        pose.text = f"{_text(shape.p_LoSo_L)} {_text(quaternion)}"
     box, capsule = element.find("geometry/box/size"), element.find("geometry/capsule")
     if box is not None:
         box.text = _text(2.0 * shape.size)

@@ -1,13 +1,15 @@
 """The model of the person, resized: the links of the papers' average man stretched to a body.
 
 Every link is stretched along the axes of its frame by `tcs.model.people.link_scales`, and so are
-the positions of the joints on it: links stay connected. A seated person keeps their thighs on the
+the positions of the joints on it: links stay connected. Its shapes enclose the stretched skin
+(`person_covers`). A seated person keeps their thighs on the
 seat and their back at the back rest; a lying one their back on the mattress and their hips where
 the bed bends.
 """
 
 from __future__ import annotations
 
+import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,6 +23,7 @@ from tcs.files.xml_documents import read_xml
 from tcs.kernel.arrays import FloatArray
 from tcs.model.people import Scale, link_scales
 from tcs.model.scene.environment import EnvironmentFile
+from tcs.model.scene.person_covers import cover, padding_for, parts_of
 from tcs.model.scene.person_shapes import (
     LinkShape,
     read_pose,
@@ -52,6 +55,8 @@ PARENTS: Mapping[str, str] = {
     },
 }
 """The link from which each link hangs, from the head outward."""
+_ELLIPTIC = ("mid_body", "lower_body", "quad")
+"""Parts whose depth and breadth are of different measures, with capsules across or along them."""
 _SAME_FRAME = {"head_link": "head", "head_turn_link": "head", "neck_rotation": "neck"}
 """Links without shapes that move with a part of the person."""
 
@@ -94,29 +99,39 @@ def scales_by_link(model: str, scales: Mapping[str, Scale]) -> dict[str, Scale]:
     return {f"{model}::{link}": scales[part_of(link)] for link in (ROOT, *PARENTS)}
 
 
-def padding_of(
-    environment: EnvironmentFile,
-    link: str,
-    scales: Mapping[str, Scale],
-    shapes: Mapping[str, Sequence[LinkShape]],
-) -> float:
+def padding_of(environment: EnvironmentFile, link: str, scales: Mapping[str, Scale]) -> float:
     """Return the padding of a link [m].
-
-    The skin of the papers' man, stretched like the link, stands out of the stretched shape by at
-    most his padding times the greatest of the link's ratios. What the mapped shape itself stands
-    out of the round one is added.
 
     Args:
         environment: The environment.
         link: Name of the link, "model::link".
         scales: What `scales_of` returns for the environment, {} for the papers' man.
-        shapes: What `person_shapes` returns for the environment; not read for the papers' man.
     """
     padding = float(environment.padding.get(link, 0.0))
     scale = scales.get(link)
-    if scale is None:
-        return padding
-    return padding * max(scale) + max(shape.overshoot(scale) for shape in shapes[link])
+    return padding if scale is None else padding_for(padding, scale)
+
+
+def covers_of(
+    environment: EnvironmentFile, link: str, shapes: Sequence[LinkShape], scale: Scale
+) -> list[tuple[LinkShape, ...]]:
+    """Return for each shape of a link those that enclose it and its skin, stretched.
+
+    Args:
+        environment: The environment.
+        link: Name of the link, "model::link".
+        shapes: The shapes of the papers' man.
+        scale: How the link is stretched.
+    """
+    padding = float(environment.padding.get(link, 0.0))
+    numbers = numbers_of_parts(link, shapes)
+    return [cover(s, scale, padding, n) for s, n in zip(shapes, numbers, strict=True)]
+
+
+def numbers_of_parts(link: str, shapes: Sequence[LinkShape]) -> list[int]:
+    """Return the number of shapes that each shape of a link has on resized people."""
+    is_uneven = part_of(link.partition("::")[2]) in _ELLIPTIC
+    return [parts_of(shape, is_uneven=is_uneven) for shape in shapes]
 
 
 def person_shapes(environment: EnvironmentFile) -> dict[str, list[LinkShape]]:
@@ -167,8 +182,13 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
     joints = _joints(environment)
     before, shapes = link_poses(root, joints), _shapes(root, where)
     for name in (ROOT, *PARENTS):
-        for element in (*links[name].findall("collision"), *links[name].findall("visual")):
-            write_shape(element, read_shape(element, where).stretch(scales[name]))
+        full = f"{environment.person_model}::{name}"
+        for kind in ("collision", "visual"):
+            elements = links[name].findall(kind)
+            stretched = [read_shape(element, where) for element in elements]
+            covers = covers_of(environment, full, stretched, scales[name])
+            for element, shapes_of_one in zip(elements, covers, strict=True):
+                _write_shapes(links[name], element, shapes_of_one)
     _move_joints(links, before, scales)
     after, resized = link_poses(root, joints), _shapes(root, where)
     shift = motion_to_support(before, shapes, after, resized)
@@ -177,6 +197,19 @@ def resized_model(environment: EnvironmentFile, path: Path, where: str) -> str:
         if (over := pose.get("relative_to", "")) not in scales:
             write_position(pose, read_pose(pose)[1] + before[over][0].T @ shift)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _write_shapes(
+    link: ElementTree.Element, element: ElementTree.Element, shapes: Sequence[LinkShape]
+) -> None:
+    """Write the shapes that enclose one, in its place; those after the first get names."""
+    at, name = list(link).index(element), element.get("name", "")
+    for number, shape in enumerate(shapes):
+        written = element if number == 0 else copy.deepcopy(element)
+        if number:
+            written.set("name", f"{name}_part_{number + 1}")
+            link.insert(at + number, written)
+        write_shape(written, shape)
 
 
 def model_file(environment: EnvironmentFile) -> tuple[ElementTree.Element, str]:

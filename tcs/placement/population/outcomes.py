@@ -141,7 +141,7 @@ def _prepared(
         scenes = PeopleInScene(arm.lowered, arm.scene, arm.job.task, positions)
         in_states = np.stack(states, axis=1)
         arrays = scenes.arrays_for(scales[int(columns[0])], in_states[0])
-        arrays = arrays._replace(body_vs_environment=arm.body_pairs)
+        arrays = arrays._replace(body_vs_environment=arm.body_pairs[:, scenes.rows])
         problems = PersonProblems(arrays, str(trials.file.metadata["measure"]))
         yield _Prepared(scenes, problems, poses, rows, place, in_states)
 

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tcs.errors import EnvironmentFileError
 from tcs.model.people import PAPERS_MAN, Person, papers_man
 from tcs.model.scene import goals_on_person, load_environment, with_person
+from tcs.model.scene.person_covers import cover, padding_for
 from tcs.model.scene.person_shapes import LinkShape
 from tcs.model.scene.resized_person import (
     PARENTS,
+    covers_of,
     padding_of,
     part_of,
     person_shapes,
@@ -60,7 +63,8 @@ def _corners(scene):
     for link, shapes in person_shapes(scene.file).items():
         X = scene.pose(link)
         R, p = X.rotation().matrix(), X.translation()
-        boxes = [shape.stretch(scales.get(link, (1, 1, 1))).extent(R, p) for shape in shapes]
+        covers = covers_of(scene.file, link, shapes, scales.get(link, (1.0, 1.0, 1.0)))
+        boxes = [shape.extent(R, p) for cover in covers for shape in cover]
         found[link] = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     return found
 
@@ -143,21 +147,44 @@ def test_padded_shapes_enclose_the_skin_stretched_like_their_link(name, percenti
     stature, mass = percentiles
     person = Person(sex="female", stature_percentile=stature, mass_percentile=mass)
     scales, shapes = scales_of(with_person(file, person)), person_shapes(file)
-    directions = rng.normal(size=(400, 3))
+    directions = rng.normal(size=(300, 3))
     for link, scale in scales.items():
-        allowed = padding_of(file, link, scales, shapes)
-        for shape in shapes[link]:
+        assert (allowed := padding_of(file, link, scales)) <= file.padding[link]
+        covers = covers_of(file, link, shapes[link], scale)
+        for shape, covering in zip(shapes[link], covers, strict=True):
             # Skin as far from the surface of the papers' man as his padding lets it be.
-            far = shape.p_LoSo_L + 2.0 * directions
-            found = [shape.nearest(point) for point in far]
-            skin = [
-                shape.p_LoSo_L + shape.R_LS @ (surface + file.padding[link] * normal)
-                for _, surface, normal in found
-            ]
-            stretched = shape.stretch(scale)
-            beyond = [stretched.nearest(np.array(scale) * point)[0] for point in skin]
-            # Directions between those that are compared.
-            assert max(beyond) <= allowed + 2e-4
+            for direction in directions:
+                _, surface, normal = shape.nearest(shape.p_LoSo_L + 2.0 * direction)
+                skin = shape.p_LoSo_L + shape.R_LS @ (surface + file.padding[link] * normal)
+                beyond = min(one.nearest(np.array(scale) * skin)[0] for one in covering)
+                # Rounding, and that of orientations in the model files.
+                assert beyond <= allowed + 1e-7
+
+
+@pytest.mark.parametrize(
+    ("is_box", "parts"), [(True, 1), (False, 1), (False, 2)], ids=["box", "capsule", "two-capsules"]
+)
+def test_any_stretched_shape_is_enclosed(is_box, parts, rng):
+    for _ in range(30):
+        scale = tuple(rng.uniform(0.6, 2.0, 3))
+        R = Rotation.random(rng=rng).as_matrix()
+        size = rng.uniform(0.02, 0.15, 3 if is_box else 2)
+        shape = LinkShape(is_box, size, R, rng.uniform(-0.1, 0.1, 3))
+        covering, allowed = cover(shape, scale, 0.015, parts), padding_for(0.015, scale)
+        assert len(covering) == parts
+        for direction in rng.normal(size=(100, 3)):
+            _, surface, normal = shape.nearest(shape.p_LoSo_L + direction)
+            skin = shape.p_LoSo_L + R @ (surface + 0.015 * normal)
+            assert min(one.nearest(np.array(scale) * skin)[0] for one in covering) <= allowed + 1e-9
+
+
+def test_two_capsules_are_closer_to_an_elliptic_body_than_one():
+    shape = LinkShape(False, np.array([0.1, 0.04]), np.eye(3), np.zeros(3))
+    scale = (1.5, 1.1, 1.2)
+    thick = [max(one.reach(np.eye(3)[1]) for one in cover(shape, scale, 0.0, n)) for n in (1, 2)]
+    # The body reaches 0.11 m there; round capsules as broad as it is reach 0.15 m.
+    assert thick[0] == pytest.approx(0.15)
+    assert 0.11 < thick[1] < 0.12
 
 
 @pytest.mark.parametrize("name", task_names())
@@ -172,11 +199,13 @@ def test_goals_keep_their_distance_from_the_padded_skin(name):
         for before, after in zip(task.goals, moved.goals, strict=True):
             link = file.body_frames[before.body_frame]
             scale = scales[link]
-            grown = padding_of(environment, link, scales, shapes_of) - file.padding[link]
+            grown = padding_of(environment, link, scales) - file.padding[link]
             shapes = shapes_of[link]
             d = [shape.nearest(before.position)[0] for shape in shapes]
-            nearest = shapes[int(np.argmin(d))].stretch(scale)
-            assert nearest.nearest(after.position)[0] == pytest.approx(min(d) + grown, abs=1e-12)
+            covering = covers_of(environment, link, shapes, scale)[int(np.argmin(d))]
+            found = min(one.nearest(after.position)[0] for one in covering)
+            # Never nearer; farther where the shape curves away beside its outermost point.
+            assert min(d) + grown - 1e-12 <= found <= min(d) + grown + 0.02
             np.testing.assert_allclose(before.quaternion, after.quaternion, atol=1e-15)
             if person is SAME:
                 np.testing.assert_allclose(before.position, after.position, atol=1e-9)
@@ -184,22 +213,18 @@ def test_goals_keep_their_distance_from_the_padded_skin(name):
 
 
 @pytest.mark.parametrize("is_box", [True, False], ids=["box", "capsule"])
-def test_surface_points_follow_the_shape(is_box):
+def test_points_lead_back_from_their_nearest_point_of_the_surface(is_box):
     generator = np.random.default_rng(0)
     size = np.array([0.1, 0.2, 0.3]) if is_box else np.array([0.1, 0.2])
     shape = LinkShape(is_box, size, np.eye(3), np.array([0.1, 0.0, -0.1]))
-    stretched = shape.stretch((1.2, 0.8, 1.5))
     for point in generator.uniform(-0.6, 0.6, (50, 3)):
         distance, surface, normal = shape.nearest(point)
         back = shape.p_LoSo_L + surface + distance * normal
         np.testing.assert_allclose(back, point, atol=1e-12)
         assert shape.nearest(shape.p_LoSo_L + surface)[0] == pytest.approx(0.0, abs=1e-12)
-        followed = shape.follow(surface, normal, stretched)
-        outside = abs(distance) * normal
-        # The same normal leads straight out of the stretched shape.
-        assert stretched.nearest(followed + outside)[0] == pytest.approx(abs(distance), abs=1e-12)
-    lower, upper = stretched.extent(np.eye(3), np.zeros(3))
-    np.testing.assert_allclose((upper - lower)[2], 1.5 * 2 * 0.3, rtol=1e-12)
+        # Nothing of a convex shape is beyond the plane through the point, across the normal.
+        beyond = shape.reach(normal) - float(normal @ (shape.p_LoSo_L + surface))
+        assert beyond == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_person_of_an_environment_file_is_resized(tmp_path):
