@@ -57,7 +57,7 @@ slow = pytest.mark.slow
         pytest.param("chair", "shaving", SMALL, {}, marks=slow),
         # The goal on the forearm, beside a thigh that is broader than that of the papers' man.
         ("bed", "bathing", SMALL, {7: "person::quad_right_link"}),
-        pytest.param("bed", "bathing", LARGE, {}, marks=slow),
+        pytest.param("bed", "bathing", LARGE, {7: "person::quad_right_link"}, marks=slow),
     ],
 )
 def test_scores_of_a_person_hold_in_drake(places, caplog, place, task, person, touching):
