@@ -59,8 +59,8 @@ def scene_outlines(file: ScoreFile, progress: Progress, only: int | None = None)
             {
                 "outlines": _outlines(scene),
                 "goals": [
-                    np.round(X_WG.translation(), _DECIMALS).tolist()
-                    for X_WG in goal_poses(scene, job.task)
+                    np.round(X_MG.translation(), _DECIMALS).tolist()
+                    for X_MG in scene.seen_from_mount(goal_poses(scene, job.task))
                 ],
             }
         )
@@ -103,7 +103,7 @@ def _outlines(scene: Scene) -> list[dict[str, Any]]:
     plant = scene.built.plant
     found = []
     for part, category in environment_parts(scene):
-        solid = part_solid(scene, part, category)
+        solid = part_solid(scene, part, category, in_mount=True)
         thing = plant.GetModelInstanceName(plant.get_body(part.body).model_instance())
         outline = {
             "category": category.name.lower(),

@@ -7,7 +7,9 @@ from tcs.model.scene.scene import Scene
 
 
 def body_frame_positions(scene: Scene, grid: Grid) -> dict[str, list[float]]:
-    """Return the position of each body frame in W for each environment state of a grid.
+    """Return the position of each body frame in M for each environment state of a grid.
+
+    M is the frame of the base poses: W, or that of the environment's mount.
 
     Args:
         scene: The scene; its state is restored.
@@ -23,7 +25,8 @@ def body_frame_positions(scene: Scene, grid: Grid) -> dict[str, list[float]]:
             for joint, value in state.items():
                 scene.set_joint(joint, value)
             for name, numbers in positions.items():
-                numbers.extend(scene.body_frame_pose(name).translation().tolist())
+                (X_MH,) = scene.seen_from_mount([scene.body_frame_pose(name)])
+                numbers.extend(X_MH.translation().tolist())
     finally:
         scene.restore(before)
     return positions

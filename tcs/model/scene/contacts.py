@@ -68,10 +68,12 @@ class ContactRule:
     Attributes:
         disabled_pairs: Pairs of robot bodies that are never checked, from the robot file.
         allowed_contacts: Pairs (robot body, environment body) that may touch, from the task.
+        on_floor: Whether the robot stands on the floor; one on furniture is checked against it.
     """
 
     disabled_pairs: frozenset[frozenset[str]]
     allowed_contacts: frozenset[frozenset[str]]
+    on_floor: bool = True
 
     @classmethod
     def of(
@@ -81,6 +83,7 @@ class ContactRule:
         allowed_contacts: Iterable[tuple[str, str]],
         *,
         where: str,
+        on_floor: bool = True,
     ) -> ContactRule:
         """Return the rule for a robot's disabled pairs and a task's allowed contacts.
 
@@ -89,6 +92,7 @@ class ContactRule:
             disabled_pairs: Pairs of robot bodies that are never checked.
             allowed_contacts: Pairs (robot body, environment body) that may touch.
             where: The source of the allowed contacts, for the message.
+            on_floor: Whether the robot stands on the floor.
 
         Raises:
             UnknownNameError: If an allowed contact names a body that has no shape in the scene.
@@ -108,6 +112,7 @@ class ContactRule:
         return cls(
             disabled_pairs=frozenset(frozenset(pair) for pair in disabled_pairs),
             allowed_contacts=frozenset(allowed),
+            on_floor=on_floor,
         )
 
     def is_checked(self, first: Part, second: Part) -> bool:
@@ -119,7 +124,7 @@ class ContactRule:
         if Group.ENVIRONMENT not in groups:
             moves_relatively = groups == {Group.ARM, Group.BODY} or first.carrier != second.carrier
             return moves_relatively and names not in self.disabled_pairs
-        if groups == {Group.BODY, Group.ENVIRONMENT} and FLOOR in names:
+        if self.on_floor and groups == {Group.BODY, Group.ENVIRONMENT} and FLOOR in names:
             return False
         return names not in self.allowed_contacts
 

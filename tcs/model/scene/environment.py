@@ -26,6 +26,7 @@ from tcs.model.grid import Axis, Grid
 from tcs.model.people import JOINTS, Person, PersonEntry, PersonLike, load_person
 from tcs.model.scene.error_distribution import ErrorDistribution
 from tcs.model.scene.furniture import BedEntry, WheelchairEntry
+from tcs.model.scene.mounting import FurnitureMount
 from tcs.model.scene.posture import Posture
 
 FLOOR = "floor"
@@ -128,6 +129,8 @@ class EnvironmentFile(Document):
     bed: BedEntry | None = None
     """Sizes of the model named "bed", or the name of a preset."""
     obstacles: Annotated[tuple[Obstacle, ...], Entries] = ()
+    mount: FurnitureMount | None = None
+    """Where the robot is bolted to furniture; None for a robot on the floor."""
     floor: bool = True
     """Whether there is a floor at z = 0; the arm must not touch it, the rest of the robot may."""
     joints: Annotated[Mapping[str, JointPosition], Entries] = {}

@@ -191,7 +191,12 @@ def _extents(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _outside(
     environment: EnvironmentFile, owner: NDArray[np.str_], lows: FloatArray, highs: FloatArray
 ) -> tuple[str, ...]:
-    """Return what is farther than `REACH` from every base position, by the axes of the grid."""
+    """Return what is farther than `REACH` from every base position, by the axes of the grid.
+
+    Nothing is said of a robot on a mount, whose base positions are in the mount's frame.
+    """
+    if environment.mount is not None:
+        return ()
     grid = Grid.from_spec(environment.grid, where=f"environment '{environment.name}', field 'grid'")
     axes = {axis.name: axis.values for axis in grid.axes}
     if not {"base_x", "base_y"} <= axes.keys():

@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
+    FixedOffsetFrame,
     Frame,
     Joint,
     ModelInstanceIndex,
@@ -56,12 +57,14 @@ class EnvironmentPlant:
         joints: Every movable joint.
         named_by_link: Names of the models whose contacts are reported by link.
         floor: Whether there is a floor.
+        mount: M, the frame that carries the robot's base; W for a robot on the floor.
     """
 
     links: dict[str, RigidBody]
     joints: EnvironmentJoints
     named_by_link: frozenset[str]
     floor: bool
+    mount: Frame
 
 
 def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> EnvironmentPlant:
@@ -109,7 +112,8 @@ def add_environment(plant: MultibodyPlant, environment: EnvironmentFile) -> Envi
     joints.set_defaults(positions.joints, where=f"{where}, field 'joints'")
     by_link = {m.name for m in environment.models if m.named_by == "link"}
     by_link |= {o.name for o in environment.obstacles if o.type != "model"}
-    return EnvironmentPlant(links, joints, frozenset(by_link), environment.floor)
+    mount = _mount_frame(plant, environment, links, where)
+    return EnvironmentPlant(links, joints, frozenset(by_link), environment.floor, mount)
 
 
 def environment_parts(
@@ -137,12 +141,35 @@ def environment_parts(
 def _parent_frame(
     plant: MultibodyPlant, entry: ModelEntry | Obstacle, links: dict[str, RigidBody], where: str
 ) -> Frame:
-    if isinstance(entry, Obstacle) or entry.parent == WORLD:
+    if isinstance(entry, Obstacle):
         return plant.world_frame()
-    if entry.parent not in links:
-        known = (WORLD, *links)
-        raise UnknownNameError("parent", entry.parent, known, where=f"{where}, '{entry.name}'")
-    return links[entry.parent].body_frame()
+    return _frame_of(plant, entry.parent, links, f"{where}, '{entry.name}'")
+
+
+def _frame_of(plant: MultibodyPlant, parent: str, links: dict[str, RigidBody], where: str) -> Frame:
+    """Return the frame of a link, an obstacle, or the world."""
+    if parent == WORLD:
+        return plant.world_frame()
+    if parent not in links:
+        raise UnknownNameError("parent", parent, (WORLD, *links), where=where)
+    return links[parent].body_frame()
+
+
+def _mount_frame(
+    plant: MultibodyPlant,
+    environment: EnvironmentFile,
+    links: dict[str, RigidBody],
+    where: str,
+) -> Frame:
+    """Return the frame M that carries the robot's base, W without a mount."""
+    mount = environment.mount
+    if mount is None:
+        return plant.world_frame()
+    parent = _frame_of(plant, mount.parent, links, f"{where}, field 'mount'")
+    X_PM = RigidTransform(RollPitchYaw(mount.pose.rpy), mount.pose.xyz)
+    if mount.on_seat:
+        X_PM = _on_seat(environment, mount.parent) @ X_PM
+    return plant.AddFrame(FixedOffsetFrame("robot_mount", parent, X_PM))
 
 
 def _add_shapes(
@@ -162,13 +189,17 @@ def _add_shapes(
 
 
 def _seated(environment: EnvironmentFile, entry: ModelEntry | Obstacle) -> RigidTransform:
-    """Return how an entry moves with the seat of a wheelchair of other sizes than the papers'."""
-    chair = environment.wheelchair
-    if chair is None or not environment.is_person(entry.name):
+    """Return how the person moves with the seat of a wheelchair of other sizes than the papers'."""
+    if not environment.is_person(entry.name) or not isinstance(entry, ModelEntry):
         return RigidTransform()
-    if not isinstance(entry, ModelEntry) or not entry.parent.startswith("wheelchair::"):
+    return _on_seat(environment, entry.parent)
+
+
+def _on_seat(environment: EnvironmentFile, parent: str) -> RigidTransform:
+    """Return how what is on the seat moves in the frame of its parent, if that is a wheelchair."""
+    if environment.wheelchair is None or not parent.startswith("wheelchair::"):
         return RigidTransform()
-    R, p = seat_motion(chair)
+    R, p = seat_motion(environment.wheelchair)
     return RigidTransform(RotationMatrix(R), p)
 
 

@@ -58,9 +58,10 @@ def _lowered(scene: Scene, task: Task | None, grid: Grid) -> LoweredScene:
         scene.spec.robot.disabled_pairs,
         (
             *(() if task is None else task.allowed_contacts),
-            *standing_contacts(scene.spec.robot, built.parts),
+            *standing_contacts(scene.spec, built.parts),
         ),
         where=f"{where}, allowed contacts",
+        on_floor=scene.spec.environment.mount is None,
     )
     arm = [part for part in built.parts if part.group is Group.ARM]
     body = [part for part in built.parts if part.group is Group.BODY]
@@ -251,7 +252,9 @@ def torso_at(lowered: LoweredScene, scene: Scene, levels: Iterable[float]) -> Sc
 def _environment_states(
     scene: Scene, task: Task | None, states: Iterable[Mapping[str, float]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the poses in W of the environment's shapes and of the goals, for each state.
+    """Return the poses in M of the environment's shapes and of the goals, for each state.
+
+    M is W, or the frame of the robot's mount: in either the base moves in the x-y plane.
 
     Returns:
         Shapes (states, parts, 3, 4) and (states, goals, 3, 4).
@@ -262,12 +265,22 @@ def _environment_states(
     for state in states:
         for name, value in state.items():
             scene.set_joint(name, value)
-        shapes.append(of_parts.frames_in_world(scene.plant_context))
-        goals.append(of_goals.frames_in_world(scene.plant_context))
+        shapes.append(_seen_from_mount(scene, of_parts.frames_in_world(scene.plant_context)))
+        goals.append(_seen_from_mount(scene, of_goals.frames_in_world(scene.plant_context)))
     return (
         of_parts.at(_stacked(shapes, len(of_parts.frames))),
         of_goals.at(_stacked(goals, len(of_goals.frames))),
     )
+
+
+def _seen_from_mount(scene: Scene, X_WF: FloatArray) -> FloatArray:
+    """Return X_MF of frames at the present state, shape (n, 3, 4)."""
+    if scene.spec.environment.mount is None:
+        return X_WF
+    X_MW = scene.mount_pose().inverse().GetAsMatrix34()
+    X_MF = X_MW[:, :3] @ X_WF
+    X_MF[:, :, 3] += X_MW[:, 3]
+    return np.asarray(X_MF)
 
 
 def goal_poses(scene: Scene, task: Task) -> list[RigidTransform]:

@@ -51,8 +51,9 @@ class Observation:
     """Values of joints of the environment [m or rad]. All others keep the positions of the
     environment file, unless they are fitted to `frames`."""
     frames: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    """Poses in W by body frame ("head") or link ("wheelchair::base_link"): x, y, z [m], followed
-    by a quaternion qw, qx, qy, qz where the orientation is observed too."""
+    """Poses by body frame ("head") or link ("wheelchair::base_link"): x, y, z [m], followed by a
+    quaternion qw, qx, qy, qz where the orientation is observed too. They are in M, the frame of the
+    base poses: W without a mount."""
     setting: Mapping[str, float] = field(default_factory=dict)
     """Values of the grid's environment axes at the time the frames were observed [m or rad], e.g.
     the height of the bed."""
@@ -230,14 +231,15 @@ def _pose(name: str, at: Sequence[float]) -> tuple[FloatArray, RotationMatrix | 
 
 
 def _residual(
-    scene: Scene, frame: Frame, p_WH: FloatArray, R_WH: RotationMatrix | None
+    scene: Scene, frame: Frame, p_MH: FloatArray, R_MH: RotationMatrix | None
 ) -> FloatArray:
     """Return the difference of a frame from the observed one: position, then weighted angle [m]."""
-    X_WH: RigidTransform = frame.CalcPoseInWorld(scene.plant_context)
-    position = np.asarray(X_WH.translation() - p_WH)
-    if R_WH is None:
+    X_MH: RigidTransform
+    (X_MH,) = scene.seen_from_mount([frame.CalcPoseInWorld(scene.plant_context)])
+    position = np.asarray(X_MH.translation() - p_MH)
+    if R_MH is None:
         return position
-    rotation = (X_WH.rotation() @ R_WH.inverse()).ToAngleAxis()
+    rotation = (X_MH.rotation() @ R_MH.inverse()).ToAngleAxis()
     return np.concatenate(
         [position, _LENGTH_SCALE * rotation.angle() * np.asarray(rotation.axis())]
     )

@@ -69,11 +69,11 @@ class _LinkPoses(NamedTuple):
     """Links of the papers' man in S states."""
 
     R: FloatArray
-    """Orientations in W, shape (S, links, 3, 3)."""
+    """Orientations in M, the frame of the base poses, shape (S, links, 3, 3)."""
     p: FloatArray
-    """Origins in W [m], shape (S, links, 3)."""
+    """Origins in M [m], shape (S, links, 3)."""
     turn: FloatArray
-    """Rotation from the model frame with all joints at 0 to W, of what carries each node,
+    """Rotation from the model frame with all joints at 0 to M, of what carries each node,
     shape (S, nodes, 3, 3)."""
 
 
@@ -198,7 +198,7 @@ class PeopleInScene:
         stretched: Mapping[str, list[LinkShape]],
         states: IntArray,
     ) -> FloatArray:
-        """Return the origins of the links of a person in W [m], shape (s, links, 3)."""
+        """Return the origins of the links of a person in M [m], shape (s, links, 3)."""
         by_link = dict(zip(_LINKS, scales, strict=True))
         moved = _moved(self._before, by_link)
         after = {
@@ -248,7 +248,7 @@ class PeopleInScene:
                 for name, value in state.items():
                     scene.set_joint(name, value)
                 poses = [plant.EvalBodyPoseInWorld(context, body) for body in (*links, *above)]
-                found.append([X.GetAsMatrix34() for X in poses])
+                found.append([X.GetAsMatrix34() for X in scene.seen_from_mount(poses)])
         finally:
             scene.restore(before)
         X = np.array(found).reshape(len(states), -1, 3, 4)

@@ -58,6 +58,7 @@ class ScenePlant:
         arm_upper: Their upper limits [rad], +inf where continuous.
         torso_joint: The prismatic joint of the torso, None for a robot without one.
         torso_limits: Limits of the torso height [m], zeros without a torso joint.
+        mount_frame: M, the frame in which base poses are given: W, or a frame on furniture.
         base_frame: B, the robot's base.
         arm_base_frame: A, the parent link of joint 1.
         tool_frame: T.
@@ -77,6 +78,7 @@ class ScenePlant:
     arm_upper: FloatArray
     torso_joint: Joint | None
     torso_limits: tuple[float, float]
+    mount_frame: Frame
     base_frame: Frame
     arm_base_frame: Frame
     tool_frame: Frame
@@ -98,9 +100,12 @@ def build_plant(
     # A continuous plant: nothing is simulated, and a time step would only add discrete state.
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     instance = _add_robot(plant, robot, meshes)
-    base_joints = _add_base(plant, plant.GetBodyByName(robot.root_body, instance))
+    root = plant.GetBodyByName(robot.root_body, instance)
+    on_floor = environment.mount is None
+    base_joints = _add_base(plant, root, plant.world_frame()) if on_floor else ()
     primitives = _add_primitives(plant, robot, instance)
     added = add_environment(plant, environment)
+    base_joints = base_joints or _add_base(plant, root, added.mount)
     for name, value in robot.joint_positions().items():
         plant.GetJointByName(name, instance).set_default_positions([value])
     plant.Finalize()
@@ -121,8 +126,10 @@ def build_plant(
         shape_of(inspector, part)
     _check_names(parts, environment.name)
     where = f"environment '{environment.name}', allowed contacts"
-    allowed_contacts = (*allowed_contacts, *standing_contacts(robot, parts))
-    rule = ContactRule.of(parts, robot.disabled_pairs, allowed_contacts, where=where)
+    allowed_contacts = (*allowed_contacts, *standing_contacts(spec, parts))
+    rule = ContactRule.of(
+        parts, robot.disabled_pairs, allowed_contacts, where=where, on_floor=on_floor
+    )
     apply_rule(scene_graph, parts, rule)
     limits = robot.joint_limits()
     return ScenePlant(
@@ -136,6 +143,7 @@ def build_plant(
         arm_upper=np.array([limits[name][1] for name in robot.arm_joints]),
         torso_joint=torso,
         torso_limits=limits[robot.torso_joint] if robot.torso_joint else (0.0, 0.0),
+        mount_frame=added.mount,
         base_frame=plant.GetFrameByName(robot.root_body, instance),
         arm_base_frame=plant.GetFrameByName(robot.arm_base, instance),
         tool_frame=plant.GetFrameByName(robot.tool_frame, instance),
@@ -160,17 +168,17 @@ def _check_names(parts: Iterable[Part], environment: str) -> None:
             )
 
 
-def _add_base(plant: MultibodyPlant, root: RigidBody) -> tuple[Joint, ...]:
-    """Attach the robot's root to the world by planar joints: x, y and yaw."""
+def _add_base(plant: MultibodyPlant, root: RigidBody, mount: Frame) -> tuple[Joint, ...]:
+    """Attach the robot's root to the world or its mount by planar joints: x, y and yaw."""
     instance = plant.AddModelInstance("base")
     axes = (np.eye(3)[0], np.eye(3)[1], np.eye(3)[2])
-    parent = plant.world_body()
+    parent = mount
     joints = []
     for name, axis in zip(BASE_JOINTS, axes, strict=True):
         joint = RevoluteJoint if name == "base_yaw" else PrismaticJoint
         child = root if name == "base_yaw" else plant.AddRigidBody(f"{name}_link", instance)
-        joints.append(plant.AddJoint(joint(name, parent.body_frame(), child.body_frame(), axis)))
-        parent = child
+        joints.append(plant.AddJoint(joint(name, parent, child.body_frame(), axis)))
+        parent = child.body_frame()
     return tuple(joints)
 
 
@@ -277,8 +285,16 @@ def coupled_frames(joints: Iterable[tuple[Joint, ...]], first: int) -> FloatArra
     ).reshape(-1, 2)
 
 
-def standing_contacts(robot: RobotFile, parts: Iterable[Part]) -> tuple[tuple[str, str], ...]:
-    """Return the contacts with the floor of a base that drives with the arm, as part of it."""
+def standing_contacts(spec: SceneSpec, parts: Iterable[Part]) -> tuple[tuple[str, str], ...]:
+    """Return the contacts of the base with what it stands on.
+
+    They are those of a base that drives with the arm, as part of it, with the floor, and those of a
+    mounted one with what it is bolted to.
+    """
+    robot, mount = spec.robot, spec.environment.mount
+    if mount is not None:
+        base = dict.fromkeys(part.name for part in parts if part.group is Group.BODY)
+        return tuple((body, other) for body in base for other in mount.touches)
     if robot.mount is None or robot.mount.drive is None:
         return ()
     names = {part.name for part in parts}

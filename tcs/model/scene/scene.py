@@ -96,7 +96,10 @@ class Scene:
         return self._attached[group]
 
     def place_base(self, x: float, y: float, yaw: float) -> None:
-        """Place the robot's base B at (x, y) in W [m] with heading `yaw` [rad]."""
+        """Place the robot's base B at (x, y) in M [m] with heading `yaw` [rad].
+
+        M is W, or the frame of the environment's mount.
+        """
         for joint, value in zip(self.built.base_joints, (x, y, yaw), strict=True):
             self._set(joint.position_start(), value)
 
@@ -165,6 +168,17 @@ class Scene:
     def base_pose(self) -> RigidTransform:
         """Return X_WB, the pose of the robot's base in the environment frame."""
         return self.built.base_frame.CalcPoseInWorld(self._state)
+
+    def mount_pose(self) -> RigidTransform:
+        """Return X_WM of the frame in which base poses are given; the identity without a mount."""
+        return self.built.mount_frame.CalcPoseInWorld(self._state)
+
+    def seen_from_mount(self, poses: Iterable[RigidTransform]) -> list[RigidTransform]:
+        """Return poses in W as poses in M; without a mount they are the same."""
+        if self.spec.environment.mount is None:
+            return list(poses)
+        X_MW = self.mount_pose().inverse()
+        return [X_MW @ X for X in poses]
 
     def body_frame_pose(self, name: str, *, where: str = "") -> RigidTransform:
         """Return X_WH, the pose of a body frame, e.g. "head".

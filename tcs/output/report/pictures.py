@@ -83,7 +83,7 @@ def map_figure(file: ScoreFile, shown: ShownSet, scored: ScoredScene | None = No
         _set_environment(scene, shown.members[0])
     return draw_map(
         PlaceMap.of(file.tables[shown.table].scores, Grid.from_dict(file.grid)),
-        environment_solids(scene),
+        environment_solids(scene, in_mount=True),
         [BaseFootprint(member, base) for member in shown.members],
         here=BaseFootprint(shown.here, base) if shown.here is not None else None,
         title=title_of(job, file),
@@ -177,7 +177,7 @@ def _member_panel(
         *goal_solids(scene, job.task, current),
     ]
     goals = np.array([X_WG.translation() for X_WG in goal_poses(scene, job.task)])
-    base = np.array([member.base_x, member.base_y, 0.0])
+    base = scene.base_pose().translation()
     # Views across the line from robot to person, from both sides: neither hides the other.
     along = math.atan2(*(goals.mean(axis=0) - base)[[1, 0]])
     if is_close and current is not None:

@@ -26,9 +26,15 @@ def robot_solids(scene: Scene) -> list[Solid]:
     ]
 
 
-def environment_solids(scene: Scene) -> list[Solid]:
-    """Return the shapes of furniture, person and obstacles in the present state of the scene."""
-    return [part_solid(scene, part, category) for part, category in environment_parts(scene)]
+def environment_solids(scene: Scene, *, in_mount: bool = False) -> list[Solid]:
+    """Return the shapes of furniture, person and obstacles in the present state of the scene.
+
+    Args:
+        scene: The scene.
+        in_mount: Whether they are in the frame of the base poses, for maps, rather than in W.
+    """
+    parts = environment_parts(scene)
+    return [part_solid(scene, part, category, in_mount=in_mount) for part, category in parts]
 
 
 def environment_parts(scene: Scene) -> list[tuple[Part, Category]]:
@@ -64,15 +70,19 @@ def goal_solids(scene: Scene, task: Task, current: int | None) -> list[Solid]:
     return solids
 
 
-def part_solid(scene: Scene, part: Part, category: Category) -> Solid:
-    """Return a collision shape in the present state of the scene."""
+def part_solid(scene: Scene, part: Part, category: Category, *, in_mount: bool = False) -> Solid:
+    """Return a collision shape in the present state of the scene, in W or as for a map."""
     corners = primitive_corners(*shape_of(scene.built.scene_graph.model_inspector(), part))
-    X_WP = scene.query_object().GetPoseInWorld(part.geometry)
-    return Solid.placed(category, corners, X_WP.rotation().matrix(), X_WP.translation())
+    X = scene.query_object().GetPoseInWorld(part.geometry)
+    if in_mount:
+        (X,) = scene.seen_from_mount([X])
+    return Solid.placed(category, corners, X.rotation().matrix(), X.translation())
 
 
 def base_outline(scene: Scene) -> FloatArray:
-    """Return the outline of the bodies on the floor, in the base's frame [m], shape (n, 2).
+    """Return the outline of the base from above, in its frame [m], shape (n, 2).
+
+    It is that of the bodies on the floor, or of what is bolted down.
 
     Moves the base of the scene to the origin.
     """
@@ -82,5 +92,6 @@ def base_outline(scene: Scene) -> FloatArray:
     robot = [part for part in scene.built.parts if part.group is not Group.ENVIRONMENT]
     base = [part for part in robot if plant.get_body(part.body).name() in standing]
     base = base or [part for part in robot if part.group is Group.BODY]
-    corners = [part_solid(scene, part, Category.ROBOT).corners[:, :2] for part in base]
+    solids = [part_solid(scene, part, Category.ROBOT, in_mount=True) for part in base]
+    corners = [solid.corners[:, :2] for solid in solids]
     return outline(np.concatenate(corners))

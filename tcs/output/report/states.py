@@ -74,7 +74,9 @@ def states_figure(
             for number, (h, stand) in enumerate(zip(shown.indices, stands, strict=True), start=1)
             if grid.state_of(h) == state
         ]
-        return StatePanel(PlaceMap.of_state(scores, grid, state), environment_solids(scene), chosen)
+        return StatePanel(
+            PlaceMap.of_state(scores, grid, state), environment_solids(scene, in_mount=True), chosen
+        )
 
     columns = axes[-1]
     numbers = range(states)

@@ -101,6 +101,8 @@ class SceneShapes:
         goals = goal_poses(scene, self.task)
         poses |= {f"{GOALS}/{g}": X_WG for g, X_WG in enumerate(goals)}
         poses[SHOWN] = RigidTransform(goals[goal].translation())
+        if scene.spec.environment.mount is not None:
+            poses |= dict.fromkeys((FLOOR, MEMBERS), scene.mount_pose())
         return {path: X.GetAsMatrix34() for path, X in poses.items()}
 
     def draw(

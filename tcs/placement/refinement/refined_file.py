@@ -133,9 +133,11 @@ def refine(
     is_scored = objective in WITHOUT_SAMPLES
     draw = _samples(file, number, scorer, objective, seed)
     drawn = draw(samples, SAMPLES_STREAM)
+    # Rails run along x of the mount; beside them there is nothing to bolt a robot to.
+    rails = ("base_y",) if file.environment.get("mount") else ()
     search = LocalSearch(
         scorer,
-        Space.of(file.configurations, sets),
+        Space.of(file.configurations, sets, fixed=rails),
         _objective(objective, sets, drawn),
         named_generator(seed, STREAM),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Self
 
@@ -27,8 +28,8 @@ class Space:
     high: FloatArray
     """Greatest values, shape (axes,)."""
     cell: FloatArray
-    """Half widths of the first cells, at least a step of the grid; 0 for an axis with a single
-    value, which stays, shape (axes,)."""
+    """Half widths of the first cells, at least a step of the grid; 0 for an axis that keeps its
+    values, shape (axes,)."""
     periodic: BoolArray
     """Whether an axis is a heading that the grid covers all around, shape (axes,)."""
     min_distance: float
@@ -37,11 +38,19 @@ class Space:
     """Whether the members of a set share the state of the environment."""
 
     @classmethod
-    def of(cls, grid: Grid, sets: SetTable | None = None) -> Self:
-        """Return the space of a grid, with the rules of its sets if there are any."""
+    def of(cls, grid: Grid, sets: SetTable | None = None, *, fixed: Collection[str] = ()) -> Self:
+        """Return the space of a grid, with the rules of its sets if there are any.
+
+        Args:
+            grid: The grid.
+            sets: Its sets.
+            fixed: Axes that keep the values of the grid.
+        """
         values = [axis.values for axis in grid.axes]
         cell = [
-            max(v[1] - v[0], LEAST_CELL[axis.held_unit]) if v.size > 1 else 0.0
+            max(v[1] - v[0], LEAST_CELL[axis.held_unit])
+            if v.size > 1 and axis.name not in fixed
+            else 0.0
             for v, axis in zip(values, grid.axes, strict=True)
         ]
         return cls(

@@ -146,7 +146,9 @@ class ScoringSetup:
         """
         job = self.job
         lowered = job.lowered(self.scene)
-        shapes = robot_shapes(lowered.arrays)
+        # Obstacles that are seen later are in W, base poses on a mount are not.
+        is_mounted = job.spec.environment.mount is not None
+        shapes = None if is_mounted else robot_shapes(lowered.arrays)
         excluded = excluded_configurations(
             job.constraints.forbid, Footprint.of(shapes), job.scored_grid
         )
