@@ -33,6 +33,7 @@ from tcs.model.scene.person_goals import goals_on_person
 from tcs.model.scene.posture import Posture
 from tcs.model.scene.scene import Contact, Scene
 from tcs.model.scene.spec import SceneSpec
+from tcs.model.scene.surface_goals import with_surface_goals
 
 __all__ = [
     "EMPTY_ENVIRONMENT",
@@ -61,4 +62,5 @@ __all__ = [
     "lower",
     "torso_at",
     "with_person",
+    "with_surface_goals",
 ]

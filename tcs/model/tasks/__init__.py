@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from tcs.model.tasks.files import load_task, task_names
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task, ToolLine
+from tcs.model.tasks.surface import Surface
+from tcs.model.tasks.task import TOOL_SPEED, Goal, KeepOut, Task
+from tcs.model.tasks.tool_line import ToolLine
 
 __all__ = [
     "TOOL_SPEED",
     "Freedom",
     "Goal",
     "KeepOut",
+    "Surface",
     "Task",
     "ToolLine",
     "load_task",

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.documents import Document, read_document
 from tcs.files.paths import DataFiles
 from tcs.model.tasks.freedom import Freedom
-from tcs.model.tasks.task import DEFAULT_APPROACH, Goal, KeepOut, Task, ToolLine
+from tcs.model.tasks.surface import Surface
+from tcs.model.tasks.task import Goal, KeepOut, Task
+from tcs.model.tasks.tool_line import DEFAULT_APPROACH, ToolLine
 
 TASKS = DataFiles("task", "tasks/*/*.yaml")
 
@@ -68,6 +71,25 @@ class GoalEntry(_Entry):
     retreat: LineEntry | None = None
 
 
+class SurfaceEntry(_Entry):
+    """A surface that is covered with goals."""
+
+    body: str
+    spacing: float
+    normal: str = "inward"
+    distance: float = 0.04
+    facing: list[float] | None = None
+    weight: float = 1.0
+    free: Literal["orientation", "nothing"] | FreeEntry | None = None
+    approach: LineEntry | None = None
+    retreat: LineEntry | None = None
+
+
+def _listed(value: object) -> object:
+    """Return a single entry as a list of one."""
+    return [value] if isinstance(value, Mapping) else value
+
+
 class KeepOutEntry(_Entry):
     """A box in a body frame: centre and full sizes [m]."""
 
@@ -91,7 +113,8 @@ class TaskFile(_Entry):
     title: str
     source: str
     environments: list[str]
-    goals: list[GoalEntry]
+    goals: list[GoalEntry] = Field(default_factory=list)
+    surface: Annotated[list[SurfaceEntry], BeforeValidator(_listed)] = Field(default_factory=list)
     tool: str = ""
     free: Literal["orientation", "nothing"] | FreeEntry | None = None
     approach: LineEntry | None = None
@@ -132,6 +155,12 @@ def _read(path: Path) -> Task:
             goals.append(_goal(entry, written))
         except TaskError as error:
             raise TaskError(f"{where}, goals[{i}]: {error}") from None
+    surfaces = []
+    for i, surface in enumerate(written.surface):
+        try:
+            surfaces.append(_surface(surface, written))
+        except TaskError as error:
+            raise TaskError(f"{where}, surface[{i}]: {error}") from None
     for i, pair in enumerate(written.allowed_contacts):
         if len(pair) != 2:
             raise TaskError(
@@ -146,6 +175,7 @@ def _read(path: Path) -> Task:
             source=written.source,
             tool=written.tool,
             allowed_contacts=tuple((pair[0], pair[1]) for pair in written.allowed_contacts),
+            surfaces=tuple(surfaces),
             keep_out=tuple(_keep_out(i, entry) for i, entry in enumerate(written.keep_out)),
             grids={
                 environment: {
@@ -162,10 +192,30 @@ def _read(path: Path) -> Task:
         ) from None
 
 
-def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
-    """Return a goal; its straight motions are its own, or those of the task, or the default."""
+def _lines(entry: GoalEntry | SurfaceEntry, task: TaskFile) -> tuple[ToolLine, ToolLine]:
+    """Return the straight motions of a goal: its own, or those of the task, or the default."""
     approach = _line(entry.approach or task.approach, "approach") or DEFAULT_APPROACH
     retreat = _line(entry.retreat or task.retreat, "retreat") or approach.reverse()
+    return approach, retreat
+
+
+def _surface(entry: SurfaceEntry, task: TaskFile) -> Surface:
+    approach, retreat = _lines(entry, task)
+    return Surface(
+        body=entry.body,
+        spacing=entry.spacing,
+        normal=entry.normal,
+        distance=entry.distance,
+        facing=None if entry.facing is None else _three(entry.facing, "facing"),
+        weight=entry.weight,
+        free=_freedom(entry.free if entry.free is not None else task.free),
+        approach=approach,
+        retreat=retreat,
+    )
+
+
+def _goal(entry: GoalEntry, task: TaskFile) -> Goal:
+    approach, retreat = _lines(entry, task)
     return Goal(
         body_frame=entry.body_frame,
         position=np.array(entry.position, dtype=np.float64),

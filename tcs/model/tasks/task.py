@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tcs.errors import TaskError, UnknownNameError
 from tcs.files.quantities import GOALS, SIZE, WEIGHT
 from tcs.model.tasks.freedom import Freedom
-
-UNIT_TOLERANCE = 1e-5
-"""Tolerance of a quaternion's length: six printed digits round by less than this."""
+from tcs.model.tasks.surface import Surface
+from tcs.model.tasks.tool_line import (
+    DEFAULT_APPROACH,
+    DEFAULT_RETREAT,
+    UNIT_TOLERANCE,
+    ToolLine,
+    finite,
+)
 
 MAX_DISTANCE = 2.0
 """Greatest distance of a goal from its body frame [m]; a larger number is not in metres."""
@@ -22,60 +27,6 @@ MAX_DISTANCE = 2.0
 
 LONGEST_NAME = 60
 """Greatest length of the name of a goal [characters]: it has to fit into a table."""
-MAX_STRAIGHT = 1.0
-"""Greatest length of a straight tool motion [m]: about the reach of an arm."""
-
-
-def _finite(field: str, numbers: ArrayLike, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return the numbers as a new array; raise for a wrong count or numbers not finite."""
-    wanted = f"{len(names)} finite numbers ({', '.join(names)})"
-    try:
-        array = np.array(numbers, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TaskError(f"field '{field}' is {numbers!r}, but must be {wanted}.") from None
-    if array.shape != (len(names),) or not np.all(np.isfinite(array)):
-        raise TaskError(f"field '{field}' is {array.tolist()}, but must be {wanted}.")
-    return array
-
-
-@dataclass(frozen=True, slots=True)
-class ToolLine:
-    """A straight motion of the tool at the constant orientation of a goal."""
-
-    direction: tuple[float, float, float]
-    """Unit direction of the motion in the tool frame T at the goal."""
-    distance: float
-    """Length of the motion [m]."""
-
-    def __post_init__(self) -> None:
-        """Check the values and normalise the direction.
-
-        Raises:
-            TaskError: If the direction has no length or the distance is out of its range.
-        """
-        direction = _finite("direction", self.direction, ("x", "y", "z"))
-        length = math.hypot(*direction)
-        if length < UNIT_TOLERANCE:
-            raise TaskError("field 'direction' has length 0. Name a direction in the tool frame.")
-        if not 0.0 < self.distance <= MAX_STRAIGHT:
-            raise TaskError(
-                f"field 'distance' is {self.distance:g} m, but must be above 0 and at most "
-                f"{MAX_STRAIGHT:g} m."
-            )
-        x, y, z = (direction / length).tolist()
-        object.__setattr__(self, "direction", (x, y, z))
-        object.__setattr__(self, "distance", float(self.distance))
-
-    @property
-    def offset(self) -> NDArray[np.float64]:
-        """Motion of the tool from begin to end, in T [m], shape (3,)."""
-        return self.distance * np.array(self.direction)
-
-    def reverse(self) -> ToolLine:
-        """Return the same line in the opposite direction."""
-        x, y, z = self.direction
-        return ToolLine((-x, -y, -z), self.distance)
-
 
 TOOL_SPEED = 0.1
 """Speed of the tool on straight motions [m/s], at which the velocity limits must be kept: a hand's
@@ -101,17 +52,11 @@ class KeepOut:
         """
         if not self.body_frame:
             raise TaskError("field 'body_frame' is empty. Name a body frame, e.g. 'head'.")
-        position = _finite("position", self.position, ("x", "y", "z"))
+        position = finite("position", self.position, ("x", "y", "z"))
         if math.hypot(*position) > MAX_DISTANCE:
             raise TaskError(f"field 'position' is beyond {MAX_DISTANCE:g} m. Write metres.")
-        for size in _finite("box", self.box, ("x", "y", "z")):
+        for size in finite("box", self.box, ("x", "y", "z")):
             SIZE.check(float(size), "field 'box'", TaskError)
-
-
-DEFAULT_APPROACH = ToolLine((1.0, 0.0, 0.0), 0.1)
-"""Straight out of the fingers: a gripper is narrowest seen from there. 10 cm is the depth of a hand
-beyond its fingers, which then clears what the tool touches before the arm swings to the side."""
-DEFAULT_RETREAT = DEFAULT_APPROACH.reverse()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +97,7 @@ class Goal:
                 f"field 'name' is {self.name[:LONGEST_NAME]!r}, but must be at most {LONGEST_NAME} "
                 "printable characters, e.g. 'left cheek'."
             )
-        position = _finite("position", self.position, ("x", "y", "z"))
+        position = finite("position", self.position, ("x", "y", "z"))
         # Unlike numpy's norm, this does not overflow, for which numpy would print a warning.
         distance = math.hypot(*position)
         if distance > MAX_DISTANCE:
@@ -160,7 +105,7 @@ class Goal:
                 f"field 'position' is {distance:.6g} m from frame '{self.body_frame}', "
                 f"but a goal on the body is at most {MAX_DISTANCE:g} m away. Write metres."
             )
-        quaternion = _finite("quaternion_wxyz", self.quaternion, ("w", "x", "y", "z"))
+        quaternion = finite("quaternion_wxyz", self.quaternion, ("w", "x", "y", "z"))
         length = math.hypot(*quaternion)
         if abs(length - 1.0) > UNIT_TOLERANCE:
             raise TaskError(
@@ -212,6 +157,8 @@ class Task:
         default_factory=dict, hash=False
     )
     """By environment, changes to the axes of its grid: new values of start, step or count."""
+    surfaces: tuple[Surface, ...] = ()
+    """Surfaces covered with further goals, which the environment gives their places."""
 
     def __post_init__(self) -> None:
         """Check the fields.
@@ -223,13 +170,15 @@ class Task:
         if not self.name:
             raise TaskError("field 'name' is empty.")
         for key, what in (("goals", "goal"), ("environments", "environment")):
-            if not getattr(self, key):
+            if not getattr(self, key) and not (key == "goals" and self.surfaces):
                 raise TaskError(f"field '{key}' is empty. A task needs at least one {what}.")
-        GOALS.check(len(self.goals), "field 'goals': its number of goals", TaskError)
+        if self.goals:
+            GOALS.check(len(self.goals), "field 'goals': its number of goals", TaskError)
         for name in self.environments:
             if self.environments.count(name) > 1:
                 raise TaskError(f"field 'environments': '{name}' is repeated. Remove one of them.")
         frames = {goal.body_frame for goal in self.goals}
+        frames |= {name for surface in self.surfaces for name in surface.frames}
         for one in self.keep_out:
             if one.body_frame not in frames:
                 raise UnknownNameError(
@@ -250,7 +199,8 @@ class Task:
     @property
     def has_freedom(self) -> bool:
         """Whether a goal is free."""
-        return any(goal.free is not None for goal in self.goals)
+        frees = [*(goal.free for goal in self.goals), *(one.free for one in self.surfaces)]
+        return any(free is not None for free in frees)
 
     def grid_changes(self, environment: str) -> Mapping[str, Mapping[str, object]]:
         """Return the changes to the axes of an environment's grid, empty if there are none."""

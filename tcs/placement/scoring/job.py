@@ -23,6 +23,7 @@ from tcs.model.scene import (
     load_environment,
     lower,
     with_person,
+    with_surface_goals,
 )
 from tcs.model.tasks import Task, load_task
 from tcs.placement.constraints import Constraints, kept_conditions
@@ -123,7 +124,7 @@ def load_job(
     conditions = (*only, *constraints.only, *kept)
     grid = restricted(grid, conditions)
     applied = dataclasses.replace(constraints, only=conditions, keep=())
-    task = goals_on_person(task, environment)
+    task = with_surface_goals(goals_on_person(task, environment), environment)
     spec = SceneSpec(robot, with_obstacles(environment, constraints.blocked))
     return Job(task, spec, grid, environment.observed_axes, applied)
 

@@ -211,7 +211,7 @@ def test_invalid_values_are_refused_with_their_location(refused, old, new, expec
 def test_goals_are_needed(refused):
     head = GOOD[: GOOD.index("goals:")]
     assert "needs at least one goal" in refused(head + "goals: []\n")
-    assert "field 'goals' is missing." in refused(head)
+    assert "field 'goals' is empty." in refused(head)
 
 
 @pytest.mark.parametrize(
