@@ -61,9 +61,37 @@ def cluster():
 
 @pytest.fixture(params=ENGINES)
 def engine(request):
+    """Each engine; of the processes one is killed in the middle, so that it is replaced."""
     if request.param == "dask":
         return Dask(request.getfixturevalue("cluster").scheduler_address, length=PART)
-    return {"threads": Threads, "processes": Processes}[request.param](2, length=PART)
+    if request.param == "threads":
+        return Threads(2, length=PART)
+    request.getfixturevalue("one_process_ends")
+    return Processes(2, length=PART)
+
+
+def end_oneself(_part):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.fixture
+def one_process_ends(monkeypatch, caplog):
+    """Kill the process that gets the third part, once."""
+    from tcs.placement.scoring.engines import local
+
+    submitted, killed = local._submitted, []
+
+    def once_deadly(pool, part):
+        if part.start >= 2 * PART and not killed:
+            killed.append(part)
+            return pool.submit(end_oneself, part)
+        return submitted(pool, part)
+
+    monkeypatch.setattr(local, "_submitted", once_deadly)
+    with caplog.at_level(logging.WARNING):
+        yield
+    assert killed
+    assert any("is scored again" in one.getMessage() for one in caplog.get_records("call"))
 
 
 def test_every_engine_gives_the_same_bytes(engine, lowered, small_job, excluded, plain):
@@ -85,33 +113,6 @@ def test_every_engine_gives_the_same_bytes(engine, lowered, small_job, excluded,
 
 def test_no_parts_need_no_worker():
     assert list(Processes(2).scored(None, [])) == []
-
-
-def end_oneself(_part):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_a_killed_process_is_replaced(work, monkeypatch, caplog):
-    from tcs.placement.scoring.engines import local
-
-    submitted, killed = local._submitted, []
-
-    def once_deadly(pool, part):
-        if part.start >= PART and not killed:
-            killed.append(part)
-            return pool.submit(end_oneself, part)
-        return submitted(pool, part)
-
-    monkeypatch.setattr(local, "_submitted", once_deadly)
-    parts = [Part(start, start + PART // 2) for start in range(0, 3 * PART, PART // 2)]
-    with caplog.at_level(logging.WARNING):
-        found = dict(Processes(1).scored(work, parts))
-    assert killed
-    assert sorted(found) == parts
-    for part, block in found.items():
-        for array, expected in zip(block, work.score(part), strict=True):
-            np.testing.assert_array_equal(array, expected)
-    assert "is scored again" in caplog.text
 
 
 def test_processes_that_always_end_are_told(work, monkeypatch):
