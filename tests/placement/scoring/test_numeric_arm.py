@@ -66,7 +66,8 @@ def test_the_file_records_numeric_ik(scored, tmp_path, capsys):
 def test_the_closed_form_is_recorded_without_a_note(capsys):
     figures = {
         "ik": "analytic", "configurations": 1, "goals": 1, "scoring_seconds": 0.1, "candidates": 0,
-        "tile": 0.0, "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x", "pairs": 1,
+        "tile": 0.0, "sets": 0, "reasons": {}, "best_single": None, "best": None, "file": "x",
+        "pairs": 1,
     }  # fmt: skip
     report_scores(figures)
     assert "Numeric" not in capsys.readouterr().out
