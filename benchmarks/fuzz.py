@@ -27,7 +27,8 @@ from typing import Any
 
 import numpy as np
 import table
-from fuzz_files import FILE_TYPES, FileType, prepare
+from fuzz_files import FileType
+from fuzz_further_files import ALL_TYPES, prepare
 from fuzz_mutations import damaged
 from worker import Worker
 
@@ -93,7 +94,7 @@ def _scored(task: Path, environment: Path, robot: Path) -> tuple[str, str]:
 
 def work(name: str, folder: Path, seed: int, score_every: int) -> None:
     """Judge the mutants whose numbers arrive on stdin; print one line of JSON for each."""
-    (file_type,) = (one for one in FILE_TYPES if one.name == name)
+    (file_type,) = (one for one in ALL_TYPES if one.name == name)
     answers = os.fdopen(os.dup(1), "w")
     # Drake and its libraries print warnings.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -150,7 +151,7 @@ def main() -> None:
         work(options.only[0], options.worker, options.seed, options.score_every)
         return
     table.header()
-    names = options.only or [one.name for one in FILE_TYPES]
+    names = options.only or [one.name for one in ALL_TYPES]
     counts: dict[str, Counter[str]] = {name: Counter() for name in names}
     slowest = dict.fromkeys(names, 0.0)
     with tempfile.TemporaryDirectory(prefix="tcs-fuzz-") as folder:

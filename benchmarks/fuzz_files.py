@@ -227,7 +227,8 @@ def _write_results(folder: Path) -> None:
     save_run(folder / "run.csv", run)
 
 
-def _three(folder: Path) -> Scored:
+def three(folder: Path) -> Scored:
+    """Return the task, the environment and the robot in a folder."""
     return folder / "task.yaml", folder / "kitchen.yaml", folder / "iiwa7.yaml"
 
 
@@ -329,14 +330,14 @@ def _read_recording(path: Path) -> Any:
 
 def _task(path: Path, _: int) -> Scored:
     _read_task(path)
-    return _three(path.parent)
+    return three(path.parent)
 
 
 def _scene(path: Path, _: int) -> Scored:
     """Build the scene of the robot in the environment, whichever of the files was changed."""
     from tcs.model.scene import Scene, SceneSpec
 
-    task, kitchen, iiwa = _three(path.parent)
+    task, kitchen, iiwa = three(path.parent)
     Scene(SceneSpec(_read_robot(iiwa), _read_environment(kitchen)))
     return task, kitchen, iiwa
 
@@ -367,7 +368,7 @@ def _unchanged_scene(folder: Path) -> Any:
     """Return the scene of the unchanged files."""
     from tcs.model.scene import Scene, SceneSpec
 
-    _, kitchen, iiwa = _three(folder)
+    _, kitchen, iiwa = three(folder)
     return Scene(SceneSpec(_read_robot(iiwa), _read_environment(kitchen)))
 
 
@@ -468,4 +469,4 @@ FILE_TYPES = (
         "recording (CSV)", "recording.csv", mutations.csv_mutated, _read_recording, _recording
     ),
 )
-"""Every type of file that a user can hand to `tcs`."""
+"""The types of files of scenes, scores and maps; `fuzz_further_files.ALL_TYPES` has all."""

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import table
 from fuzz_files import prepare
+from fuzz_further_files import write_bag
 from worker import Worker
 
 SECONDS = 300.0
@@ -280,21 +281,9 @@ def make_map(folder: Path) -> None:
 
 def make_bag(folder: Path) -> None:
     """Write a bag of ROS 1 with the joint states of the recording."""
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
     names, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
-    store = get_typestore(Stores.ROS1_NOETIC)
-    types, name = store.types, "sensor_msgs/msg/JointState"
-    stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
-    header = types["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="")
-    nothing = np.zeros(0)
-    with Writer(folder / "arm.bag") as writer:
-        connection = writer.add_connection("/joint_states", name, typestore=store)
-        for i, row in enumerate(rows[:20]):
-            positions = np.array(row.split(","), dtype=np.float64)
-            state = types[name](header, names.split(","), positions, nothing, nothing)
-            writer.write(connection, i * 20_000_000, store.serialize_ros1(state, name))
+    states = np.array([row.split(",") for row in rows[:20]], dtype=np.float64)
+    write_bag(folder / "arm.bag", names.split(","), states)
 
 
 def make_study(folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tcs.errors import TcsError
@@ -20,43 +21,93 @@ def scripts():
     sys.path.insert(0, str(FOLDER))
     try:
         import fuzz
-        import fuzz_files
+        import fuzz_further_files
         import fuzz_options
     finally:
         sys.path.remove(str(FOLDER))
-    return fuzz, fuzz_files, fuzz_options
+    return fuzz, fuzz_further_files, fuzz_options
 
 
 @pytest.fixture(scope="session")
 def folder(scripts, tmp_path_factory):
     """A valid example of every file; what `tcs` makes comes from the suites of the formats."""
+    from fuzz_files import write_texts as write_scene_texts
+
     from tcs.capability import save_map
     from tcs.capability.arplace import query, save_arplace, save_probability_map
     from tcs.model.robots import load_robot
-    from tcs.placement.store import save_scores
+    from tcs.motion import save_plan
+    from tcs.placement.store import save_motions, save_scores
     from tcs.teleop.runs.files import save_run
     from tests.capability.arplace.example import model
     from tests.capability.test_map import small_map
     from tests.placement.store.example import score_file
+    from tests.placement.store.test_motion_file import motion_file, motion_table
     from tests.teleop.runs.test_files import made
 
     made_in = tmp_path_factory.mktemp("fuzz")
+    write_scene_texts(made_in)
     scripts[1].write_texts(made_in)
-    save_scores(made_in / "scores.tcs", score_file())
+    scores = score_file()
+    save_scores(made_in / "scores.tcs", scores)
+    sets = scores.nominal.sets
+    save_motions(made_in / "scores.motions", motion_file(motion_table(sets, sets.reached)))
+    save_plan(made_in / "plan.json", small_plan())
+    write_block(made_in / "kept.block", scripts[1].BLOCK)
     save_map(made_in / "map.tcm", small_map([[0, 0, 0, 0, 0], [1, 2, 3, 4, 1]], [0.5, 0.2], [1, 1]))
     save_arplace(made_in / "model.arp", model())
     save_probability_map(made_in / "map.apm", query(model()).map)
     save_run(made_in / "run.csv", made())
     joints = load_robot("pr2").arm_joints
+    scripts[1].write_bag(made_in / "arm.bag", list(joints), np.full((3, len(joints)), -0.3))
     rows = [",".join(joints), *([",".join(["-0.3"] * len(joints))] * 5)]
     (made_in / "recording.csv").write_text("\n".join(rows))
     return made_in
 
 
-@pytest.mark.parametrize("number", range(16))
+def small_plan():
+    """A plan of one segment, as `tcs plan` would write it."""
+    from tcs.model.grid import InitialConfiguration
+    from tcs.motion import GoalResult, MotionPlan, Segment, StopPlan, Timed
+
+    times = np.linspace(0.0, 1.0, 4)
+    positions = np.linspace(0.0, 0.3, 4)[:, None] * np.ones(7)
+    timing = Timed(times=times, positions=positions, velocities=np.full((4, 7), 0.3))
+    segment = Segment("move", None, 0, (), timing)
+    at = InitialConfiguration(base_x=0.0, base_y=0.0, base_yaw=0.0, torso=0.0)
+    return MotionPlan(
+        made_from={"task": "fetch"},
+        joints=tuple("abcdefg"),
+        stops=(StopPlan(at=at, index=3, segments=(segment,), returns=False),),
+        results=(GoalResult(0, 0, True, "done"),),
+        edges=3,
+        false=0,
+        seed=0,
+        seconds=1.0,
+    )
+
+
+def write_block(path, rows):
+    """Write a block of random scores."""
+    from tcs.placement.scoring.blocks import Block, Kept
+
+    rng = np.random.default_rng(0)
+    reason = rng.integers(0, 7, (rows, 3)).astype(np.uint8)
+    reached = reason == 0
+    block = Block(
+        reason,
+        np.where(reached, -1, rng.integers(0, 50, reason.shape)).astype(np.int32),
+        np.where(reached, rng.random(reason.shape), 0.0).astype(np.float32),
+        rng.random((np.count_nonzero(reached), 7)).astype(np.float32),
+    )
+    Kept(path.parent, "key", goals=3, joints=7, contacts=10_000).save(0, block)
+    (path.parent / "0000000000.block").replace(path)
+
+
+@pytest.mark.parametrize("number", range(25))
 def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
     fuzz, fuzz_files, _ = scripts
-    file_type = fuzz_files.FILE_TYPES[number]
+    file_type = fuzz_files.ALL_TYPES[number]
     path = folder / file_type.file
     original = path.read_bytes()
     refused = 0
@@ -78,12 +129,12 @@ def test_no_mutant_ends_in_anything_but_one_line(scripts, folder, number):
 
 
 def test_every_type_has_its_entry(scripts):
-    assert len(scripts[1].FILE_TYPES) == 16
+    assert len(scripts[1].ALL_TYPES) == 25
 
 
 def test_a_mutant_is_the_same_in_every_run(scripts, folder):
     fuzz, fuzz_files, _ = scripts
-    for file_type in fuzz_files.FILE_TYPES:
+    for file_type in fuzz_files.ALL_TYPES:
         original = (folder / file_type.file).read_bytes()
         one, two = (fuzz.mutant(file_type, original, 7, 3) for _ in range(2))
         assert one == two

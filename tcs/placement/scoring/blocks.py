@@ -75,6 +75,10 @@ class Kept:
             _log.warning("%s", error)
             return None
 
+    def has(self, start: int) -> bool:
+        """Return whether there is a file of the block from a configuration on."""
+        return self._path(start).exists()
+
     def save(self, start: int, block: Block) -> None:
         """Write a block, completely or not at all.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
-from contextlib import AbstractContextManager, closing, nullcontext
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -26,9 +26,10 @@ from tcs.placement.scoring.approaches import (
     score_with_approach,
     warm_up_approaches,
 )
-from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept, key_of
+from tcs.placement.scoring.blocks import BLOCK, Block, BlockFolder, Kept
 from tcs.placement.scoring.engines import Part, ScoringEngine, Threads, Work
 from tcs.placement.scoring.engines.work import JOINTS
+from tcs.placement.scoring.shared_blocks import Manifest, Shared, joined, with_goals
 from tcs.placement.tables import ScoreTable
 
 if TYPE_CHECKING:
@@ -115,9 +116,14 @@ def sweep(
     joints = {}
     done = 0
     work = Work(problem, gripper_contacts(problem), excluded)
+
+    def part_of(some_goals: Sequence[int]) -> Work:
+        of_goals = build_problem(with_goals(lowered, some_goals).arrays, lowered.grid, measure)
+        return Work(of_goals, gripper_contacts(of_goals), excluded)
+
     with (
-        _opened(blocks, problem, lambda: key_of(lowered, measure, excluded)) as kept,
-        closing(_scored(work, engine or Threads(jobs), kept)) as parts,
+        _opened(blocks, problem, lambda: Manifest.of(lowered, measure, excluded)) as found,
+        closing(_scored(work, engine or Threads(jobs), found, part_of)) as parts,
     ):
         for part, block in parts:
             rows = slice(part.start, part.stop)
@@ -194,26 +200,51 @@ def _size(problem: Problem) -> int:
     return int(problem.environment_states * base_poses * problem.torso_levels)
 
 
+class _Found(NamedTuple):
+    """Blocks that are kept."""
+
+    kept: Kept
+    """Those of the goals, to which new ones are added."""
+    shared: Shared | None
+    """Those of other goals in the same scene, of which some are the same."""
+
+
+@contextmanager
 def _opened(
-    blocks: BlockFolder | None, problem: Problem, key: Callable[[], str]
-) -> AbstractContextManager[Kept | None]:
-    """Return a context manager of the blocks of a problem in a folder, or of None."""
+    blocks: BlockFolder | None, problem: Problem, manifest_of: Callable[[], Manifest]
+) -> Iterator[_Found | None]:
+    """Yield the blocks of a problem in a folder; None if none are to be kept."""
     if blocks is None:
-        return nullcontext()
-    return blocks.opened(
-        key(), goals=problem.goal_p.shape[1], joints=JOINTS, contacts=_codes(problem)
-    )
+        yield None
+        return
+    manifest = manifest_of()
+    goals = problem.goal_p.shape[1]
+    with blocks.opened(manifest.key, goals=goals, joints=JOINTS, contacts=_codes(problem)) as kept:
+        manifest.save(kept.folder)
+        shared = None if blocks.restart else Shared.found(blocks.path, manifest, kept)
+        yield _Found(kept, shared)
 
 
 def _scored(
-    work: Work, engine: ScoringEngine, kept: Kept | None
+    work: Work,
+    engine: ScoringEngine,
+    found_blocks: _Found | None,
+    part_of: Callable[[Sequence[int]], Work],
 ) -> Generator[tuple[Part, Block], None, None]:
-    """Yield the scores of all parts of the grid, kept ones first, and keep the new ones."""
-    size, length = _size(work.problem), engine.length if kept is None else BLOCK
+    """Yield the scores of all parts of the grid, kept ones first, and keep the new ones.
+
+    Args:
+        work: The grid with all goals.
+        engine: Who scores.
+        found_blocks: Blocks that are kept; None to keep none.
+        part_of: Returns the grid with some of the goals.
+    """
+    size, length = _size(work.problem), engine.length if found_blocks is None else BLOCK
     parts = [Part(start, min(start + length, size)) for start in range(0, size, length)]
-    if kept is None:
+    if found_blocks is None:
         yield from engine.scored(work, parts)
         return
+    kept, shared = found_blocks
     missing = []
     # Threads, because most of the time goes into decompressing.
     found = Parallel(n_jobs=READERS, prefer="threads", return_as="generator")(
@@ -224,9 +255,32 @@ def _scored(
             missing.append(part)
         else:
             yield part, block
+    if shared is not None:
+        partly = [part for part in missing if shared.kept.has(part.start)]
+        for part, block in _completed(shared, engine, partly, part_of):
+            kept.save(part.start, block)
+            missing.remove(part)
+            yield part, block
     for part, block in engine.scored(work, missing):
         kept.save(part.start, block)
         yield part, block
+
+
+def _completed(
+    shared: Shared,
+    engine: ScoringEngine,
+    parts: Sequence[Part],
+    part_of: Callable[[Sequence[int]], Work],
+) -> Generator[tuple[Part, Block], None, None]:
+    """Yield the scores of parts of which those of some goals are kept, but not of damaged ones."""
+    if not shared.missing:
+        for part in parts:
+            if (block := shared.load(*part)) is not None:
+                yield part, block
+        return
+    for part, others in engine.scored(part_of(shared.missing), parts):
+        if (block := shared.load(*part)) is not None:
+            yield part, joined(block, others, shared.mine)
 
 
 def _reached(reason: NDArray[np.uint8]) -> int:

@@ -12,6 +12,7 @@ from tcs.files import mapped
 from tcs.files.compression import compress
 from tcs.placement.scoring.blocks import FORMAT, BlockFolder
 from tcs.placement.scoring.engines import Work
+from tcs.placement.scoring.shared_blocks import with_goals
 from tcs.placement.scoring.sweep import sweep
 
 # The package has a function of the module's name.
@@ -175,3 +176,67 @@ def test_a_folder_that_cannot_be_made_is_refused(run, tmp_path):
     (tmp_path / "blocks").write_text("a file")
     with pytest.raises(OutputError, match="cannot be created"):
         run()
+
+
+def scored_goals(monkeypatch):
+    """Record how many goals each scored part has."""
+    counts, scores_of = [], Work.score
+
+    def counted(work, part):
+        counts.append(work.problem.goal_p.shape[1])
+        return scores_of(work, part)
+
+    monkeypatch.setattr(Work, "score", counted)
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        pytest.param([0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5], id="one added at the end"),
+        pytest.param([1, 2, 7], [7, 0, 2], id="one added, one removed, in another order"),
+        pytest.param([0, 3, 5, 6], [5, 3], id="only removed"),
+        pytest.param([0, 1], [2, 3], id="none in common"),
+    ],
+)
+def test_goals_that_were_scored_before_are_not_scored_again(
+    before, now, lowered, small_job, small_blocks, tmp_path, monkeypatch, plain
+):
+    counts = scored_goals(monkeypatch)
+    folder = BlockFolder(tmp_path / "blocks")
+
+    def scored(goals, **options):
+        counts.clear()
+        weights = np.full(len(goals), 1.0 / len(goals))
+        return sweep(with_goals(lowered, goals), weights, **options).tables[0]
+
+    scored(before, blocks=folder)
+    fresh = scored(now)
+    table = scored(now, blocks=folder)
+    new = len(set(now) - set(before))
+    parts = -(-small_job.grid.size // BLOCK)
+    assert counts == [new] * (parts if new else 0)
+    assert_same(table, fresh)
+    np.testing.assert_array_equal(table.reason, plain.reason[:, now])
+    np.testing.assert_array_equal(table.dexterity, plain.dexterity[:, now])
+    # They are kept like others, and a restart scores all.
+    assert_same(scored(now, blocks=folder), fresh)
+    assert counts == []
+    scored(now, blocks=BlockFolder(tmp_path / "blocks", restart=True))
+    assert counts == [len(now)] * parts
+
+
+def test_damaged_blocks_of_other_goals_are_not_taken(
+    run, lowered, small_job, plain, tmp_path, caplog
+):
+    weights = np.full(3, 1.0 / 3.0)
+    sweep(with_goals(lowered, [0, 1, 2]), weights, blocks=BlockFolder(tmp_path / "blocks"))
+    changed_byte(files(tmp_path)[1])
+    manifest = next((tmp_path / "blocks").rglob("goals.json"))
+    with caplog.at_level(logging.WARNING):
+        assert_same(run()[0], plain)
+    assert "block" in caplog.text
+    for text in ("", "[]", '{"key": 1, "rest": "", "goals": [2]}', '{"key": "", "goals": 3}'):
+        manifest.write_text(text)
+        assert_same(run(restart=True)[0], plain)
+        assert_same(run()[0], plain)
