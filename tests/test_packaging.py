@@ -19,7 +19,13 @@ DATA_PARTS = ("models", "tasks")
 
 # Distributions whose module is called otherwise; one that is found by its files alone, and one
 # that trimesh imports for us.
-MODULE_OF = {"drake": "pydrake", "pillow": "PIL", "pyyaml": "yaml", "scikit-learn": "sklearn"}
+MODULE_OF = {
+    "drake": "pydrake",
+    "pillow": "PIL",
+    "pyyaml": "yaml",
+    "scikit-learn": "sklearn",
+    "eclipse-zenoh": "zenoh",
+}
 WITHOUT_MODULE = {"example-robot-data", "pycollada"}
 
 
@@ -31,7 +37,9 @@ def of_extras() -> set[str]:
     """Modules of the extras that the package itself imports where they are installed."""
     extras = PROJECT["optional-dependencies"]
     lines = [
-        line for name in ("arplace", "bags", "dask", "mcp", "service") for line in extras[name]
+        line
+        for name in ("arplace", "bags", "dask", "mcp", "ros2", "service")
+        for line in extras[name]
     ]
     names = {re.split(r"[^\w-]", line)[0] for line in lines}
     return {MODULE_OF.get(name, name) for name in names}

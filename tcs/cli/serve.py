@@ -98,18 +98,32 @@ def serve(
     ros1: Annotated[
         bool, typer.Option("--ros1", help="Answer as a node of ROS 1, with the services of /tcs.")
     ] = False,
+    ros2: Annotated[
+        bool,
+        typer.Option(
+            "--ros2",
+            help="Answer as a node of ROS 2, with the services and actions of /tcs; ROS need not "
+            "be installed.",
+        ),
+    ] = False,
+    router: Annotated[
+        str, typer.Option(help="With --ros2: address of the router of rmw_zenoh.")
+    ] = "tcp/localhost:7447",
     *,
     frames: _FrameOptions,
     jobs: options.Jobs = 2,
 ) -> None:
     """Serve the engine over HTTP: score, select, explain, evaluate and plan as requests."""
-    if assistant + ros1 > 1:
-        raise typer.BadParameter("give one of them.", param_hint="--mcp, --ros1")
+    if assistant + ros1 + ros2 > 1:
+        raise typer.BadParameter("give one of them.", param_hint="--mcp, --ros1, --ros2")
     if assistant:
         _serve_assistant(files, jobs)
         return
     if ros1:
         _serve_ros1(files, frames, jobs)
+        return
+    if ros2:
+        _serve_ros2(files, frames, router, jobs)
         return
     http = _http("serve")
     access = http.checked_access(host, token)
@@ -173,6 +187,34 @@ def _serve_ros1(files: list[Path] | None, frames: _FrameOptions, jobs: int) -> N
         Ros1Node(engine, names, max_age=frames.max_age) as node,
     ):
         terminal.note("the services of ROS 1 are at /tcs: `rosservice list`; Ctrl-C ends.")
+        node.run()
+
+
+def _serve_ros2(files: list[Path] | None, frames: _FrameOptions, router: str, jobs: int) -> None:
+    """Answer as a node of ROS 2 until interrupted.
+
+    Raises:
+        ServiceError: If a package that this needs is not installed, or Zenoh cannot be opened.
+    """
+    from tcs.errors import ServiceError
+
+    try:
+        from tcs.service.ros.ros2 import Ros2Node, domain_of_environment
+        from tcs.service.ros.ros2_entities import zenoh_config
+    except ModuleNotFoundError as error:
+        raise ServiceError(
+            f"`tcs serve --ros2` needs the package {error.name}: pip install 'tcs[ros2]'."
+        ) from None
+    names, domain = frames.names(), domain_of_environment()
+    with (
+        _engine(files, jobs, typer.echo) as engine,
+        Ros2Node(
+            engine, names, zenoh_config(router), max_age=frames.max_age, domain=domain
+        ) as node,
+    ):
+        terminal.note(
+            f"the services of ROS 2 are at /tcs, domain {domain}, router {router}; Ctrl-C ends."
+        )
         node.run()
 
 

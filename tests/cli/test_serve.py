@@ -12,15 +12,29 @@ WITHOUT = "import sys; sys.modules['{}'] = None"
     [
         (("serve",), "fastapi", "service"),
         (("serve", "--mcp"), "mcp", "mcp"),
+        (("serve", "--ros2"), "zenoh", "ros2"),
         (("app", "--no-browser"), "uvicorn", "app"),
     ],
-    ids=["serve", "mcp", "app"],
+    ids=["serve", "mcp", "ros2", "app"],
 )
 def test_without_the_extra_one_line_names_it(process, words, package, extra):
     ran = process(*words, before=WITHOUT.format(package))
     assert ran.code == 1
     assert f"needs the package {package}: pip install 'tcs[{extra}]'." in ran.err
     assert len(ran.err.splitlines()) == 1
+
+
+def test_one_protocol_at_a_time(tcs_command):
+    ran = tcs_command("serve", "--ros1", "--ros2")
+    assert ran.code == 2
+    assert "give one of them" in ran.err
+
+
+@pytest.mark.parametrize("text", ["head", "=human/head", "head="])
+def test_frames_of_the_person_have_a_form(tcs_command, text):
+    ran = tcs_command("serve", "--ros1", "--person-frame", text)
+    assert ran.code == 2
+    assert "must be BODY=FRAME" in ran.err
 
 
 def test_other_machines_require_a_token(tcs_command):

@@ -41,6 +41,7 @@ from tcs.service.ros import FrameNames
 from tcs.service.ros.ros1 import Ros1Node
 from tcs.service.ros.ros1_types import ros1_modules, ros1_types
 from tests.placement.store.example import METADATA, score_file
+from tests.service.ros2_peer import ros2_peers
 
 HERE = (1.4, -1.2, 180.0)
 AT = {"bed_height": 0.0}
@@ -153,11 +154,23 @@ def ros1(engine, ros1_master):
         yield Ros(engine, call)
 
 
+@pytest.fixture(scope="module")
+def ros2(engine):
+    with ros2_peers(engine) as (_, peer):
+
+        def call(name, text):
+            return peer.call(f"/tcs/{name}", "tcs_msgs/srv/Call", request=text)
+
+        yield Ros(engine, call)
+
+
 # rospy leaves the sockets of its connections to the collector.
 COLLECTED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
-@pytest.fixture(params=["engine", "client", "assistant", pytest.param("ros1", marks=COLLECTED)])
+@pytest.fixture(
+    params=["engine", "client", "assistant", pytest.param("ros1", marks=COLLECTED), "ros2"]
+)
 def service(request):
     """The engine, directly, over HTTP, as tools of an assistant and as a node of ROS."""
     return request.getfixturevalue(request.param)
