@@ -20,6 +20,7 @@ from tcs.service.requests import (
     FloorRequest,
     JobRequest,
     OutcomeRequest,
+    PostureRequest,
     SelectRequest,
 )
 from tcs.service.responses import FileEntry, JobStatus
@@ -123,6 +124,10 @@ class Client:
 
     def outcome(self, request: OutcomeRequest) -> dict[str, Any]:
         """Return what is reached from a base pose, as `Engine.outcome`."""
+        return dict(self._post(request))
+
+    def posture(self, request: PostureRequest) -> dict[str, Any]:
+        """Return the scene in space at a base pose, as `Engine.posture`."""
         return dict(self._post(request))
 
     def submit(self, request: JobRequest) -> JobStatus:

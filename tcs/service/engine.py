@@ -25,8 +25,10 @@ from tcs.service.conversions import (
     utility_of,
 )
 from tcs.service.floor import floor_of, outcome_of
+from tcs.service.heavy_imports import import_heavy
 from tcs.service.jobs import Jobs, Progress
 from tcs.service.limits import Limits
+from tcs.service.postures import Postures
 from tcs.service.requests import (
     EvaluateRequest,
     ExplainRequest,
@@ -36,6 +38,7 @@ from tcs.service.requests import (
     OutcomeRequest,
     PlanRequest,
     PopulationRequest,
+    PostureRequest,
     RefineRequest,
     RescoreRequest,
     SceneRequest,
@@ -75,6 +78,7 @@ class Engine:
         self._sent = SentDocuments(folder)
         self._jobs = Jobs(limits)
         self._views = Views(self._files)
+        self._postures = Postures()
         self._work = SceneWork(self._files, self._sent, limits)
         self._set_work = SetWork(self._files, limits)
 
@@ -254,6 +258,19 @@ class Engine:
             stated = state_of(request.here, request.torso, request.at)
             return outcome_of(file, table_of(file, request), stated, best=request.best)
 
+    def posture(self, request: PostureRequest) -> dict[str, Any]:
+        """Return the scene in space at a base pose, as `tcs.service.postures.Postures.at`.
+
+        Raises:
+            NotFoundError: If the score file is not held.
+            StoreMismatchError: If the models are not those the file was made from.
+            SelectionError: If the base pose is beyond the grid, or there is no such goal.
+        """
+        file = self._files.for_scene(request.file)
+        stated = state_of(request.here, request.torso, request.at)
+        import_heavy()
+        return self._postures.at(request.file, file, stated, goal=request.goal, arm=request.arm)
+
     def submit(self, request: JobRequest) -> JobStatus:
         """Queue a job, and return its state.
 
@@ -343,6 +360,7 @@ class Engine:
 
         def done(progress: Progress) -> dict[str, Any]:
             try:
+                import_heavy()
                 return dict(without_infinities(work(progress)))
             except UnknownNameError as error:
                 where = self._sent.without_folder(error.where)

@@ -109,6 +109,19 @@ class OutcomeRequest(Observed, State):
     best: Annotated[bool, Field(strict=True)] = False
 
 
+class PostureRequest(State):
+    """Return robot, person and furniture in space at a base pose, the arm at a goal."""
+
+    file: FileId
+    here: BasePose
+    goal: Annotated[int, Field(strict=True, ge=0)] | None = None
+    """The goal that the arm is at; the one of greatest dexterity by default."""
+    arm: Annotated[list[Annotated[list[Number], Field(max_length=20)]], Field(max_length=1500)] = (
+        Field(default_factory=list)
+    )
+    """Postures of the arm [rad or m], instead of that at the goal: a frame for each."""
+
+
 class SceneRequest(Document):
     """Return the outlines of furniture, person and base from above, in each state; a job."""
 

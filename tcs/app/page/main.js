@@ -4,8 +4,10 @@ import { Refusal, cancel, ended, get, post, send } from "./api.js";
 import { Editing, thingName } from "./editing.js";
 import { FloorMap, paint } from "./map.js";
 import { by, made, options, showCards, showExpert, showGoals, showLegend, showStates, showWhy } from "./panels.js";
-import { load, sentence, t } from "./texts.js";
+import { goalName, load, sentence, t } from "./texts.js";
 import { Things, overlap, turned } from "./things.js";
+import { Playing } from "./playing.js";
+import { View3d } from "./view3d.js";
 
 const PERSONS = {
   default: null,
@@ -32,6 +34,15 @@ const editing = new Editing(map, things, {
   get states() { return whole.floors.find(Boolean).states; },
   fault, moved, redraw: showScene, restore, scored, nearest,
 });
+
+const view3d = new View3d(by("canvas3d"), by("marks3d"));
+const playing = new Playing(view3d, () => ({ request: placed(), outcome: page.outcome }), fault);
+
+// What is shown, as requests name it.
+function placed() {
+  const { x, y, yaw } = map.pose;
+  return { file: view.file, here: [x, y, yaw], torso: page.torso, at: at() };
+}
 
 function shownFile(digest, state) {
   return { file: digest, floors: [], state, scene: null };
@@ -64,6 +75,8 @@ async function start() {
 function say() {
   document.title = t("title");
   by("map").setAttribute("aria-label", t("mapLabel"));
+  by("canvas3d").setAttribute("aria-label", t("view3d"));
+  playing.clear();
   options(by("person"), Object.keys(PERSONS).map((key) => [key, t(`persons.${key}`)]), by("person").value || "default");
   by("limits").replaceChildren();
   for (const text of t("limits")) made("li", text, by("limits"));
@@ -95,7 +108,6 @@ async function openFile(wanted = new URLSearchParams()) {
   editing.clear();
   page.outcome = null;
   view = whole = shownFile(file().file, Number(wanted.get("state") ?? 0));
-  by("view").replaceChildren();
   by("environmentStates").hidden = true;
   await floorOf(view, view.state);
   options(by("torso"), floor().torsos.map((value) => [value, value.toFixed(2)]), wanted.get("torso"));
@@ -129,6 +141,7 @@ function links() {
   by("download").download = fileName(".tcs");
   by("downloadEnvironment").href = `v1/files/${view.file}/environment`;
   by("downloadEnvironment").download = `${file().environment}-changed.yaml`.replaceAll(" ", "-");
+  by("page3d").href = `v1/files/${view.file}/view`;
   by("report").href = `v1/files/${view.file}/report`;
 }
 
@@ -161,7 +174,6 @@ async function shownAnew() {
   showScene();
   listStates();
   links();
-  by("view").replaceChildren();
   await move(map.pose);
 }
 
@@ -270,6 +282,22 @@ async function changeState(state) {
   await move(map.pose);
 }
 
+// Shows the place in space, the arm at the chosen goal or at the one of greatest dexterity.
+async function space() {
+  playing.clear();
+  by("space").hidden = !view3d.isPossible;
+  if (!view3d.isPossible) return;
+  const number = page.asked;
+  const goal = by("armAt").value;
+  const found = await post("posture", { ...placed(), ...(goal ? { goal: Number(goal) } : {}) });
+  if (number !== page.asked) return;
+  view3d.contact = [];
+  view3d.map(map.canvas, map.bounds);
+  view3d.scene(found, page.outcome.goals);
+  if (page.lookedAt !== file().file) view3d.look(found.goals, [map.pose.x, map.pose.y]);
+  page.lookedAt = file().file;
+}
+
 // Puts the robot somewhere, and shows what can be done from there.
 async function move(pose, { best = false, torso = page.torso } = {}) {
   const yaw = ((pose.yaw % 360) + 360) % 360;
@@ -293,6 +321,7 @@ async function move(pose, { best = false, torso = page.torso } = {}) {
     map.place({ x: pose.x, y: pose.y, yaw: member.base_yaw_deg });
   }
   show(outcome);
+  space().catch(fault);
   clearTimeout(page.suggesting);
   page.suggesting = setTimeout(() => suggest(number).catch(fault), SETTLED);
 }
@@ -309,6 +338,8 @@ function show(outcome) {
   by("yaw").value = yaw.toFixed(1);
   by("torso").value = floor().torsos.reduce((a, b) => (Math.abs(b - page.torso) < Math.abs(a - page.torso) ? b : a));
   showGoals(outcome, (goal) => why(goal).catch(fault), (goal) => fixOf(goal).catch(fault));
+  const goals = outcome.goals.filter((goal) => goal.reached).map((goal) => [String(goal.goal), `${goal.goal + 1}. ${goalName(goal)}`]);
+  options(by("armAt"), [["", t("bestGoal")], ...goals], by("armAt").value);
   showExpert(outcome, command());
   marks();
   under();
@@ -334,6 +365,8 @@ function explained(goal) {
 
 async function why(goal) {
   const explanation = await explained(goal);
+  view3d.contact = goal.pair ?? [];
+  view3d.draw();
   showWhy(goal, explanation, page.outcome.goals, (fix) => go(fix.members[0]));
 }
 
@@ -416,14 +449,6 @@ async function scoreNow() {
   await openFile();
 }
 
-function show3d() {
-  const view = by("view");
-  view.replaceChildren();
-  const waiting = made("p", t("loading3d"), view, { role: "status" });
-  const frame = made("iframe", undefined, view, { title: t("view3d"), sandbox: "allow-scripts", src: `v1/files/${view.file}/view` });
-  frame.onload = () => waiting.remove();
-}
-
 async function changeLanguage() {
   localStorage.setItem("tcs-language", by("language").value);
   await load(by("language").value);
@@ -457,7 +482,7 @@ by("pose").onchange = () => {
   move({ x, y, yaw }, { torso: Number(by("torso").value) });
 };
 for (const id of ["alpha", "beta", "gamma"]) by(id).onchange = () => { showExpert(page.outcome, command()); suggest(page.asked).catch(fault); };
-by("show3d").onclick = show3d;
+by("armAt").onchange = () => space().catch(fault);
 by("share").onclick = async () => {
   await navigator.clipboard?.writeText(location.href).catch(() => {});
   by("jobWords").textContent = t("copied");

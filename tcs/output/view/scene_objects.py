@@ -71,7 +71,7 @@ class SceneShapes:
         self._outline = base_outline(scene)
         self._robot = robot_shapes(scene, meshes)
         self._environment = _environment_shapes(scene)
-        self._rest = _resting_arm(scene)
+        self._rest = resting_arm(scene)
 
     def poses(
         self, at: InitialConfiguration, joints: ArrayLike | None, goal: int
@@ -218,7 +218,7 @@ def _environment_shapes(scene: Scene) -> list[BodyShape]:
     ]
 
 
-def _resting_arm(scene: Scene) -> FloatArray:
+def resting_arm(scene: Scene) -> FloatArray:
     """Return the rest posture of the robot file [rad], within the joint limits."""
     robot = scene.spec.robot
     rest = np.array([robot.rest.get(name, 0.0) for name in robot.arm_joints])
