@@ -28,7 +28,7 @@ from tcs.motion.approach import Access, accesses, first_accesses
 from tcs.motion.plans import ENTRY
 from tcs.motion.stops import BodyPair, Stop, StopGrid
 from tcs.placement.scoring.rebuild import rebuild_scene
-from tcs.placement.store import MotionFile, ScoreFile
+from tcs.placement.store import MotionFile, ScoreFile, files_of_arms
 from tcs.placement.tables import MotionOutcome, MotionTable, SetTable
 
 FIRST_SAMPLES = 24
@@ -81,15 +81,14 @@ def examine(
         raise TcsError(f"jobs is {jobs}; must be 1 or more threads.")
     begun, processor = time.perf_counter(), time.process_time()
     number = file.nominal_index if table is None else table
-    job, scene, lowered = rebuild_scene(file)
+    built = [rebuild_scene(of_arm) for of_arm in files_of_arms(file)]
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
     sets = file.tables[number].sets
     rows = drawn(worth_examining(sets, within, most), sample, seed)
-    stops = StopGrid.of(job, scene, job.scored_grid, lowered)
-    first = number * job.grid.size
+    arms = [StopGrid.of(job, scene, job.scored_grid, lowered) for job, scene, lowered in built]
     slices = [rows[start : start + SLICE] for start in range(0, len(rows), SLICE)]
-    work = (delayed(_examine_slice)(stops, sets, slice_, first, seed) for slice_ in slices)
+    work = (delayed(_examine_slice)(arms, sets, slice_, number, seed) for slice_ in slices)
     outcomes: list[Outcomes] = []
     for found in Parallel(jobs, prefer="threads", return_as="generator")(work):
         outcomes += found
@@ -212,14 +211,16 @@ def drawn(rows: NDArray[np.intp], sample: int | None, seed: int) -> NDArray[np.i
 
 
 def _examine_slice(
-    stops: StopGrid, sets: SetTable, rows: NDArray[np.intp], first: int, seed: int
+    arms: Sequence[StopGrid], sets: SetTable, rows: NDArray[np.intp], table: int, seed: int
 ) -> list[Outcomes]:
-    """Examine some candidates; `first` is the number of the first configuration of their table."""
+    """Examine some candidates of a table, given by its number, with the stops of each arm."""
     trees = new_trees(seed)
-    return [
-        _examine_stop(stops, first + int(sets.candidates[row]), sets.reached[row], trees, seed)
-        for row in rows
-    ]
+    outcomes = []
+    for row in rows:
+        arm, h = divmod(int(sets.candidates[row]), sets.arm_size)
+        configuration = table * sets.arm_size + h
+        outcomes.append(_examine_stop(arms[arm], configuration, sets.reached[row], trees, seed))
+    return outcomes
 
 
 def _examine_stop(

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tcs.errors import TcsError, UnknownNameError
+from tcs.errors import SelectionError, TcsError, UnknownNameError
 from tcs.kernel.cache import is_compiled
-from tcs.model.grid import InitialConfiguration
+from tcs.model.grid import Grid, InitialConfiguration
 from tcs.motion.motion_plan import GoalResult, MotionPlan
 from tcs.motion.recheck import StopCheck
 from tcs.motion.stop_tour import ORDERS, plan_stop
@@ -18,7 +18,7 @@ from tcs.motion.stops import Stop
 from tcs.placement.scoring.job import Job
 from tcs.placement.scoring.rebuild import made_from, rebuild_scene
 from tcs.placement.selection import Choice
-from tcs.placement.store import ScoreFile
+from tcs.placement.store import ScoreFile, file_of_arm
 
 ENTRY = "motion.connect.connect"
 """The function of the planner that takes longest to compile."""
@@ -57,10 +57,16 @@ def plan(
         RobotError: If a velocity limit of the arm is unknown.
         UnknownNameError: If there is no such order.
         TcsError: If there is no such configuration, or it lacks an axis.
+        SelectionError: If the file is of several arms, and the configurations use more than one,
+            or one is not given by its number.
     """
     begun = time.perf_counter()
     if order not in ORDERS:
         raise UnknownNameError("order", order, ORDERS)
+    numbers: Sequence[int] | None = None
+    if file.arms:
+        numbers = _numbers(file, members)
+        file, members = _of_one_arm(file, numbers)
     job, scene, _ = rebuild_scene(file)
     if on_compile is not None and not is_compiled(ENTRY):
         on_compile()
@@ -81,7 +87,8 @@ def plan(
             and (able[0] == number or goal in results)
         ]
         stop = Stop.at_values(job, scene, values, seed)
-        planned, found = plan_stop(stop, h, number, goals, order)
+        index = h if numbers is None else numbers[number]
+        planned, found = plan_stop(stop, index, number, goals, order)
         results |= {result.goal: result for result in found}
         stops.append(planned)
         check = StopCheck(stop)
@@ -99,6 +106,56 @@ def plan(
         seed=seed,
         seconds=time.perf_counter() - begun,
     )
+
+
+def _numbers(
+    file: ScoreFile, members: Choice | Sequence[int] | InitialConfiguration
+) -> Sequence[int]:
+    """Return the flat indices of the stops in a file of several arms, in the order of the visits.
+
+    Raises:
+        SelectionError: If a single configuration is given by its values.
+    """
+    if isinstance(members, InitialConfiguration):
+        raise SelectionError(
+            f"plan: the file is of {' and '.join(file.arms)}, so a configuration must be given by "
+            "its number in `tcs export`, which names the arm: --configuration N."
+        )
+    if isinstance(members, Choice):
+        table = 0 if members.match is None else members.match.index
+        size = Grid.from_dict(file.grid).size
+        return [table * size + members.indices[i] for i in members.order]
+    return members
+
+
+def _of_one_arm(file: ScoreFile, numbers: Sequence[int]) -> tuple[ScoreFile, list[int]]:
+    """Return the file of the arm that configurations use, and their flat indices in that.
+
+    Args:
+        file: A file of several arms.
+        numbers: Flat indices in it.
+
+    Raises:
+        SelectionError: If they use more than one arm.
+        TcsError: If there is no such configuration.
+    """
+    grid = Grid.from_dict(file.grid)
+    total = len(file.tables) * grid.size
+    for h in numbers:
+        if not 0 <= h < total:
+            raise TcsError(f"plan: no configuration {h}; the file has {total:,}, from 0.")
+    tables, rows = np.divmod(np.array(numbers, dtype=np.int64), grid.size)
+    arms, of_arm = np.divmod(rows, grid.arm_size)
+    if len(set(arms.tolist())) > 1:
+        used = ", ".join(
+            f"{h} ({grid.arms[arm]})" for h, arm in zip(numbers, arms.tolist(), strict=True)
+        )
+        raise SelectionError(
+            f"plan: the stops use more than one arm, configurations {used}, and a plan is of one. "
+            "Plan those of each arm: --configuration N."
+        )
+    arm = file_of_arm(file, grid.arms[int(arms[0])])
+    return arm, (tables * grid.arm_size + of_arm).tolist()
 
 
 Place = tuple[int | None, list[float]]

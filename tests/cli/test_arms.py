@@ -53,7 +53,7 @@ def test_answers_are_confirmed_by_drake(tcs_command, both):
     ("words", "message"),
     [
         (("report", "--out", "r.html"), "needs one arm, but the score file is of left and right"),
-        (("plan",), "needs one arm"),
+        (("plan", "--here", 1.05, -0.7, 180, "--exactly"), "--configuration N"),
         (("view", "--export", "v.html"), "needs one arm"),
     ],
 )
